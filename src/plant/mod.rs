@@ -1,0 +1,33 @@
+//! Bodies that carry out the commanded accelerations.
+//!
+//! A plant holds the true state of the swarm. [`rapier`] flies rigid bodies in a physics engine and is the only room
+//! that names it.
+
+pub mod rapier;
+
+use crate::scenario::{PlantSpec, Scenario};
+use crate::swarm::{Pair, Rows, Swarm};
+
+/// A swarm of double integrators p'' = a22 v + u (equation (1)), however it is realised.
+pub trait Plant: Send {
+    /// Moves every vehicle over `dt_s` seconds under constant commanded accelerations u \[m/s^2\], N x 3.
+    fn step(&mut self, control: &Rows, dt_s: f64);
+
+    /// Writes the true state.
+    fn observe(&self, swarm: &mut Swarm);
+
+    /// Puts the vehicles back into a state that [`Plant::observe`] gave: a step that was refused is undone.
+    fn restore(&mut self, swarm: &Swarm);
+
+    /// Appends the pairs whose keep-out balls overlap at the end of the last step by the plant's own collision
+    /// detection, in index order. A plant without one appends nothing.
+    fn keep_out_contacts(&self, _pairs: &mut Vec<Pair>) {}
+}
+
+/// The plant that a scenario asks for, at the scenario's start.
+#[must_use]
+pub fn for_scenario(scenario: &Scenario) -> Box<dyn Plant> {
+    match scenario.plant {
+        PlantSpec::Rapier(precision) => rapier::plant(scenario, precision),
+    }
+}

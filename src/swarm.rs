@@ -1,0 +1,175 @@
+//! The state of a swarm: where every vehicle is and how fast it moves.
+//!
+//! A row is a vehicle and a column is an axis, so each axis is contiguous in memory. Lengths are metres, times seconds,
+//! in one inertial frame with z up. Vehicles are counted from 0 in code and from 1 in everything a person reads.
+
+use std::fmt;
+
+use nalgebra::{MatrixXx3, Vector3};
+
+/// An N x 3 table of vectors, a row per vehicle \[x, y, z\].
+pub type Rows = MatrixXx3<f64>;
+
+/// Positions \[m\] and velocities \[m/s\] of N vehicles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swarm {
+    /// N x 3 positions \[m\].
+    pub positions_m: Rows,
+    /// N x 3 velocities \[m/s\].
+    pub velocities_m_s: Rows,
+}
+
+impl Swarm {
+    /// A swarm at rest at the given positions \[m\].
+    #[must_use]
+    pub fn at_rest(positions_m: Rows) -> Self {
+        let velocities_m_s = Rows::zeros(positions_m.nrows());
+        Self { positions_m, velocities_m_s }
+    }
+
+    /// Number of vehicles N.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.positions_m.nrows()
+    }
+
+    /// Mean velocity \[m/s\], zero for an empty swarm.
+    #[must_use]
+    pub fn mean_velocity_m_s(&self) -> Vector3<f64> {
+        mean_row(&self.velocities_m_s)
+    }
+
+    /// Largest speed of a vehicle relative to the swarm's mean velocity \[m/s\].
+    #[must_use]
+    pub fn disagreement_m_s(&self) -> f64 {
+        let mean = self.mean_velocity_m_s();
+        (0..self.count()).map(|i| (row(&self.velocities_m_s, i) - mean).norm()).fold(0.0, f64::max)
+    }
+
+    /// The first vehicle with a position or velocity that is not a finite number.
+    #[must_use]
+    pub fn first_not_finite(&self) -> Option<usize> {
+        first_row_not_finite(&self.positions_m).into_iter().chain(first_row_not_finite(&self.velocities_m_s)).min()
+    }
+}
+
+/// Row `i` as a vector.
+#[inline]
+#[must_use]
+pub fn row(rows: &Rows, i: usize) -> Vector3<f64> {
+    Vector3::new(rows[(i, 0)], rows[(i, 1)], rows[(i, 2)])
+}
+
+/// Writes a vector into row `i`.
+#[inline]
+pub fn set_row(rows: &mut Rows, i: usize, v: Vector3<f64>) {
+    (rows[(i, 0)], rows[(i, 1)], rows[(i, 2)]) = (v.x, v.y, v.z);
+}
+
+/// Distance between rows `i` and `j` of a table of positions.
+#[inline]
+#[must_use]
+pub fn separation(positions_m: &Rows, i: usize, j: usize) -> f64 {
+    (row(positions_m, j) - row(positions_m, i)).norm()
+}
+
+/// Mean of all rows, zero for an empty table.
+#[must_use]
+pub fn mean_row(rows: &Rows) -> Vector3<f64> {
+    let n = rows.nrows().max(1) as f64;
+    Vector3::new(rows.column(0).sum() / n, rows.column(1).sum() / n, rows.column(2).sum() / n)
+}
+
+/// The first row that holds a number that is not finite.
+#[must_use]
+pub fn first_row_not_finite(rows: &Rows) -> Option<usize> {
+    // A sum is finite unless a term is not (or it overflows), which keeps the usual case branch-free.
+    if rows.iter().map(|x| x * 0.0).sum::<f64>() == 0.0 {
+        return None;
+    }
+    (0..rows.nrows()).find(|&i| rows.row(i).iter().any(|x| !x.is_finite()))
+}
+
+/// Two different vehicles, the lower index first. Shown from 1: `2-3`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Pair {
+    first: usize,
+    second: usize,
+}
+
+impl Pair {
+    /// The pair of vehicles `i` and `j` (from 0), in either order.
+    ///
+    /// # Panics
+    /// If `i == j`: a vehicle is not a pair.
+    #[must_use]
+    pub fn new(i: usize, j: usize) -> Self {
+        assert_ne!(i, j, "a pair needs two different vehicles");
+        Self { first: i.min(j), second: i.max(j) }
+    }
+
+    /// The lower index, from 0.
+    #[must_use]
+    pub fn first(self) -> usize {
+        self.first
+    }
+
+    /// The higher index, from 0.
+    #[must_use]
+    pub fn second(self) -> usize {
+        self.second
+    }
+
+    /// Both numbers as people read them, from 1.
+    #[must_use]
+    pub fn numbers(self) -> [usize; 2] {
+        [self.first + 1, self.second + 1]
+    }
+}
+
+impl fmt::Display for Pair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.first + 1, self.second + 1)
+    }
+}
+
+/// The closest that a pair came, and when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestApproach {
+    /// The pair.
+    pub pair: Pair,
+    /// Distance between the two centres \[m\].
+    pub separation_m: f64,
+    /// Time \[s\].
+    pub time_s: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn disagreement_ignores_the_common_velocity() {
+        let mut swarm = Swarm::at_rest(Rows::zeros(2));
+        set_row(&mut swarm.velocities_m_s, 0, Vector3::new(11.0, 0.0, 0.0));
+        set_row(&mut swarm.velocities_m_s, 1, Vector3::new(9.0, 0.0, 0.0));
+        assert_eq!(swarm.disagreement_m_s(), 1.0);
+        assert_eq!(swarm.mean_velocity_m_s(), Vector3::new(10.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn the_first_vehicle_that_is_not_finite_is_named() {
+        let mut swarm = Swarm::at_rest(Rows::zeros(3));
+        assert_eq!(swarm.first_not_finite(), None);
+        swarm.velocities_m_s[(1, 2)] = f64::NAN;
+        swarm.positions_m[(2, 0)] = f64::INFINITY;
+        assert_eq!(swarm.first_not_finite(), Some(1));
+    }
+
+    #[test]
+    fn a_pair_is_ordered_and_shown_from_one() {
+        let pair = Pair::new(2, 1);
+        assert_eq!((pair.first(), pair.second(), pair.numbers()), (1, 2, [2, 3]));
+        assert_eq!(pair.to_string(), "2-3");
+    }
+}
