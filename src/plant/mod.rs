@@ -11,7 +11,10 @@ use crate::swarm::{Pair, Rows, Swarm};
 /// A swarm of double integrators p'' = a22 v + u (equation (1)), however it is realised.
 pub trait Plant: Send {
     /// Moves every vehicle over `dt_s` seconds under constant commanded accelerations u \[m/s^2\], N x 3.
-    fn step(&mut self, control: &Rows, dt_s: f64);
+    ///
+    /// # Errors
+    /// [`PlantError`] when a vehicle's state is no longer a finite number; the plant is then of no further use.
+    fn step(&mut self, control: &Rows, dt_s: f64) -> Result<(), PlantError>;
 
     /// Writes the true state.
     fn observe(&self, swarm: &mut Swarm);
@@ -22,6 +25,17 @@ pub trait Plant: Send {
     /// Appends the pairs whose keep-out balls overlap at the end of the last step by the plant's own collision
     /// detection, in index order. A plant without one appends nothing.
     fn keep_out_contacts(&self, _pairs: &mut Vec<Pair>) {}
+}
+
+/// Why a plant could not carry out a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlantError {
+    /// A position or velocity left the range of the plant's numbers.
+    #[error("the state of vehicle {} is no longer a finite number", vehicle + 1)]
+    NotFinite {
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
 }
 
 /// The plant that a scenario asks for, at the scenario's start.

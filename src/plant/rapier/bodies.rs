@@ -1,0 +1,166 @@
+// The plant itself, for whichever engine the including module calls `engine`.
+
+use engine::prelude::{
+    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, LockedAxes, PhysicsWorld, Real,
+    RigidBodyBuilder, RigidBodyHandle, Vector,
+};
+
+use crate::plant::{Plant, PlantError};
+use crate::scenario::{Scenario, Space};
+use crate::swarm::{Pair, Rows, Swarm};
+
+/// Hulls meet hulls.
+const HULL: Group = Group::GROUP_1;
+/// Keep-out balls meet keep-out balls.
+const KEEP_OUT: Group = Group::GROUP_2;
+/// Share of the closing speed that two hulls keep after a bounce.
+const HULL_RESTITUTION: Real = 0.5;
+
+/// A swarm of rigid bodies, one a vehicle, in vehicle order.
+pub(super) struct Bodies {
+    world: PhysicsWorld,
+    handles: Vec<RigidBodyHandle>,
+    mass_kg: Vec<f64>,
+    a22_per_s: f64,
+    dt_s: f64,
+    damping_per_s: Real,
+}
+
+impl Bodies {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let mut world = empty_world();
+        let handles = (0..scenario.count()).map(|i| insert_vehicle(&mut world, scenario, i)).collect();
+        let mut bodies = Self {
+            world,
+            handles,
+            mass_kg: scenario.mass_kg.clone(),
+            a22_per_s: scenario.a22_per_s,
+            dt_s: f64::NAN,
+            damping_per_s: 0.0,
+        };
+        bodies.set_dt(scenario.time.dt_s);
+        bodies
+    }
+
+    /// Sets the step and the damping that makes a free velocity exactly exp(a22 t) over it.
+    fn set_dt(&mut self, dt_s: f64) {
+        if dt_s != self.dt_s {
+            self.dt_s = dt_s;
+            self.damping_per_s = real(libm::expm1(-self.a22_per_s * dt_s) / dt_s);
+            self.world.integration_parameters.dt = real(dt_s);
+            for &handle in &self.handles {
+                self.world.bodies[handle].set_linear_damping(self.damping_per_s);
+            }
+        }
+    }
+}
+
+impl Plant for Bodies {
+    fn step(&mut self, control: &Rows, dt_s: f64) -> Result<(), PlantError> {
+        self.set_dt(dt_s);
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &mut self.world.bodies[handle];
+            body.reset_forces(false);
+            body.add_force(vector(control, i) * real(self.mass_kg[i]), true);
+        }
+        self.world.step();
+        match self.world.quarantine().bodies().first() {
+            None => Ok(()),
+            Some(lost) => {
+                let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
+                Err(PlantError::NotFinite { vehicle })
+            }
+        }
+    }
+
+    fn observe(&self, swarm: &mut Swarm) {
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &self.world.bodies[handle];
+            set(&mut swarm.positions_m, i, body.translation());
+            set(&mut swarm.velocities_m_s, i, body.linvel());
+        }
+    }
+
+    fn restore(&mut self, swarm: &Swarm) {
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &mut self.world.bodies[handle];
+            body.set_translation(vector(&swarm.positions_m, i), true);
+            body.set_linvel(vector(&swarm.velocities_m_s, i), true);
+        }
+    }
+
+    fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
+        let before = pairs.len();
+        let vehicle = |handle: ColliderHandle| {
+            let collider = self.world.colliders.get(handle)?;
+            let keeps_out = collider.collision_groups().memberships == KEEP_OUT;
+            keeps_out.then_some(usize::try_from(collider.user_data).ok()?)
+        };
+        for contact in self.world.narrow_phase.contact_pairs() {
+            // A manifold also holds contacts predicted for the near future: only an overlap counts.
+            let overlaps = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.dist < 0.0));
+            if overlaps && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
+                pairs.push(Pair::new(i, j));
+            }
+        }
+        pairs[before..].sort_unstable();
+    }
+}
+
+fn empty_world() -> PhysicsWorld {
+    let mut world = PhysicsWorld { gravity: Vector::ZERO, ..PhysicsWorld::default() };
+    let parameters = &mut world.integration_parameters;
+    // One iteration: motion within a step is a straight line (module documentation).
+    parameters.num_solver_iterations = 1;
+    // The engine would clamp speeds at 400 m/s.
+    parameters.normalized_max_linear_velocity = Real::MAX;
+    // Reused contacts report stale distances: evidence must be of this step.
+    parameters.contact_recycling = false;
+    // Continuous collision detection would shorten motion; the audit judges what happened.
+    parameters.max_ccd_substeps = 0;
+    world
+}
+
+fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, i: usize) -> RigidBodyHandle {
+    let locked = match scenario.space {
+        Space::Plane => LockedAxes::ROTATION_LOCKED | LockedAxes::TRANSLATION_LOCKED_Z,
+        Space::Volume => LockedAxes::ROTATION_LOCKED,
+    };
+    let body = RigidBodyBuilder::dynamic()
+        .translation(vector(&scenario.start.positions_m, i))
+        .linvel(vector(&scenario.start.velocities_m_s, i))
+        .locked_axes(locked)
+        .can_sleep(false);
+    let handle = world.bodies.insert(body);
+
+    let among = |group: Group| InteractionGroups::new(group, group, InteractionTestMode::And);
+    let hull = ColliderBuilder::ball(real(scenario.hull_radius_m[i]))
+        .mass(real(scenario.mass_kg[i]))
+        .restitution(HULL_RESTITUTION)
+        .friction(0.0)
+        .collision_groups(among(HULL))
+        .user_data(i as u128);
+    let keep_out = ColliderBuilder::ball(real(scenario.delta_m / 2.0))
+        .density(0.0)
+        .collision_groups(among(KEEP_OUT))
+        .solver_groups(InteractionGroups::none())
+        .user_data(i as u128);
+    world.colliders.insert_with_parent(hull, handle, &mut world.bodies);
+    world.colliders.insert_with_parent(keep_out, handle, &mut world.bodies);
+    world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
+    handle
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "rounding to the engine's precision is what is meant")]
+fn real(x: f64) -> Real {
+    x as Real
+}
+
+fn vector(rows: &Rows, i: usize) -> Vector {
+    Vector::new(real(rows[(i, 0)]), real(rows[(i, 1)]), real(rows[(i, 2)]))
+}
+
+#[allow(clippy::useless_conversion, reason = "a widening in single precision only")]
+fn set(rows: &mut Rows, i: usize, v: Vector) {
+    (rows[(i, 0)], rows[(i, 1)], rows[(i, 2)]) = (v.x.into(), v.y.into(), v.z.into());
+}

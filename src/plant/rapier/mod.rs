@@ -1,0 +1,34 @@
+//! Rigid bodies in Rapier, in single and double precision: the only room that names the engine.
+//!
+//! Each vehicle is a dynamic body with rotations locked, no gravity and two ball colliders: the **hull** (the vehicle's
+//! real radius; hulls collide and bounce) and the **keep-out** ball of radius delta/2 (reports contacts, never pushes).
+//! In the plane z = 0 translation along z is locked as well.
+//!
+//! # Motion within a step
+//! With one solver iteration and no contact the engine updates `v += u dt; p += v dt; v *= 1/(1 + c dt)`, so within a
+//! step a vehicle moves on a straight line and a linear sweep of the step is exact. (With n iterations the position
+//! would gain `u dt^2 (n+1)/(2n)` instead of `u dt^2`.) The damping coefficient `c = (exp(-a22 dt) - 1)/dt` makes a free
+//! velocity exactly `v(0) exp(a22 t)`, the free motion of equation (1); it is negative for a22 > 0.
+
+use crate::plant::Plant;
+use crate::scenario::{Precision, Scenario};
+
+/// Both modules hold the same source, compiled against the engine's two precisions.
+mod single {
+    use rapier3d as engine;
+    include!("bodies.rs");
+}
+
+mod double {
+    use rapier3d_f64 as engine;
+    include!("bodies.rs");
+}
+
+/// A swarm of rigid bodies at the scenario's start.
+#[must_use]
+pub fn plant(scenario: &Scenario, precision: Precision) -> Box<dyn Plant> {
+    match precision {
+        Precision::Single => Box::new(single::Bodies::new(scenario)),
+        Precision::Double => Box::new(double::Bodies::new(scenario)),
+    }
+}

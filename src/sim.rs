@@ -1,0 +1,346 @@
+//! The loop: sense, law, actuate, plant, observe, judge, record.
+//!
+//! [`fly`] takes any [`Law`] and any [`Plant`] and holds the command constant over each step (sample-and-hold). The
+//! audit sweeps every step, the step that a refusal shortened too. Nothing is allocated per step.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use crate::audit::{AuditError, AuditOutcome, Auditor, StepFinding, closest_approach};
+use crate::law::{Certificate, Law, LawError};
+use crate::plant::{Plant, PlantError};
+use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::scenario::Scenario;
+use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, first_row_not_finite, row};
+
+/// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
+/// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
+const SIDE_BY_SIDE_FROM: usize = 64;
+
+/// What a flight left behind besides its recording.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// How it ended.
+    pub ending: Ending,
+    /// Time flown \[s\].
+    pub duration_s: f64,
+    /// Whole steps flown.
+    pub steps: u64,
+    /// The law's promise, made before the first step.
+    pub certificate: Certificate,
+    /// What the independent judge found.
+    pub audit: AuditOutcome,
+    /// Pairs whose keep-out balls the plant's own collision detection saw overlap, in index order.
+    pub engine_contacts: Vec<Pair>,
+    /// State at the end.
+    pub last: Swarm,
+    /// Wall-clock time by kind of work.
+    pub performance: Performance,
+}
+
+/// How a flight ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ending {
+    /// At the scenario's duration.
+    Completed,
+    /// The caller asked for it.
+    Interrupted,
+    /// The law had no answer for the state that was reached.
+    LawUndefined(LawError),
+}
+
+/// Wall-clock time by kind of work. Work done side by side counts in each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Performance {
+    /// From first to last step.
+    pub wall: Duration,
+    /// In the law.
+    pub law: Duration,
+    /// In the plant.
+    pub physics: Duration,
+    /// In the audit.
+    pub audit: Duration,
+    /// In the recorders.
+    pub record: Duration,
+}
+
+/// Why a flight could not be carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// The law commanded something that is not a number.
+    #[error("step {step}: the law's command for vehicle {} is not a finite number", vehicle + 1)]
+    CommandNotFinite {
+        /// The step, from 1; 0 is the start.
+        step: u64,
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
+    /// A vehicle's state left the range of numbers.
+    #[error("step {step}: the state of vehicle {} is no longer a finite number", vehicle + 1)]
+    StateNotFinite {
+        /// The step, from 1; 0 is the start.
+        step: u64,
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
+    /// The judge refused what it was shown.
+    #[error(transparent)]
+    Audit(#[from] AuditError),
+    /// The recording could not be kept.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+/// Flies a scenario under `law` in `plant` and hands every recorded instant to `recorder`.
+///
+/// `carry_on` is asked after each step with the number of steps flown and ends the flight with
+/// [`ControlFlow::Break`].
+///
+/// A step that takes more than half of the clearance above the law's barrier from some pair is refused, undone and flown
+/// in halves (at most [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between.
+///
+/// # Errors
+/// [`SimError`]; what was recorded up to then stays recorded.
+pub fn fly(
+    scenario: &Scenario,
+    law: &mut dyn Law,
+    plant: &mut dyn Plant,
+    recorder: &mut dyn Recorder,
+    carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> Result<Flight, SimError> {
+    let certificate = law.certificate(&scenario.start);
+    let mut cockpit = Cockpit::new(scenario, law, plant, recorder)?;
+    let began = Instant::now();
+    let ending = cockpit.fly(carry_on)?;
+    cockpit.performance.wall = began.elapsed();
+    Ok(cockpit.land(ending, certificate))
+}
+
+/// Everything that a step needs, allocated once.
+struct Cockpit<'a> {
+    scenario: &'a Scenario,
+    law: &'a mut dyn Law,
+    plant: &'a mut dyn Plant,
+    recorder: &'a mut dyn Recorder,
+    auditor: Auditor,
+    state: Swarm,
+    next: Swarm,
+    control: Rows,
+    time_s: f64,
+    steps: u64,
+    /// Closest approach since the last sample.
+    closest: Option<ClosestApproach>,
+    /// Smallest separation over the last sweep: bounds from below how near any pair is now.
+    nearest_m: f64,
+    open_violations: Vec<Pair>,
+    engine_contacts: Vec<Pair>,
+    contacts_now: Vec<Pair>,
+    performance: Performance,
+}
+
+impl<'a> Cockpit<'a> {
+    fn new(
+        scenario: &'a Scenario,
+        law: &'a mut dyn Law,
+        plant: &'a mut dyn Plant,
+        recorder: &'a mut dyn Recorder,
+    ) -> Result<Self, SimError> {
+        let mut state = scenario.start.clone();
+        plant.observe(&mut state);
+        Ok(Self {
+            auditor: Auditor::new(scenario.count(), scenario.delta_m)?,
+            next: state.clone(),
+            control: Rows::zeros(scenario.count()),
+            state,
+            scenario,
+            law,
+            plant,
+            recorder,
+            time_s: 0.0,
+            steps: 0,
+            closest: None,
+            nearest_m: 0.0,
+            open_violations: Vec::new(),
+            engine_contacts: Vec::new(),
+            contacts_now: Vec::new(),
+            performance: Performance::default(),
+        })
+    }
+
+    fn fly(&mut self, carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>) -> Result<Ending, SimError> {
+        if let Err(undefined) = self.judge_and_command(None)? {
+            return self.end_early(Ending::LawUndefined(undefined));
+        }
+        self.record_sample()?;
+        for step in 1..=self.scenario.time.steps() {
+            if let Err(undefined) = self.advance(step)? {
+                return self.end_early(Ending::LawUndefined(undefined));
+            }
+            self.steps = step;
+            if self.scenario.time.records(step) {
+                self.record_sample()?;
+            }
+            if carry_on(step).is_break() && step < self.scenario.time.steps() {
+                return self.end_early(Ending::Interrupted);
+            }
+        }
+        Ok(Ending::Completed)
+    }
+
+    /// Flies one step, in halves where it is refused. The inner error ends the flight: the law is undefined.
+    fn advance(&mut self, step: u64) -> Result<Result<(), LawError>, SimError> {
+        let dt_s = self.scenario.time.dt_s;
+        let start_s = (step - 1) as f64 * dt_s;
+        let whole = 1_u64 << self.scenario.time.max_halvings;
+        let (mut flown, mut part, mut shortest) = (0, whole, whole);
+        while flown < whole {
+            let seconds = |parts: u64| dt_s * (parts as f64 / whole as f64);
+            self.move_vehicles(step, seconds(part))?;
+            if part > 1 && self.is_refused() {
+                self.plant.restore(&self.state);
+                part /= 2;
+                shortest = shortest.min(part);
+                continue;
+            }
+            flown += part;
+            self.time_s = if flown == whole { step as f64 * dt_s } else { start_s + seconds(flown) };
+            std::mem::swap(&mut self.state, &mut self.next);
+            if let Err(undefined) = self.judge_and_command(Some(step))? {
+                return Ok(Err(undefined));
+            }
+            while part < whole && flown.is_multiple_of(2 * part) {
+                part *= 2;
+            }
+        }
+        if shortest < whole {
+            let dt_s = dt_s * (shortest as f64 / whole as f64);
+            self.recorder.event(&Event::StepRefined { time_s: start_s, dt_s })?;
+        }
+        Ok(Ok(()))
+    }
+
+    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<(), SimError> {
+        let began = Instant::now();
+        self.plant
+            .step(&self.control, dt_s)
+            .map_err(|PlantError::NotFinite { vehicle }| SimError::StateNotFinite { step, vehicle })?;
+        self.plant.observe(&mut self.next);
+        self.performance.physics += began.elapsed();
+        match self.next.first_not_finite() {
+            Some(vehicle) => Err(SimError::StateNotFinite { step, vehicle }),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether the move from `state` to `next` takes more than half of some pair's clearance above the barrier.
+    fn is_refused(&self) -> bool {
+        let Some(barrier_m) = self.law.barrier_m() else { return false };
+        let moved_m = (0..self.state.count())
+            .map(|i| (row(&self.next.positions_m, i) - row(&self.state.positions_m, i)).norm())
+            .fold(0.0, f64::max);
+        // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
+        if 2.0 * moved_m <= 0.5 * (self.nearest_m - barrier_m) {
+            return false;
+        }
+        self.scenario.graph.edges().any(|(i, j)| {
+            let from = row(&self.state.positions_m, j) - row(&self.state.positions_m, i);
+            let to = row(&self.next.positions_m, j) - row(&self.next.positions_m, i);
+            let clearance_m = from.norm() - barrier_m;
+            closest_approach(from, to).separation_m - barrier_m < 0.5 * clearance_m
+        })
+    }
+
+    /// Audits the sweep that led to `state` (or the start) and asks the law for the next command.
+    fn judge_and_command(&mut self, step: Option<u64>) -> Result<Result<(), LawError>, SimError> {
+        let Self { auditor, law, state, control, time_s, .. } = self;
+        let mut audit = || {
+            let began = Instant::now();
+            let finding = match step {
+                None => auditor.start(*time_s, &state.positions_m),
+                Some(_) => auditor.step(*time_s, &state.positions_m),
+            };
+            (finding, began.elapsed())
+        };
+        let mut command = || {
+            let began = Instant::now();
+            (law.control(state, control), began.elapsed())
+        };
+        let side_by_side = state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
+        let ((finding, audit_time), (commanded, law_time)) =
+            if side_by_side { rayon::join(audit, command) } else { (audit(), command()) };
+        self.performance.audit += audit_time;
+        self.performance.law += law_time;
+        self.take_finding(&finding?)?;
+        self.collect_engine_contacts()?;
+        if commanded.is_ok() && let Some(vehicle) = first_row_not_finite(&self.control) {
+            return Err(SimError::CommandNotFinite { step: step.unwrap_or(0), vehicle });
+        }
+        Ok(commanded)
+    }
+
+    fn take_finding(&mut self, finding: &StepFinding) -> Result<(), RecordError> {
+        if let Some(closest) = finding.closest {
+            self.nearest_m = closest.separation_m;
+            if self.closest.is_none_or(|before| closest.separation_m < before.separation_m) {
+                self.closest = Some(closest);
+            }
+        }
+        Ok(())
+    }
+
+    fn collect_engine_contacts(&mut self) -> Result<(), RecordError> {
+        self.contacts_now.clear();
+        self.plant.keep_out_contacts(&mut self.contacts_now);
+        for &pair in &self.contacts_now {
+            if let Err(place) = self.engine_contacts.binary_search(&pair) {
+                self.engine_contacts.insert(place, pair);
+                self.recorder.event(&Event::EngineContact { pair, time_s: self.time_s })?;
+            }
+        }
+        Ok(())
+    }
+
+    fn record_sample(&mut self) -> Result<(), RecordError> {
+        let began = Instant::now();
+        self.recorder.sample(&Sample {
+            time_s: self.time_s,
+            step: self.steps,
+            swarm: &self.state,
+            control: &self.control,
+            separation: self.closest.take(),
+            energy: self.law.energy(&self.state),
+        })?;
+        self.performance.record += began.elapsed();
+        Ok(())
+    }
+
+    /// Records the last instant and why it is the last. A law without an answer leaves a zero command.
+    fn end_early(&mut self, ending: Ending) -> Result<Ending, SimError> {
+        let reason = match &ending {
+            Ending::Completed => return Ok(ending),
+            Ending::Interrupted => "interrupted".to_owned(),
+            Ending::LawUndefined(why) => {
+                self.control.fill(0.0);
+                format!("the law is undefined: {why}")
+            }
+        };
+        if self.closest.is_some() {
+            self.record_sample()?;
+        }
+        self.recorder.event(&Event::EndedEarly { time_s: self.time_s, reason })?;
+        Ok(ending)
+    }
+
+    fn land(self, ending: Ending, certificate: Certificate) -> Flight {
+        Flight {
+            ending,
+            duration_s: self.time_s,
+            steps: self.steps,
+            certificate,
+            audit: self.auditor.finish(),
+            engine_contacts: self.engine_contacts,
+            last: self.state,
+            performance: self.performance,
+        }
+    }
+}
