@@ -14,7 +14,9 @@ pub use edge_tension::{EdgeTensionLaw, EdgeTensionParameters};
 pub use laplacian::LaplacianLaw;
 pub use tension::{EdgeTension, TensionError};
 
-use crate::swarm::{Pair, Rows, Swarm};
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::swarm::{Pair, Rows, Swarm, first_row_not_finite, mean_row, row, set_row};
 
 /// A control law: a function from the swarm's state to an acceleration per vehicle.
 pub trait Law: Send {
@@ -52,7 +54,7 @@ pub enum LawError {
     /// A pair is at or inside the distance where its tension is infinite: a collision, not a number to clamp.
     #[error("vehicles {pair} are {separation_m} m apart, not more than the safety distance {delta_m} m")]
     Collision {
-        /// The pair.
+        /// The first such pair in index order.
         pair: Pair,
         /// Its separation \[m\].
         separation_m: f64,
@@ -62,7 +64,119 @@ pub enum LawError {
     /// A position or velocity is not a finite number.
     #[error("the state of vehicle {} is not a finite number", vehicle + 1)]
     NotFinite {
-        /// The vehicle, from 0.
+        /// The first such vehicle, from 0.
         vehicle: usize,
     },
+    /// The state is finite, but distances, velocities or accelerations computed from it are not.
+    #[error("the state of the swarm is too large for double precision")]
+    OutOfRange,
+    /// The state or the table of accelerations is of another swarm.
+    #[error("the law is for {expected} vehicles and was given {found}")]
+    WrongCount {
+        /// Number of vehicles of the law.
+        expected: usize,
+        /// Number of vehicles given.
+        found: usize,
+    },
+}
+
+/// Why a law cannot be made from its parameters.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ParameterError {
+    /// An edge has no tension.
+    #[error("vehicles {pair}: {source}")]
+    Tension {
+        /// The first such edge in index order.
+        pair: Pair,
+        /// What is wrong.
+        source: TensionError,
+    },
+    /// Graph and formation are of different swarms.
+    #[error("the graph has {graph} vehicles and the formation has {formation}")]
+    Counts {
+        /// Number of vehicles of the graph.
+        graph: usize,
+        /// Number of slots of the formation.
+        formation: usize,
+    },
+    /// A gain is not a finite number.
+    #[error("{name} is {value}; it must be a finite number")]
+    NotFinite {
+        /// The gain, as in the equations.
+        name: &'static str,
+        /// As given.
+        value: f64,
+    },
+    /// A slot of the formation is not a finite number.
+    #[error("the slot of vehicle {} is not a finite number", vehicle + 1)]
+    Slot {
+        /// The first such vehicle, from 0.
+        vehicle: usize,
+    },
+    /// The edges do not fit in memory.
+    #[error("{edges} edges do not fit in memory")]
+    Memory {
+        /// Number of edges.
+        edges: usize,
+    },
+}
+
+impl ParameterError {
+    fn check(graph: &Graph, formation: &Formation, gains: &[(&'static str, f64)]) -> Result<(), Self> {
+        if graph.count() != formation.count() {
+            return Err(Self::Counts { graph: graph.count(), formation: formation.count() });
+        }
+        if let Some(vehicle) = first_row_not_finite(&formation.slots_m) {
+            return Err(Self::Slot { vehicle });
+        }
+        match gains.iter().find(|(_, value)| !value.is_finite()) {
+            Some(&(name, value)) => Err(Self::NotFinite { name, value }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Whether a state is of `count` vehicles and finite.
+fn check_state(count: usize, swarm: &Swarm) -> Result<(), LawError> {
+    check_count(count, swarm.positions_m.nrows())?;
+    check_count(count, swarm.velocities_m_s.nrows())?;
+    swarm.first_not_finite().map_or(Ok(()), |vehicle| Err(LawError::NotFinite { vehicle }))
+}
+
+fn check_count(expected: usize, found: usize) -> Result<(), LawError> {
+    if expected == found { Ok(()) } else { Err(LawError::WrongCount { expected, found }) }
+}
+
+/// Whether the accelerations computed from a finite state are finite.
+fn check_range(control: &Rows) -> Result<(), LawError> {
+    first_row_not_finite(control).map_or(Ok(()), |_| Err(LawError::OutOfRange))
+}
+
+/// Adds `gain` L_G X to `sums`, where X has a row for each vehicle: row i gains `gain` times the sum of x_i - x_j over
+/// the neighbours j of i. On the complete graph this is N (x_i - mean x) and takes O(N).
+fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows) {
+    if graph.is_complete() {
+        let gain = gain * graph.count() as f64;
+        for (rows, mut sums) in rows.column_iter().zip(sums.column_iter_mut()) {
+            let mean = rows.sum() / graph.count() as f64;
+            sums.iter_mut().zip(rows.iter()).for_each(|(sum, x)| *sum += gain * (x - mean));
+        }
+        return;
+    }
+    for (i, j) in graph.edges() {
+        let difference = (row(rows, i) - row(rows, j)) * gain;
+        set_row(sums, i, row(sums, i) + difference);
+        set_row(sums, j, row(sums, j) - difference);
+    }
+}
+
+/// 1/2 sum |v_i - mean v|^2 \[m^2/s^2\].
+fn relative_kinetic_energy(swarm: &Swarm) -> f64 {
+    0.5 * sum_of_squares_about_mean(&swarm.velocities_m_s)
+}
+
+/// Sum of |x_i - mean x|^2 over the rows of a table.
+fn sum_of_squares_about_mean(rows: &Rows) -> f64 {
+    let mean = mean_row(rows);
+    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm_squared()).sum()
 }

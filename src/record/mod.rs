@@ -1,8 +1,12 @@
 //! A run's samples as they are made, and the files that hold them.
 //!
 //! [`mcap`] writes and reads `run.mcap`. A recorder knows the state of a swarm and nothing of laws, plants or judges.
+//! Several recorders of one run are joined as a pair: `(first, (second, third))` is a recorder again.
 
+mod hash;
 pub mod mcap;
+
+pub use hash::{StateHash, sha256_hex};
 
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
@@ -21,6 +25,38 @@ pub struct Sample<'a> {
     pub separation: Option<ClosestApproach>,
     /// The law's energy E \[m^2/s^2\] where it has one.
     pub energy: Option<f64>,
+}
+
+/// A [`Sample`] that owns its state, as a recording gives it back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedSample {
+    /// Time since the start \[s\].
+    pub time_s: f64,
+    /// Steps taken so far.
+    pub step: u64,
+    /// Positions \[m\] and velocities \[m/s\].
+    pub swarm: Swarm,
+    /// Commanded accelerations u \[m/s^2\], N x 3.
+    pub control: Rows,
+    /// Closest approach over the steps since the sample before.
+    pub separation: Option<ClosestApproach>,
+    /// The law's energy E \[m^2/s^2\] where it has one.
+    pub energy: Option<f64>,
+}
+
+impl OwnedSample {
+    /// The same sample by reference.
+    #[must_use]
+    pub fn as_sample(&self) -> Sample<'_> {
+        Sample {
+            time_s: self.time_s,
+            step: self.step,
+            swarm: &self.swarm,
+            control: &self.control,
+            separation: self.separation,
+            energy: self.energy,
+        }
+    }
 }
 
 /// Something that happened between samples.
@@ -65,6 +101,20 @@ pub enum Event {
     },
 }
 
+impl Event {
+    /// When it happened \[s\].
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        match *self {
+            Self::ViolationBegan { time_s, .. }
+            | Self::ViolationEnded { time_s, .. }
+            | Self::EngineContact { time_s, .. }
+            | Self::StepRefined { time_s, .. }
+            | Self::EndedEarly { time_s, .. } => time_s,
+        }
+    }
+}
+
 /// Receives a run as it is made.
 pub trait Recorder {
     /// Takes one sample.
@@ -80,7 +130,41 @@ pub trait Recorder {
     fn event(&mut self, event: &Event) -> Result<(), RecordError>;
 }
 
-/// Why a sample could not be kept.
+/// Keeps nothing.
+impl Recorder for () {
+    fn sample(&mut self, _sample: &Sample<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+impl<R: Recorder + ?Sized> Recorder for &mut R {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        (**self).sample(sample)
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        (**self).event(event)
+    }
+}
+
+/// Gives everything to the first, then to the second; stops at the first error.
+impl<A: Recorder, B: Recorder> Recorder for (A, B) {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.0.sample(sample)?;
+        self.1.sample(sample)
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        self.0.event(event)?;
+        self.1.event(event)
+    }
+}
+
+/// Why a sample could not be kept, or a recording not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The file could not be written.
@@ -91,11 +175,72 @@ pub enum RecordError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// A recording could not be read.
-    #[error("{path} is not a recording that can be read: {reason}")]
+    /// The system could not read the file.
+    #[error("cannot read {path}: {source}")]
+    Open {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file was read, and its content is not a recording or is damaged.
+    #[error("{path} is not a recording that can be read: {fault}")]
     Read {
         /// The file.
         path: String,
+        /// What is wrong with it.
+        fault: ReadFault,
+    },
+}
+
+/// What is wrong with the content of a recording.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ReadFault {
+    /// The file has no bytes.
+    #[error("the file is empty")]
+    Empty,
+    /// The file does not begin as MCAP files do.
+    #[error("it is not an MCAP file")]
+    NotMcap,
+    /// A channel that every recording has is missing.
+    #[error("it has no {topic} channel with a message definition of this program")]
+    NoChannel {
+        /// The channel's topic.
+        topic: &'static str,
+    },
+    /// A channel has the expected topic and another message definition or encoding.
+    #[error("its {topic} channel holds {found} instead of {expected} in cdr encoding")]
+    ForeignChannel {
+        /// The channel's topic.
+        topic: &'static str,
+        /// Schema and encoding that were found.
+        found: String,
+        /// Schema that was expected.
+        expected: &'static str,
+    },
+    /// A record is longer than any recording needs.
+    #[error("the record at byte {offset} claims {bytes} bytes, more than the limit of {limit}")]
+    TooLong {
+        /// Where in the file.
+        offset: u64,
+        /// The length that it claims \[bytes\].
+        bytes: u64,
+        /// The limit \[bytes\].
+        limit: u64,
+    },
+    /// A record contradicts its checksum or the format.
+    #[error("the record at byte {offset} is damaged: {reason}")]
+    Damaged {
+        /// Where in the file.
+        offset: u64,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A message does not hold what its channel promises.
+    #[error("a {topic} message is wrong: {reason}")]
+    Message {
+        /// The channel's topic.
+        topic: &'static str,
         /// What is wrong with it.
         reason: String,
     },

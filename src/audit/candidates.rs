@@ -1,0 +1,172 @@
+//! Which pairs a step must be judged by.
+//!
+//! Up to [`SMALL_SWARM`] vehicles: all of them. Beyond, a list of near pairs in the manner of L. Verlet (Physical Review
+//! 159, 98, 1967), with a budget of motion for each vehicle. When the list is made, from reference positions x, vehicle i
+//! gets a budget b(i), and a pair is left out only if |x(j) - x(i)| > R + b(i) + b(j). As long as every vehicle stays
+//! within its budget of its reference position, a pair left out stays farther apart than R. The distance from a fixed point is
+//! convex along a straight line, so it is enough to look at the ends of each step.
+
+use crate::swarm::{Rows, row, separation};
+
+/// Up to this many vehicles a list costs more than it saves.
+const SMALL_SWARM: usize = 32;
+/// R over the distance that must be covered when a list is made: room for the closest pair to part before a new list is
+/// due. More makes lists last longer and grow longer.
+const RADIUS_OVER_BOUND: f64 = 1.25;
+/// Budget beyond the step at hand, as a fraction of R. More makes lists last longer and grow longer.
+const SLACK_OVER_RADIUS: f64 = 0.125;
+/// Relative widening of every reach, far above rounding (1e-16) and far below what costs anything.
+const ROUNDING: f64 = 1e-9;
+
+/// The list of near pairs and what it is good for.
+#[derive(Clone, Debug)]
+pub(super) struct Candidates {
+    /// R \[m\]; `None` without a list.
+    radius_m: Option<f64>,
+    reference_m: Rows,
+    budget_m: Vec<f64>,
+    pairs: Vec<[u32; 2]>,
+    reaches: Vec<Reach>,
+}
+
+/// Half of the condition for two vehicles to be listed, and its extent along the axis of the sort.
+#[derive(Clone, Copy, Debug)]
+struct Reach {
+    low: f64,
+    high: f64,
+    half_m: f64,
+    vehicle: u32,
+}
+
+/// The pairs to be swept, in the order of pairs.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Cover<'a> {
+    /// All pairs of so many vehicles.
+    All(usize),
+    /// These.
+    Listed(&'a [[u32; 2]]),
+}
+
+impl Cover<'_> {
+    /// Calls `f` with each pair and returns their number.
+    #[inline]
+    pub(super) fn for_each(self, mut f: impl FnMut(usize, usize)) -> u64 {
+        match self {
+            Self::All(n) => {
+                for i in 0..n {
+                    for j in i + 1..n {
+                        f(i, j);
+                    }
+                }
+                pair_count(n)
+            }
+            Self::Listed(pairs) => {
+                for &[i, j] in pairs {
+                    f(i as usize, j as usize);
+                }
+                pairs.len() as u64
+            }
+        }
+    }
+}
+
+/// N (N - 1) / 2.
+pub(super) fn pair_count(n: usize) -> u64 {
+    n as u64 * (n as u64).saturating_sub(1) / 2
+}
+
+impl Candidates {
+    pub(super) fn new() -> Self {
+        Self {
+            radius_m: None,
+            reference_m: Rows::zeros(0),
+            budget_m: Vec::new(),
+            pairs: Vec::new(),
+            reaches: Vec::new(),
+        }
+    }
+
+    /// The pairs to be swept for the straight motion between two instants: every pair that is not among them stays
+    /// farther apart than `bound_m` throughout.
+    ///
+    /// `from` must be the `to` of the call before. Memory is at most 8 bytes for half of all pairs; where more than that
+    /// are near, all are swept and no list is kept.
+    pub(super) fn cover(&mut self, from: &Rows, to: &Rows, bound_m: f64) -> Cover<'_> {
+        let n = to.nrows();
+        if n <= SMALL_SWARM {
+            return Cover::All(n);
+        }
+        if !self.still_covers(to, bound_m) {
+            self.list(from, to, bound_m);
+        }
+        if self.radius_m.is_some() { Cover::Listed(&self.pairs) } else { Cover::All(n) }
+    }
+
+    fn still_covers(&self, to: &Rows, bound_m: f64) -> bool {
+        self.radius_m.is_some_and(|radius_m| bound_m <= radius_m)
+            && self
+                .budget_m
+                .iter()
+                .enumerate()
+                .all(|(i, &budget_m)| (row(to, i) - row(&self.reference_m, i)).norm_squared() <= budget_m * budget_m)
+    }
+
+    fn list(&mut self, from: &Rows, to: &Rows, bound_m: f64) {
+        let n = to.nrows();
+        let radius_m = RADIUS_OVER_BOUND * bound_m;
+        if self.reference_m.nrows() == n {
+            self.reference_m.copy_from(from);
+        } else {
+            self.reference_m = from.clone();
+        }
+        self.budget_m.clear();
+        self.budget_m.extend((0..n).map(|i| {
+            let needed_m = (row(to, i) - row(from, i)).norm();
+            needed_m * (1.0 + ROUNDING) + SLACK_OVER_RADIUS * radius_m
+        }));
+        self.sort_reaches(radius_m);
+        self.radius_m = self.collect_pairs().then_some(radius_m);
+    }
+
+    /// Sorts the vehicles by the lower end of their reach along the axis on which the swarm is longest.
+    fn sort_reaches(&mut self, radius_m: f64) {
+        let extent = |axis: usize| {
+            let column = self.reference_m.column(axis);
+            column.max() - column.min()
+        };
+        let axis = if extent(0) >= extent(1).max(extent(2)) {
+            0
+        } else if extent(1) >= extent(2) {
+            1
+        } else {
+            2
+        };
+        let along = self.reference_m.column(axis);
+        self.reaches.clear();
+        self.reaches.extend(along.iter().zip(&self.budget_m).zip(0..).map(|((&x, &budget_m), vehicle)| {
+            let half_m = (radius_m / 2.0 + budget_m) * (1.0 + ROUNDING);
+            let rounding_m = 4.0 * f64::EPSILON * (x.abs() + half_m);
+            Reach { low: x - half_m - rounding_m, high: x + half_m + rounding_m, half_m, vehicle }
+        }));
+        self.reaches.sort_unstable_by(|a, b| a.low.total_cmp(&b.low));
+    }
+
+    /// Lists the pairs within reach of each other in the order of pairs; `false` if that is more than half of all.
+    fn collect_pairs(&mut self) -> bool {
+        let limit = pair_count(self.reaches.len()) / 2;
+        self.pairs.clear();
+        for (k, a) in self.reaches.iter().enumerate() {
+            for b in self.reaches[k + 1..].iter().take_while(|b| b.low <= a.high) {
+                let (i, j) = (a.vehicle.min(b.vehicle), a.vehicle.max(b.vehicle));
+                if separation(&self.reference_m, i as usize, j as usize) <= a.half_m + b.half_m {
+                    self.pairs.push([i, j]);
+                }
+            }
+            if self.pairs.len() as u64 > limit {
+                return false;
+            }
+        }
+        self.pairs.sort_unstable();
+        true
+    }
+}

@@ -1,0 +1,115 @@
+//! How well a swarm fits a shape once the best rigid motion is taken out.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::Formation;
+use crate::swarm::{Rows, first_row_not_finite, row};
+
+/// An isometry of space: x -> rotation x + translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidMotion {
+    /// Orthogonal 3 x 3 matrix; its determinant is -1 where it reflects.
+    pub rotation: Matrix3<f64>,
+    /// Translation \[m\].
+    pub translation_m: Vector3<f64>,
+}
+
+impl RigidMotion {
+    /// The image of a point \[m\].
+    #[must_use]
+    pub fn apply(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+        self.rotation * point_m + self.translation_m
+    }
+
+    /// Whether the motion reflects.
+    #[must_use]
+    pub fn reflects(&self) -> bool {
+        self.rotation.determinant() < 0.0
+    }
+}
+
+/// The isometry that takes the slots onto the positions with the least sum of squared errors, reflections allowed
+/// (orthogonal Procrustes problem).
+///
+/// With the centred tables P (positions) and H (slots), the rotation is U V^T of the singular value decomposition
+/// H^T P = V S U^T. Where the shape is flat the motion out of its flat is any that fits.
+/// None for an empty swarm, for different numbers of positions and slots, or where a number is not finite.
+/// Allocates nothing.
+#[must_use]
+pub fn best_rigid_motion(positions_m: &Rows, formation: &Formation) -> Option<RigidMotion> {
+    Fit::new(positions_m, formation).map(|fit| RigidMotion {
+        rotation: fit.rotation,
+        translation_m: fit.positions_centre - fit.rotation * fit.slots_centre,
+    })
+}
+
+/// Root mean square distance \[m\] between the positions and the slots after [`best_rigid_motion`], NaN where there is
+/// none. Allocates nothing.
+#[must_use]
+pub fn procrustes_rms_m(positions_m: &Rows, formation: &Formation) -> f64 {
+    let Some(fit) = Fit::new(positions_m, formation) else { return f64::NAN };
+    let count = positions_m.nrows();
+    // Summing the residuals keeps the digits that |P|^2 + |H|^2 - 2 tr S would cancel near a perfect fit.
+    let sum: f64 = (0..count)
+        .map(|i| {
+            let slot = row(&formation.slots_m, i) - fit.slots_centre;
+            (row(positions_m, i) - fit.positions_centre - fit.rotation * slot).norm_squared()
+        })
+        .sum();
+    (sum / count as f64).sqrt()
+}
+
+struct Fit {
+    rotation: Matrix3<f64>,
+    positions_centre: Vector3<f64>,
+    slots_centre: Vector3<f64>,
+}
+
+impl Fit {
+    fn new(positions_m: &Rows, formation: &Formation) -> Option<Self> {
+        let slots_m = &formation.slots_m;
+        let count = positions_m.nrows();
+        if count == 0 || slots_m.nrows() != count {
+            return None;
+        }
+        let (positions_centre, slots_centre) = (centre(positions_m), centre(slots_m));
+        let mut covariance = Matrix3::zeros();
+        for i in 0..count {
+            let position = row(positions_m, i) - positions_centre;
+            covariance += position * (row(slots_m, i) - slots_centre).transpose();
+        }
+        let largest = covariance.amax();
+        if !covariance.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let svd = if largest > 0.0 { covariance / largest } else { covariance }.svd(true, true);
+        Some(Self { rotation: svd.u? * svd.v_t?, positions_centre, slots_centre })
+    }
+}
+
+/// Dimension of the smallest flat that holds all rows: 0 a point, 1 a line, 2 a plane, 3 space.
+///
+/// Counts the singular values of the centred table above `relative_tolerance` times the largest one. An empty table
+/// and one with a number that is not finite have dimension 0.
+#[must_use]
+pub fn affine_dimension(rows: &Rows, relative_tolerance: f64) -> usize {
+    if rows.nrows() == 0 || first_row_not_finite(rows).is_some() {
+        return 0;
+    }
+    let centre = centre(rows);
+    let mut centred = DMatrix::from_fn(rows.nrows(), 3, |i, axis| rows[(i, axis)] - centre[axis]);
+    let largest = centred.amax();
+    if largest == 0.0 || !largest.is_finite() {
+        return 0;
+    }
+    centred /= largest;
+    let singular = centred.singular_values();
+    singular.iter().filter(|&&value| value > relative_tolerance * singular[0]).count()
+}
+
+/// Mean of the rows, taken about the first one so that a swarm far from the origin loses no digits.
+fn centre(rows: &Rows) -> Vector3<f64> {
+    let origin = row(rows, 0);
+    let count = rows.nrows();
+    origin + (1..count).map(|i| row(rows, i) - origin).sum::<Vector3<f64>>() / count as f64
+}

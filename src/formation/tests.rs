@@ -1,0 +1,196 @@
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Rotation3};
+use proptest::prelude::*;
+
+use super::*;
+
+/// Rounding of a fit, relative to the extent of the shape: sums of a few dozen products in double precision.
+const FIT_TOLERANCE: f64 = 1e-13;
+/// Tolerance of the dimension used throughout: far above rounding, far below any shape's aspect.
+const DIMENSION_TOLERANCE: f64 = 1e-9;
+
+fn rows(points: &[[f64; 3]]) -> Rows {
+    Rows::from_fn(points.len(), |i, axis| points[i][axis])
+}
+
+fn moved(slots: &Rows, motion: &RigidMotion) -> Rows {
+    let mut rows = slots.clone();
+    for i in 0..rows.nrows() {
+        set_row(&mut rows, i, motion.apply(row(slots, i)));
+    }
+    rows
+}
+
+fn shapes() -> [Formation; 6] {
+    [
+        Formation::pentagon(3.0),
+        Formation::circle(7, 2.0),
+        Formation::line(4, 1.5),
+        Formation::grid(11, 0.7),
+        Formation::sphere(23, 4.0),
+        Formation::points(rows(&[[0.0, 0.0, 0.0], [1.0, 2.0, 3.0], [-4.0, 0.5, 0.25], [2.0, -1.0, 7.0]])),
+    ]
+}
+
+fn motions() -> impl Strategy<Value = RigidMotion> {
+    let angle = -TAU..TAU;
+    ((angle.clone(), angle.clone(), angle), [-1e3..1e3, -1e3..1e3, -1e3..1e3], any::<bool>()).prop_map(
+        |((roll, pitch, yaw), [x, y, z], reflect)| {
+            let turn = *Rotation3::from_euler_angles(roll, pitch, yaw).matrix();
+            let mirror = Matrix3::from_diagonal(&Vector3::new(if reflect { -1.0 } else { 1.0 }, 1.0, 1.0));
+            RigidMotion { rotation: turn * mirror, translation_m: Vector3::new(x, y, z) }
+        },
+    )
+}
+
+proptest! {
+    #[test]
+    fn every_rigid_motion_and_reflection_is_taken_out(motion in motions()) {
+        for shape in shapes() {
+            let positions = moved(&shape.slots_m, &motion);
+            let error = procrustes_rms_m(&positions, &shape);
+            prop_assert!(error <= 1e3 * FIT_TOLERANCE, "{shape:?}: {error}");
+            let edge_error = largest_edge_error_m(&positions, &shape, &Graph::complete(shape.count()));
+            prop_assert!(edge_error <= 1e3 * FIT_TOLERANCE);
+            let found = best_rigid_motion(&positions, &shape).ok_or_else(|| TestCaseError::fail("no motion"))?;
+            let orthogonality = (found.rotation.transpose() * found.rotation - Matrix3::identity()).amax();
+            prop_assert!(orthogonality <= FIT_TOLERANCE);
+            for i in 0..shape.count() {
+                let gap = (found.apply(row(&shape.slots_m, i)) - row(&positions, i)).norm();
+                prop_assert!(gap <= 1e4 * FIT_TOLERANCE, "{gap}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_rigid_motion_fits_better_than_the_best(motion in motions(), noise in prop::collection::vec(-0.3..0.3, 15)) {
+        let shape = Formation::pentagon(3.0);
+        let positions = &shape.slots_m + Rows::from_fn(5, |i, axis| noise[3 * i + axis]);
+        let other = RigidMotion { translation_m: motion.translation_m * 1e-4, ..motion };
+        let rms_of = |motion: &RigidMotion| (moved(&shape.slots_m, motion) - &positions).norm() / 5.0_f64.sqrt();
+        let best = procrustes_rms_m(&positions, &shape);
+        let found = best_rigid_motion(&positions, &shape).ok_or_else(|| TestCaseError::fail("no motion"))?;
+        prop_assert!((rms_of(&found) - best).abs() <= FIT_TOLERANCE);
+        prop_assert!(best <= rms_of(&other) + FIT_TOLERANCE);
+    }
+}
+
+#[test]
+fn a_reflected_chiral_shape_needs_a_reflection() {
+    let shape = &shapes()[5];
+    let mirrored = rows(&[[0.0, 0.0, 0.0], [1.0, 2.0, -3.0], [-4.0, 0.5, -0.25], [2.0, -1.0, -7.0]]);
+    assert_eq!(best_rigid_motion(&mirrored, shape).map(|motion| motion.reflects()), Some(true));
+    assert_eq!(best_rigid_motion(&shape.slots_m, shape).map(|motion| motion.reflects()), Some(false));
+}
+
+#[test]
+fn the_error_of_a_stretched_shape_is_the_known_one() {
+    // A square of side 2 stretched by 1.25 along x: each corner is 0.25 off, and no rotation helps.
+    let square = Formation::points(rows(&[[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]]));
+    let mut stretched = square.slots_m.clone();
+    stretched.column_mut(0).scale_mut(1.25);
+    assert!((procrustes_rms_m(&stretched, &square) - 0.25).abs() < FIT_TOLERANCE);
+    let expected = 0.5_f64.max((2.5_f64.powi(2) + 4.0).sqrt() - 8.0_f64.sqrt());
+    assert!((largest_edge_error_m(&stretched, &square, &Graph::complete(4)) - expected).abs() < FIT_TOLERANCE);
+}
+
+#[test]
+fn only_edges_of_the_graph_count() {
+    let shape = Formation::line(3, 1.0);
+    let bent = rows(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]);
+    assert_eq!(largest_edge_error_m(&bent, &shape, &Graph::path(3)), 0.0);
+    let error = largest_edge_error_m(&bent, &shape, &Graph::complete(3));
+    assert!((error - (2.0 - 2.0_f64.sqrt())).abs() < FIT_TOLERANCE);
+}
+
+#[test]
+fn a_position_that_is_not_a_number_is_never_a_good_fit() {
+    let shape = Formation::pentagon(3.0);
+    for bad in [f64::NAN, f64::INFINITY] {
+        for i in 0..5 {
+            let mut positions = shape.slots_m.clone();
+            positions[(i, 1)] = bad;
+            assert!(procrustes_rms_m(&positions, &shape).is_nan());
+            let error = largest_edge_error_m(&positions, &shape, &Graph::complete(5));
+            assert!(error.is_nan() || error == f64::INFINITY);
+        }
+    }
+    let graph = Graph::complete(5);
+    assert!(procrustes_rms_m(&Rows::zeros(4), &shape).is_nan());
+    assert!(largest_edge_error_m(&Rows::zeros(4), &shape, &graph).is_nan());
+    assert!(best_rigid_motion(&Rows::zeros(0), &Formation::line(0, 1.0)).is_none());
+}
+
+#[test]
+fn all_vehicles_in_one_point_still_have_a_fit() {
+    let shape = Formation::line(2, 2.0);
+    assert!((procrustes_rms_m(&Rows::zeros(2), &shape) - 1.0).abs() < FIT_TOLERANCE);
+    assert_eq!(procrustes_rms_m(&Rows::zeros(1), &Formation::line(1, 2.0)), 0.0);
+}
+
+#[test]
+fn the_affine_dimension_is_that_of_the_shape() {
+    let dimensions = shapes().map(|shape| shape.affine_dimension(DIMENSION_TOLERANCE));
+    assert_eq!(dimensions, [2, 2, 1, 2, 3, 3]);
+    assert_eq!(affine_dimension(&rows(&[[1.0, 2.0, 3.0]; 4]), DIMENSION_TOLERANCE), 0);
+    assert_eq!(affine_dimension(&Rows::zeros(0), DIMENSION_TOLERANCE), 0);
+    assert_eq!(affine_dimension(&rows(&[[0.0; 3], [f64::NAN, 0.0, 1.0]]), DIMENSION_TOLERANCE), 0);
+    assert_eq!(affine_dimension(&rows(&[[-1e308, 0.0, 0.0], [1e308, 0.0, 0.0]]), DIMENSION_TOLERANCE), 0);
+}
+
+#[test]
+fn the_affine_dimension_ignores_place_and_size() {
+    for scale in [1e-150, 1e-6, 1.0, 1e150] {
+        let line = rows(&[[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [5.0, 10.0, 15.0]]) * scale;
+        assert_eq!(affine_dimension(&line, DIMENSION_TOLERANCE), 1);
+    }
+    let far = rows(&[[5e6, 5e6, 5e6]; 3]) + Formation::line(3, 2.0).slots_m;
+    assert_eq!(affine_dimension(&far, DIMENSION_TOLERANCE), 1);
+    let bent = rows(&[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 1e-6, 0.0]]);
+    assert_eq!((affine_dimension(&bent, DIMENSION_TOLERANCE), affine_dimension(&bent, 1e-3)), (2, 1));
+}
+
+#[test]
+fn shapes_have_the_distances_they_are_named_for() {
+    let pentagon = Formation::pentagon(3.0);
+    for (i, j) in [(0, 1), (0, 2), (1, 2), (2, 3), (2, 4), (3, 4)] {
+        assert!((pentagon.desired_distance(i, j) - 3.0).abs() < FIT_TOLERANCE);
+    }
+    assert!((pentagon.desired_distance(0, 3) - 27.0_f64.sqrt()).abs() < FIT_TOLERANCE);
+    assert!((Formation::circle(6, 1.5).desired_distance(5, 0) - 1.5).abs() < FIT_TOLERANCE);
+    assert!((Formation::circle(6, 1.5).desired_distance(1, 4) - 3.0).abs() < FIT_TOLERANCE);
+    assert_eq!(Formation::line(5, 2.0).desired_distance(1, 4), 6.0);
+    let grid = Formation::grid(7, 2.0);
+    assert_eq!(row(&grid.slots_m, 6), Vector3::new(0.0, 4.0, 0.0));
+    assert_eq!(row(&Formation::grid(9, 1.0).slots_m, 8), Vector3::new(2.0, 2.0, 0.0));
+    let sphere = Formation::sphere(200, 3.0);
+    assert!((0..200).all(|i| (row(&sphere.slots_m, i).norm() - 3.0).abs() < FIT_TOLERANCE));
+    // An even spread of N points on a sphere of radius r keeps them about r sqrt(4 pi / N) apart.
+    let apart = sphere.min_distance().map_or(0.0, |(_, distance)| distance);
+    assert!(apart > 0.7 * 3.0 * (2.0 * TAU / 200.0).sqrt(), "{apart}");
+    assert!(pentagon.is_in_plane_z0() && grid.is_in_plane_z0() && !sphere.is_in_plane_z0());
+    assert_eq!([Formation::grid(0, 1.0).count(), Formation::sphere(0, 1.0).count(), Formation::circle(0, 1.0).count()], [0; 3]);
+}
+
+proptest! {
+    #[test]
+    fn the_closest_pair_is_that_of_the_full_search(points in prop::collection::vec([0..6_i32, 0..6, 0..6], 0..30)) {
+        let positions = Rows::from_fn(points.len(), |i, axis| f64::from(points[i][axis]));
+        let mut expected: Option<(Pair, f64)> = None;
+        for (i, j) in Graph::complete(points.len()).edges() {
+            let distance = separation(&positions, i, j);
+            if expected.is_none_or(|(_, best)| distance < best) {
+                expected = Some((Pair::new(i, j), distance));
+            }
+        }
+        prop_assert_eq!(closest_pair(&positions), expected);
+    }
+}
+
+#[test]
+fn the_closest_pair_of_less_than_two_or_not_finite_positions_is_none() {
+    assert_eq!(closest_pair(&Rows::zeros(1)), None);
+    assert_eq!(closest_pair(&rows(&[[0.0; 3], [f64::NAN; 3], [1.0; 3]])), None);
+    assert_eq!(closest_pair(&rows(&[[2.0; 3], [1.0; 3], [2.0; 3]])), Some((Pair::new(0, 2), 0.0)));
+}

@@ -1,0 +1,87 @@
+//! What a law promises about separation before the first step.
+
+use std::fmt;
+
+use super::LawError;
+
+/// The separation that a law guarantees from a given start, or why it guarantees none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Certificate {
+    /// No pair ever comes closer than this \[m\], under the assumptions of the law's proof.
+    pub certified_m: Option<f64>,
+    /// Energy E(0) of the start \[m^2/s^2\], where the law has one, whether or not it certifies anything.
+    pub energy_initial: Option<f64>,
+    /// Every reason why nothing is certified.
+    pub void: Vec<Void>,
+}
+
+/// Why a certificate is void.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Void {
+    /// The law does not push vehicles apart.
+    NoBarrier,
+    /// Some pair is not joined by an edge.
+    GraphNotComplete,
+    /// The law has no answer for the start, such as a pair at or inside its safety distance.
+    StartRefused(LawError),
+}
+
+impl Certificate {
+    /// A certificate that promises nothing, for one reason.
+    #[must_use]
+    pub fn void(reason: Void) -> Self {
+        Self { certified_m: None, energy_initial: None, void: vec![reason] }
+    }
+}
+
+impl Void {
+    /// A stable name for files, such as `graph-not-complete`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoBarrier => "no-barrier",
+            Self::GraphNotComplete => "graph-not-complete",
+            Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
+            Self::StartRefused(_) => "start-refused",
+        }
+    }
+}
+
+impl fmt::Display for Void {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoBarrier => f.write_str("The law has no barrier: it does not keep vehicles apart."),
+            Self::GraphNotComplete => f.write_str(
+                "The graph is not complete: pairs without an edge are not kept apart, and the energy may grow.",
+            ),
+            Self::StartRefused(fault) => write!(f, "The law has no answer for the start: {fault}."),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::Pair;
+
+    #[test]
+    fn every_reason_has_its_own_code_and_a_sentence() {
+        let collision = LawError::Collision { pair: Pair::new(0, 1), separation_m: 1.5, delta_m: 2.0 };
+        let reasons = [
+            Void::NoBarrier,
+            Void::GraphNotComplete,
+            Void::StartRefused(collision),
+            Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
+        ];
+        let codes = reasons.map(|reason| reason.code());
+        assert_eq!(codes, ["no-barrier", "graph-not-complete", "start-too-close", "start-refused"]);
+        for reason in reasons {
+            let sentence = reason.to_string();
+            assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
+        }
+        assert_eq!(
+            reasons[2].to_string(),
+            "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
+        );
+    }
+}

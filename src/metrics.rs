@@ -1,0 +1,331 @@
+//! Numbers of a run, folded from its samples one at a time.
+//!
+//! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. What it knows
+//! of the time between samples is nothing; peaks are those of the samples.
+
+use crate::formation::{Formation, largest_edge_error_m, procrustes_rms_m};
+use crate::graph::Graph;
+use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::scenario::JudgeSpec;
+use crate::swarm::{Rows, row};
+
+/// Times are sums and products of steps: this much shorter than `hold_s` still counts as held \[s\].
+const TIME_ROUNDING_S: f64 = 1e-9;
+
+/// Folds samples, in the order of time, into a [`Summary`].
+#[derive(Clone, Debug)]
+pub struct Metrics<'a> {
+    formation: &'a Formation,
+    graph: &'a Graph,
+    judge: JudgeSpec,
+    samples: u64,
+    /// First instant from which everything was within the judge's tolerances up to now \[s\].
+    good_since_s: Option<f64>,
+    last_s: f64,
+    last_positions_m: Rows,
+    max_edge_error_m: f64,
+    disagreement_m_s: f64,
+    common_m_s: f64,
+    peak_control_m_s2: f64,
+    final_control_m_s2: f64,
+    energy: Option<EnergyRange>,
+}
+
+/// Energy \[m^2/s^2\] over the samples that have one.
+#[derive(Clone, Copy, Debug)]
+struct EnergyRange {
+    initial: f64,
+    last: f64,
+    max: f64,
+}
+
+/// Numbers of a run. Those of the end are of its last sample. Where a state was not finite, so are its numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Samples seen.
+    pub samples: u64,
+    /// Time of the last sample \[s\].
+    pub end_s: f64,
+    /// When the formation was reached for good, see [`Metrics::finish`] \[s\].
+    pub reached_at_s: Option<f64>,
+    /// How long all tolerances had been kept when the run ended \[s\]; none where they were not kept at the end.
+    pub held_s: Option<f64>,
+    /// Largest error of a desired distance over the graph's edges at the end \[m\].
+    pub max_edge_error_m: f64,
+    /// Root mean square distance of the vehicles from the formation in its best place, turned and perhaps mirrored, at
+    /// the end \[m\].
+    pub rms_position_error_m: f64,
+    /// Largest speed relative to the swarm's mean velocity at the end \[m/s\].
+    pub disagreement_m_s: f64,
+    /// Speed of the mean velocity at the end \[m/s\].
+    pub common_m_s: f64,
+    /// Largest commanded acceleration of a vehicle, Euclidean norm, over all samples \[m/s^2\].
+    pub peak_control_m_s2: f64,
+    /// Largest commanded acceleration of a vehicle at the end \[m/s^2\].
+    pub final_control_m_s2: f64,
+    /// Energy of the first sample that has one \[m^2/s^2\].
+    pub energy_initial: Option<f64>,
+    /// Energy of the last sample that has one \[m^2/s^2\].
+    pub energy_final: Option<f64>,
+    /// Largest energy over all samples \[m^2/s^2\].
+    pub energy_max: Option<f64>,
+    /// `energy_max` over `energy_initial`: 1 where the energy never exceeded its start; none for a start without energy.
+    pub energy_max_over_initial: Option<f64>,
+}
+
+impl<'a> Metrics<'a> {
+    /// No samples yet of a run towards `formation` by the tolerances of `judge`.
+    #[must_use]
+    pub fn new(formation: &'a Formation, graph: &'a Graph, judge: JudgeSpec) -> Self {
+        Self {
+            formation,
+            graph,
+            judge,
+            samples: 0,
+            good_since_s: None,
+            last_s: 0.0,
+            last_positions_m: Rows::zeros(0),
+            max_edge_error_m: f64::NAN,
+            disagreement_m_s: f64::NAN,
+            common_m_s: f64::NAN,
+            peak_control_m_s2: 0.0,
+            final_control_m_s2: 0.0,
+            energy: None,
+        }
+    }
+
+    /// Takes one sample: O(edges), and no allocation after the first.
+    pub fn observe(&mut self, sample: &Sample<'_>) {
+        let positions_m = &sample.swarm.positions_m;
+        self.samples += 1;
+        self.last_s = sample.time_s;
+        if self.last_positions_m.nrows() == positions_m.nrows() {
+            self.last_positions_m.copy_from(positions_m);
+        } else {
+            self.last_positions_m = positions_m.clone();
+        }
+        self.max_edge_error_m = largest_edge_error_m(positions_m, self.formation, self.graph);
+        self.disagreement_m_s = sample.swarm.disagreement_m_s();
+        self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
+        self.final_control_m_s2 = largest_norm(sample.control);
+        self.peak_control_m_s2 = larger(self.peak_control_m_s2, self.final_control_m_s2);
+        if let Some(energy) = sample.energy {
+            let before = self.energy.unwrap_or(EnergyRange { initial: energy, last: energy, max: energy });
+            self.energy = Some(EnergyRange { last: energy, max: larger(before.max, energy), ..before });
+        }
+        let good = self.max_edge_error_m <= self.judge.edge_error_m
+            && self.disagreement_m_s <= self.judge.disagreement_m_s
+            && sample.swarm.first_not_finite().is_none();
+        self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
+    }
+
+    /// Largest error of a desired distance at the last sample \[m\].
+    #[must_use]
+    pub fn edge_error_m(&self) -> f64 {
+        self.max_edge_error_m
+    }
+
+    /// The numbers of everything seen.
+    ///
+    /// The formation counts as reached at the time of the first sample from which on every sample, to the last, had an
+    /// edge error and a disagreement of at most the judge's, provided that this lasted at least `hold_s` up to the last
+    /// sample. A formation that was held for long and lost again is not reached; one that was regained counts from when
+    /// it was regained.
+    #[must_use]
+    pub fn finish(&self) -> Summary {
+        let held_s = self.good_since_s.map(|since| self.last_s - since);
+        let reached = held_s.is_some_and(|held| held >= self.judge.hold_s - TIME_ROUNDING_S);
+        Summary {
+            samples: self.samples,
+            end_s: self.last_s,
+            reached_at_s: self.good_since_s.filter(|_| reached),
+            held_s,
+            max_edge_error_m: self.max_edge_error_m,
+            rms_position_error_m: procrustes_rms_m(&self.last_positions_m, self.formation),
+            disagreement_m_s: self.disagreement_m_s,
+            common_m_s: self.common_m_s,
+            peak_control_m_s2: self.peak_control_m_s2,
+            final_control_m_s2: self.final_control_m_s2,
+            energy_initial: self.energy.map(|energy| energy.initial),
+            energy_final: self.energy.map(|energy| energy.last),
+            energy_max: self.energy.map(|energy| energy.max),
+            energy_max_over_initial: self
+                .energy
+                .filter(|energy| energy.initial != 0.0)
+                .map(|energy| energy.max / energy.initial),
+        }
+    }
+}
+
+impl Recorder for Metrics<'_> {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.observe(sample);
+        Ok(())
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+/// Largest Euclidean norm of a row; NaN where there is one.
+fn largest_norm(rows: &Rows) -> f64 {
+    (0..rows.nrows()).map(|i| row(rows, i).norm()).fold(0.0, larger)
+}
+
+/// The larger number; NaN where either is, which `f64::max` would hide.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::Swarm;
+
+    /// Sums of a few numbers of order 1 are right to some 1e-15.
+    const ROUNDING: f64 = 1e-12;
+    const JUDGE: JudgeSpec = JudgeSpec { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
+
+    fn pair_of_vehicles() -> (Formation, Graph) {
+        (Formation::line(2, 3.0), Graph::complete(2))
+    }
+
+    /// Two vehicles `error_m` too far apart, parting at `relative_m_s`, sampled every 0.25 s.
+    fn summary(course: &[(f64, f64)], judge: JudgeSpec) -> Summary {
+        let (formation, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&formation, &graph, judge);
+        let control = Rows::zeros(2);
+        for (k, (error_m, relative_m_s)) in course.iter().enumerate() {
+            let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0 + error_m, 0.0, 0.0]));
+            swarm.velocities_m_s[(1, 0)] = *relative_m_s;
+            let time_s = 0.25 * k as f64;
+            metrics.observe(&Sample {
+                time_s,
+                step: k as u64,
+                swarm: &swarm,
+                control: &control,
+                separation: None,
+                energy: None,
+            });
+        }
+        metrics.finish()
+    }
+
+    const GOOD: (f64, f64) = (0.005, 0.0);
+    const FAR: (f64, f64) = (0.5, 0.0);
+    /// Half of the relative speed is the disagreement: 0.03 m/s.
+    const FAST: (f64, f64) = (0.005, 0.06);
+
+    #[test]
+    fn reached_is_the_first_instant_from_which_both_tolerances_hold_to_the_end() {
+        let s = summary(&[FAR, FAST, GOOD, GOOD, GOOD, GOOD, GOOD], JUDGE);
+        assert_eq!((s.reached_at_s, s.held_s, s.end_s), (Some(0.5), Some(1.0), 1.5));
+    }
+
+    #[test]
+    fn a_formation_held_shorter_than_asked_is_not_reached() {
+        let s = summary(&[FAR, FAR, FAR, GOOD, GOOD, GOOD, GOOD], JUDGE);
+        assert_eq!((s.reached_at_s, s.held_s), (None, Some(0.75)));
+        let patient = JudgeSpec { hold_s: 0.75, ..JUDGE };
+        assert_eq!(summary(&[FAR, FAR, FAR, GOOD, GOOD, GOOD, GOOD], patient).reached_at_s, Some(0.75));
+    }
+
+    #[test]
+    fn a_formation_that_is_lost_again_is_not_reached_however_long_it_was_held() {
+        for lost in [FAR, FAST] {
+            let mut course = vec![GOOD; 100];
+            course.push(lost);
+            let s = summary(&course, JUDGE);
+            assert_eq!((s.reached_at_s, s.held_s), (None, None));
+            course.extend([GOOD; 5]);
+            assert_eq!(summary(&course, JUDGE).reached_at_s, Some(25.25), "regained counts from then on");
+        }
+    }
+
+    #[test]
+    fn rounding_of_times_does_not_cost_the_hold() {
+        let (formation, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&formation, &graph, JUDGE);
+        let swarm = Swarm::at_rest(formation.slots_m.clone());
+        for time_s in [9.0_f64.next_up(), 10.0] {
+            let control = Rows::zeros(2);
+            metrics.observe(&Sample {
+                time_s,
+                step: 0,
+                swarm: &swarm,
+                control: &control,
+                separation: None,
+                energy: None,
+            });
+        }
+        assert_eq!(metrics.finish().reached_at_s, Some(9.0_f64.next_up()));
+    }
+
+    #[test]
+    fn a_state_that_is_not_a_number_is_never_within_tolerance() {
+        let s = summary(&[GOOD, GOOD, GOOD, GOOD, GOOD, (f64::NAN, 0.0)], JUDGE);
+        assert_eq!(s.reached_at_s, None);
+        assert!(s.max_edge_error_m.is_nan());
+        let s = summary(&[GOOD, GOOD, GOOD, GOOD, GOOD, (0.0, f64::NAN)], JUDGE);
+        assert_eq!(s.reached_at_s, None);
+    }
+
+    #[test]
+    fn no_samples_reach_nothing() {
+        let s = summary(&[], JUDGE);
+        assert_eq!((s.samples, s.reached_at_s, s.energy_initial), (0, None, None));
+        assert_eq!(summary(&[], JudgeSpec { hold_s: 0.0, ..JUDGE }).reached_at_s, None);
+    }
+
+    #[test]
+    fn the_numbers_are_those_of_the_samples() {
+        let (formation, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&formation, &graph, JUDGE);
+        let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.5, 0.0, 0.0]));
+        swarm.velocities_m_s = Rows::from_row_slice(&[3.0, 4.0, 0.0, 3.0, 4.2, 0.0]);
+        for (k, (energy, u)) in [(2.0, 0.5), (3.0, 2.0), (1.0, 1.0)].into_iter().enumerate() {
+            let control = Rows::from_row_slice(&[0.6 * u, 0.8 * u, 0.0, 0.0, 0.0, -0.1]);
+            metrics.observe(&Sample {
+                time_s: k as f64,
+                step: k as u64,
+                swarm: &swarm,
+                control: &control,
+                separation: None,
+                energy: Some(energy),
+            });
+        }
+        assert!((metrics.edge_error_m() - 0.5).abs() < ROUNDING);
+        let s = metrics.finish();
+        assert_eq!((s.samples, s.end_s), (3, 2.0));
+        for (found, expected) in [
+            (s.max_edge_error_m, 0.5),
+            // Each of the two is a quarter of a metre from its place in the best fit.
+            (s.rms_position_error_m, 0.25),
+            (s.disagreement_m_s, 0.1),
+            (s.common_m_s, 3.0_f64.hypot(4.1)),
+            (s.peak_control_m_s2, 2.0),
+            (s.final_control_m_s2, 1.0),
+        ] {
+            assert!((found - expected).abs() < ROUNDING, "{found} instead of {expected}");
+        }
+        assert_eq!((s.energy_initial, s.energy_final, s.energy_max), (Some(2.0), Some(1.0), Some(3.0)));
+        assert_eq!(s.energy_max_over_initial, Some(1.5));
+    }
+
+    #[test]
+    fn a_start_without_energy_has_no_ratio() {
+        let (formation, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&formation, &graph, JUDGE);
+        let (swarm, control) = (Swarm::at_rest(formation.slots_m.clone()), Rows::zeros(2));
+        metrics.observe(&Sample {
+            time_s: 0.0,
+            step: 0,
+            swarm: &swarm,
+            control: &control,
+            separation: None,
+            energy: Some(0.0),
+        });
+        assert_eq!(metrics.finish().energy_max_over_initial, None);
+    }
+}

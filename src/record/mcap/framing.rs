@@ -1,0 +1,237 @@
+//! The records of an MCAP file, one after the other.
+//!
+//! The format's framing is read here and not by the `mcap` crate, because a recording may be damaged or hostile: the
+//! crate's readers reserve memory for whatever length a record claims and do unchecked arithmetic on lengths inside a
+//! chunk. Here memory grows only with bytes that are really in the file.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use mcap::MAGIC;
+use mcap::records::op;
+
+use crate::record::ReadFault;
+
+/// Longest record that is read \[bytes\]: a sample of three million vehicles.
+const RECORD_LIMIT_BYTES: u64 = 256 * 1024 * 1024;
+
+/// Bytes of a record's head: opcode and length.
+const HEAD_BYTES: usize = 9;
+
+/// Bytes of a footer's content.
+const FOOTER_BYTES: u64 = 20;
+
+/// The system's error or the file's fault.
+pub(super) enum Trouble {
+    System(io::Error),
+    Fault(ReadFault),
+}
+
+impl From<io::Error> for Trouble {
+    fn from(error: io::Error) -> Self {
+        Self::System(error)
+    }
+}
+
+impl From<ReadFault> for Trouble {
+    fn from(fault: ReadFault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+/// One record: what it is and what it holds.
+pub(super) struct Record<'a> {
+    /// Where in the file it, or the chunk around it, begins \[bytes\].
+    pub(super) offset: u64,
+    pub(super) opcode: u8,
+    pub(super) body: &'a [u8],
+}
+
+/// Reads the data section of an MCAP file record by record and goes into its chunks.
+pub(super) struct RecordReader {
+    file: BufReader<File>,
+    /// Whether the file ends as a closed recording does.
+    complete: bool,
+    /// Where in the file the next record begins \[bytes\].
+    offset: u64,
+    /// Where in the file the record in `body` begins \[bytes\].
+    body_offset: u64,
+    body: Vec<u8>,
+    /// The part of `body` that holds records of a chunk not yet given out.
+    chunk: std::ops::Range<usize>,
+    ended: bool,
+}
+
+impl RecordReader {
+    pub(super) fn open(path: &Path) -> Result<Self, Trouble> {
+        let mut file = File::open(path)?;
+        let mut magic = Vec::new();
+        (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic)?;
+        if magic.is_empty() {
+            return Err(ReadFault::Empty.into());
+        }
+        if magic != MAGIC {
+            return Err(ReadFault::NotMcap.into());
+        }
+        let complete = ends_with_footer(&mut file)?;
+        let offset = file.seek(SeekFrom::Start(MAGIC.len() as u64))?;
+        Ok(Self {
+            file: BufReader::new(file),
+            complete,
+            offset,
+            body_offset: offset,
+            body: Vec::new(),
+            chunk: 0..0,
+            ended: false,
+        })
+    }
+
+    pub(super) fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// The next record, chunks taken apart; `None` at the end of the data section or where a file that was not closed
+    /// breaks off.
+    pub(super) fn next(&mut self) -> Result<Option<Record<'_>>, Trouble> {
+        while self.chunk.is_empty() {
+            let Some(opcode) = self.read_record()? else { return Ok(None) };
+            match opcode {
+                op::DATA_END | op::FOOTER => {
+                    self.ended = true;
+                    return Ok(None);
+                }
+                op::CHUNK => {
+                    self.chunk = chunk_records(&self.body).map_err(|reason| damaged(self.body_offset, reason))?;
+                }
+                _ => return Ok(Some(Record { offset: self.body_offset, opcode, body: &self.body })),
+            }
+        }
+        let rest = &self.body[self.chunk.clone()];
+        let head = Fields(rest).head();
+        match head.and_then(|(opcode, bytes)| Some((opcode, usize::try_from(bytes).ok()?))) {
+            Some((opcode, bytes)) if bytes <= rest.len() - HEAD_BYTES => {
+                self.chunk.start += HEAD_BYTES + bytes;
+                let body = &rest[HEAD_BYTES..HEAD_BYTES + bytes];
+                Ok(Some(Record { offset: self.body_offset, opcode, body }))
+            }
+            _ => Err(damaged(self.body_offset, "a record inside the chunk is longer than the chunk").into()),
+        }
+    }
+
+    /// Reads the next record of the file into `body`, or only its opcode where nobody wants the content.
+    fn read_record(&mut self) -> Result<Option<u8>, Trouble> {
+        if self.ended {
+            return Ok(None);
+        }
+        self.body_offset = self.offset;
+        if self.fill(HEAD_BYTES as u64)? < HEAD_BYTES as u64 {
+            return self.broken_off();
+        }
+        let Some((opcode, bytes)) = Fields(&self.body).head() else { return self.broken_off() };
+        let wanted = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK);
+        if opcode == 0 {
+            return Err(damaged(self.body_offset, "it has no type").into());
+        }
+        let read = if wanted {
+            if bytes > RECORD_LIMIT_BYTES {
+                let (offset, limit) = (self.body_offset, RECORD_LIMIT_BYTES);
+                return Err(ReadFault::TooLong { offset, bytes, limit }.into());
+            }
+            self.fill(bytes)?
+        } else {
+            io::copy(&mut (&mut self.file).take(bytes), &mut io::sink())?
+        };
+        self.offset = self.offset.saturating_add(HEAD_BYTES as u64).saturating_add(bytes);
+        if read < bytes { self.broken_off() } else { Ok(Some(opcode)) }
+    }
+
+    /// Replaces `body` by the next `bytes` bytes, or by as many as there are.
+    fn fill(&mut self, bytes: u64) -> io::Result<u64> {
+        self.body.clear();
+        let read = (&mut self.file).take(bytes).read_to_end(&mut self.body)?;
+        Ok(read as u64)
+    }
+
+    /// The end of a file that was not closed; a file that was closed cannot end here.
+    fn broken_off<T>(&mut self) -> Result<Option<T>, Trouble> {
+        self.ended = true;
+        if self.complete {
+            return Err(damaged(self.body_offset, "it goes beyond the end of the file").into());
+        }
+        Ok(None)
+    }
+}
+
+/// Whether the file ends with a footer record and the format's closing bytes.
+fn ends_with_footer(file: &mut File) -> io::Result<bool> {
+    let mut expected = vec![op::FOOTER];
+    expected.extend_from_slice(&FOOTER_BYTES.to_le_bytes());
+    let head = expected.len();
+    let tail = head as u64 + FOOTER_BYTES + MAGIC.len() as u64;
+    let length = file.seek(SeekFrom::End(0))?;
+    let Some(start) = length.checked_sub(tail) else { return Ok(false) };
+    file.seek(SeekFrom::Start(start))?;
+    let mut bytes = Vec::new();
+    file.take(tail).read_to_end(&mut bytes)?;
+    Ok(bytes.starts_with(&expected) && bytes.ends_with(MAGIC))
+}
+
+/// Where in a chunk's content its records are, once its checksum is found right.
+fn chunk_records(body: &[u8]) -> Result<std::ops::Range<usize>, &'static str> {
+    let mut fields = Fields(body);
+    let header = (|| {
+        let _message_times = (fields.u64()?, fields.u64()?);
+        Some((fields.u64()?, fields.u32()?, fields.str()?, fields.u64()?))
+    })();
+    let (uncompressed_bytes, crc, compression, bytes) = header.ok_or("the chunk has no header")?;
+    if !compression.is_empty() {
+        return Err("the chunk is compressed, which this program does not read (`mcap decompress` helps)");
+    }
+    let records = usize::try_from(bytes).ok().and_then(|bytes| fields.0.get(..bytes));
+    let records = records.filter(|_| bytes == uncompressed_bytes).ok_or("the chunk is shorter than it says")?;
+    if crc != 0 && crc32fast::hash(records) != crc {
+        return Err("the checksum of the chunk is wrong");
+    }
+    let start = body.len() - fields.0.len();
+    Ok(start..start + records.len())
+}
+
+pub(super) fn damaged(offset: u64, reason: &str) -> ReadFault {
+    ReadFault::Damaged { offset, reason: reason.to_owned() }
+}
+
+/// Takes the fields of a record off its front; `None` where it is too short.
+pub(super) struct Fields<'a>(pub(super) &'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn head(mut self) -> Option<(u8, u64)> {
+        let [opcode] = self.array()?;
+        Some((opcode, self.u64()?))
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (array, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*array)
+    }
+
+    pub(super) fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub(super) fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    pub(super) fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    pub(super) fn str(&mut self) -> Option<&'a str> {
+        let bytes = usize::try_from(self.u32()?).ok()?;
+        let (text, rest) = self.0.split_at_checked(bytes)?;
+        self.0 = rest;
+        std::str::from_utf8(text).ok()
+    }
+}

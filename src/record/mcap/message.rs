@@ -1,0 +1,294 @@
+//! The messages of a recording: what each channel carries, to CDR and back.
+
+use byteorder::LittleEndian;
+use serde::ser::SerializeSeq;
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::Header;
+use crate::record::{Event, OwnedSample, ReadFault, Sample};
+use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
+
+/// How ROS 2 marks plain little-endian CDR at the head of each message.
+const CDR_LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+
+/// Message encoding of every channel.
+pub(super) const MESSAGE_ENCODING: &str = "cdr";
+/// Schema encoding of every channel.
+pub(super) const SCHEMA_ENCODING: &str = "ros2msg";
+
+/// A channel of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Topic {
+    Scenario,
+    Swarm,
+    Summary,
+    Events,
+}
+
+impl Topic {
+    /// In the order in which a recorder declares them.
+    pub(super) const ALL: [Self; 4] = [Self::Scenario, Self::Swarm, Self::Summary, Self::Events];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Scenario => "/scenario",
+            Self::Swarm => "/swarm",
+            Self::Summary => "/summary",
+            Self::Events => "/events",
+        }
+    }
+
+    pub(super) fn schema_name(self) -> &'static str {
+        match self {
+            Self::Scenario => "tautline_msgs/msg/Scenario",
+            Self::Swarm => "tautline_msgs/msg/Swarm",
+            Self::Summary => "tautline_msgs/msg/Summary",
+            Self::Events => "tautline_msgs/msg/Event",
+        }
+    }
+
+    pub(super) fn schema_text(self) -> &'static str {
+        match self {
+            Self::Scenario => include_str!("scenario.msg"),
+            Self::Swarm => include_str!("swarm.msg"),
+            Self::Summary => include_str!("summary.msg"),
+            Self::Events => include_str!("event.msg"),
+        }
+    }
+
+    fn fault(self, reason: impl Into<String>) -> ReadFault {
+        ReadFault::Message { topic: self.name(), reason: reason.into() }
+    }
+}
+
+/// Replaces the content of `bytes` by the message in CDR.
+pub(super) fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> Result<(), cdr_encoding::Error> {
+    bytes.clear();
+    bytes.extend_from_slice(&CDR_LITTLE_ENDIAN);
+    cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)
+}
+
+/// Reads a message of a topic. Bytes behind its last field are ignored, so that fields can be added later.
+pub(super) fn decode<'a, T: Deserialize<'a>>(topic: Topic, bytes: &'a [u8]) -> Result<T, ReadFault> {
+    let body = bytes
+        .strip_prefix(&CDR_LITTLE_ENDIAN)
+        .ok_or_else(|| topic.fault("it does not begin as little-endian CDR does"))?;
+    let (message, _) = cdr_encoding::from_bytes::<T, LittleEndian>(body).map_err(|e| topic.fault(e.to_string()))?;
+    Ok(message)
+}
+
+/// The fields of `scenario.msg`, in order.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ScenarioMessage<S> {
+    name: S,
+    sha256: S,
+    vehicles: u64,
+    delta_m: f64,
+    toml: S,
+}
+
+impl<'a> From<&'a Header> for ScenarioMessage<&'a str> {
+    fn from(header: &'a Header) -> Self {
+        Self {
+            name: &header.scenario_name,
+            sha256: &header.scenario_sha256,
+            vehicles: header.vehicles as u64,
+            delta_m: header.delta_m,
+            toml: &header.scenario_toml,
+        }
+    }
+}
+
+impl ScenarioMessage<String> {
+    pub(super) fn into_header(self) -> Result<Header, ReadFault> {
+        Ok(Header {
+            scenario_name: self.name,
+            scenario_toml: self.toml,
+            scenario_sha256: self.sha256,
+            vehicles: usize::try_from(self.vehicles).map_err(|_| Topic::Scenario.fault("too many vehicles"))?,
+            delta_m: self.delta_m,
+        })
+    }
+}
+
+/// The fields of `swarm.msg`, in order.
+#[derive(Serialize, Deserialize)]
+pub(super) struct SwarmMessage<V> {
+    pub(super) time_s: f64,
+    step: u64,
+    positions_m: V,
+    velocities_m_s: V,
+    controls_m_s2: V,
+}
+
+impl<'a> From<&Sample<'a>> for SwarmMessage<VehicleByVehicle<'a>> {
+    fn from(sample: &Sample<'a>) -> Self {
+        Self {
+            time_s: sample.time_s,
+            step: sample.step,
+            positions_m: VehicleByVehicle(&sample.swarm.positions_m),
+            velocities_m_s: VehicleByVehicle(&sample.swarm.velocities_m_s),
+            controls_m_s2: VehicleByVehicle(sample.control),
+        }
+    }
+}
+
+impl SwarmMessage<Vec<f64>> {
+    /// Number of vehicles, going by the positions.
+    pub(super) fn vehicles(&self) -> usize {
+        self.positions_m.len() / 3
+    }
+
+    /// The sample of `vehicles` vehicles, with the summary where it is of the same step.
+    pub(super) fn into_sample(
+        self,
+        vehicles: usize,
+        summary: Option<&SummaryMessage>,
+    ) -> Result<OwnedSample, ReadFault> {
+        for (name, numbers) in [
+            ("positions_m", &self.positions_m),
+            ("velocities_m_s", &self.velocities_m_s),
+            ("controls_m_s2", &self.controls_m_s2),
+        ] {
+            if Some(numbers.len()) != vehicles.checked_mul(3) {
+                let reason =
+                    format!("{name} has {} numbers, which is not 3 for each of {vehicles} vehicles", numbers.len());
+                return Err(Topic::Swarm.fault(reason));
+            }
+        }
+        let summary = summary.filter(|summary| summary.step == self.step);
+        Ok(OwnedSample {
+            time_s: self.time_s,
+            step: self.step,
+            swarm: Swarm {
+                positions_m: Rows::from_row_slice(&self.positions_m),
+                velocities_m_s: Rows::from_row_slice(&self.velocities_m_s),
+            },
+            control: Rows::from_row_slice(&self.controls_m_s2),
+            separation: summary.map(SummaryMessage::separation).transpose()?.flatten(),
+            energy: summary.map(|summary| summary.energy_m2_s2).filter(|energy| !energy.is_nan()),
+        })
+    }
+}
+
+/// A table as the sequence x1, y1, z1, x2, ...
+pub(super) struct VehicleByVehicle<'a>(&'a Rows);
+
+impl Serialize for VehicleByVehicle<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut sequence = serializer.serialize_seq(Some(self.0.len()))?;
+        for i in 0..self.0.nrows() {
+            for axis in 0..3 {
+                sequence.serialize_element(&self.0[(i, axis)])?;
+            }
+        }
+        sequence.end()
+    }
+}
+
+/// The fields of `summary.msg`, in order.
+#[derive(Serialize, Deserialize)]
+pub(super) struct SummaryMessage {
+    time_s: f64,
+    step: u64,
+    separation_m: f64,
+    separation_time_s: f64,
+    first_vehicle: u64,
+    second_vehicle: u64,
+    energy_m2_s2: f64,
+}
+
+impl From<&Sample<'_>> for SummaryMessage {
+    fn from(sample: &Sample<'_>) -> Self {
+        let [first_vehicle, second_vehicle] = numbers_of(sample.separation.map(|closest| closest.pair));
+        Self {
+            time_s: sample.time_s,
+            step: sample.step,
+            separation_m: sample.separation.map_or(f64::NAN, |closest| closest.separation_m),
+            separation_time_s: sample.separation.map_or(f64::NAN, |closest| closest.time_s),
+            first_vehicle,
+            second_vehicle,
+            energy_m2_s2: sample.energy.unwrap_or(f64::NAN),
+        }
+    }
+}
+
+impl SummaryMessage {
+    fn separation(&self) -> Result<Option<ClosestApproach>, ReadFault> {
+        if self.first_vehicle == 0 {
+            return Ok(None);
+        }
+        let pair = pair_of(Topic::Summary, [self.first_vehicle, self.second_vehicle])?;
+        Ok(Some(ClosestApproach { pair, separation_m: self.separation_m, time_s: self.separation_time_s }))
+    }
+}
+
+/// The fields of `event.msg`, in order.
+#[derive(Serialize, Deserialize)]
+pub(super) struct EventMessage<S> {
+    kind: S,
+    time_s: f64,
+    first_vehicle: u64,
+    second_vehicle: u64,
+    value: f64,
+    text: String,
+}
+
+impl From<&Event> for EventMessage<&'static str> {
+    fn from(event: &Event) -> Self {
+        let (kind, pair, value, text) = match event {
+            Event::ViolationBegan { pair, .. } => (
+                "violation-began",
+                Some(*pair),
+                f64::NAN,
+                format!("vehicles {pair} came closer than the safety distance"),
+            ),
+            Event::ViolationEnded { pair, min_m, .. } => (
+                "violation-ended",
+                Some(*pair),
+                *min_m,
+                format!("vehicles {pair} are clear again after coming to {min_m} m"),
+            ),
+            Event::EngineContact { pair, .. } => (
+                "engine-contact",
+                Some(*pair),
+                f64::NAN,
+                format!("the engine saw the keep-out balls of vehicles {pair} overlap"),
+            ),
+            Event::StepRefined { dt_s, .. } => {
+                ("step-refined", None, *dt_s, format!("a step was flown in steps down to {dt_s} s"))
+            }
+            Event::EndedEarly { reason, .. } => ("ended-early", None, f64::NAN, reason.clone()),
+        };
+        let [first_vehicle, second_vehicle] = numbers_of(pair);
+        Self { kind, time_s: event.time_s(), first_vehicle, second_vehicle, value, text }
+    }
+}
+
+impl EventMessage<String> {
+    pub(super) fn into_event(self) -> Result<Event, ReadFault> {
+        let time_s = self.time_s;
+        let pair = || pair_of(Topic::Events, [self.first_vehicle, self.second_vehicle]);
+        Ok(match self.kind.as_str() {
+            "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
+            "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
+            "engine-contact" => Event::EngineContact { pair: pair()?, time_s },
+            "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
+            "ended-early" => Event::EndedEarly { time_s, reason: self.text },
+            unknown => return Err(Topic::Events.fault(format!("unknown kind {unknown:?}"))),
+        })
+    }
+}
+
+/// Both numbers from 1, or zeros for no pair.
+fn numbers_of(pair: Option<Pair>) -> [u64; 2] {
+    pair.map_or([0, 0], |pair| pair.numbers().map(|number| number as u64))
+}
+
+fn pair_of(topic: Topic, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
+    let index = |number: u64| number.checked_sub(1).and_then(|index| usize::try_from(index).ok());
+    match numbers.map(index) {
+        [Some(first), Some(second)] if first != second => Ok(Pair::new(first, second)),
+        _ => Err(topic.fault(format!("{} and {} are not a pair of vehicles", numbers[0], numbers[1]))),
+    }
+}

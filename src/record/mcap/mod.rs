@@ -1,0 +1,76 @@
+//! `run.mcap`: a run as an [MCAP](https://mcap.dev/spec) file.
+//!
+//! Messages are in CDR (little-endian, as ROS 2 writes it), schemas are ROS 2 message definitions in plain text, so
+//! general MCAP tools show every field without knowing this program. Four channels:
+//!
+//! | topic | schema | when | holds |
+//! | --- | --- | --- | --- |
+//! | `/scenario` | `tautline_msgs/msg/Scenario` | once, first | name, SHA-256 and text of the resolved scenario, N, delta |
+//! | `/summary` | `tautline_msgs/msg/Summary` | each sample | closest approach and energy |
+//! | `/swarm` | `tautline_msgs/msg/Swarm` | each sample | positions, velocities, controls |
+//! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
+//!
+//! The fields, with their units, are in the schemas themselves:
+//!
+//! ```text
+#![doc = include_str!("scenario.msg")]
+//! ```
+//!
+//! ```text
+#![doc = include_str!("swarm.msg")]
+//! ```
+//!
+//! ```text
+#![doc = include_str!("summary.msg")]
+//! ```
+//!
+//! ```text
+#![doc = include_str!("event.msg")]
+//! ```
+//!
+//! `log_time` and `publish_time` are simulated nanoseconds since the start; nothing in the file depends on the clock
+//! or the machine, so two recordings of one run are equal byte for byte. The two messages of a sample are always in the
+//! same chunk, `/summary` first.
+//!
+//! A chunk is kept in memory until it is complete and is then handed to the system at once: when a message is
+//! [`FLUSH_PERIOD_S`] or more after the last chunk, or when [`FLUSH_BYTES`] are waiting. A process that is killed leaves
+//! every chunk up to then readable, and [`McapRecording`] reads such a file.
+
+mod framing;
+mod message;
+mod reader;
+mod writer;
+
+pub use reader::{Entry, McapRecording};
+pub use writer::{FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
+
+use super::sha256_hex;
+
+/// What a recording says about the run as a whole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// Name of the scenario.
+    pub scenario_name: String,
+    /// The resolved scenario as TOML.
+    pub scenario_toml: String,
+    /// SHA-256 of `scenario_toml`, 64 hexadecimal digits.
+    pub scenario_sha256: String,
+    /// Number of vehicles N.
+    pub vehicles: usize,
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
+}
+
+impl Header {
+    /// The header of a run of this scenario; its hash is computed here.
+    #[must_use]
+    pub fn new(scenario_name: &str, scenario_toml: &str, vehicles: usize, delta_m: f64) -> Self {
+        Self {
+            scenario_name: scenario_name.to_owned(),
+            scenario_toml: scenario_toml.to_owned(),
+            scenario_sha256: sha256_hex(scenario_toml),
+            vehicles,
+            delta_m,
+        }
+    }
+}

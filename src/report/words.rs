@@ -1,0 +1,192 @@
+//! A report in words: one line, and a table.
+
+use std::fmt::Write as _;
+
+use super::{Report, Status};
+
+/// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero.
+pub(super) fn metres(number: f64) -> String {
+    if number != 0.0 && number.abs() < 5e-3 { format!("{number:.1e}") } else { format!("{number:.3}") }
+}
+
+/// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller.
+pub(super) fn metres_below(number: f64, limit_m: f64) -> String {
+    (3..=17)
+        .find(|&decimals| format!("{number:.decimals$}") != format!("{limit_m:.decimals$}"))
+        .map_or_else(|| number.to_string(), |decimals| format!("{number:.decimals$}"))
+}
+
+/// A length \[m\] rounded down to three decimals, so that "never closer than" stays true.
+fn metres_at_least(number: f64) -> String {
+    let shown = format!("{number:.3}");
+    match shown.parse::<f64>() {
+        Ok(rounded) if rounded > number => format!("{:.3}", rounded - 0.001),
+        _ => shown,
+    }
+}
+
+/// A time with its unit.
+pub(super) fn seconds(time_s: f64) -> String {
+    format!("{time_s:.2} s")
+}
+
+impl Report {
+    /// The verdict in one line.
+    ///
+    /// `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.5 s`, or
+    /// `VIOLATION: vehicles 2-3 came to 1.533 m (delta 2.000 m) at 3.63 s`.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        let delta = metres(self.separation.delta_m);
+        match self.audit.status {
+            Status::Clear => {
+                let closest = self.separation.min_m.map(metres_at_least);
+                let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
+                format!("CLEAR: {closest} (delta {delta} m), {}", self.formation_in_words())
+            }
+            Status::Violation => {
+                let deepest = self.deepest_in_words();
+                format!("VIOLATION: {deepest}")
+            }
+            Status::Undecided if self.audit.parry.disagreements > 0 => {
+                format!("UNDECIDED: the two detectors disagree (delta {delta} m), {}", self.formation_in_words())
+            }
+            Status::Undecided => {
+                format!("UNDECIDED: not everything could be judged (delta {delta} m), {}", self.formation_in_words())
+            }
+        }
+    }
+
+    fn formation_in_words(&self) -> String {
+        match (self.formation.reached_at_s, self.formation.max_edge_error_m) {
+            (Some(at_s), _) => format!("formation reached at {at_s:.1} s"),
+            (None, Some(error_m)) => format!("formation NOT reached (largest edge error {} m)", short(error_m)),
+            (None, None) => "formation NOT reached".to_owned(),
+        }
+    }
+
+    fn deepest_in_words(&self) -> String {
+        let Self { separation, .. } = self;
+        let delta_m = separation.delta_m;
+        let (Some([first, second]), Some(min_m)) = (separation.min_pair, separation.min_m) else {
+            return format!("two vehicles came closer than {} m", metres(delta_m));
+        };
+        let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s))).unwrap_or_default();
+        format!(
+            "vehicles {first}-{second} came to {} m (delta {} m){at}",
+            metres_below(min_m, delta_m),
+            metres(delta_m)
+        )
+    }
+
+    /// The numbers as a short table, a line each, with a line end.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for (name, content) in [
+            ("separation", self.separation_line()),
+            ("audit", self.audit_line()),
+            ("formation", self.formation_line()),
+            ("energy", self.energy_line()),
+            ("control", format!("peak {}, final {} m/s^2", or_dash(self.control.peak_m_s2), or_dash(self.control.final_m_s2))),
+            (
+                "velocity",
+                format!(
+                    "disagreement {}, common {} m/s",
+                    or_dash(self.velocity.disagreement_m_s),
+                    or_dash(self.velocity.common_m_s)
+                ),
+            ),
+            ("run", self.run_line()),
+            ("performance", self.performance_line()),
+        ] {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{name:<12} {content}");
+        }
+        text
+    }
+
+    fn separation_line(&self) -> String {
+        let separation = &self.separation;
+        let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
+        let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
+        let certified = match separation.certified_m {
+            Some(certified_m) => format!("certified {certified_m:.6} m"),
+            None => "not certified".to_owned(),
+        };
+        format!(
+            "{} m{}{} (delta {} m, {certified})",
+            separation.min_m.map_or("-".to_owned(), |min_m| format!("{min_m:.6}")),
+            at.unwrap_or_default(),
+            pair.unwrap_or_default(),
+            metres(separation.delta_m),
+        )
+    }
+
+    fn audit_line(&self) -> String {
+        let audit = &self.audit;
+        let detectors = match audit.parry.disagreements {
+            0 => "both detectors agree".to_owned(),
+            n => format!("{n} disagreements of the two detectors"),
+        };
+        let contacts = audit.rapier.contact_pairs.map(|pairs| format!(", {pairs} contact pairs seen by the engine"));
+        format!(
+            "{} violations in {} steps, {} pairs swept; {detectors}{}",
+            audit.violations.len(),
+            audit.steps,
+            audit.pairs_checked,
+            contacts.unwrap_or_default()
+        )
+    }
+
+    fn formation_line(&self) -> String {
+        let formation = &self.formation;
+        let reached = formation.reached_at_s.map_or("not reached".to_owned(), |at_s| format!("reached at {}", seconds(at_s)));
+        format!(
+            "{reached}, largest edge error {} m, rms position error {} m",
+            or_dash(formation.max_edge_error_m),
+            or_dash(formation.rms_position_error_m)
+        )
+    }
+
+    fn energy_line(&self) -> String {
+        let energy = &self.energy;
+        let ratio = energy.max_over_initial.map(|ratio| format!(", at most {ratio:.6} of the initial"));
+        format!("initial {}, final {} m^2/s^2{}", or_dash(energy.initial), or_dash(energy.at_end), ratio.unwrap_or_default())
+    }
+
+    fn run_line(&self) -> String {
+        let run = &self.run;
+        format!(
+            "{} vehicles, {} s in {} steps of {:.3} ms, state {}",
+            run.vehicles,
+            run.duration_s,
+            run.steps,
+            run.dt_s * 1e3,
+            run.state_hash.get(..12).unwrap_or(&run.state_hash)
+        )
+    }
+
+    fn performance_line(&self) -> String {
+        let performance = &self.performance;
+        let time = |time_s: Option<f64>| time_s.map_or("-".to_owned(), |time_s| format!("{time_s:.3}"));
+        let factor = performance.real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
+        format!(
+            "{} s wall, {factor} x real time (law {}, physics {}, audit {}, record {} s)",
+            time(performance.wall_s),
+            time(performance.law_s),
+            time(performance.physics_s),
+            time(performance.audit_s),
+            time(performance.record_s)
+        )
+    }
+}
+
+/// A length with two decimals, or in powers of ten where that would show little.
+fn short(number: f64) -> String {
+    if number.abs() < 5e-2 { metres(number) } else { format!("{number:.2}") }
+}
+
+fn or_dash(number: Option<f64>) -> String {
+    number.map_or("-".to_owned(), metres)
+}
