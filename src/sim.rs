@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use crate::audit::{AuditError, AuditOutcome, Auditor, StepFinding, closest_approach};
+use crate::audit::{AuditError, AuditOutcome, Auditor, StepFinding, Violation, swept_separation_m};
 use crate::law::{Certificate, Law, LawError};
 use crate::plant::{Plant, PlantError};
 use crate::record::{Event, RecordError, Recorder, Sample};
@@ -132,7 +132,6 @@ struct Cockpit<'a> {
     closest: Option<ClosestApproach>,
     /// Smallest separation over the last sweep: bounds from below how near any pair is now.
     nearest_m: f64,
-    open_violations: Vec<Pair>,
     engine_contacts: Vec<Pair>,
     contacts_now: Vec<Pair>,
     performance: Performance,
@@ -160,7 +159,6 @@ impl<'a> Cockpit<'a> {
             steps: 0,
             closest: None,
             nearest_m: 0.0,
-            open_violations: Vec::new(),
             engine_contacts: Vec::new(),
             contacts_now: Vec::new(),
             performance: Performance::default(),
@@ -246,14 +244,14 @@ impl<'a> Cockpit<'a> {
             let from = row(&self.state.positions_m, j) - row(&self.state.positions_m, i);
             let to = row(&self.next.positions_m, j) - row(&self.next.positions_m, i);
             let clearance_m = from.norm() - barrier_m;
-            closest_approach(from, to).separation_m - barrier_m < 0.5 * clearance_m
+            swept_separation_m(from, to) - barrier_m < 0.5 * clearance_m
         })
     }
 
     /// Audits the sweep that led to `state` (or the start) and asks the law for the next command.
     fn judge_and_command(&mut self, step: Option<u64>) -> Result<Result<(), LawError>, SimError> {
         let Self { auditor, law, state, control, time_s, .. } = self;
-        let mut audit = || {
+        let audit = || {
             let began = Instant::now();
             let finding = match step {
                 None => auditor.start(*time_s, &state.positions_m),
@@ -261,7 +259,7 @@ impl<'a> Cockpit<'a> {
             };
             (finding, began.elapsed())
         };
-        let mut command = || {
+        let command = || {
             let began = Instant::now();
             (law.control(state, control), began.elapsed())
         };
@@ -270,22 +268,17 @@ impl<'a> Cockpit<'a> {
             if side_by_side { rayon::join(audit, command) } else { (audit(), command()) };
         self.performance.audit += audit_time;
         self.performance.law += law_time;
-        self.take_finding(&finding?)?;
+        let finding = finding?;
+        if let Some(closest) = finding.closest {
+            self.nearest_m = closest.separation_m;
+            self.closest = self.closest.filter(|before| before.separation_m <= closest.separation_m).or(Some(closest));
+        }
+        record_violations(self.recorder, &finding)?;
         self.collect_engine_contacts()?;
         if commanded.is_ok() && let Some(vehicle) = first_row_not_finite(&self.control) {
             return Err(SimError::CommandNotFinite { step: step.unwrap_or(0), vehicle });
         }
         Ok(commanded)
-    }
-
-    fn take_finding(&mut self, finding: &StepFinding) -> Result<(), RecordError> {
-        if let Some(closest) = finding.closest {
-            self.nearest_m = closest.separation_m;
-            if self.closest.is_none_or(|before| closest.separation_m < before.separation_m) {
-                self.closest = Some(closest);
-            }
-        }
-        Ok(())
     }
 
     fn collect_engine_contacts(&mut self) -> Result<(), RecordError> {
@@ -343,4 +336,15 @@ impl<'a> Cockpit<'a> {
             performance: self.performance,
         }
     }
+}
+
+fn record_violations(recorder: &mut dyn Recorder, finding: &StepFinding<'_>) -> Result<(), RecordError> {
+    for violation in finding.began {
+        recorder.event(&Event::ViolationBegan { pair: violation.pair, time_s: violation.from_s })?;
+    }
+    for violation in finding.ended {
+        let &Violation { pair, to_s, min_m, .. } = violation;
+        recorder.event(&Event::ViolationEnded { pair, time_s: to_s, min_m })?;
+    }
+    Ok(())
 }

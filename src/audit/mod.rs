@@ -37,6 +37,8 @@ mod sweep;
 
 pub use outcome::{AuditError, AuditOutcome, Disagreement, ParryEvidence, Status, StepFinding, Violation};
 
+use nalgebra::Vector3;
+
 use crate::swarm::{ClosestApproach, Pair, Rows, row, separation};
 use candidates::{Candidates, pair_count};
 use judge::{Closest, Findings, Step};
@@ -72,6 +74,13 @@ pub struct Auditor {
     refused: u64,
     unresolved: u64,
     parry: ParryEvidence,
+}
+
+/// Smallest distance of two vehicles \[m\] while their relative position moves on a straight line from `from` to `to`
+/// \[m\].
+#[must_use]
+pub fn swept_separation_m(from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+    RelativeMotion::new(from, to).closest().squared.sqrt()
 }
 
 impl Auditor {
