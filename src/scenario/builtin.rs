@@ -1,0 +1,47 @@
+//! The scenarios that the program carries with it.
+
+/// A scenario embedded in the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Builtin {
+    /// Its name, as [`super::Source::resolve`] takes it.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub summary: &'static str,
+    /// Its file, comments included: what to copy for a scenario of one's own.
+    pub toml: &'static str,
+}
+
+const ALL: [Builtin; 4] = [
+    Builtin {
+        name: "pentagon",
+        summary: "five vehicles from a line to a pentagon under the edge-tension law: clear and reached",
+        toml: include_str!("../../assets/pentagon.toml"),
+    },
+    Builtin {
+        name: "circle",
+        summary: "six vehicles from a line to a circle under the edge-tension law: clear and reached",
+        toml: include_str!("../../assets/circle.toml"),
+    },
+    Builtin {
+        name: "pentagon-laplacian",
+        summary: "the pentagon's start under the Laplacian baseline, which avoids nothing: a violation",
+        toml: include_str!("../../assets/pentagon-laplacian.toml"),
+    },
+    Builtin {
+        name: "pentagon-collinear",
+        summary: "the pentagon from an exactly straight line, which no force leaves: clear but never reached",
+        toml: include_str!("../../assets/pentagon-collinear.toml"),
+    },
+];
+
+/// All built-in scenarios, the default first.
+#[must_use]
+pub fn all() -> &'static [Builtin] {
+    &ALL
+}
+
+/// The built-in scenario of this name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Builtin> {
+    ALL.iter().find(|builtin| builtin.name == name)
+}

@@ -1,0 +1,224 @@
+//! What is wrong with a scenario, where it stands and what to do about it.
+
+use std::fmt::{self, Write as _};
+use std::ops::Range;
+
+/// Widest excerpt of a line that an error shows \[characters\].
+const EXCERPT_CHARS: usize = 100;
+
+/// Why a scenario cannot be flown.
+///
+/// [`fmt::Display`] is the whole story in plain text: place, message, the offending line and the remedy. The parts are
+/// there for programs that render their own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenarioError {
+    message: String,
+    help: Option<String>,
+    field: Option<Field>,
+    place: Option<Box<Place>>,
+}
+
+/// A key of the scenario file, or one entry of the list that it holds. Shown as an override names it:
+/// `start.positions_m.2` is the position of vehicle 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Dotted path of the key, such as `time.dt_s`.
+    pub key: &'static str,
+    /// Entry of a list, from 0.
+    pub entry: Option<usize>,
+}
+
+/// Where in a text an error stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// What the text is called: a path, the name of a built-in scenario, or `--set` for an override.
+    pub source: String,
+    /// The whole text.
+    pub text: String,
+    /// The offending bytes of the text.
+    pub span: Range<usize>,
+    /// Line of the first offending byte, from 1.
+    pub line: usize,
+    /// Column of the first offending byte, from 1, in characters.
+    pub column: usize,
+}
+
+impl ScenarioError {
+    pub(super) fn new(message: impl AsRef<str>) -> Self {
+        Self { message: printable(message.as_ref()), help: None, field: None, place: None }
+    }
+
+    pub(super) fn with_help(mut self, help: impl AsRef<str>) -> Self {
+        self.help = Some(printable(help.as_ref()));
+        self
+    }
+
+    pub(super) fn at(mut self, key: &'static str) -> Self {
+        self.field = Some(Field { key, entry: None });
+        self
+    }
+
+    pub(super) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
+        self.field = Some(Field { key, entry: Some(entry) });
+        self
+    }
+
+    pub(super) fn with_place(mut self, place: Place) -> Self {
+        self.place = Some(Box::new(place));
+        self
+    }
+
+    /// What is wrong, in one sentence.
+    #[must_use]
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// What to do about it.
+    #[must_use]
+    pub fn help(&self) -> Option<&str> {
+        self.help.as_deref()
+    }
+
+    /// The key whose value is wrong, for a scenario that was read well but cannot be flown.
+    #[must_use]
+    pub fn field(&self) -> Option<Field> {
+        self.field
+    }
+
+    /// Where it stands in the text that it was read from. None for a scenario built in code, and for a file that
+    /// could not be read at all.
+    #[must_use]
+    pub fn place(&self) -> Option<&Place> {
+        self.place.as_deref()
+    }
+}
+
+impl std::error::Error for ScenarioError {}
+
+impl fmt::Display for ScenarioError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.place, &self.field) {
+            (Some(place), _) => {
+                writeln!(f, "{}:{}:{}: {}", printable(&place.source), place.line, place.column, self.message)?;
+                write!(f, "{}", place.excerpt())?;
+            }
+            (None, Some(field)) => write!(f, "{field}: {}", self.message)?,
+            (None, None) => f.write_str(&self.message)?,
+        }
+        self.help.as_ref().map_or(Ok(()), |help| write!(f, "\n  help: {help}"))
+    }
+}
+
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.key)?;
+        self.entry.map_or(Ok(()), |entry| write!(f, ".{}", entry + 1))
+    }
+}
+
+impl Place {
+    /// The place of a span of bytes in a text; a span beyond the text or within a character is moved to the nearest
+    /// boundary before it.
+    #[must_use]
+    pub fn new(source: &str, text: &str, span: Range<usize>) -> Self {
+        let start = floor_char_boundary(text, span.start);
+        let end = floor_char_boundary(text, span.end).max(start);
+        let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
+        Self {
+            source: source.to_owned(),
+            text: text.to_owned(),
+            span: start..end,
+            line: text[..start].bytes().filter(|&byte| byte == b'\n').count() + 1,
+            column: text[line_start..start].chars().count() + 1,
+        }
+    }
+
+    /// The offending line with carets below the offending part, cut to what fits a terminal.
+    fn excerpt(&self) -> String {
+        let line_start = self.text[..self.span.start].rfind('\n').map_or(0, |newline| newline + 1);
+        let line = self.text[line_start..].lines().next().unwrap_or_default();
+        let marked = self.text[self.span.clone()].lines().next().map_or(0, |part| part.chars().count()).max(1);
+        let before = self.column - 1;
+        let skipped =
+            if before + marked.min(EXCERPT_CHARS / 2) > EXCERPT_CHARS { before - EXCERPT_CHARS / 4 } else { 0 };
+        let shown: String =
+            line.chars().skip(skipped).take(EXCERPT_CHARS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+        let carets = marked.min((shown.chars().count() + skipped).saturating_sub(before).max(1));
+        let number = self.line.to_string();
+        let mut excerpt = String::new();
+        // Writing to a string cannot fail.
+        let _ = writeln!(excerpt, "  {number} | {shown}");
+        let _ = write!(
+            excerpt,
+            "  {:gutter$} | {:indent$}{:^<carets$}",
+            "",
+            "",
+            "",
+            gutter = number.len(),
+            indent = before - skipped
+        );
+        excerpt
+    }
+}
+
+/// The largest boundary between characters that is not beyond `index`.
+fn floor_char_boundary(text: &str, index: usize) -> usize {
+    (0..=index.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0)
+}
+
+/// The text with control characters escaped: what a file holds must not steer the terminal.
+fn printable(text: &str) -> String {
+    text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
+        if c.is_control() && c != '\n' {
+            out.extend(c.escape_default());
+        } else {
+            out.push(c);
+        }
+        out
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_shows_place_line_carets_and_remedy_in_plain_text() {
+        let text = "name = \"a\"\nside_m = 2.0\n";
+        let error =
+            ScenarioError::new("too small").with_help("enlarge it").with_place(Place::new("f.toml", text, 20..23));
+        assert_eq!(
+            error.to_string(),
+            "f.toml:2:10: too small\n  2 | side_m = 2.0\n    |          ^^^\n  help: enlarge it"
+        );
+    }
+
+    #[test]
+    fn without_a_text_the_key_is_the_place() {
+        let error = ScenarioError::new("is zero").at_entry("swarm.mass_kg", 1);
+        assert_eq!(error.to_string(), "swarm.mass_kg.2: is zero");
+    }
+
+    #[test]
+    fn a_very_long_line_is_cut_around_the_offending_part() {
+        let text = format!("{}BAD{}", "x".repeat(5000), "y".repeat(5000));
+        let shown = ScenarioError::new("m").with_place(Place::new("f", &text, 5000..5003)).to_string();
+        assert!(shown.lines().all(|line| line.len() < 120), "{shown}");
+        let [_, excerpt, carets] = shown.lines().collect::<Vec<_>>()[..] else { panic!("{shown}") };
+        assert_eq!(&excerpt[carets.find('^').unwrap_or(0)..][..3], "BAD");
+        assert!(carets.ends_with("^^^"));
+    }
+
+    #[test]
+    fn control_characters_of_the_input_do_not_reach_the_terminal() {
+        let error = ScenarioError::new("key \u{1b}[2J").with_place(Place::new("f", "\u{1b}[2J", 0..1));
+        assert!(!error.to_string().contains('\u{1b}'));
+    }
+
+    #[test]
+    fn a_span_outside_the_text_or_within_a_character_is_moved_into_it() {
+        assert_eq!(Place::new("f", "aä", 2..99).span, 1..3);
+        assert_eq!(Place::new("f", "", 7..9).span, 0..0);
+    }
+}

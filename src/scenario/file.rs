@@ -1,0 +1,440 @@
+//! The scenario file: its keys, units and defaults as serde types, and the JSON Schema made from them.
+//!
+//! A table whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all
+//! choices. TOML writes both in one flat table; [`super::document`] moves the keys of a choice below it before serde
+//! sees them, so a key of another choice is refused at its own place.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::de::{SeqAccess, Visitor, value::SeqAccessDeserializer};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::{JudgeSpec, TimeSpec};
+
+/// Default mass of a vehicle \[kg\].
+pub const DEFAULT_MASS_KG: f64 = 1.0;
+/// Default radius of a vehicle's solid hull \[m\].
+pub const DEFAULT_HULL_RADIUS_M: f64 = 0.25;
+/// Default scale of the edge tension \[m^2/s^2\].
+pub const DEFAULT_ALPHA: f64 = 1.0;
+/// Default position gain of the Laplacian law \[1/s^2\].
+pub const DEFAULT_F1_PER_S2: f64 = 1.0;
+
+/// Tables whose remaining keys belong to a choice: table, key of the choice, keys common to all choices.
+pub(super) const CHOICES: [(&str, &str, &[&str]); 4] = [
+    ("start", "shape", &["positions_m", "velocities_m_s", "jitter_m", "seed"]),
+    ("formation", "shape", &[]),
+    ("law", "kind", &["delta_m"]),
+    ("graph", "kind", &[]),
+];
+
+/// The JSON Schema of the scenario file, with descriptions, units and defaults.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(ScenarioFile).to_value()
+}
+
+/// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
+/// entries of every list, are counted from 1.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "tautline scenario")]
+pub(super) struct ScenarioFile {
+    /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`.
+    #[schemars(length(min = 1, max = 64), pattern("^[A-Za-z0-9_-]+$"))]
+    pub(super) name: String,
+    /// The vehicles.
+    #[serde(default)]
+    pub(super) swarm: SwarmFile,
+    /// Where they start.
+    pub(super) start: StartFile,
+    /// The slots that they shall reach.
+    pub(super) formation: FormationFile,
+    /// The control law.
+    pub(super) law: LawFile,
+    /// Which vehicles sense each other: all of them unless given.
+    #[serde(default)]
+    pub(super) graph: GraphFile,
+    /// The bodies that carry out the commands.
+    #[serde(default)]
+    pub(super) plant: PlantFile,
+    /// Duration and rates.
+    pub(super) time: TimeFile,
+    /// What counts as a reached formation.
+    #[serde(default)]
+    pub(super) judge: JudgeFile,
+}
+
+/// The vehicles.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct SwarmFile {
+    /// Number of vehicles N. Needed where neither the start nor the formation lists points; checked against them
+    /// where they do.
+    #[schemars(range(min = 2))]
+    pub(super) count: Option<u64>,
+    /// Mass \[kg\]: one number for all vehicles or a list with one for each.
+    pub(super) mass_kg: PerVehicle,
+    /// Radius of the solid hull \[m\], for all vehicles or for each. The hulls of any two vehicles must fit within
+    /// `law.delta_m`.
+    pub(super) hull_radius_m: PerVehicle,
+    /// Velocity coefficient a22 of p'' = a22 v + u \[1/s\]: negative is drag, positive feeds energy in.
+    pub(super) a22_per_s: f64,
+    /// 2 keeps the swarm in the plane z = 0, 3 lets it use all axes. Without it: 2 when every position, velocity and
+    /// slot has z = 0, otherwise 3.
+    #[schemars(range(min = 2, max = 3))]
+    pub(super) dimensions: Option<u8>,
+}
+
+/// Where the vehicles start: `positions_m`, or a `shape` with its parameters.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StartFile {
+    /// Position of each vehicle \[m\].
+    pub(super) positions_m: Option<Vec<Point>>,
+    /// Velocity of each vehicle \[m/s\]; at rest unless given.
+    pub(super) velocities_m_s: Option<Vec<Point>>,
+    /// Largest random offset along each axis \[m\], uniform, added to every position. Along z only in three
+    /// dimensions.
+    #[serde(default)]
+    pub(super) jitter_m: f64,
+    /// Seed of the random numbers (ChaCha8, the same on every machine).
+    #[serde(default)]
+    pub(super) seed: u64,
+    #[schemars(flatten)]
+    pub(super) shape: Option<StartShape>,
+}
+
+/// A start without a list of positions.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(tag = "shape")]
+pub(super) enum StartShape {
+    /// Vehicles 1, 2, ... along x.
+    Line {
+        /// Distance between neighbours \[m\].
+        spacing_m: f64,
+    },
+    /// A near-square grid in the plane z = 0, row by row.
+    Grid {
+        /// Distance between neighbours \[m\].
+        spacing_m: f64,
+    },
+    /// A circle in the plane z = 0.
+    Circle {
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// Points spread evenly over a sphere.
+    Sphere {
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// Uniformly random positions in a square, or in a cube in three dimensions, that keep a distance.
+    Random {
+        /// Half the side of the square or cube around the origin \[m\].
+        half_extent_m: f64,
+        /// Smallest distance between two vehicles \[m\]: more than `law.delta_m`.
+        min_separation_m: f64,
+    },
+}
+
+/// The slots of the formation. Laws that control distances reach it up to rotation, reflection and translation.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FormationFile {
+    #[schemars(flatten)]
+    pub(super) shape: FormationShape,
+}
+
+/// A formation and its size.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(tag = "shape")]
+pub(super) enum FormationShape {
+    /// Five slots: the corners of a house of side d, (0,0) (d,0) (d/2, sqrt3 d/2) (0, sqrt3 d) (d, sqrt3 d).
+    Pentagon {
+        /// Side d \[m\].
+        side_m: f64,
+    },
+    /// Equal angles on a circle in the plane z = 0.
+    Circle {
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// Along x.
+    Line {
+        /// Distance between neighbours \[m\].
+        spacing_m: f64,
+    },
+    /// A near-square grid in the plane z = 0, row by row.
+    Grid {
+        /// Distance between neighbours \[m\].
+        spacing_m: f64,
+    },
+    /// Points spread evenly over a sphere.
+    Sphere {
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// A list of slots.
+    Points {
+        /// Slot of each vehicle \[m\].
+        points_m: Vec<Point>,
+    },
+}
+
+/// The control law and the safety distance.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LawFile {
+    /// Safety distance delta \[m\]: every flight is judged by it, whatever the law.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) delta_m: f64,
+    #[schemars(flatten)]
+    pub(super) kind: LawKind,
+}
+
+/// A control law and its parameters.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(tag = "kind")]
+pub(super) enum LawKind {
+    /// Distances as springs with a barrier at delta: collision-free on the complete graph.
+    EdgeTension {
+        /// Scale of the tension \[m^2/s^2\].
+        #[serde(default = "default_alpha")]
+        alpha: f64,
+    },
+    /// The Laplacian baseline: converges from every start and avoids nothing.
+    Laplacian {
+        /// Gain on positions \[1/s^2\].
+        #[serde(default = "default_f1_per_s2")]
+        f1_per_s2: f64,
+        /// Gain on velocities \[1/s\]; 1 + `swarm.a22_per_s` unless given.
+        f2_per_s: Option<f64>,
+    },
+}
+
+/// Which vehicles sense each other.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GraphFile {
+    #[schemars(flatten)]
+    pub(super) kind: GraphKind,
+}
+
+/// An undirected, connected graph.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(tag = "kind")]
+pub(super) enum GraphKind {
+    /// Every pair.
+    Complete {},
+    /// Vehicle 1 with every other.
+    Star {},
+    /// Each vehicle with the next, and the last with the first.
+    Ring {},
+    /// Each vehicle with the next.
+    Path {},
+    /// A list of pairs.
+    Edges {
+        /// Pairs of vehicles, counted from 1.
+        edges: Vec<Edge>,
+    },
+}
+
+/// The bodies that carry out the commands.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct PlantFile {
+    /// The engine.
+    pub(super) kind: PlantKind,
+    /// Floating-point precision of the engine: 32 or 64 bits.
+    pub(super) precision: PrecisionFile,
+}
+
+/// A plant.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum PlantKind {
+    /// Rapier rigid bodies.
+    #[default]
+    Rapier,
+}
+
+/// Floating-point precision.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum PrecisionFile {
+    /// 32 bits.
+    #[default]
+    Single,
+    /// 64 bits.
+    Double,
+}
+
+/// Duration and rates.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TimeFile {
+    /// Length of the flight \[s\].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) duration_s: f64,
+    /// Control and physics step \[s\].
+    #[serde(default = "default_dt_s")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) dt_s: f64,
+    /// Samples recorded per second of flight \[Hz\], at most one a step.
+    #[serde(default = "default_record_hz")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) record_hz: f64,
+    /// How often a step that takes more than half of a clearance may be halved; 0 takes every step as it is.
+    #[serde(default = "default_max_halvings")]
+    pub(super) max_halvings: u32,
+}
+
+/// What counts as a reached formation: both limits hold to the end of the flight, and at least for `hold_s`.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct JudgeFile {
+    /// Largest error of a desired distance over the edges of the graph \[m\].
+    pub(super) edge_error_m: f64,
+    /// Largest speed relative to the swarm's mean velocity \[m/s\].
+    pub(super) disagreement_m_s: f64,
+    /// Shortest time for which both must hold \[s\].
+    pub(super) hold_s: f64,
+}
+
+/// One number for all vehicles or a list with one for each.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum PerVehicle {
+    /// The same for all.
+    All(f64),
+    /// One for each.
+    Each(Vec<f64>),
+}
+
+/// \[x, y\] or \[x, y, z\].
+#[derive(Clone, Copy, Debug, JsonSchema)]
+#[schemars(transparent)]
+pub(super) struct Point(#[schemars(with = "Vec<f64>", length(min = 2, max = 3))] pub(super) [f64; 3]);
+
+/// Two vehicles, counted from 1.
+#[derive(Clone, Copy, Debug, JsonSchema)]
+#[schemars(transparent)]
+pub(super) struct Edge(pub(super) [u64; 2]);
+
+impl Default for SwarmFile {
+    fn default() -> Self {
+        Self {
+            count: None,
+            mass_kg: PerVehicle::All(DEFAULT_MASS_KG),
+            hull_radius_m: PerVehicle::All(DEFAULT_HULL_RADIUS_M),
+            a22_per_s: 0.0,
+            dimensions: None,
+        }
+    }
+}
+
+impl Default for GraphFile {
+    fn default() -> Self {
+        Self { kind: GraphKind::Complete {} }
+    }
+}
+
+impl Default for JudgeFile {
+    fn default() -> Self {
+        let JudgeSpec { edge_error_m, disagreement_m_s, hold_s } = JudgeSpec::default();
+        Self { edge_error_m, disagreement_m_s, hold_s }
+    }
+}
+
+fn default_alpha() -> f64 {
+    DEFAULT_ALPHA
+}
+
+fn default_f1_per_s2() -> f64 {
+    DEFAULT_F1_PER_S2
+}
+
+fn default_dt_s() -> f64 {
+    TimeSpec::DEFAULT_DT_S
+}
+
+fn default_record_hz() -> f64 {
+    TimeSpec::DEFAULT_RECORD_HZ
+}
+
+fn default_max_halvings() -> u32 {
+    TimeSpec::DEFAULT_MAX_HALVINGS
+}
+
+impl<'de> Deserialize<'de> for PerVehicle {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct PerVehicleVisitor;
+
+        impl<'de> Visitor<'de> for PerVehicleVisitor {
+            type Value = PerVehicle;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, or a list with a number for each vehicle")
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<PerVehicle, E> {
+                Ok(PerVehicle::All(number))
+            }
+
+            fn visit_i64<E>(self, number: i64) -> Result<PerVehicle, E> {
+                Ok(PerVehicle::All(number as f64))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<PerVehicle, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(list)).map(PerVehicle::Each)
+            }
+        }
+
+        deserializer.deserialize_any(PerVehicleVisitor)
+    }
+}
+
+impl<'de> Deserialize<'de> for Point {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer
+            .deserialize_seq(ShortList { expected: "a point: [x, y] or [x, y, z]", numbers: [0.0; 3] })
+            .map(Self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Edge {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(ShortList { expected: "an edge: two vehicle numbers", numbers: [0; 2] }).map(Self)
+    }
+}
+
+/// Reads a list of 2 to `N` numbers; those that are not there keep their value.
+struct ShortList<T, const N: usize> {
+    expected: &'static str,
+    numbers: [T; N],
+}
+
+impl<'de, T: Deserialize<'de>, const N: usize> Visitor<'de> for ShortList<T, N> {
+    type Value = [T; N];
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.expected)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<Self::Value, A::Error> {
+        let mut length = 0;
+        while let Some(number) = list.next_element()? {
+            if let Some(slot) = self.numbers.get_mut(length) {
+                *slot = number;
+            }
+            length += 1;
+        }
+        if (2..=N).contains(&length) { Ok(self.numbers) } else { Err(serde::de::Error::invalid_length(length, &self)) }
+    }
+}

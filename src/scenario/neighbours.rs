@@ -1,0 +1,90 @@
+//! Points that keep a distance from each other.
+
+use std::collections::HashMap;
+
+use nalgebra::Vector3;
+
+/// A set of points of which no two are within a distance of each other. Inserting takes constant time.
+///
+/// Points lie in cubic cells of twice the distance, so whatever is within the distance of a point is in its cell or in
+/// one that touches it, rounding of the cell's number included; and a cell holds few points, because they keep their
+/// distance.
+pub(super) struct Spaced {
+    distance_m: f64,
+    cells: HashMap<[i64; 3], Vec<(usize, Vector3<f64>)>>,
+    count: usize,
+}
+
+impl Spaced {
+    /// No points yet; `distance_m` must be positive.
+    pub(super) fn new(distance_m: f64) -> Self {
+        Self { distance_m, cells: HashMap::new(), count: 0 }
+    }
+
+    /// Adds a point, unless one of those before it (numbered from 0 in order of insertion; the lowest is named) is at
+    /// the distance or nearer: then that one and its separation are the error.
+    pub(super) fn insert(&mut self, point: Vector3<f64>) -> Result<(), (usize, f64)> {
+        let cell = self.cell(point);
+        let mut nearest: Option<(usize, f64)> = None;
+        for dx in -1..=1 {
+            for dy in -1..=1 {
+                for dz in -1..=1 {
+                    let neighbour = [cell[0] + dx, cell[1] + dy, cell[2] + dz];
+                    for &(other, position) in self.cells.get(&neighbour).into_iter().flatten() {
+                        let separation_m = (point - position).norm();
+                        if separation_m <= self.distance_m && nearest.is_none_or(|(lowest, _)| other < lowest) {
+                            nearest = Some((other, separation_m));
+                        }
+                    }
+                }
+            }
+        }
+        if let Some(near) = nearest {
+            return Err(near);
+        }
+        self.cells.entry(cell).or_default().push((self.count, point));
+        self.count += 1;
+        Ok(())
+    }
+
+    /// The cell of a point; coordinates beyond 2^62 cells share the last one.
+    fn cell(&self, point: Vector3<f64>) -> [i64; 3] {
+        const LAST: f64 = (1_i64 << 62) as f64;
+        #[expect(clippy::cast_possible_truncation, reason = "clamped to what an i64 holds")]
+        let number = |x: f64| (x / (2.0 * self.distance_m)).floor().clamp(-LAST, LAST) as i64;
+        [number(point.x), number(point.y), number(point.z)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn a_point_at_exactly_the_distance_is_too_near_and_one_beyond_is_not() {
+        let mut spaced = Spaced::new(2.0);
+        assert_eq!(spaced.insert(Vector3::zeros()), Ok(()));
+        assert_eq!(spaced.insert(Vector3::new(2.0, 0.0, 0.0)), Err((0, 2.0)));
+        assert_eq!(spaced.insert(Vector3::new(2.0_f64.next_up(), 0.0, 0.0)), Ok(()));
+    }
+
+    proptest! {
+        #[test]
+        fn cells_find_what_comparing_all_pairs_finds(
+            points in prop::collection::vec([-3.0..3.0, -3.0..3.0, -0.5..0.5], 1..40),
+            distance_m in 0.05..1.5,
+            far in prop::sample::select(vec![0.0, 1e3, -1e9]),
+        ) {
+            let points: Vec<_> = points.iter().map(|&[x, y, z]| Vector3::new(x + far, y, z)).collect();
+            let mut spaced = Spaced::new(distance_m);
+            let found = points.iter().enumerate().find_map(|(j, &p)| spaced.insert(p).err().map(|(i, l)| (i, j, l)));
+            let expected = points.iter().enumerate().find_map(|(j, &p)| {
+                let near = |&i: &usize| (p - points[i]).norm() <= distance_m;
+                (0..j).find(near).map(|i| (i, j, (p - points[i]).norm()))
+            });
+            prop_assert_eq!(found, expected);
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Where a scenario comes from.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::document::{Document, suggest};
+use super::error::{Place, ScenarioError};
+use super::{Override, Scenario, build, builtin};
+
+/// Largest scenario file that is read \[bytes\]. The longest scenario that can be flown, a million vehicles with a
+/// position, a velocity and a slot each, takes about 200 MB.
+pub const MAX_FILE_BYTES: u64 = 256 << 20;
+
+/// Where the text of a scenario comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A built-in scenario, by name.
+    Builtin(String),
+    /// A TOML file.
+    File(PathBuf),
+    /// TOML in memory.
+    Text {
+        /// What to call it in messages.
+        name: String,
+        /// The TOML.
+        text: String,
+    },
+}
+
+impl Source {
+    /// The built-in scenario of this name, or else the file at this path.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] when it is neither: a word without `.` or a separator of paths, and no such file.
+    pub fn resolve(name_or_path: &str) -> Result<Self, ScenarioError> {
+        if builtin::find(name_or_path).is_some() {
+            return Ok(Self::Builtin(name_or_path.to_owned()));
+        }
+        let path = Path::new(name_or_path);
+        if name_or_path.contains(['/', '\\', '.']) || path.exists() {
+            return Ok(Self::File(path.to_owned()));
+        }
+        Err(unknown_builtin(name_or_path))
+    }
+
+    /// What it is called and its text.
+    fn text(&self) -> Result<(String, String), ScenarioError> {
+        match self {
+            Self::Builtin(name) => {
+                builtin::find(name).map(|b| (b.name.to_owned(), b.toml.to_owned())).ok_or_else(|| unknown_builtin(name))
+            }
+            Self::Text { name, text } => Ok((name.clone(), text.clone())),
+            Self::File(path) => Ok((path.display().to_string(), read_file(path)?)),
+        }
+    }
+}
+
+impl Scenario {
+    /// Reads, completes and checks a scenario.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] when the source cannot be read, is not TOML, has a key that is unknown, missing or of the
+    /// wrong type, or says something that cannot be flown (see [`Scenario::validate`]). It names the place, in the
+    /// text or in an override.
+    pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
+        let (name, text) = source.text()?;
+        let document = Document { name: &name, text: &text, overrides };
+        let scenario = build::scenario(document.decode()?).map_err(|error| document.place(error))?;
+        scenario.validate().map_err(|error| document.place(error))?;
+        Ok(scenario)
+    }
+}
+
+fn unknown_builtin(name: &str) -> ScenarioError {
+    let names: Vec<String> = builtin::all().iter().map(|builtin| builtin.name.to_owned()).collect();
+    ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file")).with_help(suggest(name, &names))
+}
+
+/// The text of a file that is small enough and UTF-8.
+fn read_file(path: &Path) -> Result<String, ScenarioError> {
+    let shown = path.display();
+    let cannot = |error: std::io::Error| {
+        ScenarioError::new(format!("cannot read {shown}: {error}"))
+            .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
+    };
+    let too_large = || {
+        ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
+            .with_help("no scenario is that long: is it the right file?")
+    };
+    let metadata = std::fs::metadata(path).map_err(cannot)?;
+    if metadata.is_dir() {
+        return Err(ScenarioError::new(format!("{shown} is a directory"))
+            .with_help("give the path of a scenario file within it"));
+    }
+    if metadata.len() > MAX_FILE_BYTES {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::new();
+    // A device or a pipe does not say how long it is.
+    File::open(path).map_err(cannot)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(cannot)?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        return Err(too_large());
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = error.utf8_error().valid_up_to();
+        let bytes = error.into_bytes();
+        let text = String::from_utf8_lossy(&bytes[..bytes.len().min(valid + 64)]);
+        ScenarioError::new(format!("byte {valid} (from 0) is not UTF-8"))
+            .with_help("save the file as UTF-8 text")
+            .with_place(Place::new(&shown.to_string(), &text, valid..valid + '\u{fffd}'.len_utf8()))
+    })
+}

@@ -1,0 +1,360 @@
+//! What a scenario must be for it to be flown.
+
+use std::fmt::Display;
+
+use super::error::ScenarioError;
+use super::neighbours::Spaced;
+use super::{LawSpec, Scenario, Space, TimeSpec};
+use crate::graph::Graph;
+use crate::swarm::{Pair, Rows, row};
+
+/// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such
+/// numbers stay finite in single precision too.
+pub const LARGEST: f64 = 1e9;
+
+/// Smallest magnitude of a number that must be positive, in SI units. Squares of such numbers are normal numbers in
+/// single precision too.
+pub const SMALLEST: f64 = 1e-9;
+
+/// Most steps of a flight. Up to here the product of step number, step and recording rate is known to better than the
+/// 1e-6 that decides whether a step is recorded ([`TimeSpec::records`]); at a microsecond a step it takes 17 minutes.
+pub const MAX_STEPS: f64 = 1e9;
+
+/// Most halvings of a step: 2^-30 of it is below a nanosecond for every step of less than a second.
+pub const MAX_HALVINGS: u32 = 30;
+
+/// Longest name \[characters\].
+pub const MAX_NAME_CHARS: usize = 64;
+
+/// Memory that a flight may be expected to take \[bytes\].
+pub const MAX_MEMORY_BYTES: u128 = 8 << 30;
+
+/// Memory expected for a vehicle: state, rigid body, two colliders and their places in the engine's and the audit's
+/// bounding volumes \[bytes\].
+pub const BYTES_PER_VEHICLE: u128 = 4096;
+
+/// Memory expected for an edge: its parameters in the law and its place in the graph \[bytes\].
+pub const BYTES_PER_EDGE: u128 = 16;
+
+/// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
+/// step.
+const SLOT_MARGIN: f64 = 1e-9;
+
+/// Vehicles that a message names before it counts the rest.
+const NAMED_VEHICLES: usize = 8;
+
+impl Scenario {
+    /// Checks that the scenario can be flown. [`Scenario::read`] has done so; a scenario built or changed in code is
+    /// to be checked before it is flown.
+    ///
+    /// What holds afterwards: at least two vehicles, and one row or entry for each everywhere; expected memory, steps
+    /// and magnitudes within [`MAX_MEMORY_BYTES`], [`MAX_STEPS`], [`SMALLEST`] and [`LARGEST`]; all numbers finite;
+    /// every two starts and every two slots more than delta apart; any two hulls fit within delta; the graph
+    /// connected; z = 0 everywhere in the plane.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for the first that does not hold, with the key that says so and the remedy, and without a
+    /// place in a text.
+    pub fn validate(&self) -> Result<(), ScenarioError> {
+        check_name(&self.name)?;
+        check_count(self.count())?;
+        self.check_lengths()?;
+        check_memory(self.count(), self.graph.edge_count() as u128)?;
+        self.check_law()?;
+        self.check_vehicles()?;
+        self.check_motion()?;
+        self.check_separations()?;
+        self.check_hulls()?;
+        check_connected(&self.graph)?;
+        self.check_time()?;
+        let judge = self.judge;
+        positive("judge.edge_error_m", "the edge error", judge.edge_error_m)?;
+        positive("judge.disagreement_m_s", "the disagreement", judge.disagreement_m_s)?;
+        at_least_zero("judge.hold_s", "the hold time", judge.hold_s)
+    }
+
+    fn check_lengths(&self) -> Result<(), ScenarioError> {
+        let count = self.count();
+        let lengths = [
+            ("start.velocities_m_s", "start velocities", self.start.velocities_m_s.nrows()),
+            ("formation.points_m", "slots in the formation", self.formation.count()),
+            ("swarm.mass_kg", "masses", self.mass_kg.len()),
+            ("swarm.hull_radius_m", "hull radii", self.hull_radius_m.len()),
+            ("graph.edges", "vehicles in the graph", self.graph.count()),
+        ];
+        match lengths.into_iter().find(|&(.., length)| length != count) {
+            Some((key, what, length)) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
+                .with_help("there must be one for each start position")
+                .at(key)),
+            None => Ok(()),
+        }
+    }
+
+    fn check_law(&self) -> Result<(), ScenarioError> {
+        positive("law.delta_m", "the safety distance delta", self.delta_m)?;
+        match self.law {
+            LawSpec::EdgeTension { alpha } => positive("law.alpha", "alpha", alpha).map(drop),
+            LawSpec::Laplacian { f1_per_s2, f2_per_s } => {
+                positive("law.f1_per_s2", "the gain f1", f1_per_s2)?;
+                at_least_zero("law.f2_per_s", "the gain f2", f2_per_s)
+            }
+        }
+    }
+
+    fn check_vehicles(&self) -> Result<(), ScenarioError> {
+        for (i, &mass_kg) in self.mass_kg.iter().enumerate() {
+            require_positive(format_args!("the mass of vehicle {}", i + 1), mass_kg)
+                .map_err(|error| error.at_entry("swarm.mass_kg", i))?;
+        }
+        for (i, &radius_m) in self.hull_radius_m.iter().enumerate() {
+            require_positive(format_args!("the hull radius of vehicle {}", i + 1), radius_m)
+                .map_err(|error| error.at_entry("swarm.hull_radius_m", i))?;
+        }
+        Ok(())
+    }
+
+    fn check_motion(&self) -> Result<(), ScenarioError> {
+        require_finite("a22", self.a22_per_s).map_err(|error| error.at("swarm.a22_per_s"))?;
+        let tables = [
+            ("start.positions_m", "the start position", &self.start.positions_m),
+            ("start.velocities_m_s", "the start velocity", &self.start.velocities_m_s),
+            ("formation.points_m", "the slot", &self.formation.slots_m),
+        ];
+        for (key, what, rows) in tables {
+            for i in 0..rows.nrows() {
+                for axis in 0..3 {
+                    let name = ["x", "y", "z"][axis];
+                    require_finite(format_args!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
+                        .map_err(|error| error.at_entry(key, i))?;
+                }
+                if self.space == Space::Plane && rows[(i, 2)] != 0.0 {
+                    let z = rows[(i, 2)];
+                    return Err(ScenarioError::new(format!(
+                        "z of {what} of vehicle {} is {z}, but the swarm lives in the plane z = 0",
+                        i + 1
+                    ))
+                    .with_help("set z to 0, or swarm.dimensions to 3")
+                    .at_entry(key, i));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_separations(&self) -> Result<(), ScenarioError> {
+        let delta_m = self.delta_m;
+        if let Some((pair, separation_m)) = first_within(&self.start.positions_m, delta_m) {
+            let said = if separation_m == 0.0 {
+                format!("vehicles {pair} start at the same point")
+            } else {
+                format!("vehicles {pair} start {separation_m} m apart, not more than delta = {delta_m} m")
+            };
+            return Err(ScenarioError::new(said)
+                .with_help(format!("move one of them away, or reduce law.delta_m below {separation_m}"))
+                .at_entry("start.positions_m", pair.second()));
+        }
+        if let Some((pair, distance_m)) = first_within(&self.formation.slots_m, delta_m * (1.0 + SLOT_MARGIN)) {
+            let [a, b] = pair.numbers();
+            let said = if distance_m == 0.0 {
+                format!("the slots of vehicles {a} and {b} are the same point")
+            } else if distance_m <= delta_m {
+                format!("a desired distance of {distance_m} m (vehicles {pair}) is not more than delta = {delta_m} m")
+            } else {
+                format!(
+                    "a desired distance of {distance_m} m (vehicles {pair}) exceeds delta = {delta_m} m by less than a \
+                     billionth of it"
+                )
+            };
+            return Err(ScenarioError::new(said)
+                .with_help("enlarge the formation, or reduce law.delta_m: slots must be more than delta apart")
+                .at_entry("formation.points_m", pair.second()));
+        }
+        Ok(())
+    }
+
+    fn check_hulls(&self) -> Result<(), ScenarioError> {
+        let mut order: Vec<usize> = (0..self.count()).collect();
+        order.sort_by(|&i, &j| self.hull_radius_m[j].total_cmp(&self.hull_radius_m[i]));
+        let &[i, j, ..] = &order[..] else { return Ok(()) };
+        let touching_m = self.hull_radius_m[i] + self.hull_radius_m[j];
+        if touching_m <= self.delta_m {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!(
+            "the hulls of vehicles {} touch at {touching_m} m, before the safety distance delta = {} m",
+            Pair::new(i, j),
+            self.delta_m
+        ))
+        .with_help(format!("set swarm.hull_radius_m to at most {}, or enlarge law.delta_m", self.delta_m / 2.0))
+        .at_entry("swarm.hull_radius_m", i))
+    }
+
+    fn check_time(&self) -> Result<(), ScenarioError> {
+        let TimeSpec { duration_s, dt_s, record_hz, max_halvings } = self.time;
+        positive("time.dt_s", "the time step", dt_s)?;
+        require_more_than_zero("the duration", duration_s).map_err(|error| error.at("time.duration_s"))?;
+        if dt_s > duration_s {
+            return Err(ScenarioError::new(format!(
+                "one step of {dt_s} s is longer than the flight of {duration_s} s"
+            ))
+            .with_help("enlarge time.duration_s or reduce time.dt_s")
+            .at("time.duration_s"));
+        }
+        let steps = duration_s / dt_s;
+        if steps > MAX_STEPS {
+            return Err(ScenarioError::new(format!(
+                "{duration_s} s in steps of {dt_s} s are {steps:.2e} steps; at most {MAX_STEPS:e} are flown"
+            ))
+            .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
+            .at("time.duration_s"));
+        }
+        if self.a22_per_s.abs() * dt_s > 1.0 {
+            return Err(ScenarioError::new(format!(
+                "one step of {dt_s} s is longer than the time 1/|a22| = {} s in which velocities change by themselves",
+                1.0 / self.a22_per_s.abs()
+            ))
+            .with_help("reduce time.dt_s or swarm.a22_per_s")
+            .at("swarm.a22_per_s"));
+        }
+        positive("time.record_hz", "the recording rate", record_hz)?;
+        if max_halvings > MAX_HALVINGS {
+            return Err(ScenarioError::new(format!(
+                "a step is halved at most {MAX_HALVINGS} times, not {max_halvings}"
+            ))
+            .with_help("the default is 10")
+            .at("time.max_halvings"));
+        }
+        Ok(())
+    }
+}
+
+fn check_name(name: &str) -> Result<(), ScenarioError> {
+    let said = if name.is_empty() {
+        "the name is empty".to_owned()
+    } else if name.chars().count() > MAX_NAME_CHARS {
+        format!("the name has more than {MAX_NAME_CHARS} characters")
+    } else if let Some(bad) = name.chars().find(|&c| !(c.is_ascii_alphanumeric() || c == '-' || c == '_')) {
+        format!("the name holds {bad:?}")
+    } else {
+        return Ok(());
+    };
+    Err(ScenarioError::new(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
+}
+
+/// Refuses a swarm in which nothing can be kept apart.
+pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
+    if count >= 2 {
+        return Ok(());
+    }
+    let vehicles = if count == 1 { "vehicle" } else { "vehicles" };
+    Err(ScenarioError::new(format!("{count} {vehicles} cannot form a formation"))
+        .with_help("a swarm has at least 2 vehicles")
+        .at("swarm.count"))
+}
+
+/// Refuses a swarm that would take more memory than [`MAX_MEMORY_BYTES`].
+pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioError> {
+    let bytes = count as u128 * BYTES_PER_VEHICLE + edges * BYTES_PER_EDGE;
+    if bytes <= MAX_MEMORY_BYTES {
+        return Ok(());
+    }
+    const GIB: f64 = (1_u64 << 30) as f64;
+    Err(ScenarioError::new(format!(
+        "{count} vehicles with {edges} edges would take {:.1} GiB of memory ({BYTES_PER_VEHICLE} bytes a vehicle, \
+         {BYTES_PER_EDGE} bytes an edge); at most {} GiB are used",
+        bytes as f64 / GIB,
+        MAX_MEMORY_BYTES >> 30
+    ))
+    .with_help("fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"")
+    .at("swarm.count"))
+}
+
+/// Number of pairs of `count` vehicles.
+pub(super) fn pair_count(count: usize) -> u128 {
+    let count = count as u128;
+    count * count.saturating_sub(1) / 2
+}
+
+/// The first vehicle, and the first before it, that are at most `distance_m` apart.
+fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
+    let mut spaced = Spaced::new(distance_m);
+    (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
+}
+
+/// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
+fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
+    if graph.is_connected() {
+        return Ok(());
+    }
+    let mut neighbours = vec![Vec::new(); graph.count()];
+    for (i, j) in graph.edges() {
+        neighbours[i].push(j);
+        neighbours[j].push(i);
+    }
+    let mut reached = vec![false; graph.count()];
+    reached[0] = true;
+    let mut open = vec![0];
+    while let Some(i) = open.pop() {
+        for &j in &neighbours[i] {
+            if !std::mem::replace(&mut reached[j], true) {
+                open.push(j);
+            }
+        }
+    }
+    let apart: Vec<String> =
+        (0..graph.count()).filter(|&i| !reached[i]).map(|i| (i + 1).to_string()).take(NAMED_VEHICLES + 1).collect();
+    let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
+    let named = apart[..apart.len().min(NAMED_VEHICLES)].join(", ");
+    Err(ScenarioError::new(format!("the graph is not connected: no path joins vehicle 1 to {named}{more}"))
+        .with_help("add edges until every vehicle can be reached from every other")
+        .at("graph.edges"))
+}
+
+/// The number, if it is positive and within the limits.
+pub(super) fn positive(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
+    require_positive(what, number).map_err(|error| error.at(key))
+}
+
+fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<(), ScenarioError> {
+    require_finite(what, number)
+        .and_then(|number| {
+            if number >= 0.0 {
+                Ok(())
+            } else {
+                Err(ScenarioError::new(format!("{what} is {number}")).with_help("it must be at least 0"))
+            }
+        })
+        .map_err(|error| error.at(key))
+}
+
+fn require_positive(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
+    require_finite(&what, number)?;
+    require_more_than_zero(&what, number)?;
+    if number < SMALLEST {
+        return Err(ScenarioError::new(format!("{what} is {number:e}, too small to compute with"))
+            .with_help(format!("the least is {SMALLEST:e}")));
+    }
+    Ok(number)
+}
+
+fn require_more_than_zero(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
+    if number > 0.0 && number.is_finite() {
+        return Ok(number);
+    }
+    let shown = if number.is_nan() { "not a number".to_owned() } else { number.to_string() };
+    Err(ScenarioError::new(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
+}
+
+fn require_finite(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
+    if number.abs() <= LARGEST {
+        return Ok(number);
+    }
+    let (shown, help) = if number.is_nan() {
+        ("not a number".to_owned(), "give a number".to_owned())
+    } else if number.is_infinite() {
+        ("infinite".to_owned(), "give a finite number".to_owned())
+    } else {
+        (format!("{number:e}, too large to compute with"), format!("the most is {LARGEST:e} in either direction"))
+    };
+    Err(ScenarioError::new(format!("{what} is {shown}")).with_help(help))
+}
