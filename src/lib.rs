@@ -1,6 +1,42 @@
 //! tautline flies a swarm into formation inside a rigid-body engine and proves that nothing touched.
+//!
+//! A control law steers N vehicles into a formation; vehicles are rigid bodies in Rapier; an independent judge sweeps
+//! every step of every pair and says whether any two came closer than a safety distance delta. Data flows one way:
+//!
+//! ```text
+//! scenario -> sim ( sense -> law -> actuate -> plant -> observe ) -> record -> audit / metrics -> report
+//! ```
+//!
+//! # Fly a scenario
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use tautline::scenario::{Override, Scenario, Source};
+//! use tautline::{audit, plant, sim};
+//!
+//! let shorter = Override::parse("time.duration_s=5")?;
+//! let scenario = Scenario::read(&Source::resolve("pentagon")?, &[shorter])?;
+//! let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(&scenario));
+//! let flight = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut (), &mut |_step| ControlFlow::Continue(()))?;
+//! assert_eq!(flight.audit.status, audit::Status::Clear);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Judge positions of your own
+//!
+//! [`audit::Auditor`] needs nothing but times and positions. [`law::Law`] and [`plant::Plant`] are traits: bring your
+//! own law (`examples/own_law.rs`), or your own vehicle.
+//!
+//! # Units and frames
+//!
+//! SI units, in the names (`clearance_m`, `a22_per_s`). One inertial frame, z up. Tables of vectors are N x 3, a row
+//! per vehicle. Vehicles are counted from 0 in code and from 1 in everything a person reads. Equation numbers are those
+//! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
 
 pub mod audit;
+#[cfg(feature = "program")]
+pub mod cli;
 pub mod formation;
 pub mod graph;
 pub mod law;

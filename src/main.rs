@@ -1,1 +1,7 @@
-fn main() {}
+//! The program: see `tautline --help`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    tautline::cli::main()
+}

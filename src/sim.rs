@@ -251,15 +251,17 @@ impl<'a> Cockpit<'a> {
     /// Audits the sweep that led to `state` (or the start) and asks the law for the next command.
     fn judge_and_command(&mut self, step: Option<u64>) -> Result<Result<(), LawError>, SimError> {
         let Self { auditor, law, state, control, time_s, .. } = self;
-        let audit = || {
+        let (state, time_s): (&Swarm, f64) = (state, *time_s);
+        let audit = move || {
             let began = Instant::now();
+            let auditor = auditor;
             let finding = match step {
-                None => auditor.start(*time_s, &state.positions_m),
-                Some(_) => auditor.step(*time_s, &state.positions_m),
+                None => auditor.start(time_s, &state.positions_m),
+                Some(_) => auditor.step(time_s, &state.positions_m),
             };
             (finding, began.elapsed())
         };
-        let command = || {
+        let mut command = || {
             let began = Instant::now();
             (law.control(state, control), began.elapsed())
         };

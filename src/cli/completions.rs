@@ -1,0 +1,21 @@
+//! `tautline completions`: a completion script for a shell.
+
+use clap::{Args, CommandFactory as _};
+use clap_complete::Shell;
+
+use super::console;
+use super::{Arguments, Exit, Failure};
+
+/// Arguments of `tautline completions`.
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArguments {
+    /// The shell.
+    shell: Shell,
+}
+
+pub(super) fn completions(arguments: &CompletionsArguments) -> Result<Exit, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), env!("CARGO_PKG_NAME"), &mut script);
+    console::data(&String::from_utf8_lossy(&script))?;
+    Ok(Exit::Good)
+}

@@ -1,0 +1,60 @@
+//! Where text goes: data to standard output, talk beside it, nothing into a closed pipe.
+
+use std::io::{self, IsTerminal as _, Write as _};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::Failure;
+
+/// Refresh rate of a progress bar \[Hz\].
+const PROGRESS_HZ: u8 = 10;
+
+/// What the user wants to see.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Console {
+    /// Standard output carries data, so talk goes to standard error.
+    pub(super) data_on_stdout: bool,
+    /// No talk at all.
+    pub(super) quiet: bool,
+}
+
+impl Console {
+    /// Says something to a person. What nobody reads any more is dropped.
+    pub(super) fn say(self, text: &str) {
+        if self.quiet {
+            return;
+        }
+        let text = text.trim_end();
+        let _ = if self.data_on_stdout {
+            writeln!(io::stderr().lock(), "{text}")
+        } else {
+            writeln!(io::stdout().lock(), "{text}")
+        };
+    }
+
+    /// A progress bar on a terminal, nothing in a pipe.
+    pub(super) fn progress(self, total: u64, message: String) -> ProgressBar {
+        if self.quiet || !io::stderr().is_terminal() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(PROGRESS_HZ));
+        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %, {eta} left") {
+            bar.set_style(style);
+        }
+        bar.set_message(message);
+        bar.enable_steady_tick(Duration::from_millis(500));
+        bar
+    }
+}
+
+/// Writes data to standard output.
+pub(super) fn data(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::machine(format!("cannot write to standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
+}

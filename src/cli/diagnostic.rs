@@ -1,0 +1,140 @@
+//! Errors as a person reads them: what, where, and the remedy.
+
+use std::fmt;
+use std::io::Write as _;
+
+use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
+
+use super::Exit;
+use crate::audit::AuditError;
+use crate::law::ParameterError;
+use crate::record::RecordError;
+use crate::report::ArtefactError;
+use crate::scenario::ScenarioError;
+use crate::sim::SimError;
+
+/// An error on its way to the user, with the exit code that it means.
+#[derive(Debug)]
+pub(super) struct Failure {
+    exit: Exit,
+    message: String,
+    help: Option<String>,
+    source: Option<NamedSource<String>>,
+    label: Option<LabeledSpan>,
+}
+
+impl Failure {
+    /// The input is wrong.
+    pub(super) fn input(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { help: Some(help.into()), ..Self::plain(Exit::WrongInput, message.into()) }
+    }
+
+    /// The machine failed.
+    pub(super) fn machine(message: impl Into<String>) -> Self {
+        Self::plain(Exit::MachineFailed, message.into())
+    }
+
+    pub(super) fn with_help(self, help: impl Into<String>) -> Self {
+        Self { help: Some(help.into()), ..self }
+    }
+
+    fn plain(exit: Exit, message: String) -> Self {
+        Self { exit, message, help: None, source: None, label: None }
+    }
+
+    /// Shows the error on standard error.
+    pub(super) fn show(&self) -> Exit {
+        let mut text = String::new();
+        if GraphicalReportHandler::new().render_report(&mut text, self).is_err() {
+            text = format!("error: {}\n", self.message);
+        }
+        // Nobody is left to tell where standard error is closed.
+        let _ = std::io::stderr().lock().write_all(text.as_bytes());
+        self.exit
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl Diagnostic for Failure {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.source.as_ref().map(|source| source as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        self.label.clone().map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = _>>)
+    }
+}
+
+impl From<ScenarioError> for Failure {
+    fn from(error: ScenarioError) -> Self {
+        let field = error.field().filter(|_| error.place().is_none());
+        let message = match field {
+            Some(field) => format!("{field}: {}", error.message()),
+            None => error.message().to_owned(),
+        };
+        Self {
+            help: error.help().map(str::to_owned),
+            source: error.place().map(|place| NamedSource::new(&place.source, harmless(&place.text))),
+            label: error.place().map(|place| LabeledSpan::underline(place.span.clone())),
+            ..Self::plain(Exit::WrongInput, message)
+        }
+    }
+}
+
+/// The text with control characters blanked, byte for byte: what a file holds must not steer the terminal.
+fn harmless(text: &str) -> String {
+    let blank = |c: char| if c.is_control() && c != '\n' && c != '\t' { " ".repeat(c.len_utf8()) } else { c.to_string() };
+    text.chars().map(blank).collect()
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::Write { .. } => Self::machine(error.to_string())
+                .with_help("what was recorded before stays readable; free some space or give another folder with --out"),
+            RecordError::Open { .. } | RecordError::Read { .. } => Self::plain(Exit::WrongInput, error.to_string()),
+        }
+    }
+}
+
+impl From<ArtefactError> for Failure {
+    fn from(error: ArtefactError) -> Self {
+        Self::machine(error.to_string()).with_help("free some space or give another folder with --out")
+    }
+}
+
+impl From<ParameterError> for Failure {
+    fn from(error: ParameterError) -> Self {
+        Self::plain(Exit::WrongInput, error.to_string())
+    }
+}
+
+impl From<AuditError> for Failure {
+    fn from(error: AuditError) -> Self {
+        Self::plain(Exit::WrongInput, error.to_string())
+    }
+}
+
+impl From<SimError> for Failure {
+    fn from(error: SimError) -> Self {
+        match error {
+            SimError::Record(error) => error.into(),
+            SimError::Audit(error) => error.into(),
+            SimError::CommandNotFinite { .. } | SimError::StateNotFinite { .. } => Self::input(
+                error.to_string(),
+                "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
+            ),
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The program, a file a command. The only room that prints.
+//!
+//! Exit codes are the same for all commands: see [`Exit`]. Human text goes to standard output, or to standard error
+//! where standard output carries data.
+
+mod completions;
+mod console;
+mod diagnostic;
+mod list;
+mod run;
+mod schema;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use diagnostic::Failure;
+
+/// How the program ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Exit {
+    /// Judged and good, or nothing to judge.
+    Good = 0,
+    /// Judged and bad: a violation, a claim not met.
+    Bad = 1,
+    /// The input is wrong: usage, scenario, recording.
+    WrongInput = 2,
+    /// The machine failed: input and output, no adapter.
+    MachineFailed = 3,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
+///
+/// Without a command, flies the built-in scenario `pentagon`.
+#[derive(Debug, Parser)]
+#[command(version, after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fly a scenario, audit every step and leave a recording and a report.
+    Run(run::RunArguments),
+    /// List the built-in scenarios, or print one as TOML to start from.
+    List(list::ListArguments),
+    /// Print the JSON Schema of the scenario file.
+    Schema,
+    /// Print a completion script for a shell.
+    Completions(completions::CompletionsArguments),
+}
+
+/// Runs the program with the arguments of the process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(usage) => {
+            // A closed pipe is the reader's choice.
+            let _ = usage.print();
+            return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good }.into();
+        }
+    };
+    let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
+    let done = match command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::List(arguments) => list::list(&arguments),
+        Command::Schema => schema::schema(),
+        Command::Completions(arguments) => completions::completions(&arguments),
+    };
+    done.unwrap_or_else(|failure| failure.show()).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::Arguments;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+}

@@ -1,0 +1,208 @@
+//! `tautline run`: fly a scenario and leave a recording and a report.
+
+use std::fs;
+use std::io;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Args;
+
+use super::console::{self, Console};
+use super::{Exit, Failure};
+use crate::formation::affine_dimension;
+use crate::metrics::Metrics;
+use crate::plant;
+use crate::record::StateHash;
+use crate::record::mcap::{Header, McapRecorder};
+use crate::report::{EndedEarly, Findings, Performance, Report, Run};
+use crate::scenario::{Override, Scenario, Source};
+use crate::sim::{self, Ending, Flight};
+
+/// Steps between two looks at the progress bar.
+const PROGRESS_EVERY: u64 = 64;
+/// Offsets below this share of the extent do not make a start or a formation leave its line or plane.
+const FLATNESS: f64 = 1e-9;
+
+/// Arguments of `tautline run`.
+#[derive(Debug, Args)]
+pub(super) struct RunArguments {
+    /// A scenario file, or the name of a built-in scenario.
+    #[arg(default_value = "pentagon")]
+    scenario: String,
+    /// Set any key of the scenario for this run; may be given several times.
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    overrides: Vec<String>,
+    /// Folder for the recording and the report \[default: out/<scenario name>\].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite a folder that holds a finished run.
+    #[arg(long)]
+    force: bool,
+    /// Print the report as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+    /// Print no summary and no progress.
+    #[arg(long)]
+    quiet: bool,
+    /// Threads to use; the recording has the same bits for any number \[default: one a core\].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl Default for RunArguments {
+    fn default() -> Self {
+        Self {
+            scenario: "pentagon".to_owned(),
+            overrides: Vec::new(),
+            out: None,
+            force: false,
+            json: false,
+            quiet: false,
+            threads: None,
+        }
+    }
+}
+
+pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
+    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+    let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
+    let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
+    folder.open(arguments.force)?;
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .build()
+        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    let interrupted = interruption()?;
+    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted))?;
+    report.write(&folder.report())?;
+
+    console.say(&format!("{}\n{}", report.headline(), report.text()));
+    for reason in &report.verdict.reasons {
+        console.say(reason);
+    }
+    console.say(&format!("wrote {} and {}", folder.recording().display(), folder.report().display()));
+    if arguments.json {
+        let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
+        console::data(&json)?;
+    }
+    Ok(if report.verdict.pass { Exit::Good } else { Exit::Bad })
+}
+
+/// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
+fn fly(
+    scenario: &Scenario,
+    folder: &RunFolder,
+    console: Console,
+    interrupted: &AtomicBool,
+) -> Result<Report, Failure> {
+    let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+    let mut recording = McapRecorder::create(&folder.recording(), &header)?;
+    let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
+    let mut state_hash = StateHash::new();
+
+    let progress = console.progress(scenario.time.steps(), scenario.name.clone());
+    let mut carry_on = |step: u64| {
+        if step.is_multiple_of(PROGRESS_EVERY) {
+            progress.set_position(step);
+        }
+        if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let mut law = scenario.law()?;
+    let mut plant = plant::for_scenario(scenario);
+    let mut recorders = (&mut recording, (&mut metrics, &mut state_hash));
+    let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
+    progress.finish_and_clear();
+    let closed = recording.finish();
+    let flight = flown?;
+    closed?;
+    Ok(report(scenario, &header, &flight, metrics, state_hash.finish()))
+}
+
+fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: Metrics<'_>, state_hash: String) -> Report {
+    let reason = match &flight.ending {
+        Ending::Completed => None,
+        Ending::Interrupted => Some("interrupted".to_owned()),
+        Ending::LawUndefined(why) => Some(format!("the law is undefined: {why}")),
+    };
+    let wall_s = flight.performance.wall.as_secs_f64();
+    Report::new(&Findings {
+        scenario_name: &scenario.name,
+        scenario_sha256: &header.scenario_sha256,
+        delta_m: scenario.delta_m,
+        judge: scenario.judge,
+        start_dimension: affine_dimension(&scenario.start.positions_m, FLATNESS),
+        formation_dimension: scenario.formation.affine_dimension(FLATNESS),
+        certificate: &flight.certificate,
+        audit: &flight.audit,
+        engine_contact_pairs: Some(flight.engine_contacts.len() as u64),
+        summary: &metrics.finish(),
+        run: &Run {
+            duration_s: flight.duration_s,
+            dt_s: scenario.time.dt_s,
+            steps: flight.steps,
+            vehicles: scenario.count(),
+            state_hash,
+        },
+        performance: Performance {
+            wall_s: Some(wall_s),
+            real_time_factor: Some(flight.duration_s / wall_s),
+            law_s: Some(flight.performance.law.as_secs_f64()),
+            physics_s: Some(flight.performance.physics.as_secs_f64()),
+            audit_s: Some(flight.performance.audit.as_secs_f64()),
+            record_s: Some(flight.performance.record.as_secs_f64()),
+        },
+        ended_early: reason.as_deref().map(|reason| EndedEarly { time_s: flight.duration_s, reason }),
+    })
+}
+
+/// Set by Ctrl-C (and by a request to terminate).
+fn interruption() -> Result<Arc<AtomicBool>, Failure> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
+        .map_err(|error| Failure::machine(format!("cannot listen to Ctrl-C: {error}")))?;
+    Ok(interrupted)
+}
+
+/// The folder that a run leaves behind. It is finished once it holds a report.
+struct RunFolder {
+    path: PathBuf,
+}
+
+impl RunFolder {
+    fn at(path: PathBuf) -> Self {
+        Self { path }
+    }
+
+    fn recording(&self) -> PathBuf {
+        self.path.join("run.mcap")
+    }
+
+    fn report(&self) -> PathBuf {
+        self.path.join("report.json")
+    }
+
+    /// Makes the folder ready. A finished run in it is kept unless `force` says otherwise.
+    fn open(&self, force: bool) -> Result<(), Failure> {
+        let report = self.report();
+        if report.exists() && !force {
+            return Err(Failure::input(
+                format!("{} holds a finished run", self.path.display()),
+                "give another folder with --out, or overwrite the run with --force",
+            ));
+        }
+        let machine = |path: &Path, error: &io::Error| {
+            Failure::machine(format!("cannot write {}: {error}", path.display()))
+                .with_help("give a folder that can be written to with --out")
+        };
+        fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
+        // From here on the old report would describe another recording.
+        match fs::remove_file(&report) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
+            _ => Ok(()),
+        }
+    }
+}

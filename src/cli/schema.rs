@@ -1,0 +1,10 @@
+//! `tautline schema`: the JSON Schema of the scenario file.
+
+use super::console;
+use super::{Exit, Failure};
+use crate::scenario::file;
+
+pub(super) fn schema() -> Result<Exit, Failure> {
+    console::data(&format!("{:#}\n", file::schema()))?;
+    Ok(Exit::Good)
+}
