@@ -56,9 +56,7 @@ impl Formation {
     pub fn grid(count: usize, spacing_m: f64) -> Self {
         let root = count.isqrt();
         let columns = if root * root < count { root + 1 } else { root };
-        Self::from_fn(count, |i| {
-            Vector3::new((i % columns) as f64 * spacing_m, (i / columns) as f64 * spacing_m, 0.0)
-        })
+        Self::from_fn(count, |i| Vector3::new((i % columns) as f64 * spacing_m, (i / columns) as f64 * spacing_m, 0.0))
     }
 
     /// Nearly even on a sphere about the origin, by the Fibonacci spiral: equal steps in z, and from slot to slot a

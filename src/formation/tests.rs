@@ -170,7 +170,10 @@ fn shapes_have_the_distances_they_are_named_for() {
     let apart = sphere.min_distance().map_or(0.0, |(_, distance)| distance);
     assert!(apart > 0.7 * 3.0 * (2.0 * TAU / 200.0).sqrt(), "{apart}");
     assert!(pentagon.is_in_plane_z0() && grid.is_in_plane_z0() && !sphere.is_in_plane_z0());
-    assert_eq!([Formation::grid(0, 1.0).count(), Formation::sphere(0, 1.0).count(), Formation::circle(0, 1.0).count()], [0; 3]);
+    assert_eq!(
+        [Formation::grid(0, 1.0).count(), Formation::sphere(0, 1.0).count(), Formation::circle(0, 1.0).count()],
+        [0; 3]
+    );
 }
 
 proptest! {

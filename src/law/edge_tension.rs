@@ -86,7 +86,8 @@ impl EdgeTensionLaw {
     pub fn matrix_form(&self, swarm: &Swarm) -> Result<Rows, LawError> {
         check_state(self.graph.count(), swarm)?;
         let EdgeTensionParameters { alpha, delta_m, a22_per_s } = self.parameters;
-        if self.graph.edges().any(|(i, j)| separation(&swarm.positions_m, i, j) <= delta_m) {
+        let within = |distance_m: f64| distance_m > delta_m && distance_m.is_finite();
+        if !self.graph.edges().all(|(i, j)| within(separation(&swarm.positions_m, i, j))) {
             return Err(self.fault(swarm));
         }
         let weighted = self.graph.weighted_laplacian(|i, j| {
@@ -112,8 +113,7 @@ impl EdgeTensionLaw {
     fn try_energy(&self, swarm: &Swarm) -> Result<f64, LawError> {
         check_state(self.graph.count(), swarm)?;
         let potential = self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?;
-        let energy = relative_kinetic_energy(swarm)
-            + self.parameters.alpha * potential / swarm.count().max(1) as f64;
+        let energy = relative_kinetic_energy(swarm) + self.parameters.alpha * potential / swarm.count().max(1) as f64;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
 }
@@ -169,4 +169,4 @@ impl Law for EdgeTensionLaw {
 }
 
 #[cfg(test)]
-mod tests {}
+mod tests;

@@ -277,3 +277,6 @@ fn columns_mut(rows: &mut Rows) -> [&mut [f64]; 3] {
     let (y, z) = rest.split_at_mut(count);
     [x, y, z]
 }
+
+#[cfg(test)]
+mod tests;

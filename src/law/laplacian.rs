@@ -41,12 +41,7 @@ impl LaplacianLaw {
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
     /// is not finite.
-    pub fn new(
-        graph: &Graph,
-        formation: &Formation,
-        f1_per_s2: f64,
-        f2_per_s: f64,
-    ) -> Result<Self, ParameterError> {
+    pub fn new(graph: &Graph, formation: &Formation, f1_per_s2: f64, f2_per_s: f64) -> Result<Self, ParameterError> {
         ParameterError::check(graph, formation, &[("f1", f1_per_s2), ("f2", f2_per_s)])?;
         let errors_m = Rows::zeros(graph.count());
         Ok(Self { graph: graph.clone(), formation: formation.clone(), f1_per_s2, f2_per_s, errors_m })
@@ -86,4 +81,4 @@ impl Law for LaplacianLaw {
 }
 
 #[cfg(test)]
-mod tests {}
+mod tests;

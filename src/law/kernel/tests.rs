@@ -1,0 +1,100 @@
+use super::*;
+use crate::formation::Formation;
+use crate::law::EdgeTension;
+use crate::swarm::{row, separation, set_row};
+
+/// Relative error of a sum of a hundred pulls, against the sum of their sizes.
+const SUM_ROUNDING: f64 = 1e-14;
+const DELTA_M: f64 = 0.1;
+
+/// A kernel on the distances of a formation, and a swarm that is spread out otherwise.
+fn fixture(graph: &Graph) -> (Kernel, Rows, Formation) {
+    let count = graph.count();
+    let formation = Formation::sphere(count, 3.0);
+    let mut positions_m = Formation::sphere(count, 4.0).slots_m;
+    for i in 0..count {
+        positions_m[(i, 0)] += (i as f64).sin();
+        positions_m[(i, 2)] *= 1.5;
+    }
+    let inverse = graph.edges().map(|(i, j)| 1.0 / tension(&formation, i, j).k_m()).collect();
+    (Kernel::new(graph, DELTA_M, inverse), positions_m, formation)
+}
+
+fn tension(formation: &Formation, i: usize, j: usize) -> EdgeTension {
+    EdgeTension::new(1.0, DELTA_M, formation.desired_distance(i, j)).expect("slots are far apart")
+}
+
+fn graphs() -> Vec<Graph> {
+    let complete = [1, 2, 3, 5, 9, LISTED_UP_TO, LISTED_UP_TO + 1, 33, 40, 41, 64].map(Graph::complete);
+    complete.into_iter().chain([Graph::star(30), Graph::ring(17), Graph::path(10)]).collect()
+}
+
+#[test]
+fn the_sums_are_those_of_the_tension_edge_by_edge() {
+    for graph in graphs() {
+        let (kernel, positions_m, formation) = fixture(&graph);
+        let (mut expected, mut sizes, mut potential) = (Rows::zeros(graph.count()), vec![0.0; graph.count()], 0.0);
+        for (i, j) in graph.edges() {
+            let tension = tension(&formation, i, j);
+            let distance_m = separation(&positions_m, i, j);
+            let pull = (row(&positions_m, i) - row(&positions_m, j)) * (tension.derivative(distance_m) / distance_m);
+            let (of_i, of_j) = (row(&expected, i) + pull, row(&expected, j) - pull);
+            set_row(&mut expected, i, of_i);
+            set_row(&mut expected, j, of_j);
+            sizes[i] += pull.norm();
+            sizes[j] += pull.norm();
+            potential += tension.value(distance_m);
+        }
+        let mut sums = Rows::zeros(graph.count());
+        assert_eq!(kernel.add_pulls(&positions_m, &mut sums), Ok(()));
+        for (i, size) in sizes.iter().enumerate() {
+            let error = (row(&sums, i) - row(&expected, i)).norm();
+            assert!(error <= SUM_ROUNDING * size, "N = {}, vehicle {i}: {error:e} of {size:e}", graph.count());
+        }
+        let found = kernel.potential(&positions_m).unwrap_or(f64::NAN);
+        assert!((found - potential).abs() <= SUM_ROUNDING * potential, "N = {}: {found} {potential}", graph.count());
+    }
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_vector_instructions() {
+    for graph in graphs() {
+        let (kernel, positions_m, _) = fixture(&graph);
+        let (mut dispatched, mut baseline) = (Rows::zeros(graph.count()), Rows::zeros(graph.count()));
+        assert_eq!(kernel.add_pulls(&positions_m, &mut dispatched), Ok(()));
+        let axes = columns(&positions_m);
+        let (within, potential) = match &kernel.edges {
+            Edges::All(count) => (
+                kernel.add_pulls_by_row(*count, axes, columns_mut(&mut baseline)),
+                kernel.potential_by_row(*count, axes),
+            ),
+            Edges::Listed(edges) => (
+                kernel.add_pulls_by_list(edges, axes, columns_mut(&mut baseline)),
+                kernel.potential_by_list(edges, axes),
+            ),
+        };
+        assert_eq!(within, Ok(()));
+        assert_eq!(dispatched, baseline);
+        assert_eq!(kernel.potential(&positions_m), potential);
+    }
+}
+
+#[test]
+fn one_pair_out_of_domain_is_noticed_wherever_it_is() {
+    for graph in [Graph::complete(7), Graph::complete(43)] {
+        let (kernel, positions_m, _) = fixture(&graph);
+        for (i, j) in graph.edges() {
+            let mut touching = positions_m.clone();
+            let beside = row(&touching, i) + nalgebra::Vector3::new(0.0, 0.5 * DELTA_M, 0.0);
+            set_row(&mut touching, j, beside);
+            let mut sums = Rows::zeros(graph.count());
+            assert_eq!(kernel.add_pulls(&touching, &mut sums), Err(OutOfDomain), "{i} {j}");
+            assert_eq!(kernel.potential(&touching), Err(OutOfDomain));
+        }
+        for i in 0..graph.count() {
+            let mut far = positions_m.clone();
+            far[(i, 2)] = 1e200;
+            assert_eq!(kernel.potential(&far), Err(OutOfDomain));
+        }
+    }
+}
