@@ -170,3 +170,67 @@ impl Candidates {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPACING_M: f64 = 3.0;
+
+    fn line(n: usize, offset: impl Fn(usize) -> f64) -> Rows {
+        Rows::from_fn(n, |i, axis| if axis == 0 { i as f64 * SPACING_M + offset(i) } else { 0.0 })
+    }
+
+    fn listed(candidates: &mut Candidates, from: &Rows, to: &Rows, bound_m: f64) -> Option<Vec<[usize; 2]>> {
+        match candidates.cover(from, to, bound_m) {
+            Cover::All(_) => None,
+            cover @ Cover::Listed(_) => {
+                let mut pairs = vec![];
+                let count = cover.for_each(|i, j| pairs.push([i, j]));
+                assert_eq!(count, pairs.len() as u64);
+                Some(pairs)
+            }
+        }
+    }
+
+    #[test]
+    fn a_small_swarm_is_swept_whole_and_in_the_order_of_pairs() {
+        let rows = line(4, |_| 0.0);
+        let mut pairs = vec![];
+        let count = Candidates::new().cover(&rows, &rows, 1.0).for_each(|i, j| pairs.push((i, j)));
+        assert_eq!((count, pairs), (6, vec![(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]));
+    }
+
+    #[test]
+    fn a_list_is_kept_while_its_budget_lasts_and_made_anew_after() {
+        let start = line(100, |_| 0.0);
+        let mut candidates = Candidates::new();
+        let neighbours: Vec<_> = (0..99).map(|i| [i, i + 1]).collect();
+        assert_eq!(listed(&mut candidates, &start, &start, SPACING_M).as_ref(), Some(&neighbours));
+        let slack_m = SLACK_OVER_RADIUS * RADIUS_OVER_BOUND * SPACING_M;
+
+        let within = line(100, |i| if i == 7 { 0.9 * slack_m } else { 0.0 });
+        assert_eq!(listed(&mut candidates, &start, &within, SPACING_M).as_ref(), Some(&neighbours));
+        assert_eq!(candidates.reference_m, start, "kept");
+        let beyond = line(100, |i| if i == 7 { 1.1 * slack_m } else { 0.0 });
+        listed(&mut candidates, &within, &beyond, SPACING_M);
+        assert_eq!(candidates.reference_m, within, "made anew");
+        listed(&mut candidates, &beyond, &beyond, 2.0 * SPACING_M);
+        assert_eq!(candidates.reference_m, beyond, "made anew for a wider bound");
+    }
+
+    #[test]
+    fn a_vehicle_that_crosses_the_swarm_in_one_step_is_paired_with_all_it_could_meet() {
+        let start = line(100, |_| 0.0);
+        let thrown = line(100, |i| if i == 0 { 600.0 } else { 0.0 });
+        let pairs = listed(&mut Candidates::new(), &start, &thrown, SPACING_M).unwrap();
+        assert!((1..100).all(|j| pairs.contains(&[0, j])));
+        assert_eq!(pairs.len(), 99 + 98);
+    }
+
+    #[test]
+    fn a_crowd_has_no_list() {
+        let rows = Rows::zeros(100);
+        assert_eq!(listed(&mut Candidates::new(), &rows, &rows, 1.0), None);
+    }
+}

@@ -71,3 +71,41 @@ impl Violation {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn below(pair: Pair, span_s: [f64; 2], min_m: f64, from_start: bool, to_end: bool) -> Below {
+        let [from_s, to_s] = span_s;
+        Below { violation: Violation { pair, from_s, to_s, min_m, min_at_s: from_s }, from_start, to_end }
+    }
+
+    #[test]
+    fn pairs_that_go_on_are_merged_and_those_that_begin_between_them_are_not() {
+        let (a, b, c) = (Pair::new(0, 1), Pair::new(0, 2), Pair::new(1, 2));
+        let mut ledger = Ledger::default();
+        ledger.enter(&[below(a, [0.5, 1.0], 1.0, false, true), below(c, [0.2, 1.0], 1.5, false, true)]);
+        ledger.enter(&[
+            below(a, [1.0, 1.5], 1.2, true, false),
+            below(b, [1.3, 1.4], 0.5, false, false),
+            below(c, [1.0, 2.0], 0.1, true, true),
+        ]);
+        assert_eq!(ledger.began.iter().map(|v| v.pair).collect::<Vec<_>>(), [b]);
+        assert_eq!(ledger.ended.iter().map(|v| v.pair).collect::<Vec<_>>(), [a, b]);
+        ledger.enter(&[]);
+        assert_eq!(ledger.ended.iter().map(|v| v.pair).collect::<Vec<_>>(), [c]);
+        let found: Vec<_> =
+            ledger.into_violations().iter().map(|v| (v.pair, v.from_s, v.to_s, v.min_m, v.min_at_s)).collect();
+        assert_eq!(found, [(c, 0.2, 2.0, 0.1, 1.0), (a, 0.5, 1.5, 1.0, 0.5), (b, 1.3, 1.4, 0.5, 1.3)]);
+    }
+
+    #[test]
+    fn a_pair_that_left_and_came_back_at_the_same_instant_is_two_violations() {
+        let pair = Pair::new(0, 1);
+        let mut ledger = Ledger::default();
+        ledger.enter(&[below(pair, [0.5, 1.0], 1.0, false, false)]);
+        ledger.enter(&[below(pair, [1.0, 1.5], 1.0, false, false)]);
+        assert_eq!(ledger.violations.len(), 2);
+    }
+}

@@ -235,3 +235,63 @@ impl Auditor {
         StepFinding { closest, began: &self.ledger.began, ended: &self.ledger.ended }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A judge whose second detector measures with another delta than the first.
+    fn judge_with_a_wrong_second_detector() -> Auditor {
+        let mut auditor = Auditor::new(2, 2.0).unwrap();
+        auditor.keep_out = KeepOut::new(2.1);
+        auditor.keep_out.delta_m = 2.0;
+        auditor
+    }
+
+    fn pass(miss_m: f64) -> [Rows; 2] {
+        [-5.0, 5.0].map(|x| Rows::from_row_slice(&[0.0, 0.0, 0.0, x, miss_m, 0.0]))
+    }
+
+    #[test]
+    fn a_pass_that_only_one_detector_calls_contact_is_undecided_and_says_why() {
+        let [before, after] = pass(2.05);
+        let mut auditor = judge_with_a_wrong_second_detector();
+        auditor.start(0.0, &before).unwrap();
+        auditor.step(1.0, &after).unwrap();
+        let outcome = auditor.finish();
+        assert_eq!((outcome.status, outcome.parry.disagreements), (Status::Undecided, 1));
+        let first = outcome.parry.first_disagreement.unwrap();
+        assert_eq!((first.pair, first.closed_form_s, first.min_m), (Pair::new(0, 1), None, 2.05));
+        assert!(first.parry_s.is_some() && first.parry_s == outcome.parry.min_toi_s);
+        let sentence = first.to_string();
+        assert!(sentence.starts_with("vehicles 1-2 between 0 s and 1 s, smallest separation 2.05 m"), "{sentence}");
+    }
+
+    #[test]
+    fn entries_at_different_times_are_a_disagreement_beside_the_violation() {
+        let [before, after] = pass(1.0);
+        let mut auditor = judge_with_a_wrong_second_detector();
+        auditor.start(0.0, &before).unwrap();
+        auditor.step(1.0, &after).unwrap();
+        let outcome = auditor.finish();
+        assert_eq!((outcome.status, outcome.parry.disagreements), (Status::Violation, 1));
+    }
+
+    #[test]
+    fn two_right_detectors_call_the_same_passes_clear_and_violation() {
+        for (miss_m, status) in [(2.05, Status::Clear), (1.0, Status::Violation)] {
+            let [before, after] = pass(miss_m);
+            let mut auditor = Auditor::new(2, 2.0).unwrap();
+            auditor.start(0.0, &before).unwrap();
+            auditor.step(1.0, &after).unwrap();
+            let outcome = auditor.finish();
+            assert_eq!((outcome.status, outcome.parry.disagreements), (status, 0));
+        }
+    }
+
+    #[test]
+    fn a_judge_can_be_sent_to_another_thread() {
+        fn is_send<T: Send>(_: &T) {}
+        is_send(&Auditor::new(2, 2.0).unwrap());
+    }
+}

@@ -67,7 +67,12 @@ impl KeepOut {
         below: Option<Span>,
         cast: Option<f64>,
     ) -> bool {
-        let differs_by = match (below, cast) {
+        self.difference(motion, closest, below, cast) <= self.grazing_band(motion)
+    }
+
+    /// How far the two answers are apart, in squared separation \[m^2\]; NaN if parry could not tell.
+    fn difference(&self, motion: &RelativeMotion, closest: Approach, below: Option<Span>, cast: Option<f64>) -> f64 {
+        match (below, cast) {
             (None, None) => 0.0,
             (None, Some(toi)) if toi.is_nan() => f64::NAN,
             (Some(_), None) | (None, Some(_)) => {
@@ -81,8 +86,7 @@ impl KeepOut {
                 let apart = (toi - span.enter).abs() * speed_squared.sqrt();
                 apart * (chord + apart)
             }
-        };
-        differs_by <= self.grazing_band(motion)
+        }
     }
 
     /// Width of the band for this motion \[m^2\].
@@ -94,4 +98,80 @@ impl KeepOut {
 
 fn vector(v: nalgebra::Vector3<f64>) -> Vector {
     Vector::new(v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const DELTA_M: f64 = 2.0;
+
+    fn answers(keep_out: &KeepOut, motion: &RelativeMotion) -> (Approach, Option<Span>, Option<f64>) {
+        let closest = motion.closest();
+        let below = (closest.separation_m() < keep_out.delta_m).then(|| motion.below(keep_out.delta_m, closest));
+        (closest, below, keep_out.cast(motion))
+    }
+
+    /// A straight pass: `miss_m` from zero at the closest, seen from `before_m` ahead of it to `after_m` behind it, in the
+    /// plane of two directions.
+    fn pass(miss_m: f64, before_m: f64, after_m: f64, along: [f64; 3], aside: [f64; 3]) -> Option<RelativeMotion> {
+        let along = Vector3::from(along).try_normalize(1e-3)?;
+        let aside = Vector3::from(aside);
+        let aside = (aside - along * along.dot(&aside)).try_normalize(1e-3)?;
+        Some(RelativeMotion::new(aside * miss_m - along * before_m, aside * miss_m + along * after_m))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn the_detectors_agree_within_the_band_even_where_rounding_decides(
+            ulps in -40.0..40.0_f64,
+            (before, after) in (-6.0..6.0_f64, -6.0..6.0_f64),
+            along in prop::array::uniform3(-1.0..1.0_f64),
+            aside in prop::array::uniform3(-1.0..1.0_f64),
+            depth in prop_oneof![Just(0.0), -1e-9..1e-9_f64, -1.0..1.0_f64],
+        ) {
+            let (before_m, after_m) = (10_f64.powf(before), 10_f64.powf(after));
+            let rounding_m = f64::EPSILON * (before_m * before_m + DELTA_M * DELTA_M) / (2.0 * DELTA_M);
+            let miss_m = DELTA_M + depth + (ulps * rounding_m).clamp(-1.0, 1.0);
+            let Some(motion) = pass(miss_m, before_m, after_m, along, aside) else { return Ok(()) };
+            let keep_out = KeepOut::new(DELTA_M);
+            let (closest, below, cast) = answers(&keep_out, &motion);
+            prop_assert!(keep_out.agrees(&motion, closest, below, cast), "{below:?} {cast:?}");
+            // What needs no closer look is clear to both.
+            prop_assert!(keep_out.is_near(&motion, closest) || (below.is_none() && cast.is_none()));
+        }
+    }
+
+    #[test]
+    fn any_answer_that_rounding_does_not_explain_is_a_disagreement() {
+        let keep_out = KeepOut::new(DELTA_M);
+        let agrees = |miss_m: f64, change: fn(Option<f64>) -> Option<f64>| {
+            let motion = pass(miss_m, 10.0, 10.0, [1.0, 2.0, 0.5], [0.0, 1.0, -1.0]).unwrap();
+            let (closest, below, cast) = answers(&keep_out, &motion);
+            keep_out.agrees(&motion, closest, below, change(cast))
+        };
+        for (miss_m, changes) in [
+            (1.0, [|_| None, |toi: Option<f64>| toi.map(|toi| toi + 1e-12), |_| Some(f64::NAN)]),
+            (DELTA_M - 1e-9, [|_| None, |toi: Option<f64>| toi.map(|toi| toi + 1e-8), |_| Some(0.0)]),
+            (DELTA_M + 1e-9, [|_| Some(0.5), |_| Some(0.0), |_| Some(f64::NAN)]),
+        ] {
+            assert!(agrees(miss_m, |cast| cast));
+            for change in changes {
+                assert!(!agrees(miss_m, change), "{miss_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_motion_whose_square_underflows_makes_no_contact() {
+        let keep_out = KeepOut::new(DELTA_M);
+        let from = Vector3::new(DELTA_M + 1e-12, 0.0, 0.0);
+        let motion = RelativeMotion::new(from, from + Vector3::new(0.0, 1e-158, 0.0));
+        assert_eq!(keep_out.cast(&motion), None);
+    }
 }

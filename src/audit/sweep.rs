@@ -96,3 +96,101 @@ impl Approach {
         self.squared.sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn motion(from: [f64; 3], to: [f64; 3]) -> RelativeMotion {
+        RelativeMotion::new(Vector3::from(from), Vector3::from(to))
+    }
+
+    /// The smallest squared separation as an exact fraction, for positions that are whole numbers: |r0 x d|^2 / |d|^2
+    /// between the ends, else that of the nearer end.
+    fn exact_closest(from: [i64; 3], to: [i64; 3]) -> (i128, i128) {
+        let wide = |v: [i64; 3]| v.map(i128::from);
+        let (from, to) = (wide(from), wide(to));
+        let by = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+        let dot = |a: [i128; 3], b: [i128; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        if dot(from, by) >= 0 || dot(to, by) <= 0 {
+            return (dot(from, from).min(dot(to, to)), 1);
+        }
+        let cross = |i: usize, j: usize| from[i] * by[j] - from[j] * by[i];
+        let cross = [cross(1, 2), cross(2, 0), cross(0, 1)];
+        (dot(cross, cross), dot(by, by))
+    }
+
+    fn whole(range: std::ops::Range<i64>) -> impl Strategy<Value = [i64; 3]> {
+        prop::array::uniform3(range)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn the_separation_is_that_of_exact_arithmetic_within_the_resolution(
+            (from, to) in prop_oneof![
+                (whole(-1_000_000..1_000_000), whole(-1_000_000..1_000_000)),
+                (whole(-9..9), whole(-9..9)),
+                // Through the neighbourhood of zero.
+                (whole(-1_000_000..1_000_000), whole(-9..9)).prop_map(|(a, b)| {
+                    (a, std::array::from_fn(|axis| b[axis] - a[axis]))
+                }),
+            ],
+        ) {
+            #[expect(clippy::cast_precision_loss, reason = "the fraction is rounded to double precision once")]
+            let exact = { let (above, below) = exact_closest(from, to); (above as f64 / below as f64).sqrt() };
+            let motion = motion(from.map(|x| x as f64), to.map(|x| x as f64));
+            let found = motion.closest();
+            let resolution = RESOLUTION * motion.from_squared.sqrt();
+            prop_assert!((found.separation_m() - exact).abs() <= resolution, "{} {exact}", found.separation_m());
+            prop_assert!(found.squared <= motion.from_squared.min(motion.to_squared));
+            prop_assert!((0.0..=1.0).contains(&found.at));
+        }
+
+        #[test]
+        fn at_entry_and_exit_the_separation_is_the_distance(
+            from in prop::array::uniform3(-50.0..50.0_f64),
+            to in prop::array::uniform3(-50.0..50.0_f64),
+            deep in 1e-6..30.0_f64,
+        ) {
+            // Rounding of |r0 + s d| from up to 90 m away, with a margin.
+            const TOLERANCE_M: f64 = 1e-12;
+            let motion = motion(from, to);
+            let closest = motion.closest();
+            let distance = closest.separation_m() + deep;
+            let Span { enter, exit } = motion.below(distance, closest);
+            prop_assert!(0.0 <= enter && enter <= closest.at && closest.at <= exit && exit <= 1.0);
+            let at = |s: f64| (motion.from + motion.by * s).norm();
+            if enter > 0.0 { prop_assert!((at(enter) - distance).abs() < TOLERANCE_M) }
+            if exit < 1.0 { prop_assert!((at(exit) - distance).abs() < TOLERANCE_M) }
+            prop_assert_eq!(enter == 0.0, at(0.0) < distance);
+            prop_assert_eq!(exit == 1.0, at(1.0) < distance);
+        }
+    }
+
+    #[test]
+    fn a_pair_that_keeps_its_distance_is_closest_at_the_start() {
+        let still = motion([3.0, 4.0, 0.0], [3.0, 4.0, 0.0]);
+        assert_eq!(still.closest(), Approach { squared: 25.0, at: 0.0 });
+        assert_eq!(still.below(6.0, still.closest()), Span { enter: 0.0, exit: 1.0 });
+    }
+
+    #[test]
+    fn a_graze_is_below_for_the_chord_that_it_cuts() {
+        // 1 nm deep at distance 2 m: half the chord is sqrt((2 - x)(2 + x)) with x = 2 - 1e-9.
+        let x = 2.0 - 1e-9;
+        let graze = motion([-10.0, x, 0.0], [10.0, x, 0.0]);
+        let Span { enter, exit } = graze.below(2.0, graze.closest());
+        let half = ((2.0 - x) * (2.0 + x)).sqrt() / 20.0;
+        assert!((enter - (0.5 - half)).abs() < 1e-15 && (exit - (0.5 + half)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_motion_too_small_to_square_is_below_for_the_whole_step() {
+        let tiny = motion([1e-180, 0.0, 0.0], [-1e-180, 0.0, 0.0]);
+        assert_eq!(tiny.below(1.0, tiny.closest()), Span { enter: 0.0, exit: 1.0 });
+    }
+}
