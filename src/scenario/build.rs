@@ -95,7 +95,8 @@ fn check_counts(file: &ScenarioFile, count: usize) -> Result<(), ScenarioError> 
             let vehicles = if count == 1 { "vehicle" } else { "vehicles" };
             return Err(ScenarioError::new(format!("{listed} {what} for {count} {vehicles}"))
                 .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
-                .at(key));
+                .at(key)
+                .at("swarm.count"));
         }
     }
     Ok(())
@@ -133,7 +134,8 @@ fn start(file: &StartFile, count: usize, space: Space, delta_m: f64) -> Result<S
         (Some(_), Some(_)) => {
             return Err(ScenarioError::new("both `positions_m` and a `shape` are given")
                 .with_help("keep one of them")
-                .at("start.shape"));
+                .at("start.shape")
+                .at("start.positions_m"));
         }
         (None, None) => {
             return Err(ScenarioError::new("no start positions are given")

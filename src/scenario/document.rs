@@ -25,6 +25,9 @@ const ORIGINS: [(&str, &[&str]); 5] = [
     ("swarm.count", &["start.positions_m", "formation.points_m", "formation.shape"]),
 ];
 
+/// Longest part of an unknown name that a message repeats \[characters\].
+const NAME_CHARS: usize = 40;
+
 /// A named text and the overrides on top of it.
 pub(super) struct Document<'a> {
     pub(super) name: &'a str,
@@ -49,11 +52,19 @@ impl<'a> Document<'a> {
         ScenarioFile::deserialize(toml::Deserializer::from(root)).map_err(|error| self.explain(&error))
     }
 
-    /// Gives an error about a key its place in the text.
+    /// Gives an error about keys its place in the text: at the first key that an override touched, or else at the
+    /// first key.
     pub(super) fn place(&self, error: ScenarioError) -> ScenarioError {
-        let (Some(field), None, Ok(root)) = (error.field(), error.place(), self.tree()) else { return error };
-        let place = self.locate(find(&root, field));
-        error.with_place(place)
+        let (None, Ok(root)) = (error.place(), self.tree()) else { return error };
+        let spans = error.fields().iter().map(|&field| find(&root, field, self.text.len() + 1));
+        let overridden = spans.clone().find(|span| span.start > self.text.len());
+        match overridden.or_else(|| spans.clone().next()) {
+            Some(span) => {
+                let place = self.locate(span);
+                error.with_place(place)
+            }
+            None => error,
+        }
     }
 
     /// The text as a tree, overrides applied.
@@ -88,27 +99,27 @@ impl<'a> Document<'a> {
 
     /// An error of serde in the words of the file.
     fn explain(&self, error: &toml::de::Error) -> ScenarioError {
-        let place = self.locate(error.span().unwrap_or(0..0));
+        let span = error.span().unwrap_or(0..0);
+        let place = self.locate(span.clone());
+        let name: String = place.text[place.span.clone()].trim_matches(['"', '\'']).chars().take(NAME_CHARS).collect();
         let message = error.message();
-        let (said, help) = if let Some((name, known)) = unknown("unknown field `", message) {
-            let known = self.with_common_keys(known, error.span());
-            (format!("unknown key `{name}`"), Some(suggest(&name, &known)))
-        } else if let Some((name, known)) = unknown("unknown variant `", message) {
-            (format!("unknown choice `{name}`"), Some(suggest(&name, &known)))
-        } else if let Some(name) = message.strip_prefix("missing field ") {
-            (format!("missing key {name}"), None)
+        let (said, help) = if message.starts_with("unknown field ") || message.starts_with("unexpected keys ") {
+            let known = self.with_common_keys(known_names(message), &span);
+            (format!("unknown key `{name}`"), suggest(&name, &known))
+        } else if message.starts_with("unknown variant ") {
+            (format!("unknown choice `{name}`"), suggest(&name, &known_names(message)))
         } else {
-            (message.replace("expected f64", "expected a number").replace(" u64", " a whole number"), None)
+            let help = "the built-in scenarios show every table; `tautline schema` describes every key".to_owned();
+            (in_words(message), help)
         };
-        let said = ScenarioError::new(said).with_place(place);
-        help.into_iter().fold(said, ScenarioError::with_help)
+        ScenarioError::new(said).with_help(help).with_place(place)
     }
 
     /// The known keys of a choice, with those common to all choices of its table.
-    fn with_common_keys(&self, mut known: Vec<String>, span: Option<Range<usize>>) -> Vec<String> {
+    fn with_common_keys(&self, mut known: Vec<String>, span: &Range<usize>) -> Vec<String> {
         let Ok(root) = self.tree() else { return known };
         let holds = |table: &str| match root.get_ref().get(table).map(Spanned::get_ref) {
-            Some(DeValue::Table(keys)) => keys.keys().any(|key| Some(key.span()) == span),
+            Some(DeValue::Table(keys)) => keys.keys().any(|key| key.span() == *span),
             _ => false,
         };
         for (table, choice, common) in CHOICES {
@@ -120,6 +131,40 @@ impl<'a> Document<'a> {
         known.dedup();
         known
     }
+}
+
+/// The names that serde's sentence about an unknown name ends with. What comes before is the input's and may hold
+/// anything.
+fn known_names(message: &str) -> Vec<String> {
+    match (message.rfind(", expected "), message.rfind(", available keys: ")) {
+        (Some(at), None) => message[at..].split('`').skip(1).step_by(2).map(str::to_owned).collect(),
+        (_, Some(at)) => {
+            let list = &message[at + ", available keys: ".len()..];
+            list.split(", ").filter(|name| !name.is_empty()).map(str::to_owned).collect()
+        }
+        (None, None) => Vec::new(),
+    }
+}
+
+/// What the types of Rust that stand in serde's sentences are called here.
+const WORDS: [(&str, &str); 4] =
+    [("f64", "a number"), ("u64", "a whole number from 0"), ("u32", "a whole number from 0"), ("u8", "2 or 3")];
+
+/// serde's sentence about a value without the names of Rust's types.
+fn in_words(message: &str) -> String {
+    if message == "wanted string or table" {
+        return "expected a string".to_owned();
+    }
+    if let Some(at) = message.rfind("expected struct ") {
+        return format!("{}expected a table", &message[..at]);
+    }
+    let mut said = message.replacen("missing field ", "missing key ", 1).replace(" as i128", "");
+    for (rust, words) in WORDS {
+        if let Some(start) = said.strip_suffix(rust).filter(|start| start.ends_with("expected ")) {
+            said = format!("{start}{words}");
+        }
+    }
+    said
 }
 
 /// Moves the keys of a choice below it: `{ kind = "k", a = 1, common = 2 }` becomes `{ kind = { k = { a = 1 } },
@@ -142,19 +187,29 @@ fn nest<'a>(value: &mut Spanned<DeValue<'a>>, choice: &'static str, common: &[&s
 }
 
 /// The span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its table
-/// if nothing is.
-fn find(root: &Spanned<DeTable<'_>>, field: Field) -> Range<usize> {
+/// if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
+fn find(root: &Spanned<DeTable<'_>>, field: Field, overridden: usize) -> Range<usize> {
     let origins = ORIGINS.iter().find(|(key, _)| *key == field.key).map_or(&[][..], |(_, origins)| origins);
     let found = std::iter::once(field.key).chain(origins.iter().copied()).find_map(|key| lookup(root, key));
-    match found {
-        Some(value) => match (value.get_ref(), field.entry) {
-            (DeValue::Array(list), Some(entry)) => list.get(entry).map_or(value.span(), Spanned::span),
-            _ => value.span(),
-        },
-        None => {
-            let table = field.key.split('.').next().unwrap_or_default();
-            root.get_ref().get_key_value(table).map_or(0..0, |(key, _)| key.span())
-        }
+    let Some(value) = found else {
+        let table = field.key.split('.').next().unwrap_or_default();
+        return root.get_ref().get_key_value(table).map_or(0..0, |(key, _)| key.span());
+    };
+    let value = match (value.get_ref(), field.entry) {
+        (DeValue::Array(list), Some(entry)) => list.get(entry).unwrap_or(value),
+        _ => value,
+    };
+    first_span_from(value, overridden).unwrap_or_else(|| value.span())
+}
+
+/// The first span within a list, or of the value, that starts at `least` or later.
+fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<usize>> {
+    if value.span().start >= least {
+        return Some(value.span());
+    }
+    match value.get_ref() {
+        DeValue::Array(list) => list.iter().find_map(|entry| first_span_from(entry, least)),
+        _ => None,
     }
 }
 
@@ -166,19 +221,6 @@ fn lookup<'t, 'a>(root: &'t Spanned<DeTable<'a>>, path: &str) -> Option<&'t Span
         DeValue::Table(table) => table.get(key),
         _ => None,
     })
-}
-
-/// The name and the known names of serde's sentence about an unknown one.
-fn unknown(prefix: &str, message: &str) -> Option<(String, Vec<String>)> {
-    let rest = message.strip_prefix(prefix)?;
-    // The name is the input's and may hold anything; the list after it is ours.
-    let (name, known) = rest.rsplit_once("`, ")?;
-    let (name, known) = match rest.rfind("`, expected ") {
-        Some(at) => (&rest[..at], &rest[at..]),
-        None => (name, known),
-    };
-    let known = known.split('`').skip(1).filter(|part| !part.is_empty() && !part.contains([',', ' ']));
-    Some((name.to_owned(), known.map(str::to_owned).collect()))
 }
 
 /// A remedy for a name that is not known: the nearest one, if it is near, and all of them.

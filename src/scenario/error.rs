@@ -14,7 +14,7 @@ const EXCERPT_CHARS: usize = 100;
 pub struct ScenarioError {
     message: String,
     help: Option<String>,
-    field: Option<Field>,
+    fields: Vec<Field>,
     place: Option<Box<Place>>,
 }
 
@@ -45,7 +45,7 @@ pub struct Place {
 
 impl ScenarioError {
     pub(super) fn new(message: impl AsRef<str>) -> Self {
-        Self { message: printable(message.as_ref()), help: None, field: None, place: None }
+        Self { message: printable(message.as_ref()), help: None, fields: Vec::new(), place: None }
     }
 
     pub(super) fn with_help(mut self, help: impl AsRef<str>) -> Self {
@@ -53,13 +53,16 @@ impl ScenarioError {
         self
     }
 
+    /// Names a key whose value is part of what is wrong. The first one named stands for the error, unless another was
+    /// overridden.
     pub(super) fn at(mut self, key: &'static str) -> Self {
-        self.field = Some(Field { key, entry: None });
+        self.fields.push(Field { key, entry: None });
         self
     }
 
+    /// Like [`ScenarioError::at`], for an entry of a list.
     pub(super) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
-        self.field = Some(Field { key, entry: Some(entry) });
+        self.fields.push(Field { key, entry: Some(entry) });
         self
     }
 
@@ -83,7 +86,12 @@ impl ScenarioError {
     /// The key whose value is wrong, for a scenario that was read well but cannot be flown.
     #[must_use]
     pub fn field(&self) -> Option<Field> {
-        self.field
+        self.fields.first().copied()
+    }
+
+    /// All keys that are part of what is wrong.
+    pub(super) fn fields(&self) -> &[Field] {
+        &self.fields
     }
 
     /// Where it stands in the text that it was read from. None for a scenario built in code, and for a file that
@@ -98,7 +106,7 @@ impl std::error::Error for ScenarioError {}
 
 impl fmt::Display for ScenarioError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.place, &self.field) {
+        match (&self.place, self.field()) {
             (Some(place), _) => {
                 writeln!(f, "{}:{}:{}: {}", printable(&place.source), place.line, place.column, self.message)?;
                 write!(f, "{}", place.excerpt())?;

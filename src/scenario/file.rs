@@ -12,13 +12,13 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{JudgeSpec, TimeSpec};
 
-/// Default mass of a vehicle \[kg\].
+/// Default mass of a vehicle in kg.
 pub const DEFAULT_MASS_KG: f64 = 1.0;
-/// Default radius of a vehicle's solid hull \[m\].
+/// Default radius of a vehicle's solid hull in m.
 pub const DEFAULT_HULL_RADIUS_M: f64 = 0.25;
-/// Default scale of the edge tension \[m^2/s^2\].
+/// Default scale of the edge tension in m^2/s^2.
 pub const DEFAULT_ALPHA: f64 = 1.0;
-/// Default position gain of the Laplacian law \[1/s^2\].
+/// Default position gain of the Laplacian law in 1/s^2.
 pub const DEFAULT_F1_PER_S2: f64 = 1.0;
 
 /// Tables whose remaining keys belong to a choice: table, key of the choice, keys common to all choices.
@@ -32,7 +32,32 @@ pub(super) const CHOICES: [(&str, &str, &[&str]); 4] = [
 /// The JSON Schema of the scenario file, with descriptions, units and defaults.
 #[must_use]
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(ScenarioFile).to_value()
+    let mut schema = schemars::schema_for!(ScenarioFile).to_value();
+    remove_null(&mut schema);
+    schema
+}
+
+/// TOML has no null: a key that may be left out has the type that it has when it is there.
+fn remove_null(schema: &mut serde_json::Value) {
+    use serde_json::Value;
+    match schema {
+        Value::Object(object) => {
+            object.retain(|key, value| !(key == "default" && value.is_null()));
+            for (key, value) in object {
+                match value {
+                    Value::Array(types) if key == "type" => {
+                        types.retain(|name| name != "null");
+                        if let [only] = &mut types[..] {
+                            *value = only.take();
+                        }
+                    }
+                    other => remove_null(other),
+                }
+            }
+        }
+        Value::Array(list) => list.iter_mut().for_each(remove_null),
+        _ => {}
+    }
 }
 
 /// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
@@ -74,12 +99,12 @@ pub(super) struct SwarmFile {
     /// where they do.
     #[schemars(range(min = 2))]
     pub(super) count: Option<u64>,
-    /// Mass \[kg\]: one number for all vehicles or a list with one for each.
+    /// Mass in kg: one number for all vehicles or a list with one for each.
     pub(super) mass_kg: PerVehicle,
-    /// Radius of the solid hull \[m\], for all vehicles or for each. The hulls of any two vehicles must fit within
+    /// Radius of the solid hull in m, for all vehicles or for each. The hulls of any two vehicles must fit within
     /// `law.delta_m`.
     pub(super) hull_radius_m: PerVehicle,
-    /// Velocity coefficient a22 of p'' = a22 v + u \[1/s\]: negative is drag, positive feeds energy in.
+    /// Velocity coefficient a22 of p'' = a22 v + u in 1/s: negative is drag, positive feeds energy in.
     pub(super) a22_per_s: f64,
     /// 2 keeps the swarm in the plane z = 0, 3 lets it use all axes. Without it: 2 when every position, velocity and
     /// slot has z = 0, otherwise 3.
@@ -91,15 +116,15 @@ pub(super) struct SwarmFile {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StartFile {
-    /// Position of each vehicle \[m\].
+    /// Position of each vehicle in m.
     pub(super) positions_m: Option<Vec<Point>>,
-    /// Velocity of each vehicle \[m/s\]; at rest unless given.
+    /// Velocity of each vehicle in m/s; at rest unless given.
     pub(super) velocities_m_s: Option<Vec<Point>>,
-    /// Largest random offset along each axis \[m\], uniform, added to every position. Along z only in three
+    /// Largest random offset along each axis in m, uniform, added to every position. Along z only in three
     /// dimensions.
     #[serde(default)]
     pub(super) jitter_m: f64,
-    /// Seed of the random numbers (ChaCha8, the same on every machine).
+    /// Seed of the random numbers (`ChaCha8`, the same on every machine).
     #[serde(default)]
     pub(super) seed: u64,
     #[schemars(flatten)]
@@ -113,29 +138,29 @@ pub(super) struct StartFile {
 pub(super) enum StartShape {
     /// Vehicles 1, 2, ... along x.
     Line {
-        /// Distance between neighbours \[m\].
+        /// Distance between neighbours in m.
         spacing_m: f64,
     },
     /// A near-square grid in the plane z = 0, row by row.
     Grid {
-        /// Distance between neighbours \[m\].
+        /// Distance between neighbours in m.
         spacing_m: f64,
     },
     /// A circle in the plane z = 0.
     Circle {
-        /// Radius \[m\].
+        /// Radius in m.
         radius_m: f64,
     },
     /// Points spread evenly over a sphere.
     Sphere {
-        /// Radius \[m\].
+        /// Radius in m.
         radius_m: f64,
     },
     /// Uniformly random positions in a square, or in a cube in three dimensions, that keep a distance.
     Random {
-        /// Half the side of the square or cube around the origin \[m\].
+        /// Half the side of the square or cube around the origin in m.
         half_extent_m: f64,
-        /// Smallest distance between two vehicles \[m\]: more than `law.delta_m`.
+        /// Smallest distance between two vehicles in m: more than `law.delta_m`.
         min_separation_m: f64,
     },
 }
@@ -155,32 +180,32 @@ pub(super) struct FormationFile {
 pub(super) enum FormationShape {
     /// Five slots: the corners of a house of side d, (0,0) (d,0) (d/2, sqrt3 d/2) (0, sqrt3 d) (d, sqrt3 d).
     Pentagon {
-        /// Side d \[m\].
+        /// Side d in m.
         side_m: f64,
     },
     /// Equal angles on a circle in the plane z = 0.
     Circle {
-        /// Radius \[m\].
+        /// Radius in m.
         radius_m: f64,
     },
     /// Along x.
     Line {
-        /// Distance between neighbours \[m\].
+        /// Distance between neighbours in m.
         spacing_m: f64,
     },
     /// A near-square grid in the plane z = 0, row by row.
     Grid {
-        /// Distance between neighbours \[m\].
+        /// Distance between neighbours in m.
         spacing_m: f64,
     },
     /// Points spread evenly over a sphere.
     Sphere {
-        /// Radius \[m\].
+        /// Radius in m.
         radius_m: f64,
     },
     /// A list of slots.
     Points {
-        /// Slot of each vehicle \[m\].
+        /// Slot of each vehicle in m.
         points_m: Vec<Point>,
     },
 }
@@ -189,7 +214,7 @@ pub(super) enum FormationShape {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LawFile {
-    /// Safety distance delta \[m\]: every flight is judged by it, whatever the law.
+    /// Safety distance delta in m: every flight is judged by it, whatever the law.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) delta_m: f64,
     #[schemars(flatten)]
@@ -203,16 +228,16 @@ pub(super) struct LawFile {
 pub(super) enum LawKind {
     /// Distances as springs with a barrier at delta: collision-free on the complete graph.
     EdgeTension {
-        /// Scale of the tension \[m^2/s^2\].
+        /// Scale of the tension in m^2/s^2.
         #[serde(default = "default_alpha")]
         alpha: f64,
     },
     /// The Laplacian baseline: converges from every start and avoids nothing.
     Laplacian {
-        /// Gain on positions \[1/s^2\].
+        /// Gain on positions in 1/s^2.
         #[serde(default = "default_f1_per_s2")]
         f1_per_s2: f64,
-        /// Gain on velocities \[1/s\]; 1 + `swarm.a22_per_s` unless given.
+        /// Gain on velocities in 1/s; 1 + `swarm.a22_per_s` unless given.
         f2_per_s: Option<f64>,
     },
 }
@@ -279,14 +304,14 @@ pub(super) enum PrecisionFile {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TimeFile {
-    /// Length of the flight \[s\].
+    /// Length of the flight in s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) duration_s: f64,
-    /// Control and physics step \[s\].
+    /// Control and physics step in s.
     #[serde(default = "default_dt_s")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) dt_s: f64,
-    /// Samples recorded per second of flight \[Hz\], at most one a step.
+    /// Samples recorded per second of flight in Hz, at most one a step.
     #[serde(default = "default_record_hz")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) record_hz: f64,
@@ -299,11 +324,11 @@ pub(super) struct TimeFile {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct JudgeFile {
-    /// Largest error of a desired distance over the edges of the graph \[m\].
+    /// Largest error of a desired distance over the edges of the graph in m.
     pub(super) edge_error_m: f64,
-    /// Largest speed relative to the swarm's mean velocity \[m/s\].
+    /// Largest speed relative to the swarm's mean velocity in m/s.
     pub(super) disagreement_m_s: f64,
-    /// Shortest time for which both must hold \[s\].
+    /// Shortest time for which both must hold in s.
     pub(super) hold_s: f64,
 }
 
@@ -317,7 +342,7 @@ pub(super) enum PerVehicle {
     Each(Vec<f64>),
 }
 
-/// \[x, y\] or \[x, y, z\].
+/// x, y and, unless it is 0, z.
 #[derive(Clone, Copy, Debug, JsonSchema)]
 #[schemars(transparent)]
 pub(super) struct Point(#[schemars(with = "Vec<f64>", length(min = 2, max = 3))] pub(super) [f64; 3]);

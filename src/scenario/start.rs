@@ -1,6 +1,6 @@
 //! Start positions from a shape and from random numbers.
 //!
-//! Random numbers are ChaCha8 words turned into doubles by exact arithmetic, so a seed means the same start on every
+//! Random numbers are `ChaCha8` words turned into doubles by exact arithmetic, so a seed means the same start on every
 //! machine.
 
 use nalgebra::Vector3;
@@ -46,7 +46,8 @@ pub(super) fn positions(
                     "a smallest separation of {min_separation_m} m is not more than delta = {delta_m} m"
                 ))
                 .with_help("enlarge start.min_separation_m or reduce law.delta_m")
-                .at("start.min_separation_m"));
+                .at("start.min_separation_m")
+                .at("law.delta_m"));
             }
             return scatter(count, space, half_extent_m, min_separation_m, random);
         }
@@ -91,7 +92,9 @@ fn scatter(
                 i + 1
             ))
             .with_help("enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles")
-            .at("start.half_extent_m"));
+            .at("start.half_extent_m")
+            .at("start.min_separation_m")
+            .at("swarm.count"));
         };
         set_row(&mut positions_m, i, position);
     }

@@ -36,6 +36,9 @@ pub const BYTES_PER_VEHICLE: u128 = 4096;
 /// Memory expected for an edge: its parameters in the law and its place in the graph \[bytes\].
 pub const BYTES_PER_EDGE: u128 = 16;
 
+/// Bytes of a GiB.
+const GIB: f64 = (1_u64 << 30) as f64;
+
 /// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
 /// step.
 const SLOT_MARGIN: f64 = 1e-9;
@@ -134,7 +137,8 @@ impl Scenario {
                         i + 1
                     ))
                     .with_help("set z to 0, or swarm.dimensions to 3")
-                    .at_entry(key, i));
+                    .at_entry(key, i)
+                    .at("swarm.dimensions"));
                 }
             }
         }
@@ -150,8 +154,10 @@ impl Scenario {
                 format!("vehicles {pair} start {separation_m} m apart, not more than delta = {delta_m} m")
             };
             return Err(ScenarioError::new(said)
-                .with_help(format!("move one of them away, or reduce law.delta_m below {separation_m}"))
-                .at_entry("start.positions_m", pair.second()));
+                .with_help("move one of them away, or reduce law.delta_m: starts must be more than delta apart")
+                .at_entry("start.positions_m", pair.second())
+                .at_entry("start.positions_m", pair.first())
+                .at("law.delta_m"));
         }
         if let Some((pair, distance_m)) = first_within(&self.formation.slots_m, delta_m * (1.0 + SLOT_MARGIN)) {
             let [a, b] = pair.numbers();
@@ -167,7 +173,9 @@ impl Scenario {
             };
             return Err(ScenarioError::new(said)
                 .with_help("enlarge the formation, or reduce law.delta_m: slots must be more than delta apart")
-                .at_entry("formation.points_m", pair.second()));
+                .at_entry("formation.points_m", pair.second())
+                .at_entry("formation.points_m", pair.first())
+                .at("law.delta_m"));
         }
         Ok(())
     }
@@ -186,7 +194,9 @@ impl Scenario {
             self.delta_m
         ))
         .with_help(format!("set swarm.hull_radius_m to at most {}, or enlarge law.delta_m", self.delta_m / 2.0))
-        .at_entry("swarm.hull_radius_m", i))
+        .at_entry("swarm.hull_radius_m", i)
+        .at_entry("swarm.hull_radius_m", j)
+        .at("law.delta_m"))
     }
 
     fn check_time(&self) -> Result<(), ScenarioError> {
@@ -206,7 +216,8 @@ impl Scenario {
                 "{duration_s} s in steps of {dt_s} s are {steps:.2e} steps; at most {MAX_STEPS:e} are flown"
             ))
             .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
-            .at("time.duration_s"));
+            .at("time.duration_s")
+            .at("time.dt_s"));
         }
         if self.a22_per_s.abs() * dt_s > 1.0 {
             return Err(ScenarioError::new(format!(
@@ -214,7 +225,8 @@ impl Scenario {
                 1.0 / self.a22_per_s.abs()
             ))
             .with_help("reduce time.dt_s or swarm.a22_per_s")
-            .at("swarm.a22_per_s"));
+            .at("swarm.a22_per_s")
+            .at("time.dt_s"));
         }
         positive("time.record_hz", "the recording rate", record_hz)?;
         if max_halvings > MAX_HALVINGS {
@@ -254,11 +266,10 @@ pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
 
 /// Refuses a swarm that would take more memory than [`MAX_MEMORY_BYTES`].
 pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioError> {
-    let bytes = count as u128 * BYTES_PER_VEHICLE + edges * BYTES_PER_EDGE;
+    let bytes = (count as u128 * BYTES_PER_VEHICLE).saturating_add(edges.saturating_mul(BYTES_PER_EDGE));
     if bytes <= MAX_MEMORY_BYTES {
         return Ok(());
     }
-    const GIB: f64 = (1_u64 << 30) as f64;
     Err(ScenarioError::new(format!(
         "{count} vehicles with {edges} edges would take {:.1} GiB of memory ({BYTES_PER_VEHICLE} bytes a vehicle, \
          {BYTES_PER_EDGE} bytes an edge); at most {} GiB are used",
@@ -266,7 +277,8 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
         MAX_MEMORY_BYTES >> 30
     ))
     .with_help("fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"")
-    .at("swarm.count"))
+    .at("swarm.count")
+    .at("graph.kind"))
 }
 
 /// Number of pairs of `count` vehicles.
@@ -341,7 +353,11 @@ fn require_more_than_zero(what: impl Display, number: f64) -> Result<f64, Scenar
     if number > 0.0 && number.is_finite() {
         return Ok(number);
     }
-    let shown = if number.is_nan() { "not a number".to_owned() } else { number.to_string() };
+    let shown = match number {
+        _ if number.is_nan() => "not a number".to_owned(),
+        f64::INFINITY => "infinite".to_owned(),
+        _ => number.to_string(),
+    };
     Err(ScenarioError::new(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
 }
 
