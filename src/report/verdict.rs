@@ -69,11 +69,7 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
         return None;
     }
     let why = if let Some(held_s) = summary.held_s {
-        format!(
-            "it was kept for the last {} only, and {} are asked for",
-            seconds(held_s),
-            seconds(judge.hold_s)
-        )
+        format!("it was kept for the last {} only, and {} are asked for", seconds(held_s), seconds(judge.hold_s))
     } else if !summary.max_edge_error_m.is_finite() {
         "no state at the end is known".to_owned()
     } else if summary.max_edge_error_m > judge.edge_error_m {

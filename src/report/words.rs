@@ -88,7 +88,10 @@ impl Report {
             ("audit", self.audit_line()),
             ("formation", self.formation_line()),
             ("energy", self.energy_line()),
-            ("control", format!("peak {}, final {} m/s^2", or_dash(self.control.peak_m_s2), or_dash(self.control.final_m_s2))),
+            (
+                "control",
+                format!("peak {}, final {} m/s^2", or_dash(self.control.peak_m_s2), or_dash(self.control.final_m_s2)),
+            ),
             (
                 "velocity",
                 format!(
@@ -141,7 +144,8 @@ impl Report {
 
     fn formation_line(&self) -> String {
         let formation = &self.formation;
-        let reached = formation.reached_at_s.map_or("not reached".to_owned(), |at_s| format!("reached at {}", seconds(at_s)));
+        let reached =
+            formation.reached_at_s.map_or("not reached".to_owned(), |at_s| format!("reached at {}", seconds(at_s)));
         format!(
             "{reached}, largest edge error {} m, rms position error {} m",
             or_dash(formation.max_edge_error_m),
@@ -152,7 +156,12 @@ impl Report {
     fn energy_line(&self) -> String {
         let energy = &self.energy;
         let ratio = energy.max_over_initial.map(|ratio| format!(", at most {ratio:.6} of the initial"));
-        format!("initial {}, final {} m^2/s^2{}", or_dash(energy.initial), or_dash(energy.at_end), ratio.unwrap_or_default())
+        format!(
+            "initial {}, final {} m^2/s^2{}",
+            or_dash(energy.initial),
+            or_dash(energy.at_end),
+            ratio.unwrap_or_default()
+        )
     }
 
     fn run_line(&self) -> String {

@@ -1,0 +1,315 @@
+//! Tests of the report as a whole: keys, null for what is no number, reasons, headlines.
+
+use super::*;
+use crate::audit::Auditor;
+use crate::law::Void;
+use crate::swarm::Rows;
+
+const DELTA_M: f64 = 2.0;
+const JUDGE: JudgeSpec = JudgeSpec { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
+
+/// Two vehicles that pass each other at `miss_m` between 0 and 1 s, as the judge sees it.
+fn passing(miss_m: f64) -> AuditOutcome {
+    let mut auditor = Auditor::new(2, DELTA_M).expect("a judge");
+    auditor.start(0.0, &Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, miss_m, 0.0])).expect("judged");
+    auditor.step(1.0, &Rows::from_row_slice(&[5.0, 0.0, 0.0, -5.0, miss_m, 0.0])).expect("judged");
+    auditor.finish()
+}
+
+const REACHED: Summary = Summary {
+    samples: 7201,
+    end_s: 120.0,
+    reached_at_s: Some(36.5),
+    held_s: Some(83.5),
+    max_edge_error_m: 4.5e-14,
+    rms_position_error_m: 1e-14,
+    disagreement_m_s: 1e-13,
+    common_m_s: 0.0,
+    peak_control_m_s2: 1.03,
+    final_control_m_s2: 0.0,
+    energy_initial: Some(3.656_742_96),
+    energy_final: Some(0.0),
+    energy_max: Some(3.656_742_96),
+    energy_max_over_initial: Some(1.0),
+};
+
+const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: None, max_edge_error_m: 8.57, ..REACHED };
+
+/// What a test changes about an otherwise good run.
+struct Case {
+    audit: AuditOutcome,
+    summary: Summary,
+    start_dimension: usize,
+    ended_early: Option<EndedEarly<'static>>,
+    certificate: Certificate,
+}
+
+impl Case {
+    fn good() -> Self {
+        let certificate = Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![] };
+        Self { audit: passing(2.4607), summary: REACHED, start_dimension: 2, ended_early: None, certificate }
+    }
+
+    fn report(&self) -> Report {
+        Report::new(&Findings {
+            scenario_name: "pentagon",
+            scenario_sha256: "00ff",
+            delta_m: DELTA_M,
+            judge: JUDGE,
+            start_dimension: self.start_dimension,
+            formation_dimension: 2,
+            certificate: &self.certificate,
+            audit: &self.audit,
+            engine_contact_pairs: Some(0),
+            summary: &self.summary,
+            run: &Run {
+                duration_s: 120.0,
+                dt_s: 1.0 / 240.0,
+                steps: 28_800,
+                vehicles: 5,
+                state_hash: "0123456789abcdef".to_owned(),
+            },
+            performance: Performance {
+                wall_s: Some(0.5),
+                real_time_factor: Some(240.0),
+                law_s: Some(0.1),
+                physics_s: Some(0.2),
+                audit_s: Some(0.1),
+                record_s: Some(0.05),
+            },
+            ended_early: self.ended_early,
+        })
+    }
+
+    /// The only reason why this run does not pass.
+    fn reason(&self) -> String {
+        let verdict = self.report().verdict;
+        assert!(!verdict.pass);
+        assert_eq!(verdict.reasons.len(), 1, "{:?}", verdict.reasons);
+        verdict.reasons[0].clone()
+    }
+}
+
+/// Every key of an indented JSON text in order, with its indentation less that of the outermost keys.
+fn keys(json: &str) -> Vec<String> {
+    let key = |line: &str| {
+        let name = line.trim_start().strip_prefix('"')?.split_once("\":")?.0;
+        Some(format!("{}{name}", &line[2..line.len() - line.trim_start().len()]))
+    };
+    json.lines().filter_map(key).collect()
+}
+
+#[test]
+fn the_keys_of_the_json_are_these_in_this_order() {
+    let mut case = Case::good();
+    case.audit = passing(1.5);
+    let expected = "schema_version
+scenario
+  name
+  sha256
+tool
+  name
+  version
+verdict
+  pass
+  reasons
+separation
+  delta_m
+  min_m
+  min_at_s
+  min_pair
+  certified_m
+  certificate_void
+audit
+  status
+  violations
+      pair
+      from_s
+      to_s
+      min_m
+      min_at_s
+  steps
+  pairs_checked
+  closed_form
+    min_m
+  parry
+    min_toi_s
+    disagreements
+  rapier
+    contact_pairs
+formation
+  reached
+  reached_at_s
+  max_edge_error_m
+  rms_position_error_m
+energy
+  initial
+  final
+  max_over_initial
+control
+  peak_m_s2
+  final_m_s2
+velocity
+  disagreement_m_s
+  common_m_s
+run
+  duration_s
+  dt_s
+  steps
+  vehicles
+  state_hash
+performance
+  wall_s
+  real_time_factor
+  law_s
+  physics_s
+  audit_s
+  record_s";
+    let json = case.report().to_json().expect("JSON");
+    assert_eq!(keys(&json), expected.lines().collect::<Vec<_>>());
+}
+
+#[test]
+fn a_report_read_back_from_its_json_is_the_same_to_the_last_bit() {
+    let mut case = Case::good();
+    case.audit = passing(1.5);
+    let report = case.report();
+    let back: Report = serde_json::from_str(&report.to_json().expect("JSON")).expect("reads back");
+    assert_eq!(back, report);
+    let extended = report.to_json().expect("JSON").replacen("{\n", "{\n  \"extra\": 1,\n", 1);
+    assert!(serde_json::from_str::<Report>(&extended).is_err(), "an unknown key goes unnoticed");
+}
+
+#[test]
+fn what_is_no_finite_number_is_null_and_reads_back() {
+    let mut case = Case::good();
+    case.summary = Summary {
+        max_edge_error_m: f64::NAN,
+        rms_position_error_m: f64::INFINITY,
+        disagreement_m_s: f64::NAN,
+        common_m_s: f64::NEG_INFINITY,
+        peak_control_m_s2: f64::NAN,
+        final_control_m_s2: f64::NAN,
+        energy_final: Some(f64::NAN),
+        ..NOT_REACHED
+    };
+    let report = case.report();
+    let json = report.to_json().expect("JSON");
+    assert!(!json.contains("NaN") && !json.contains("inf"), "{json}");
+    let value: serde_json::Value = serde_json::from_str(&json).expect("valid JSON");
+    assert!(value["formation"]["max_edge_error_m"].is_null() && value["energy"]["final"].is_null());
+    assert_eq!(serde_json::from_str::<Report>(&json).expect("reads back"), report);
+}
+
+#[test]
+fn a_clear_run_that_reached_its_formation_passes_without_reasons() {
+    let report = Case::good().report();
+    assert!(report.verdict.pass);
+    assert_eq!(report.verdict.reasons, Vec::<String>::new());
+    assert_eq!(report.headline(), "CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.5 s");
+    assert_eq!((report.separation.min_pair, report.audit.status), (Some([1, 2]), Status::Clear));
+}
+
+#[test]
+fn a_violation_is_told_with_its_pair_distance_and_time() {
+    let case = Case { audit: passing(1.5327), ..Case::good() };
+    assert_eq!(
+        case.reason(),
+        "Vehicles 1 and 2 came to 1.533 m of each other at 0.50 s; the safety distance is 2.000 m."
+    );
+    assert_eq!(case.report().headline(), "VIOLATION: vehicles 1-2 came to 1.533 m (delta 2.000 m) at 0.50 s");
+    let violation = &case.report().audit.violations[0];
+    assert_eq!((violation.pair, violation.min_m), ([1, 2], Some(1.5327)));
+}
+
+#[test]
+fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
+    let case = Case { audit: passing(DELTA_M - 1e-7), ..Case::good() };
+    assert!(case.report().headline().contains("came to 1.9999999 m (delta 2.000 m)"));
+}
+
+#[test]
+fn a_formation_that_is_not_reached_is_told_with_its_largest_error() {
+    let case = Case { summary: NOT_REACHED, ..Case::good() };
+    assert_eq!(
+        case.reason(),
+        "The formation was not reached: at the end a distance is still wrong by 8.570 m, and 0.01 m are allowed."
+    );
+    assert_eq!(
+        case.report().headline(),
+        "CLEAR: never closer than 2.460 m (delta 2.000 m), formation NOT reached (largest edge error 8.57 m)"
+    );
+}
+
+#[test]
+fn a_formation_kept_too_short_or_still_moving_says_so() {
+    let short = Summary { reached_at_s: None, held_s: Some(0.4), ..REACHED };
+    assert!(Case { summary: short, ..Case::good() }.reason().contains("kept for the last 0.40 s only, and 1.00 s"));
+    let moving = Summary { reached_at_s: None, held_s: None, disagreement_m_s: 0.5, ..REACHED };
+    assert!(Case { summary: moving, ..Case::good() }.reason().contains("differ by 0.500 m/s"));
+}
+
+#[test]
+fn a_start_flatter_than_the_formation_is_named_only_where_it_was_not_left() {
+    let case = Case { summary: NOT_REACHED, start_dimension: 1, ..Case::good() };
+    let reasons = case.report().verdict.reasons;
+    assert_eq!(reasons.len(), 2);
+    assert!(reasons[1].starts_with("The start lies on a line and the formation needs a plane"), "{}", reasons[1]);
+    assert!(Case { start_dimension: 1, ..Case::good() }.report().verdict.pass);
+}
+
+#[test]
+fn detectors_that_disagree_never_pass() {
+    let mut case = Case::good();
+    case.audit.parry.disagreements = 3;
+    case.audit.status = audit::Status::Undecided;
+    assert!(case.reason().starts_with("The two detectors of the audit disagree 3 times"));
+    assert!(case.report().headline().starts_with("UNDECIDED: the two detectors disagree"));
+}
+
+#[test]
+fn what_was_not_judged_whole_never_passes() {
+    let mut case = Case::good();
+    case.audit.status = audit::Status::Undecided;
+    assert!(case.reason().starts_with("The audit could not judge everything"));
+    assert!(case.report().headline().starts_with("UNDECIDED: not everything could be judged"));
+}
+
+#[test]
+fn a_run_that_ended_early_never_passes_and_says_why() {
+    let ended_early = Some(EndedEarly { time_s: 3.627, reason: "interrupted" });
+    assert_eq!(Case { ended_early, ..Case::good() }.reason(), "The run ended early, at 3.63 s: interrupted.");
+}
+
+#[test]
+fn a_void_certificate_says_why_in_sentences() {
+    let report = Case::good().report();
+    assert_eq!((report.separation.certified_m, report.separation.certificate_void.len()), (Some(2.055_307), 0));
+    assert!(report.text().contains("certified 2.055307 m"));
+    let report = Case { certificate: Certificate::void(Void::NoBarrier), ..Case::good() }.report();
+    assert_eq!(report.separation.certified_m, None);
+    assert_eq!(report.separation.certificate_void, [Void::NoBarrier.to_string()]);
+    assert!(report.text().contains("not certified"));
+}
+
+#[test]
+fn the_table_has_a_line_for_every_part() {
+    let text = Case::good().report().text();
+    let names: Vec<_> = text.lines().map(|line| line.split(' ').next().unwrap_or_default()).collect();
+    let parts = ["separation", "audit", "formation", "energy", "control", "velocity", "run", "performance"];
+    assert_eq!(names, parts);
+    assert!(text.contains("2.460700 m at 0.50 s, vehicles 1-2 (delta 2.000 m"), "{text}");
+    assert!(!text.contains("NaN"));
+}
+
+#[test]
+fn a_report_on_disk_is_the_report() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("report.json");
+    let report = Case::good().report();
+    report.write(&path).expect("writes");
+    let text = std::fs::read_to_string(&path).expect("reads");
+    assert!(text.ends_with("}\n"));
+    assert_eq!(serde_json::from_str::<Report>(&text).expect("reads back"), report);
+    assert!(report.write(&folder.path().join("missing/report.json")).is_err());
+}
