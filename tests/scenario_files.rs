@@ -168,7 +168,7 @@ fn a_file_that_cannot_be_a_scenario_is_refused_before_it_is_understood() {
 
     let large = folder.path().join("large.toml");
     fs::File::create(&large).and_then(|file| file.set_len(1 << 30)).expect("a sparse file of 1 GiB");
-    assert!(error(&large).message().ends_with("has more than 256 MiB"));
+    assert!(error(&large).message().ends_with("has more than 128 MiB"));
 
     let latin1 = folder.path().join("latin1.toml");
     fs::write(&latin1, b"name = \"pair\"\n# caf\xe9\n").expect("a file");
@@ -194,16 +194,17 @@ fn an_unknown_name_is_answered_with_the_names_that_are_known() {
 #[test]
 fn an_override_sets_any_key_and_makes_those_that_are_not_there() {
     let set = |sets: &[&str]| read_builtin("pentagon", sets).expect("right overrides");
-    assert_eq!(set(&["law.delta_m=1.5"]).delta_m, 1.5);
-    assert_eq!(set(&["name=my-run"]).name, "my-run");
-    assert_eq!(set(&["plant.precision=double"]).resolved_toml().matches("\"double\"").count(), 1);
-    assert_eq!(set(&["plant = {precision = \"double\"}"]).plant, set(&["plant.precision=double"]).plant);
+    let says = |sets: &[&str], line: &str| set(sets).resolved_toml().lines().any(|written| written.trim() == line);
+    assert!(says(&["law.delta_m=1.5"], "delta_m = 1.5"));
+    assert!(says(&["name=my-run"], "name = \"my-run\""));
+    assert!(says(&["plant.precision=double"], "precision = \"double\""));
+    assert!(says(&["plant = {precision = \"double\"}"], "precision = \"double\""));
+    assert!(says(&["start.positions_m.4.x=-1"], "[-1.0, 0.05],"));
+    assert!(says(&["start.positions_m.4.1=-1"], "[-1.0, 0.05],"));
+    assert!(says(&["start.positions_m.4=[-1, 0.5]"], "[-1.0, 0.5],"));
+    assert!(says(&["time.dt_s=0.1", "time.dt_s=0.2"], "dt_s = 0.2"), "the last one wins");
     assert_eq!(set(&["graph.kind=star"]).graph.edge_count(), 4);
-    assert_eq!(set(&["start.positions_m.4.x=-1"]).start.positions_m[(3, 0)], -1.0);
-    assert_eq!(set(&["start.positions_m.4.1=-1"]).start.positions_m[(3, 0)], -1.0);
-    assert_eq!(set(&["start.positions_m.4=[-1, 0.5]"]).start.positions_m[(3, 1)], 0.5);
     assert_eq!(set(&["formation={shape=\"circle\", radius_m=3}"]).formation, Formation::circle(5, 3.0));
-    assert_eq!(set(&["time.dt_s=0.1", "time.dt_s=0.2"]).time.dt_s, 0.2, "the last one wins");
 }
 
 #[test]

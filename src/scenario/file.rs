@@ -1,7 +1,7 @@
 //! The scenario file: its keys, units and defaults as serde types, and the JSON Schema made from them.
 //!
 //! A table whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all
-//! choices. TOML writes both in one flat table; [`super::document`] moves the keys of a choice below it before serde
+//! choices. TOML writes both in one flat table; `document` moves the keys of a choice below it before serde
 //! sees them, so a key of another choice is refused at its own place.
 
 use std::fmt;

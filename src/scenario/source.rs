@@ -8,9 +8,9 @@ use super::document::{Document, suggest};
 use super::error::{Place, ScenarioError};
 use super::{Override, Scenario, build, builtin};
 
-/// Largest scenario file that is read \[bytes\]. The longest scenario that can be flown, a million vehicles with a
-/// position, a velocity and a slot each, takes about 200 MB.
-pub const MAX_FILE_BYTES: u64 = 256 << 20;
+/// Largest scenario file that is read \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge
+/// each. Reading takes about 45 times the length of the file in memory.
+pub const MAX_FILE_BYTES: u64 = 128 << 20;
 
 /// Where the text of a scenario comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
