@@ -48,7 +48,8 @@ pub struct StepFinding<'a> {
 pub struct AuditOutcome {
     /// The verdict.
     pub status: Status,
-    /// Closest approach of all pairs from the start to the end; among equals the earliest, then the lowest pair.
+    /// Closest approach of all pairs from the start to the end; among equals that of the earliest step, there the
+    /// lowest pair, at its earliest time.
     pub closest: Option<ClosestApproach>,
     /// Every violation, in the order of their beginning and then by pair.
     pub violations: Vec<Violation>,
