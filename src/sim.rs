@@ -277,7 +277,9 @@ impl<'a> Cockpit<'a> {
         }
         record_violations(self.recorder, &finding)?;
         self.collect_engine_contacts()?;
-        if commanded.is_ok() && let Some(vehicle) = first_row_not_finite(&self.control) {
+        if commanded.is_ok()
+            && let Some(vehicle) = first_row_not_finite(&self.control)
+        {
             return Err(SimError::CommandNotFinite { step: step.unwrap_or(0), vehicle });
         }
         Ok(commanded)

@@ -94,15 +94,17 @@ impl From<ScenarioError> for Failure {
 
 /// The text with control characters blanked, byte for byte: what a file holds must not steer the terminal.
 fn harmless(text: &str) -> String {
-    let blank = |c: char| if c.is_control() && c != '\n' && c != '\t' { " ".repeat(c.len_utf8()) } else { c.to_string() };
+    let blank =
+        |c: char| if c.is_control() && c != '\n' && c != '\t' { " ".repeat(c.len_utf8()) } else { c.to_string() };
     text.chars().map(blank).collect()
 }
 
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
         match error {
-            RecordError::Write { .. } => Self::machine(error.to_string())
-                .with_help("what was recorded before stays readable; free some space or give another folder with --out"),
+            RecordError::Write { .. } => Self::machine(error.to_string()).with_help(
+                "what was recorded before stays readable; free some space or give another folder with --out",
+            ),
             RecordError::Open { .. } | RecordError::Read { .. } => Self::plain(Exit::WrongInput, error.to_string()),
         }
     }

@@ -39,7 +39,10 @@ impl From<Exit> for ExitCode {
 ///
 /// Without a command, flies the built-in scenario `pentagon`.
 #[derive(Debug, Parser)]
-#[command(version, after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.")]
+#[command(
+    version,
+    after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed."
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,

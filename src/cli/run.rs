@@ -92,12 +92,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
-fn fly(
-    scenario: &Scenario,
-    folder: &RunFolder,
-    console: Console,
-    interrupted: &AtomicBool,
-) -> Result<Report, Failure> {
+fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &AtomicBool) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.recording(), &header)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
