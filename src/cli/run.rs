@@ -47,7 +47,7 @@ pub(super) struct RunArguments {
     #[arg(long)]
     quiet: bool,
     /// Threads to use, by default one a core; the recording has the same bits for any number.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }
 
