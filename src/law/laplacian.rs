@@ -59,9 +59,9 @@ impl Law for LaplacianLaw {
         self.errors_m.copy_from(&swarm.positions_m);
         self.errors_m -= &self.formation.slots_m;
         control.fill(0.0);
-        add_laplacian_product(&self.graph, &self.errors_m, self.f1_per_s2, control);
-        add_laplacian_product(&self.graph, &swarm.velocities_m_s, self.f2_per_s, control);
-        *control /= -(swarm.count() as f64);
+        let per_vehicle = -1.0 / swarm.count().max(1) as f64;
+        add_laplacian_product(&self.graph, &self.errors_m, self.f1_per_s2 * per_vehicle, control);
+        add_laplacian_product(&self.graph, &swarm.velocities_m_s, self.f2_per_s * per_vehicle, control);
         check_range(control)
     }
 

@@ -63,16 +63,10 @@ fn the_bits_do_not_depend_on_the_vector_instructions() {
         let (mut dispatched, mut baseline) = (Rows::zeros(graph.count()), Rows::zeros(graph.count()));
         assert_eq!(kernel.add_pulls(&positions_m, &mut dispatched), Ok(()));
         let axes = columns(&positions_m);
-        let (within, potential) = match &kernel.edges {
-            Edges::All(count) => (
-                kernel.add_pulls_by_row(*count, axes, columns_mut(&mut baseline)),
-                kernel.potential_by_row(*count, axes),
-            ),
-            Edges::Listed(edges) => (
-                kernel.add_pulls_by_list(edges, axes, columns_mut(&mut baseline)),
-                kernel.potential_by_list(edges, axes),
-            ),
-        };
+        // Called without dispatch, this is the code for the oldest processor of the target.
+        let add_pulls = AddPulls { kernel: &kernel, axes, sums: columns_mut(&mut baseline) };
+        let within = add_pulls.with_simd(pulp::Scalar);
+        let potential = Potential { kernel: &kernel, axes }.with_simd(pulp::Scalar);
         assert_eq!(within, Ok(()));
         assert_eq!(dispatched, baseline);
         assert_eq!(kernel.potential(&positions_m), potential);
