@@ -93,9 +93,10 @@ fn scattered(slots_m: &Rows) -> Rows {
 
 /// The complete graph, a star, and the graph of the edges that `keep` picks.
 fn graphs(count: usize, keep: &[bool]) -> Result<[Graph; 3], TestCaseError> {
-    let kept = Graph::complete(count).edges().zip(keep.iter().cycle()).filter(|(_, keep)| **keep);
+    let complete = Graph::complete(count);
+    let kept = complete.edges().zip(keep.iter().cycle()).filter(|(_, keep)| **keep);
     let picked = Graph::from_edges(count, &kept.map(|(edge, _)| edge).collect::<Vec<_>>()).map_err(fail)?;
-    Ok([Graph::complete(count), Graph::star(count), picked])
+    Ok([complete, Graph::star(count), picked])
 }
 
 fn keep() -> impl Strategy<Value = Vec<bool>> {
