@@ -1,4 +1,4 @@
-//! The edge-tension sums over all edges, eight edges at a time.
+//! The edge-tension sums over all edges, a block of edges at a time.
 //!
 //! The loops over lanes hold nothing but IEEE additions, multiplications, divisions, square roots and selections, which
 //! the compiler turns into whatever vector instructions were found at run time. Nothing is fused or reordered, and sums
@@ -16,8 +16,8 @@ use crate::swarm::Rows;
 const LANES: usize = 8;
 /// Edges that are evaluated together, a multiple of [`LANES`].
 const BLOCK: usize = 32;
-/// Up to this many vehicles even the complete graph is taken as a list: its short rows would leave many lanes empty. Here
-/// both ways take about the same time.
+/// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. Around
+/// this number both ways take the same time.
 const LISTED_UP_TO: usize = 16;
 
 type Lanes = [f64; LANES];
@@ -82,10 +82,7 @@ impl WithSimd for AddPulls<'_> {
         let mut block = Block::new(kernel.delta_m);
         match &kernel.edges {
             Edges::All(count) => {
-                let mut rows = kernel.inverse_k_per_m.as_slice();
-                for i in 0..*count {
-                    let (row, rest) = rows.split_at(count - i - 1);
-                    rows = rest;
+                for (i, row) in rows(*count, &kernel.inverse_k_per_m) {
                     let mut of_own = [[0.0; LANES]; 3];
                     for (c, inverse) in row.chunks(BLOCK).enumerate() {
                         let first = i + 1 + c * BLOCK;
@@ -140,10 +137,7 @@ impl WithSimd for Potential<'_> {
         let mut sum = [0.0; LANES];
         match &kernel.edges {
             Edges::All(count) => {
-                let mut rows = kernel.inverse_k_per_m.as_slice();
-                for i in 0..*count {
-                    let (row, rest) = rows.split_at(count - i - 1);
-                    rows = rest;
+                for (i, row) in rows(*count, &kernel.inverse_k_per_m) {
                     for (c, inverse) in row.chunks(BLOCK).enumerate() {
                         block.fill_from_row(i, i + 1 + c * BLOCK, inverse, axes);
                         block.add_values(&mut sum);
@@ -159,6 +153,16 @@ impl WithSimd for Potential<'_> {
         }
         block.within().map(|()| total(sum))
     }
+}
+
+/// Each vehicle of the complete graph with the values of its edges to all later ones.
+#[inline(always)]
+fn rows(count: usize, mut values: &[f64]) -> impl Iterator<Item = (usize, &[f64])> {
+    (0..count).map(move |i| {
+        let (row, rest) = values.split_at(count - i - 1);
+        values = rest;
+        (i, row)
+    })
 }
 
 /// Up to [`BLOCK`] edges.
@@ -252,13 +256,22 @@ impl Block {
     }
 }
 
+/// The length of an edge, and 1 where it is not in (delta, infinity).
+#[inline(always)]
+fn distance_m(delta_m: f64, x: f64, y: f64, z: f64) -> (f64, u64) {
+    let distance_m = (x * x + y * y + z * z).sqrt();
+    (distance_m, u64::from(!(distance_m > delta_m && distance_m < f64::INFINITY)))
+}
+
+/// The edges times w_ij/alpha, and 1 where some length is not in (delta, infinity). Arrays go in and out by value: with
+/// nothing that may alias, the loop becomes vector instructions.
 #[inline(always)]
 fn pulls(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> ([Lanes; 3], u64) {
     let [mut x, mut y, mut z] = edges_m;
     let mut outside = 0;
     for k in 0..LANES {
-        let distance_m = (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
-        outside |= u64::from(!(distance_m > delta_m && distance_m < f64::INFINITY));
+        let (distance_m, out) = distance_m(delta_m, x[k], y[k], z[k]);
+        outside |= out;
         let s = (distance_m - delta_m) * inverse_k_per_m[k];
         let (numerator, denominator) = tension::slope_fraction(s, s - tension::REST);
         let weight = inverse_k_per_m[k] * numerator / (denominator * distance_m);
@@ -269,14 +282,15 @@ fn pulls(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> ([Lanes; 
     ([x, y, z], outside)
 }
 
+/// V/alpha of the edges, and 1 where some length is not in (delta, infinity).
 #[inline(always)]
 fn values(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> (Lanes, u64) {
     let [x, y, z] = edges_m;
     let mut values = [0.0; LANES];
     let mut outside = 0;
     for k in 0..LANES {
-        let distance_m = (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
-        outside |= u64::from(!(distance_m > delta_m && distance_m < f64::INFINITY));
+        let (distance_m, out) = distance_m(delta_m, x[k], y[k], z[k]);
+        outside |= out;
         let s = (distance_m - delta_m) * inverse_k_per_m[k];
         values[k] = tension::value(s, s - tension::REST);
     }

@@ -14,9 +14,11 @@ pub use edge_tension::{EdgeTensionLaw, EdgeTensionParameters};
 pub use laplacian::LaplacianLaw;
 pub use tension::{EdgeTension, TensionError};
 
+use nalgebra::Vector3;
+
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::swarm::{Pair, Rows, Swarm, first_row_not_finite, mean_row, row};
+use crate::swarm::{Pair, Rows, Swarm, first_row_not_finite, row};
 
 /// A control law: a function from the swarm's state to an acceleration per vehicle.
 pub trait Law: Send {
@@ -173,11 +175,11 @@ fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows)
 
 /// 1/2 sum |v_i - mean v|^2 \[m^2/s^2\].
 fn relative_kinetic_energy(swarm: &Swarm) -> f64 {
-    0.5 * sum_of_squares_about_mean(&swarm.velocities_m_s)
+    0.5 * sum_of_squares_about_mean(swarm.count(), |i| row(&swarm.velocities_m_s, i))
 }
 
-/// Sum of |x_i - mean x|^2 over the rows of a table.
-fn sum_of_squares_about_mean(rows: &Rows) -> f64 {
-    let mean = mean_row(rows);
-    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm_squared()).sum()
+/// Sum of |x_i - mean x|^2 over the vehicles.
+fn sum_of_squares_about_mean(count: usize, x: impl Fn(usize) -> Vector3<f64>) -> f64 {
+    let mean = (0..count).map(&x).sum::<Vector3<f64>>() / count.max(1) as f64;
+    (0..count).map(|i| (x(i) - mean).norm_squared()).sum()
 }
