@@ -6,6 +6,7 @@ use engine::prelude::{
 };
 use nalgebra::Vector3;
 
+use crate::law::Law;
 use crate::plant::{Plant, PlantError};
 use crate::scenario::{CONTACT_PREDICTION_M, Scenario, Space};
 use crate::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
@@ -62,12 +63,12 @@ impl Bodies {
 }
 
 impl Plant for Bodies {
-    fn step(&mut self, control: &Rows, dt_s: f64) -> Result<(), PlantError> {
+    fn step(&mut self, _law: &mut dyn Law, held: &Rows, dt_s: f64) -> Result<(), PlantError> {
         self.set_dt(dt_s);
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
             body.reset_forces(false);
-            body.add_force(reals(row(control, i)) * real(self.mass_kg[i]), true);
+            body.add_force(reals(row(held, i)) * real(self.mass_kg[i]), true);
         }
         self.world.step();
         match self.world.quarantine().bodies().first() {
