@@ -1,5 +1,10 @@
 //! Axes: what range they show, and where their ticks are.
 
+use std::ops::Range;
+
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+
 /// Numbers beyond this have no place on an axis: differences of larger ones might overflow.
 const LARGEST: f64 = 1e150;
 /// Smallest share of its magnitude that a range may span: below, ticks would differ by rounding alone.
@@ -88,6 +93,30 @@ impl Axis {
             Scale::Linear => number_label(place, self.step),
             Scale::Log => power_label(place),
         }
+    }
+}
+
+/// An axis is a coordinate of the drawing library, whose values are places.
+impl Ranged for Axis {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, place: &f64, pixels: (i32, i32)) -> i32 {
+        RangedCoordf64::from(self.range()).map(place, pixels)
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.from..self.to
+    }
+}
+
+impl ValueFormatter<f64> for Axis {
+    fn format_ext(&self, place: &f64) -> String {
+        self.tick_label(*place)
     }
 }
 

@@ -6,8 +6,6 @@ use plotters::chart::{ChartBuilder, ChartContext, LabelAreaPosition};
 use plotters::coord::CoordTranslate;
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
-use plotters::coord::combinators::{BindKeyPoints as _, WithKeyPoints};
-use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea as _};
 use plotters::element::{Circle, Cross, EmptyElement, PathElement, PointCollection, Polygon, Text};
 use plotters::prelude::SVGBackend;
@@ -133,7 +131,7 @@ pub(super) enum MarkShape {
 impl Mark {
     fn draw<'a, C: CoordTranslate>(&self, area: &DrawingArea<SVGBackend<'a>, C>, place: C::From) -> Drawn
     where
-        for<'b> &'b Cross<C::From>: PointCollection<'b, C::From>,
+        for<'b> &'b Cross<C::From, i32>: PointCollection<'b, C::From>,
         for<'b> &'b Circle<C::From, i32>: PointCollection<'b, C::From>,
     {
         let (radius, shape) = (tenths_i(self.size_px), Stroke::solid(self.color, 1.6).shape());
@@ -157,8 +155,7 @@ pub(super) struct Chart {
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Spec = WithKeyPoints<RangedCoordf64>;
-type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Spec, Spec>>;
+type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;
 pub(super) type Drawn<T = ()> = Result<T, DrawingAreaErrorKind<std::io::Error>>;
 
 impl Chart {
@@ -229,10 +226,7 @@ impl Chart {
             .margin_right(RIGHT * PX)
             .set_label_area_size(LabelAreaPosition::Left, LEFT * PX)
             .set_label_area_size(LabelAreaPosition::Bottom, BELOW * PX)
-            .build_cartesian_2d(
-                (self.x.from..self.x.to).with_key_points(self.x.ticks.clone()),
-                (self.y.from..self.y.to).with_key_points(self.y.ticks.clone()),
-            )?;
+            .build_cartesian_2d(self.x.clone(), self.y.clone())?;
         let hairline = |color: RGBColor| Stroke::solid(color, 0.8).shape();
         plot.configure_mesh()
             .bold_line_style(hairline(GRID))
@@ -240,8 +234,6 @@ impl Chart {
             .label_style(text(TEXT, INK))
             .axis_desc_style(text(TEXT, INK))
             .set_all_tick_mark_size(4 * PX)
-            .x_label_formatter(&|&place| self.x.tick_label(place))
-            .y_label_formatter(&|&place| self.y.tick_label(place))
             .x_desc(self.x.label.as_str())
             .y_desc(self.y.label.as_str())
             .draw()?;
@@ -302,7 +294,7 @@ impl Chart {
         let area = plot.plotting_area();
         mark.draw(area, place)?;
         if let Some(words) = &mark.text {
-            let words = Text::new(words.as_str(), (tenths_i(6.0), -tenths_i(3.0)), text(TEXT, INK).pos(BESIDE));
+            let words = Text::new(words.clone(), (tenths_i(6.0), -tenths_i(3.0)), text(TEXT, INK).pos(BESIDE));
             area.draw(&(EmptyElement::at(place) + words))?;
         }
         Ok(())
@@ -408,7 +400,8 @@ pub(super) fn draw_title(root: &Area<'_>, title: &str) -> Drawn {
 
 /// Text of a size \[px\].
 pub(super) fn text(size_px: f64, color: RGBColor) -> TextStyle<'static> {
-    TextStyle::from(("sans-serif", size_px * f64::from(PX) * FONT_FACTOR)).color(&color)
+    let style = TextStyle::from(("sans-serif", size_px * f64::from(PX) * FONT_FACTOR));
+    TextStyle { color: color.to_backend_color(), ..style }
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a length within a figure")]

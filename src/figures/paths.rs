@@ -1,7 +1,6 @@
 //! Where the vehicles went.
 
 use plotters::chart::ChartBuilder;
-use plotters::coord::combinators::BindKeyPoints as _;
 use plotters::drawing::IntoDrawingArea as _;
 use plotters::element::{Circle, Cross, EmptyElement, PathElement, Text};
 use plotters::prelude::SVGBackend;
@@ -108,11 +107,8 @@ fn draw_in_space(course: &Course, drawing: &mut String, size: (u32, u32), title:
     let pixels = |span: f64| (unit * span).round() as i32;
 
     // The library's second axis points up.
-    let mut plot = ChartBuilder::on(&root).margin_top(chart::TITLE * PX).build_cartesian_3d(
-        (x.from..x.to).with_key_points(x.ticks.clone()),
-        (z.from..z.to).with_key_points(z.ticks.clone()),
-        (y.from..y.to).with_key_points(y.ticks.clone()),
-    )?;
+    let mut plot =
+        ChartBuilder::on(&root).margin_top(chart::TITLE * PX).build_cartesian_3d(x.clone(), z.clone(), y.clone())?;
     plot.set_3d_pixel_range((pixels(across), pixels(up), pixels(deep)));
     plot.with_projection(|mut view| {
         (view.yaw, view.pitch, view.scale) = (YAW, PITCH, 1.0);
