@@ -30,6 +30,8 @@ pub(super) struct Axis {
     pub(super) to: f64,
     /// Places of the ticks.
     pub(super) ticks: Vec<f64>,
+    /// Drawn from its greater end to its lesser one.
+    pub(super) reversed: bool,
     step: f64,
 }
 
@@ -57,7 +59,7 @@ impl Axis {
         let ticks = (0..100).map(|k| (first + f64::from(k)) * step).take_while(|&tick| tick <= to + ROUNDING * step);
         // Adding 0 turns -0 into 0.
         let ticks = ticks.map(|tick| tick + 0.0).collect();
-        Self { label: label.to_owned(), scale: Scale::Linear, from, to, ticks, step }
+        Self { label: label.to_owned(), scale: Scale::Linear, from, to, ticks, reversed: false, step }
     }
 
     /// A logarithmic axis over whole decades that shows all of the finite positive `numbers`, or the upper
@@ -72,7 +74,7 @@ impl Axis {
         let step = f64::from((decades + 6) / 7);
         // Ticks are decades divisible by the step, so that 1 is one of them wherever it is on the axis.
         let ticks = (0..=decades).map(|k| from + f64::from(k)).filter(|place| place.rem_euclid(step) == 0.0).collect();
-        Self { label: label.to_owned(), scale: Scale::Log, from, to, ticks, step }
+        Self { label: label.to_owned(), scale: Scale::Log, from, to, ticks, reversed: false, step }
     }
 
     /// The place of a number on the axis; none where it has none.
@@ -110,7 +112,7 @@ impl Ranged for Axis {
     }
 
     fn range(&self) -> Range<f64> {
-        self.from..self.to
+        if self.reversed { self.to..self.from } else { self.from..self.to }
     }
 }
 

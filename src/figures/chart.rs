@@ -22,13 +22,14 @@ pub(super) const PX: u32 = 10;
 /// Width of a figure \[px\].
 pub(super) const WIDTH: u32 = 520;
 /// Space for the numbers and the label of the vertical axis \[px\].
-const LEFT: u32 = 62;
+const LEFT: u32 = 58;
+const MARGIN: u32 = 6;
 const RIGHT: u32 = 16;
 pub(super) const TITLE: u32 = 32;
 /// Space for the numbers and the label of the horizontal axis \[px\].
 const BELOW: u32 = 44;
 const LEGEND_ROW: u32 = 18;
-const LEGEND_MARGIN: u32 = 8;
+const LEGEND_MARGIN: u32 = 12;
 /// Height of the plotting area \[px\]; with equal axes it follows the data between the two others.
 const HEIGHT: u32 = 270;
 const LEAST_HEIGHT: u32 = 150;
@@ -38,9 +39,6 @@ pub(super) const TEXT: f64 = 12.5;
 const HEADING: f64 = 14.0;
 /// The library scales fonts by this before it writes them.
 const FONT_FACTOR: f64 = 1.24;
-
-/// Where a text is anchored that stands to the upper right of a mark.
-pub(super) const BESIDE: Pos = Pos { h_pos: HPos::Left, v_pos: VPos::Bottom };
 
 /// Neutral colours; each has a counterpart for dark pages in [`super::STYLE`].
 pub(super) const PAPER: RGBColor = RGBColor(0xFF, 0xFF, 0xFF);
@@ -128,6 +126,18 @@ pub(super) enum MarkShape {
     Ring,
 }
 
+impl MarkShape {
+    /// A text beside a mark: to the lower left of a cross and to the upper right of a ring, so that the numbers of one
+    /// that ends where it started stay apart.
+    pub(super) fn beside(self, words: &str) -> Text<'static, (i32, i32), String> {
+        let (x, y, pos) = match self {
+            Self::Cross => (-5.0, 4.0, Pos::new(HPos::Right, VPos::Top)),
+            Self::Ring => (6.0, -3.0, Pos::new(HPos::Left, VPos::Bottom)),
+        };
+        Text::new(words.to_owned(), (tenths_i(x), tenths_i(y)), text(TEXT, INK).pos(pos))
+    }
+}
+
 impl Mark {
     fn draw<'a, C: CoordTranslate>(&self, area: &DrawingArea<SVGBackend<'a>, C>, place: C::From) -> Drawn
     where
@@ -182,7 +192,7 @@ impl Chart {
 
     /// Widens one range until a unit is as long on both axes; returns the height of the plotting area \[px\].
     fn make_axes_equal(&mut self) -> u32 {
-        let width = f64::from(WIDTH - LEFT - RIGHT);
+        let width = f64::from(WIDTH - MARGIN - LEFT - RIGHT);
         let (across, up) = (self.x.to - self.x.from, self.y.to - self.y.from);
         let height = (width * up / across).clamp(f64::from(LEAST_HEIGHT), f64::from(MOST_HEIGHT)).round();
         let unit = (across / width).max(up / height);
@@ -223,6 +233,7 @@ impl Chart {
     fn plot_area<'a, 'b>(&self, area: &'a Area<'b>) -> Drawn<Plot<'a, 'b>> {
         let mut plot = ChartBuilder::on(area)
             .margin_top(TITLE * PX)
+            .margin_left(MARGIN * PX)
             .margin_right(RIGHT * PX)
             .set_label_area_size(LabelAreaPosition::Left, LEFT * PX)
             .set_label_area_size(LabelAreaPosition::Bottom, BELOW * PX)
@@ -293,11 +304,10 @@ impl Chart {
         let Some(place) = self.place(mark.at) else { return Ok(()) };
         let area = plot.plotting_area();
         mark.draw(area, place)?;
-        if let Some(words) = &mark.text {
-            let words = Text::new(words.clone(), (tenths_i(6.0), -tenths_i(3.0)), text(TEXT, INK).pos(BESIDE));
-            area.draw(&(EmptyElement::at(place) + words))?;
+        match &mark.text {
+            Some(words) => area.draw(&(EmptyElement::at(place) + mark.shape.beside(words))),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn entries(&self) -> Vec<Entry<'_>> {
@@ -323,15 +333,15 @@ enum Sample<'a> {
 }
 
 /// Length of a legend's sample \[px\].
-const SAMPLE: f64 = 22.0;
+const SAMPLE: f64 = 18.0;
 /// Space between a sample and its words, and between entries \[px\].
 const SPACE: f64 = 5.0;
-const BETWEEN: f64 = 14.0;
+const BETWEEN: f64 = 12.0;
 
 impl Entry<'_> {
     /// Width by a crude estimate of the font \[px\].
     fn width_px(&self) -> f64 {
-        SAMPLE + SPACE + 0.54 * TEXT * self.words.chars().count() as f64
+        SAMPLE + SPACE + 0.52 * TEXT * self.words.chars().count() as f64
     }
 }
 
@@ -393,7 +403,7 @@ fn draw_legend_row(area: &Area<'_>, row: &[Entry<'_>], y_px: f64) -> Drawn {
 
 /// The title above a chart.
 pub(super) fn draw_title(root: &Area<'_>, title: &str) -> Drawn {
-    let middle = f64::from(LEFT + WIDTH - RIGHT) / 2.0;
+    let middle = f64::from(MARGIN + LEFT + WIDTH - RIGHT) / 2.0;
     let style = text(HEADING, INK).pos(Pos::new(HPos::Center, VPos::Bottom));
     root.draw_text(title, &style, (tenths_i(middle), tenths_i(22.0)))
 }

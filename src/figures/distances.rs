@@ -84,7 +84,7 @@ fn of_all_pairs(course: &Course) -> Curves {
     let lines = pairs(course.vehicles()).enumerate().map(|(k, (i, j))| {
         let points = course.spans().map(|span| (span.time_s, span.pair_min_m[k])).collect();
         let (stroke, label) = if count <= TOLD_APART {
-            (Stroke::of_line(k), Some(format!("{}–{}", i + 1, j + 1)))
+            (Stroke::of_line(k), Some(Pair::new(i, j).to_string()))
         } else {
             (Stroke { opacity: 0.55, ..Stroke::solid(PALETTE[0], 0.9) }, (k == 0).then(|| format!("all {count} pairs")))
         };

@@ -121,12 +121,12 @@ impl Figure {
         let (width, height) = (size.0 / chart::PX, size.1 / chart::PX);
         let view = format!("0 0 {} {}", size.0, size.1);
         let (title, description) = (printable(title), printable(description));
-        let (title_id, description_id) = (format!("{name}-title"), format!("{name}-description"));
+        let label = format!("{title}. {description}");
         let svg = html! {
             svg xmlns="http://www.w3.org/2000/svg" class="tautline-figure" width=(width) height=(height) viewBox=(view)
-                role="img" aria-labelledby=(title_id) aria-describedby=(description_id) {
-                title id=(title_id) { (title) }
-                desc id=(description_id) { (description) }
+                role="img" aria-label=(label) {
+                title { (title) }
+                desc { (description) }
                 style { (PreEscaped(STYLE)) }
                 (PreEscaped(drawing))
             }

@@ -1,8 +1,9 @@
 //! Where the vehicles went.
 
+use nalgebra::Vector3;
 use plotters::chart::ChartBuilder;
 use plotters::drawing::IntoDrawingArea as _;
-use plotters::element::{Circle, Cross, EmptyElement, PathElement, Text};
+use plotters::element::{Circle, Cross, EmptyElement, PathElement};
 use plotters::prelude::SVGBackend;
 use plotters::style::Color as _;
 use plotters::style::RGBColor;
@@ -10,6 +11,7 @@ use plotters::style::RGBColor;
 use super::axis::Axis;
 use super::chart::{self, Chart, Drawn, GRID, INK, Line, Mark, MarkShape, PALETTE, PAPER, PX, SOFT_INK, Stroke, WIDTH};
 use super::course::{Course, FEW_VEHICLES};
+use super::thin::thinned;
 use super::{Figure, FigureError};
 use crate::swarm::row;
 
@@ -74,8 +76,10 @@ fn description(course: &Course, from: &str) -> String {
 const YAW: f64 = 0.6;
 const PITCH: f64 = 0.42;
 const HEIGHT: u32 = 380;
-/// Share of the chart that the box of the axes may take; the rest is for their numbers.
-const BOX: f64 = 0.84;
+/// Most that the box of the axes may take, across and up \[px\]; the rest is for the numbers.
+const BOX: (f64, f64) = (400.0, 320.0);
+/// Least space between the numbers of an axis \[px\].
+const TICK_PX: f64 = 26.0;
 
 /// Where the vehicles went in space: x, y and z \[m\] in a parallel projection, a unit as long on all axes. Marks and
 /// colours as in [`paths`].
@@ -93,20 +97,23 @@ fn draw_in_space(course: &Course, drawing: &mut String, size: (u32, u32), title:
     let root = SVGBackend::with_string(drawing, size).into_drawing_area();
     root.fill(&PAPER)?;
     chart::draw_title(&root, title)?;
-    let axes = [0, 1, 2].map(|axis| {
+
+    let spans = [0, 1, 2].map(|axis| {
         let (low, high) = course.extent(axis).unwrap_or((0.0, 1.0));
         Axis::linear("", [low, high], true)
     });
-    let [x, y, z] = &axes;
-    let (width, height) = (f64::from(WIDTH * PX), f64::from(HEIGHT * PX));
-    let [across, deep, up] = [x, y, z].map(|axis| axis.to - axis.from);
+    let [across, deep, up] = spans.each_ref().map(|axis| axis.to - axis.from);
     let seen_across = across * YAW.cos() + deep * YAW.sin();
     let seen_up = (across * YAW.sin() + deep * YAW.cos()) * PITCH.sin() + up * PITCH.cos();
-    let unit = BOX * (width / seen_across).min(height / seen_up);
+    let unit = (BOX.0 / seen_across).min(BOX.1 / seen_up) * f64::from(PX);
     #[expect(clippy::cast_possible_truncation, reason = "a length within a figure")]
     let pixels = |span: f64| (unit * span).round() as i32;
-
-    // The library's second axis points up.
+    let [x, mut y, z] = spans.map(|axis| {
+        let room = unit * (axis.to - axis.from) / f64::from(PX);
+        Axis::spanning("", axis.from, axis.to, (room / TICK_PX).max(1.0))
+    });
+    // The library's second axis points up and its third towards the reader: reversed, y makes a right-handed frame.
+    y.reversed = true;
     let mut plot =
         ChartBuilder::on(&root).margin_top(chart::TITLE * PX).build_cartesian_3d(x.clone(), z.clone(), y.clone())?;
     plot.set_3d_pixel_range((pixels(across), pixels(up), pixels(deep)));
@@ -121,7 +128,7 @@ fn draw_in_space(course: &Course, drawing: &mut String, size: (u32, u32), title:
             if axis.ticks.last() == Some(&place) { format!("{name} = {label} m") } else { label }
         }
     };
-    let (tick_x, tick_y, tick_z) = (tick("x", x), tick("y", y), tick("z", z));
+    let (tick_x, tick_y, tick_z) = (tick("x", &x), tick("y", &y), tick("z", &z));
     plot.configure_axes()
         .tick_size(6 * PX)
         .axis_panel_style(PAPER.mix(0.0))
@@ -132,14 +139,16 @@ fn draw_in_space(course: &Course, drawing: &mut String, size: (u32, u32), title:
         .z_formatter(&tick_y)
         .draw()?;
 
+    let shows = |p: &Vector3<f64>| [&x, &y, &z].iter().zip(p.iter()).all(|(axis, &p)| axis.place(p).is_some());
     for i in 0..course.vehicles() {
         let look = Look::of(i, course.vehicles());
-        let points: Vec<_> = course
-            .spans()
-            .map(|span| row(&span.positions_m, i))
-            .filter(|p| [x, y, z].iter().zip(p.iter()).all(|(axis, &p)| axis.place(p).is_some()))
-            .map(|p| (p.x, p.z, p.y))
-            .collect();
+        let points: Vec<_> = course.spans().map(|span| row(&span.positions_m, i)).filter(shows).collect();
+        let points: Vec<_> = points.into_iter().map(|p| (p.x, p.z, p.y)).collect();
+        let on_paper = |point| {
+            let (right, down) = plot.plotting_area().map_coordinate(&point);
+            (f64::from(right), f64::from(down))
+        };
+        let points = thinned(&points, on_paper);
         let (Some(&start), Some(&end)) = (points.first(), points.last()) else { continue };
         let style = |color: RGBColor| Stroke::solid(color, 1.6).shape();
         let radius = chart::tenths_i(look.mark_px);
@@ -147,9 +156,8 @@ fn draw_in_space(course: &Course, drawing: &mut String, size: (u32, u32), title:
         plot.draw_series([Cross::new(start, radius, style(look.start))])?;
         plot.draw_series([Circle::new(end, radius, style(look.end))])?;
         if let Some(number) = look.number {
-            let style = chart::text(chart::TEXT, INK).pos(chart::BESIDE);
-            let words = Text::new(number, (chart::tenths_i(6.0), -chart::tenths_i(4.0)), style);
-            plot.draw_series([EmptyElement::at(end) + words])?;
+            plot.draw_series([EmptyElement::at(start) + MarkShape::Cross.beside(&number)])?;
+            plot.draw_series([EmptyElement::at(end) + MarkShape::Ring.beside(&number)])?;
         }
     }
     root.present()

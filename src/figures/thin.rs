@@ -5,7 +5,7 @@ const TOLERANCE: f64 = 1.0;
 
 /// The points of a line that show: every point left out lies within [`TOLERANCE`] of the line through the others
 /// (Ramer 1972, Douglas and Peucker 1973). `pixels` maps a point to the drawing. The ends are kept, so are extremes.
-pub(super) fn thinned(points: &[(f64, f64)], pixels: impl Fn((f64, f64)) -> (f64, f64)) -> Vec<(f64, f64)> {
+pub(super) fn thinned<P: Copy>(points: &[P], pixels: impl Fn(P) -> (f64, f64)) -> Vec<P> {
     let on_paper: Vec<_> = points.iter().map(|&point| pixels(point)).collect();
     let Some(end) = points.len().checked_sub(1) else { return Vec::new() };
     let mut kept = vec![false; points.len()];
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn nothing_one_point_and_points_in_one_place_are_lines_too() {
-        assert!(thinned(&[], |p| p).is_empty());
+        assert!(thinned::<(f64, f64)>(&[], |p| p).is_empty());
         assert_eq!(thinned(&[(1.0, 2.0)], |p| p), [(1.0, 2.0)]);
         assert_eq!(thinned(&[(1.0, 2.0); 9], |p| p).len(), 2);
     }
