@@ -1,4 +1,4 @@
-//! `tautline run`: fly a scenario and leave a recording and a report.
+//! `tautline run`: fly a scenario and leave a recording, figures and a report.
 
 use std::fs;
 use std::io;
@@ -10,7 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use super::console::{self, Console};
+use super::pictures::Pictures;
 use super::{Exit, Failure};
+use crate::figures::Course;
 use crate::formation::affine_dimension;
 use crate::metrics::Metrics;
 use crate::plant;
@@ -44,6 +46,9 @@ pub(super) struct RunArguments {
     /// Overwrite a folder that holds a finished run.
     #[arg(long)]
     force: bool,
+    /// Draw no figures.
+    #[arg(long)]
+    no_figures: bool,
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -63,10 +68,21 @@ impl Default for RunArguments {
             plant: None,
             out: None,
             force: false,
+            no_figures: false,
             json: false,
             quiet: false,
             threads: None,
         }
+    }
+}
+
+impl RunArguments {
+    /// The command that flies the same again, for a shell.
+    fn command(&self) -> String {
+        let mut words = vec!["tautline", "run", &self.scenario];
+        words.extend(self.overrides.iter().flat_map(|text| ["--set", text]));
+        // Only a zero byte cannot be quoted, and no argument has one.
+        shlex::try_join(words.iter().copied()).unwrap_or_else(|_| words.join(" "))
     }
 }
 
@@ -83,14 +99,27 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
     let interrupted = interruption()?;
-    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted))?;
+    let mut course = Course::new();
+    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted, &mut course))?;
+    let pictures = Pictures {
+        scenario: &scenario,
+        course: (!arguments.no_figures).then_some(&course),
+        warnings: &[],
+        command: &arguments.command(),
+    };
+    let page = pictures.write(&folder.path, &report)?;
     report.write(&folder.report())?;
 
     console.say(&format!("{}\n{}", report.headline(), report.text()));
     for reason in &report.verdict.reasons {
         console.say(reason);
     }
-    console.say(&format!("wrote {} and {}", folder.recording().display(), folder.report().display()));
+    console.say(&format!(
+        "wrote {}, {} and {}",
+        folder.recording().display(),
+        folder.report().display(),
+        page.display()
+    ));
     if arguments.json {
         let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
         console::data(&json)?;
@@ -99,7 +128,13 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
-fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &AtomicBool) -> Result<Report, Failure> {
+fn fly(
+    scenario: &Scenario,
+    folder: &RunFolder,
+    console: Console,
+    interrupted: &AtomicBool,
+    course: &mut Course,
+) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.recording(), &header)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
@@ -114,7 +149,7 @@ fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &
     };
     let mut law = scenario.law()?;
     let mut plant = plant::for_scenario(scenario);
-    let mut recorders = (&mut recording, (&mut metrics, &mut state_hash));
+    let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, course)));
     let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
     progress.finish_and_clear();
     let closed = recording.finish();
