@@ -31,10 +31,10 @@ fn steps(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::from_parameter("bare engine"), |bencher| {
             let control = Rows::zeros(count);
             bencher.iter_batched(
-                || plant::for_scenario(&scenario),
-                |mut plant| {
+                || (scenario.law().expect("a law"), plant::for_scenario(&scenario)),
+                |(mut law, mut plant)| {
                     for _ in 0..STEPS {
-                        plant.step(&control, scenario.time.dt_s).expect("finite");
+                        plant.step(law.as_mut(), &control, scenario.time.dt_s).expect("finite");
                     }
                 },
                 BatchSize::LargeInput,

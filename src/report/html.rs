@@ -139,21 +139,30 @@ impl Report {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
         };
         let (time, judge) = (&scenario.time, &scenario.judge);
-        let [plant, precision] = match scenario.plant {
-            PlantSpec::Rapier(precision) => [
-                "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line at \
-                 constant speed.",
-                match precision {
-                    Precision::Single => "single precision (32 bits)",
-                    Precision::Double => "double precision (64 bits)",
-                },
-            ],
+        let (plant, command) = match scenario.plant {
+            PlantSpec::Rapier(precision) => (
+                format!(
+                    "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
+                     at constant speed. The engine computes in {}, law and audit in double precision (64 bits).",
+                    match precision {
+                        Precision::Single => "single precision (32 bits)",
+                        Precision::Double => "double precision (64 bits)",
+                    }
+                ),
+                "held over it",
+            ),
+            PlantSpec::Ideal => (
+                "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
+                 8th order in double precision (64 bits); the audit takes them to move on straight lines within a step."
+                    .to_owned(),
+                "recorded; the motion between follows the law in continuous time",
+            ),
         };
         vec![
             certificate,
-            format!("{plant} The engine computes in {precision}, law and audit in double precision (64 bits)."),
+            plant,
             format!(
-                "Commands are computed once a step of {} ms and held over it. A step that would take more than half of a \
+                "Commands are computed once a step of {} ms and {command}. A step that would take more than half of a \
                  pair's clearance is flown in halves, at most {} times halved.",
                 short(time.dt_s * 1e3),
                 time.max_halvings
@@ -163,8 +172,9 @@ impl Report {
              cast by parry must agree. The engine's own contacts are evidence alone."
                 .to_owned(),
             format!(
-                "Reached means: no edge is wrong by more than {} m and no vehicle differs from the mean velocity by more \
-                 than {} m/s, from then on to the end, for at least {} s.",
+                "Reached means: no edge is wrong by more than {0} m, the vehicles are within {0} m (root mean square) of the \
+                 formation, turned and perhaps mirrored, and none differs from the mean velocity by more than {1} m/s, from \
+                 then on to the end, for at least {2} s.",
                 judge.edge_error_m, judge.disagreement_m_s, judge.hold_s
             ),
             format!(
