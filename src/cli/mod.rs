@@ -7,6 +7,7 @@ mod completions;
 mod console;
 mod diagnostic;
 mod list;
+mod pictures;
 mod run;
 mod schema;
 

@@ -1,4 +1,4 @@
-//! `tautline run`: fly a scenario and leave a recording and a report.
+//! `tautline run`: fly a scenario and leave a recording, figures and a report.
 
 use std::fs;
 use std::io;
@@ -10,14 +10,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use super::console::{self, Console};
+use super::pictures::Pictures;
 use super::{Exit, Failure};
+use crate::figures::Course;
 use crate::formation::affine_dimension;
 use crate::metrics::Metrics;
 use crate::plant;
 use crate::record::StateHash;
 use crate::record::mcap::{Header, McapRecorder};
 use crate::report::{EndedEarly, Findings, Performance, Report, Run};
-use crate::scenario::{Override, Scenario, Source};
+use crate::scenario::{Override, PlantSpec, Scenario, Source};
 use crate::sim::{self, Ending, Flight};
 
 /// Steps between two looks at the progress bar.
@@ -34,20 +36,27 @@ pub(super) struct RunArguments {
     /// Set any key of the scenario for this run; may be given several times.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
-    /// Folder for the recording and the report \[default: out/<scenario name>\].
+    /// What moves the vehicles: rigid bodies, or the equation of motion solved in continuous time. Short for
+    /// `--set plant.kind=...`.
+    #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
+    plant: Option<String>,
+    /// Folder for the recording and the report; by default out/NAME, where NAME is the scenario's.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Overwrite a folder that holds a finished run.
     #[arg(long)]
     force: bool,
+    /// Draw no figures.
+    #[arg(long)]
+    no_figures: bool,
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use; the recording has the same bits for any number \[default: one a core\].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Threads to use, by default one a core; the recording has the same bits for any number.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }
 
@@ -56,8 +65,10 @@ impl Default for RunArguments {
         Self {
             scenario: "pentagon".to_owned(),
             overrides: Vec::new(),
+            plant: None,
             out: None,
             force: false,
+            no_figures: false,
             json: false,
             quiet: false,
             threads: None,
@@ -65,9 +76,21 @@ impl Default for RunArguments {
     }
 }
 
+impl RunArguments {
+    /// The command that flies the same again, for a shell.
+    fn command(&self) -> String {
+        let mut words = vec!["tautline", "run", &self.scenario];
+        words.extend(self.overrides.iter().flat_map(|text| ["--set", text]));
+        // Only a zero byte cannot be quoted, and no argument has one.
+        shlex::try_join(words.iter().copied()).unwrap_or_else(|_| words.join(" "))
+    }
+}
+
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+    let plant = arguments.plant.iter().map(|kind| format!("plant.kind={kind}"));
+    let overrides = arguments.overrides.iter().cloned().chain(plant);
+    let overrides = overrides.map(|text| Override::parse(&text)).collect::<Result<Vec<_>, _>>()?;
     let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
     let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
     folder.open(arguments.force)?;
@@ -76,14 +99,27 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
     let interrupted = interruption()?;
-    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted))?;
+    let mut course = Course::new();
+    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted, &mut course))?;
+    let pictures = Pictures {
+        scenario: &scenario,
+        course: (!arguments.no_figures).then_some(&course),
+        warnings: &[],
+        command: &arguments.command(),
+    };
+    let page = pictures.write(&folder.path, &report)?;
     report.write(&folder.report())?;
 
     console.say(&format!("{}\n{}", report.headline(), report.text()));
     for reason in &report.verdict.reasons {
         console.say(reason);
     }
-    console.say(&format!("wrote {} and {}", folder.recording().display(), folder.report().display()));
+    console.say(&format!(
+        "wrote {}, {} and {}",
+        folder.recording().display(),
+        folder.report().display(),
+        page.display()
+    ));
     if arguments.json {
         let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
         console::data(&json)?;
@@ -92,7 +128,13 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
-fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &AtomicBool) -> Result<Report, Failure> {
+fn fly(
+    scenario: &Scenario,
+    folder: &RunFolder,
+    console: Console,
+    interrupted: &AtomicBool,
+    course: &mut Course,
+) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.recording(), &header)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
@@ -107,7 +149,7 @@ fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &
     };
     let mut law = scenario.law()?;
     let mut plant = plant::for_scenario(scenario);
-    let mut recorders = (&mut recording, (&mut metrics, &mut state_hash));
+    let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, course)));
     let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
     progress.finish_and_clear();
     let closed = recording.finish();
@@ -132,7 +174,7 @@ fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: Metric
         formation_dimension: scenario.formation.affine_dimension(FLATNESS),
         certificate: &flight.certificate,
         audit: &flight.audit,
-        engine_contact_pairs: Some(flight.engine_contacts.len() as u64),
+        engine_contact_pairs: (scenario.plant != PlantSpec::Ideal).then_some(flight.engine_contacts.len() as u64),
         summary: &metrics.finish(),
         run: &Run {
             duration_s: flight.duration_s,
