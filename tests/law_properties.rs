@@ -86,8 +86,8 @@ fn cases() -> impl Strategy<Value = Case> {
 /// The same slots given to other vehicles, so that edges pull as well as push.
 fn scattered(slots_m: &Rows) -> Rows {
     let count = slots_m.nrows();
-    let coprime = |step: &usize| (2..=*step).all(|d| step % d != 0 || count % d != 0);
-    let step = (count.div_ceil(2)..).find(coprime).unwrap_or(1);
+    let coprime = |step: &usize| (2..=*step).all(|d| !step.is_multiple_of(d) || !count.is_multiple_of(d));
+    let step = (count.div_ceil(2)..count).find(coprime).unwrap_or(1);
     permuted(slots_m, &(0..count).map(|i| i * step % count).collect::<Vec<_>>())
 }
 
@@ -145,13 +145,13 @@ fn rate_of_energy(law: &mut dyn Law, swarm: &Swarm, a22_per_s: f64) -> Result<f6
     Ok((energy_at(STEP_S)? - energy_at(-STEP_S)?) / (2.0 * STEP_S))
 }
 
-/// Sum |v_i - mean v|^2.
+/// `sum |v_i - mean v|^2`
 fn relative_speeds_squared(swarm: &Swarm) -> f64 {
     let mean = swarm.mean_velocity_m_s();
     (0..swarm.count()).map(|i| (row(&swarm.velocities_m_s, i) - mean).norm_squared()).sum()
 }
 
-/// The check that dE/dt = -sum |v_i - mean v|^2 on the complete graph, for any law with an energy.
+/// The check that `dE/dt = -sum |v_i - mean v|^2` on the complete graph, for any law with an energy.
 fn energy_falls_by_the_relative_speeds_squared(law: &mut dyn Law, case: &Case) -> TestCaseResult {
     let found = rate_of_energy(law, &case.swarm, case.a22_per_s)?;
     let expected = -relative_speeds_squared(&case.swarm);

@@ -54,7 +54,7 @@ impl Kernel {
         Self { delta_m, edges, inverse_k_per_m, arch: pulp::Arch::new() }
     }
 
-    /// Adds (1/alpha) sum_j w_ij (p_i - p_j) over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
+    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
     /// Both tables have a row for each vehicle of the graph.
     pub(super) fn add_pulls(&self, positions_m: &Rows, sums: &mut Rows) -> Result<(), OutOfDomain> {
         self.arch.dispatch(AddPulls { kernel: self, axes: columns(positions_m), sums: columns_mut(sums) })
@@ -78,7 +78,7 @@ impl WithSimd for AddPulls<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let Self { kernel, axes, sums } = self;
+        let Self { kernel, axes, mut sums } = self;
         let mut block = Block::new(kernel.delta_m);
         match &kernel.edges {
             Edges::All(count) => {
@@ -108,10 +108,10 @@ impl WithSimd for AddPulls<'_> {
                 for (edges, inverse) in edges.chunks(BLOCK).zip(kernel.inverse_k_per_m.chunks(BLOCK)) {
                     block.fill_from_list(edges, inverse, axes);
                     block.turn_into_pulls();
-                    for axis in 0..3 {
-                        for (&[i, j], pull) in edges.iter().zip(&block.edges_m[axis]) {
-                            sums[axis][i] += pull;
-                            sums[axis][j] -= pull;
+                    for (sums, pulls) in sums.iter_mut().zip(&block.edges_m) {
+                        for (&[i, j], pull) in edges.iter().zip(pulls) {
+                            sums[i] += pull;
+                            sums[j] -= pull;
                         }
                     }
                 }
@@ -170,7 +170,7 @@ struct Block {
     delta_m: f64,
     /// Number of edges.
     len: usize,
-    /// Along each axis p_i - p_j of the edges.
+    /// Along each axis `p_i - p_j` of the edges.
     edges_m: [[f64; BLOCK]; 3],
     inverse_k_per_m: [f64; BLOCK],
     /// Positive once some distance was not in (delta, infinity).
@@ -220,7 +220,7 @@ impl Block {
         }
     }
 
-    /// Multiplies each edge by w_ij/alpha = V'/(alpha l).
+    /// Multiplies each edge by `w_ij/alpha = V'/(alpha l)`.
     #[inline(always)]
     fn turn_into_pulls(&mut self) {
         let chunks = self.len.div_ceil(LANES);
@@ -263,8 +263,8 @@ fn distance_m(delta_m: f64, x: f64, y: f64, z: f64) -> (f64, u64) {
     (distance_m, u64::from(!(distance_m > delta_m && distance_m < f64::INFINITY)))
 }
 
-/// The edges times w_ij/alpha, and 1 where some length is not in (delta, infinity). Arrays go in and out by value: with
-/// nothing that may alias, the loop becomes vector instructions.
+/// The edges times `w_ij/alpha`, and 1 where some length is not in (delta, infinity). Arrays go in and out by value:
+/// with nothing that may alias, the loop becomes vector instructions.
 #[inline(always)]
 fn pulls(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> ([Lanes; 3], u64) {
     let [mut x, mut y, mut z] = edges_m;

@@ -15,13 +15,17 @@ use crate::swarm::{Rows, Swarm, row};
 /// u_i = -(1/N) sum_{j in N_i} [ f1 ((p_i - h_i) - (p_j - h_j)) + f2 (v_i - v_j) ]
 /// ```
 ///
-/// It reaches the slots h_i up to a common translation from any start on a connected graph, and does not keep vehicles
-/// apart. The source's gains are f1 = 1 and f2 = 1 + a22.
+/// It reaches the slots `h_i` up to a common translation from any start on a connected graph, and does not keep
+/// vehicles apart. The source's gains are f1 = 1 and f2 = 1 + a22.
 ///
 /// # Energy
-/// On the complete graph, with e_i = p_i - h_i, E = 1/2 sum |v_i - mean v|^2 + (f1/2) sum |e_i - mean e|^2 and
-/// dE/dt = (a22 - f2) sum |v_i - mean v|^2: for f1 > 0 it is a Lyapunov function wherever f2 >= a22. On other graphs, and
-/// for f1 <= 0, none is given.
+/// On the complete graph, with `e_i = p_i - h_i`,
+///
+/// ```text
+/// E = 1/2 sum |v_i - mean v|^2 + (f1/2) sum |e_i - mean e|^2,    dE/dt = (a22 - f2) sum |v_i - mean v|^2
+/// ```
+///
+/// For f1 > 0 this is a Lyapunov function wherever f2 >= a22. On other graphs, and for f1 <= 0, none is given.
 ///
 /// # Cost
 /// O(N) a step on the complete graph, O(edges) on others, without allocation.
@@ -31,7 +35,7 @@ pub struct LaplacianLaw {
     formation: Formation,
     f1_per_s2: f64,
     f2_per_s: f64,
-    /// Scratch: p_i - h_i.
+    /// Scratch: `p_i - h_i`.
     errors_m: Rows,
 }
 

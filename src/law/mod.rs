@@ -154,8 +154,8 @@ fn check_range(control: &Rows) -> Result<(), LawError> {
     first_row_not_finite(control).map_or(Ok(()), |_| Err(LawError::OutOfRange))
 }
 
-/// Adds `gain` L_G X to `sums`, where X has a row for each vehicle: row i gains `gain` times the sum of x_i - x_j over
-/// the neighbours j of i. On the complete graph this is N (x_i - mean x) and takes O(N).
+/// Adds `gain L_G X` to `sums`, where X has a row for each vehicle: row i gains `gain` times the sum of `x_i - x_j`
+/// over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)` and takes O(N) for all rows.
 fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows) {
     let count = graph.count().max(1);
     for (x, sums) in rows.as_slice().chunks_exact(count).zip(sums.as_mut_slice().chunks_exact_mut(count)) {
@@ -173,12 +173,12 @@ fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows)
     }
 }
 
-/// 1/2 sum |v_i - mean v|^2 \[m^2/s^2\].
+/// `1/2 sum |v_i - mean v|^2` \[m^2/s^2\].
 fn relative_kinetic_energy(swarm: &Swarm) -> f64 {
     0.5 * sum_of_squares_about_mean(swarm.count(), |i| row(&swarm.velocities_m_s, i))
 }
 
-/// Sum of |x_i - mean x|^2 over the vehicles.
+/// Sum of `|x_i - mean x|^2` over the vehicles.
 fn sum_of_squares_about_mean(count: usize, x: impl Fn(usize) -> Vector3<f64>) -> f64 {
     let mean = (0..count).map(&x).sum::<Vector3<f64>>() / count.max(1) as f64;
     (0..count).map(|i| (x(i) - mean).norm_squared()).sum()

@@ -1,4 +1,5 @@
 //! The edge tension (5), (6): the potential that holds one pair of vehicles apart and together.
+#![expect(clippy::inline_always, reason = "the vectorised sums of the kernel are made of the functions here")]
 
 use std::hint::select_unpredictable;
 
