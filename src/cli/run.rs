@@ -38,7 +38,7 @@ pub(super) struct RunArguments {
     /// `--set plant.kind=...`.
     #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
     plant: Option<String>,
-    /// Folder for the recording and the report \[default: out/<scenario name>\].
+    /// Folder for the recording and the report; by default out/NAME, where NAME is the scenario's.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Overwrite a folder that holds a finished run.
@@ -50,7 +50,7 @@ pub(super) struct RunArguments {
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use; the recording has the same bits for any number \[default: one a core\].
+    /// Threads to use, by default one a core; the recording has the same bits for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
