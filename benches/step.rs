@@ -29,12 +29,12 @@ fn steps(criterion: &mut Criterion) {
         let scenario = lattice(count);
         scenario.validate().expect("the lattice can be flown");
         group.bench_function(BenchmarkId::from_parameter("bare engine"), |bencher| {
-            let control = Rows::zeros(count);
+            let (mut law, held) = (scenario.law().expect("a law"), Rows::zeros(count));
             bencher.iter_batched(
-                || (scenario.law().expect("a law"), plant::for_scenario(&scenario)),
-                |(mut law, mut plant)| {
+                || plant::for_scenario(&scenario),
+                |mut plant| {
                     for _ in 0..STEPS {
-                        plant.step(law.as_mut(), &control, scenario.time.dt_s).expect("finite");
+                        plant.step(law.as_mut(), &held, scenario.time.dt_s).expect("finite");
                     }
                 },
                 BatchSize::LargeInput,
