@@ -12,6 +12,7 @@ use clap::Args;
 use super::console::{self, Console};
 use super::{Exit, Failure};
 use crate::formation::affine_dimension;
+use crate::law::Law;
 use crate::metrics::Metrics;
 use crate::plant;
 use crate::record::StateHash;
@@ -22,6 +23,8 @@ use crate::sim::{self, Ending, Flight};
 
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
+/// Threads that a flight has work for: one for the law and one for the audit.
+const THREADS_OF_USE: usize = 2;
 /// Offsets below this share of the extent do not make a start or a formation leave its line or plane.
 const FLATNESS: f64 = 1e-9;
 
@@ -46,7 +49,7 @@ pub(super) struct RunArguments {
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use; the recording has the same bits for any number \[default: one a core\].
+    /// Threads to use, of which two are of use; the recording has the same bits for any number \[default: one a core\].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
@@ -69,14 +72,17 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
     let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
-    let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
-    folder.open(arguments.force)?;
+    let law = scenario.law()?;
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
+        .num_threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
     let interrupted = interruption()?;
-    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted))?;
+    // Nothing is written before everything that can be wrong with the input has been looked at.
+    let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
+    folder.open(arguments.force)?;
+    let report = threads.install(|| fly(&scenario, law, &folder, console, &interrupted))?;
     report.write(&folder.report())?;
 
     console.say(&format!("{}\n{}", report.headline(), report.text()));
@@ -92,7 +98,13 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
-fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &AtomicBool) -> Result<Report, Failure> {
+fn fly(
+    scenario: &Scenario,
+    mut law: Box<dyn Law>,
+    folder: &RunFolder,
+    console: Console,
+    interrupted: &AtomicBool,
+) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.recording(), &header)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
@@ -105,7 +117,6 @@ fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &
         }
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut law = scenario.law()?;
     let mut plant = plant::for_scenario(scenario);
     let mut recorders = (&mut recording, (&mut metrics, &mut state_hash));
     let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
