@@ -6,7 +6,6 @@ use std::io::Write as _;
 use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
 
 use super::Exit;
-use crate::audit::AuditError;
 use crate::law::ParameterError;
 use crate::record::RecordError;
 use crate::report::ArtefactError;
@@ -129,23 +128,17 @@ impl From<ParameterError> for Failure {
     }
 }
 
-impl From<AuditError> for Failure {
-    fn from(error: AuditError) -> Self {
-        Self::plain(Exit::WrongInput, error.to_string())
-    }
-}
-
 impl From<SimError> for Failure {
     fn from(error: SimError) -> Self {
         match error {
             SimError::Record(error) => error.into(),
-            SimError::Audit(error) => error.into(),
-            SimError::CommandNotFinite { .. } | SimError::StateNotFinite { .. } | SimError::Stalled { .. } => {
-                Self::input(
-                    error.to_string(),
-                    "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
-                )
-            }
+            SimError::Audit(_)
+            | SimError::CommandNotFinite { .. }
+            | SimError::StateNotFinite { .. }
+            | SimError::Stalled { .. } => Self::input(
+                error.to_string(),
+                "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
+            ),
         }
     }
 }

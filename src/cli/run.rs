@@ -14,6 +14,7 @@ use super::pictures::Pictures;
 use super::{Exit, Failure};
 use crate::figures::Course;
 use crate::formation::affine_dimension;
+use crate::law::Law;
 use crate::metrics::Metrics;
 use crate::plant;
 use crate::record::StateHash;
@@ -24,6 +25,8 @@ use crate::sim::{self, Ending, Flight};
 
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
+/// Threads that a flight has work for: one for the law and one for the audit.
+const THREADS_OF_USE: usize = 2;
 /// Offsets below this share of the extent do not make a start or a formation leave its line or plane.
 const FLATNESS: f64 = 1e-9;
 
@@ -55,8 +58,8 @@ pub(super) struct RunArguments {
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use, by default one a core; the recording has the same bits for any number.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    /// Threads to use, of which two are of use, by default one a core; the recording has the same bits for any number.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
 
@@ -81,6 +84,7 @@ impl RunArguments {
     fn command(&self) -> String {
         let mut words = vec!["tautline", "run", &self.scenario];
         words.extend(self.overrides.iter().flat_map(|text| ["--set", text]));
+        words.extend(self.plant.iter().flat_map(|plant| ["--plant", plant]));
         // Only a zero byte cannot be quoted, and no argument has one.
         shlex::try_join(words.iter().copied()).unwrap_or_else(|_| words.join(" "))
     }
@@ -92,15 +96,18 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let overrides = arguments.overrides.iter().cloned().chain(plant);
     let overrides = overrides.map(|text| Override::parse(&text)).collect::<Result<Vec<_>, _>>()?;
     let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
-    let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
-    folder.open(arguments.force)?;
+    let law = scenario.law()?;
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
+        .num_threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
     let interrupted = interruption()?;
+    // Nothing is written before everything that can be wrong with the input has been looked at.
+    let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
+    folder.open(arguments.force)?;
     let mut course = Course::new();
-    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted, &mut course))?;
+    let report = threads.install(|| fly(&scenario, law, &folder, console, &interrupted, &mut course))?;
     let pictures = Pictures {
         scenario: &scenario,
         course: (!arguments.no_figures).then_some(&course),
@@ -130,6 +137,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
 fn fly(
     scenario: &Scenario,
+    mut law: Box<dyn Law>,
     folder: &RunFolder,
     console: Console,
     interrupted: &AtomicBool,
@@ -147,7 +155,6 @@ fn fly(
         }
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut law = scenario.law()?;
     let mut plant = plant::for_scenario(scenario);
     let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, course)));
     let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);

@@ -20,8 +20,8 @@ pub const SMALLEST: f64 = 1e-9;
 /// 1e-6 that decides whether a step is recorded ([`TimeSpec::records`]); at a microsecond a step it takes 17 minutes.
 pub const MAX_STEPS: f64 = 1e9;
 
-/// Most halvings of a step: 2^-30 of it is below a nanosecond for every step of less than a second.
-pub const MAX_HALVINGS: u32 = 30;
+/// Most halvings of a step. Up to here doubles tell the times of its parts apart to the end of the longest flight.
+pub const MAX_HALVINGS: u32 = 20;
 
 /// Distance at which the engine begins to act on two hulls that are about to touch \[m\]: hulls must stay so far from
 /// touching while no pair is closer than delta.
