@@ -13,6 +13,9 @@ use crate::report::ArtefactError;
 use crate::scenario::ScenarioError;
 use crate::sim::SimError;
 
+/// Longest line of a source that is shown in a frame \[bytes\].
+const LONGEST_LINE: usize = 400;
+
 /// An error on its way to the user, with the exit code that it means.
 #[derive(Debug)]
 pub(super) struct Failure {
@@ -78,6 +81,10 @@ impl Diagnostic for Failure {
 
 impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
+        // miette shows whole lines, and none beyond 65,535 columns; the error's own text shows a part of any line.
+        if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
+            return Self::plain(Exit::WrongInput, error.to_string());
+        }
         let field = error.field().filter(|_| error.place().is_none());
         let message = match field {
             Some(field) => format!("{field}: {}", error.message()),
@@ -133,10 +140,12 @@ impl From<SimError> for Failure {
         match error {
             SimError::Record(error) => error.into(),
             SimError::Audit(error) => error.into(),
-            SimError::CommandNotFinite { .. } | SimError::StateNotFinite { .. } => Self::input(
-                error.to_string(),
-                "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
-            ),
+            SimError::CommandNotFinite { .. } | SimError::StateNotFinite { .. } | SimError::Stalled { .. } => {
+                Self::input(
+                    error.to_string(),
+                    "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
+                )
+            }
         }
     }
 }

@@ -128,9 +128,10 @@ impl Law for EdgeTensionLaw {
         check_count(self.graph.count(), control.nrows())?;
         control.fill(0.0);
         self.kernel.add_pulls(&swarm.positions_m, control).map_err(|_| self.fault(swarm))?;
-        *control *= self.parameters.alpha;
-        add_laplacian_product(&self.graph, &swarm.velocities_m_s, 1.0 + self.parameters.a22_per_s, control);
-        *control /= -(swarm.count() as f64);
+        let per_vehicle = -1.0 / swarm.count().max(1) as f64;
+        let EdgeTensionParameters { alpha, a22_per_s, .. } = self.parameters;
+        *control *= alpha * per_vehicle;
+        add_laplacian_product(&self.graph, &swarm.velocities_m_s, (1.0 + a22_per_s) * per_vehicle, control);
         check_range(control)
     }
 

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::swarm::{Rows, Swarm};
+use crate::swarm::{Rows, Swarm, row};
 
 /// The Laplacian law on an undirected graph of N vehicles, equation (3):
 ///
@@ -59,9 +59,9 @@ impl Law for LaplacianLaw {
         self.errors_m.copy_from(&swarm.positions_m);
         self.errors_m -= &self.formation.slots_m;
         control.fill(0.0);
-        add_laplacian_product(&self.graph, &self.errors_m, self.f1_per_s2, control);
-        add_laplacian_product(&self.graph, &swarm.velocities_m_s, self.f2_per_s, control);
-        *control /= -(swarm.count() as f64);
+        let per_vehicle = -1.0 / swarm.count().max(1) as f64;
+        add_laplacian_product(&self.graph, &self.errors_m, self.f1_per_s2 * per_vehicle, control);
+        add_laplacian_product(&self.graph, &swarm.velocities_m_s, self.f2_per_s * per_vehicle, control);
         check_range(control)
     }
 
@@ -70,8 +70,9 @@ impl Law for LaplacianLaw {
             return None;
         }
         check_state(self.graph.count(), swarm).ok()?;
-        let errors_m = &swarm.positions_m - &self.formation.slots_m;
-        let energy = relative_kinetic_energy(swarm) + 0.5 * self.f1_per_s2 * sum_of_squares_about_mean(&errors_m);
+        let error_m = |i| row(&swarm.positions_m, i) - row(&self.formation.slots_m, i);
+        let potential = 0.5 * self.f1_per_s2 * sum_of_squares_about_mean(swarm.count(), error_m);
+        let energy = relative_kinetic_energy(swarm) + potential;
         energy.is_finite().then_some(energy)
     }
 

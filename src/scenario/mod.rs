@@ -20,7 +20,8 @@ pub use error::{Field, Place, ScenarioError};
 pub use overrides::Override;
 pub use source::{MAX_FILE_BYTES, Source};
 pub use validate::{
-    BYTES_PER_EDGE, BYTES_PER_VEHICLE, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS, MAX_STEPS, SMALLEST,
+    BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
+    MAX_STEPS, SMALLEST,
 };
 
 use crate::formation::Formation;
@@ -90,6 +91,8 @@ pub enum LawSpec {
 pub enum PlantSpec {
     /// Rapier rigid bodies at the given floating-point precision.
     Rapier(Precision),
+    /// The equation of motion solved in continuous time with the law inside, in double precision.
+    Ideal,
 }
 
 /// Floating-point precision of the physics engine.
