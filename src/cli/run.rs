@@ -32,6 +32,7 @@ const FLATNESS: f64 = 1e-9;
 
 /// Arguments of `tautline run`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct RunArguments {
     /// A scenario file, or the name of a built-in scenario.
     #[arg(default_value = "pentagon")]

@@ -164,6 +164,7 @@ fn number_label(number: f64, step: f64) -> String {
 
 /// A power of ten by its exponent.
 fn power_label(exponent: f64) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     match exponent {
         -2.0 => return "0.01".to_owned(),
         -1.0 => return "0.1".to_owned(),
@@ -172,7 +173,6 @@ fn power_label(exponent: f64) -> String {
         2.0 => return "100".to_owned(),
         _ => {}
     }
-    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
     format!("10{}", format!("{exponent:.0}").chars().map(raised).collect::<String>())
 }

@@ -2,6 +2,8 @@
 //!
 //! The drawing library counts in whole pixels, so a chart is drawn ten times as large as it is shown.
 
+use std::fmt::Write as _;
+
 use plotters::chart::{ChartBuilder, ChartContext, LabelAreaPosition};
 use plotters::coord::CoordTranslate;
 use plotters::coord::Shift;
@@ -15,12 +17,12 @@ use plotters::style::{Color as _, RGBColor, ShapeStyle, TextStyle};
 
 use super::axis::Axis;
 use super::thin::thinned;
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, printable};
 
 /// Parts of a pixel in which charts are drawn.
 pub(super) const PX: u32 = 10;
 /// Width of a figure \[px\].
-pub(super) const WIDTH: u32 = 520;
+pub(super) const WIDTH: u32 = 460;
 /// Space for the numbers and the label of the vertical axis \[px\].
 const LEFT: u32 = 58;
 const MARGIN: u32 = 6;
@@ -31,16 +33,16 @@ const BELOW: u32 = 44;
 const LEGEND_ROW: u32 = 18;
 const LEGEND_MARGIN: u32 = 12;
 /// Height of the plotting area \[px\]; with equal axes it follows the data between the two others.
-const HEIGHT: u32 = 270;
-const LEAST_HEIGHT: u32 = 150;
-const MOST_HEIGHT: u32 = 430;
+const HEIGHT: u32 = 240;
+const LEAST_HEIGHT: u32 = 130;
+const MOST_HEIGHT: u32 = 380;
 /// Font sizes \[px\].
-pub(super) const TEXT: f64 = 12.5;
+pub(super) const TEXT: f64 = 13.0;
 const HEADING: f64 = 14.0;
 /// The library scales fonts by this before it writes them.
 const FONT_FACTOR: f64 = 1.24;
 
-/// Neutral colours; each has a counterpart for dark pages in [`super::STYLE`].
+/// Neutral colours.
 pub(super) const PAPER: RGBColor = RGBColor(0xFF, 0xFF, 0xFF);
 pub(super) const INK: RGBColor = RGBColor(0x1B, 0x1F, 0x24);
 pub(super) const SOFT_INK: RGBColor = RGBColor(0x57, 0x60, 0x6A);
@@ -55,6 +57,33 @@ pub(super) const PALETTE: [RGBColor; 6] = [
     RGBColor(0x9A, 0x76, 0x00),
     RGBColor(0x7D, 0x85, 0x8E),
 ];
+
+/// Every colour and its counterpart for readers who prefer dark pages.
+const DARK: [(RGBColor, RGBColor); 10] = [
+    (PAPER, RGBColor(0x14, 0x19, 0x1F)),
+    (INK, RGBColor(0xE6, 0xEA, 0xEF)),
+    (SOFT_INK, RGBColor(0x9A, 0xA4, 0xAF)),
+    (GRID, RGBColor(0x2A, 0x32, 0x3B)),
+    (PALETTE[0], RGBColor(0x56, 0xA8, 0xE0)),
+    (PALETTE[1], RGBColor(0xF0, 0x7F, 0x2E)),
+    (PALETTE[2], RGBColor(0x2F, 0xBF, 0x94)),
+    (PALETTE[3], RGBColor(0xDB, 0x8D, 0xBB)),
+    (PALETTE[4], RGBColor(0xCB, 0xA4, 0x2B)),
+    (PALETTE[5], RGBColor(0xA5, 0xAD, 0xB6)),
+];
+
+/// The style sheet that exchanges the colours on dark pages.
+pub(super) fn style() -> String {
+    let hex = |RGBColor(red, green, blue)| format!("#{red:02X}{green:02X}{blue:02X}");
+    let mut style = "@media (prefers-color-scheme:dark){".to_owned();
+    for (light, dark) in DARK.map(|(light, dark)| (hex(light), hex(dark))) {
+        for attribute in ["fill", "stroke"] {
+            // Writing to a string cannot fail.
+            let _ = write!(style, ".tautline-figure [{attribute}=\"{light}\"]{{{attribute}:{dark}}}");
+        }
+    }
+    style + "}"
+}
 
 /// How a line is stroked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -181,9 +210,10 @@ impl Chart {
 
     /// Draws the chart under a title.
     pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Result<Figure, FigureError> {
+        let title = &printable(title);
         let height_px = if self.equal { self.make_axes_equal() } else { HEIGHT };
         let legend = legend_rows(self.entries());
-        let legend_px = if legend.is_empty() { 0 } else { legend.len() as u32 * LEGEND_ROW + LEGEND_MARGIN };
+        let legend_px = legend_height(&legend);
         let size = (WIDTH * PX, (TITLE + height_px + BELOW + legend_px) * PX);
         let mut drawing = String::new();
         self.draw(&mut drawing, size, title, &legend).map_err(|error| FigureError::new(name, &error))?;
@@ -210,8 +240,7 @@ impl Chart {
         let root = SVGBackend::with_string(drawing, size).into_drawing_area();
         root.fill(&PAPER)?;
         draw_title(&root, title)?;
-        let legend_top =
-            size.1 - legend.len() as u32 * LEGEND_ROW * PX - if legend.is_empty() { 0 } else { LEGEND_MARGIN * PX };
+        let legend_top = size.1 - legend_height(legend) * PX;
         let (upper, lower) = root.split_vertically(legend_top);
         let mut plot = self.plot_area(&upper)?;
         for band in &self.bands {
@@ -224,7 +253,8 @@ impl Chart {
             self.draw_mark(&mut plot, mark)?;
         }
         for (k, row) in legend.iter().enumerate() {
-            draw_legend_row(&lower, row, (f64::from(LEGEND_ROW)).mul_add(k as f64, f64::from(LEGEND_ROW) / 2.0))?;
+            let middle = f64::from(LEGEND_MARGIN) / 2.0 + (k as f64 + 0.5) * f64::from(LEGEND_ROW);
+            draw_legend_row(&lower, row, middle)?;
         }
         root.present()
     }
@@ -362,6 +392,14 @@ fn legend_rows(entries: Vec<Entry<'_>>) -> Vec<Vec<Entry<'_>>> {
         }
     }
     rows
+}
+
+/// Height of a legend with its margins \[px\].
+fn legend_height(rows: &[Vec<Entry<'_>>]) -> u32 {
+    if rows.is_empty() {
+        return 0;
+    }
+    LEGEND_MARGIN + rows.iter().map(|_| LEGEND_ROW).sum::<u32>()
 }
 
 fn legend_left() -> f64 {

@@ -44,7 +44,7 @@ pub(super) struct Span {
     pub(super) time_s: f64,
     /// Positions at its start \[m\].
     pub(super) positions_m: Rows,
-    /// Largest control effort |u_i| of each vehicle within \[m/s^2\].
+    /// Largest control effort |u| of each vehicle within \[m/s^2\].
     pub(super) control_m_s2: Vec<f64>,
     /// Largest speed relative to the mean velocity within \[m/s\].
     pub(super) disagreement_m_s: f64,

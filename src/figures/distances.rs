@@ -3,7 +3,7 @@
 use super::axis::{Axis, Scale};
 use super::chart::{Band, Chart, INK, Line, Mark, MarkShape, PALETTE, SOFT_INK, Stroke};
 use super::course::{Course, Span, pairs};
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, metres_at_least};
 use crate::swarm::{Pair, Rows, separation};
 
 /// Distances computed for one figure, at most: some seconds of work for a thousand vehicles would be too many.
@@ -46,20 +46,22 @@ pub fn distances(course: &Course, delta_m: f64, certified_m: Option<f64>, title:
     (chart.bands, chart.lines) = (curves.bands, curves.lines);
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
     if let Some(certified_m) = certified_m {
-        chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {certified_m:.3} m"));
+        chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", metres_at_least(certified_m)));
     }
-    let mut description = format!("Distances between {} vehicles over time; ", course.vehicles());
+    let mut closest_in_words = String::new();
     if let Some(closest) = closest {
-        let words =
-            format!("closest {:.3} m, vehicles {} at {:.2} s", closest.separation_m, closest.pair, closest.time_s);
-        description.push_str(&words);
+        let metres = metres_at_least(closest.separation_m);
+        let words = format!("{metres} m, vehicles {} at {:.2} s", closest.pair, closest.time_s);
+        closest_in_words = format!(" Closest: {words}.");
         let at = (closest.time_s, closest.separation_m);
-        chart.marks.push(Mark { at, shape: MarkShape::Ring, color: INK, size_px: 4.5, text: None, label: Some(words) });
+        let label = Some(format!("closest {words}"));
+        chart.marks.push(Mark { at, shape: MarkShape::Ring, color: INK, size_px: 4.5, text: None, label });
     }
-    description.push_str(&format!("; the safety distance is {delta_m} m."));
-    if chart.y.scale == Scale::Log {
-        description.push_str(" The axis of distances is logarithmic.");
-    }
+    let count = course.vehicles();
+    let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
+    let description = format!(
+        "Distances between {count} vehicles over time{scale}; the safety distance is {delta_m} m.{closest_in_words}"
+    );
     chart.figure("distances", title, &description)
 }
 

@@ -8,7 +8,7 @@ use super::{Figure, FigureError};
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
 
-/// Control effort |u_i| \[m/s^2\] over time \[s\]: a line for each of up to 12 vehicles; of more vehicles the largest
+/// Control effort |u| \[m/s^2\] over time \[s\]: a line for each of up to 12 vehicles; of more vehicles the largest
 /// effort, the median and the band that holds nine tenths of them.
 ///
 /// # Errors
@@ -53,23 +53,28 @@ fn control_of_many(course: &Course) -> (Vec<Band>, Vec<Line>) {
     (vec![band], lines)
 }
 
-/// The law's energy \[m^2/s^2\] over time \[s\] with its bound E(0), which it must never exceed.
+/// The law's energy \[m^2/s^2\] over time \[s\] with E(0), which on a complete graph it never exceeds.
 ///
 /// # Errors
 /// [`FigureError`] when the drawing library refuses.
 pub fn energy(course: &Course, title: &str) -> Result<Figure, FigureError> {
     let points: Vec<_> = course.spans().filter_map(|span| Some((span.time_s, span.energy?))).collect();
-    let bound = course.energy_initial();
-    let y = Axis::linear("energy E [m²/s²]", points.iter().map(|&(_, y)| y).chain(bound).chain([0.0]), true);
+    let initial = course.energy_initial();
+    let y = Axis::linear("energy E [m²/s²]", points.iter().map(|&(_, y)| y).chain(initial).chain([0.0]), true);
     let largest = points.iter().map(|&(_, y)| y).fold(f64::NAN, f64::max);
     let mut chart = Chart::new(time_axis(course), y);
     chart.lines.push(Line { points, stroke: Stroke::solid(PALETTE[0], 1.8), label: Some("E(t)".to_owned()) });
-    let mut description = "The law's energy over time".to_owned();
-    if let Some(bound) = bound {
-        chart.level(bound, Stroke::dashed(INK, 1.3), format!("bound E(0) = {bound:.4} m²/s²"));
-        description.push_str(&format!(": it starts at {bound:.4} m²/s², its bound, and is never above {largest:.4}"));
+    let mut comparison = String::new();
+    if let Some(initial) = initial {
+        chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
+        let excess = largest / initial - 1.0;
+        comparison = if excess > 0.0 {
+            format!(" It exceeds E(0), {initial:.4} m²/s², by a share of {excess:.1e}.")
+        } else {
+            format!(" It never exceeds E(0), {initial:.4} m²/s².")
+        };
     }
-    description.push('.');
+    let description = format!("The law's energy over time.{comparison}");
     chart.figure("energy", title, &description)
 }
 

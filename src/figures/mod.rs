@@ -6,7 +6,7 @@
 //! | [`paths_in_space`] | the same in space, where the run is not level |
 //! | [`distances`] | distances of pairs, with the safety distance and the certified one |
 //! | [`control`] | control effort of each vehicle |
-//! | [`energy`] | the law's energy and its bound E(0) |
+//! | [`energy`] | the law's energy and its start E(0), its bound on a complete graph |
 //! | [`shape_error`] | largest error of a desired distance |
 //! | [`disagreement`] | largest speed relative to the swarm's mean |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
@@ -103,35 +103,27 @@ pub fn of_run(course: &Course, yardsticks: &Yardsticks<'_>) -> Result<Vec<Figure
 pub const NAMES_OF_RUN: [&str; 7] =
     ["paths", "paths-3d", "distances", "control", "energy", "shape-error", "disagreement"];
 
-/// Dark counterparts of the neutral colours, for readers who prefer dark pages.
-const STYLE: &str = concat!(
-    "@media (prefers-color-scheme:dark){",
-    ".tautline-figure [fill=\"#FFFFFF\"]{fill:#14191F}",
-    ".tautline-figure [fill=\"#1B1F24\"]{fill:#E6EAEF}",
-    ".tautline-figure [stroke=\"#1B1F24\"]{stroke:#E6EAEF}",
-    ".tautline-figure [stroke=\"#57606A\"]{stroke:#9AA4AF}",
-    ".tautline-figure [fill=\"#57606A\"]{fill:#9AA4AF}",
-    ".tautline-figure [stroke=\"#E1E4E8\"]{stroke:#2A323B}",
-    "}"
-);
-
 impl Figure {
-    /// Puts a drawing of `size` \[tenths of a pixel\] into a frame with title, description and style.
+    /// Puts a drawing of `size` \[tenths of a pixel\] into a frame with a printable title, description and style.
     fn framed(name: &str, title: &str, description: &str, size: (u32, u32), drawing: &str) -> Self {
         let (width, height) = (size.0 / chart::PX, size.1 / chart::PX);
         let view = format!("0 0 {} {}", size.0, size.1);
-        let (title, description) = (printable(title), printable(description));
         let label = format!("{title}. {description}");
         let svg = html! {
             svg xmlns="http://www.w3.org/2000/svg" class="tautline-figure" width=(width) height=(height) viewBox=(view)
                 role="img" aria-label=(label) {
                 title { (title) }
                 desc { (description) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(chart::style())) }
                 (PreEscaped(drawing))
             }
         };
-        Self { name: name.to_owned(), title, description, svg: svg.into_string() }
+        Self {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            description: description.to_owned(),
+            svg: svg.into_string(),
+        }
     }
 }
 
@@ -144,4 +136,9 @@ impl FigureError {
     fn new(figure: &str, reason: &dyn std::fmt::Display) -> Self {
         Self { figure: figure.to_owned(), reason: reason.to_string() }
     }
+}
+
+/// A length \[m\] rounded down to three decimals, so that "never closer than" stays true.
+fn metres_at_least(length_m: f64) -> String {
+    format!("{:.3}", (length_m * 1e3).floor() / 1e3)
 }

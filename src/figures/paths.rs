@@ -12,7 +12,7 @@ use super::axis::Axis;
 use super::chart::{self, Chart, Drawn, GRID, INK, Line, Mark, MarkShape, PALETTE, PAPER, PX, SOFT_INK, Stroke, WIDTH};
 use super::course::{Course, FEW_VEHICLES};
 use super::thin::thinned;
-use super::{Figure, FigureError};
+use super::{Figure, FigureError, printable};
 use crate::swarm::row;
 
 /// Share of the extent left free on each side.
@@ -75,9 +75,9 @@ fn description(course: &Course, from: &str) -> String {
 /// Angles of the view on a run in space \[rad\], and the height of the chart \[px\].
 const YAW: f64 = 0.6;
 const PITCH: f64 = 0.42;
-const HEIGHT: u32 = 380;
+const HEIGHT: u32 = 330;
 /// Most that the box of the axes may take, across and up \[px\]; the rest is for the numbers.
-const BOX: (f64, f64) = (400.0, 320.0);
+const BOX: (f64, f64) = (340.0, 270.0);
 /// Least space between the numbers of an axis \[px\].
 const TICK_PX: f64 = 26.0;
 
@@ -87,6 +87,7 @@ const TICK_PX: f64 = 26.0;
 /// # Errors
 /// [`FigureError`] when the drawing library refuses.
 pub fn paths_in_space(course: &Course, title: &str) -> Result<Figure, FigureError> {
+    let title = &printable(title);
     let size = (WIDTH * PX, (chart::TITLE + HEIGHT) * PX);
     let mut drawing = String::new();
     draw_in_space(course, &mut drawing, size, title).map_err(|error| FigureError::new("paths-3d", &error))?;

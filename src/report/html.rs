@@ -32,7 +32,7 @@ impl Report {
     }
 
     fn page(&self, page: &RunPage<'_>) -> Page {
-        let mut sections = vec![section("Numbers", vec![Block::Table(self.numbers())])];
+        let mut sections = vec![section("Numbers", vec![Block::Tables(self.numbers())])];
         if !self.audit.violations.is_empty() {
             sections.push(section("Violations", self.violations()));
         }
@@ -54,13 +54,17 @@ impl Report {
         }
     }
 
-    fn numbers(&self) -> Table {
-        let Self { separation, audit, formation, energy, control, velocity, run, .. } = self;
+    fn numbers(&self) -> Vec<Table> {
+        vec![self.separation_table(), self.formation_table(), self.control_table(), self.run_table()]
+    }
+
+    fn separation_table(&self) -> Table {
+        let Self { separation, audit, .. } = self;
         let pair = separation.min_pair.map(|[first, second]| format!("vehicles {first} and {second}"));
         let at = separation.min_at_s.map(|at_s| format!("at {}", seconds(at_s)));
         let closest = [pair, at].into_iter().flatten().collect::<Vec<_>>().join(" ");
         let certificate = if separation.certified_m.is_some() {
-            "known before the first step".to_owned()
+            "promised before the first step".to_owned()
         } else {
             separation.certificate_void.join(" ")
         };
@@ -70,36 +74,61 @@ impl Report {
             Status::Undecided => "undecided",
         };
         let sweep = format!("{} steps and {} pairs swept", audit.steps, audit.pairs_checked);
-        let detectors = "of the closed form and the shape cast";
         let contacts = audit.rapier.contact_pairs.map_or(NOT_KNOWN.to_owned(), |pairs| pairs.to_string());
-        let reached = formation.reached_at_s.map_or("not reached".to_owned(), seconds);
-        let relative = "largest speed relative to the mean, at the end";
-        Table {
-            caption: "The run in numbers".to_owned(),
-            columns: vec![Column::words("Quantity"), Column::numbers("Value"), Column::words("Remark")],
-            rows: vec![
-                row("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "judged by"),
+        numbers(
+            "Separation",
+            vec![
+                row("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
                 row("Smallest distance", with_unit(separation.min_m, "m"), &closest),
                 row("Certified distance", with_unit(separation.certified_m, "m"), &certificate),
                 row("Audit", status.to_owned(), &sweep),
                 row("Violations", audit.violations.len().to_string(), "times that a pair was closer than δ"),
-                row("Disagreements", audit.parry.disagreements.to_string(), detectors),
-                row("Contacts seen by the engine", contacts, "pairs whose keep-out balls overlapped, evidence alone"),
-                row("Formation reached", reached, "from then on to the end"),
+                row("Disagreements", audit.parry.disagreements.to_string(), "of closed form and shape cast"),
+                row("Contacts seen by the engine", contacts, "pairs whose keep-out balls overlapped"),
+            ],
+        )
+    }
+
+    fn formation_table(&self) -> Table {
+        let Self { formation, velocity, .. } = self;
+        let reached = formation.reached_at_s.map_or("not reached".to_owned(), seconds);
+        numbers(
+            "Formation",
+            vec![
+                row("Reached", reached, "and kept from then on to the end"),
                 row("Largest edge error", with_unit(formation.max_edge_error_m, "m"), "at the end"),
                 row("Position error", with_unit(formation.rms_position_error_m, "m"), "root mean square, at the end"),
-                row("Velocity disagreement", with_unit(velocity.disagreement_m_s, "m/s"), relative),
+                row("Velocity disagreement", with_unit(velocity.disagreement_m_s, "m/s"), "at the end"),
                 row("Common velocity", with_unit(velocity.common_m_s, "m/s"), "at the end"),
-                row("Initial energy", with_unit(energy.initial, "m²/s²"), "bound of the energy"),
+            ],
+        )
+    }
+
+    fn control_table(&self) -> Table {
+        let Self { energy, control, .. } = self;
+        numbers(
+            "Energy and control",
+            vec![
+                row("Initial energy E(0)", with_unit(energy.initial, "m²/s²"), ""),
                 row("Final energy", with_unit(energy.at_end, "m²/s²"), ""),
-                row("Largest energy", with_unit(energy.max_over_initial, "E(0)"), "over all samples"),
+                row("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all samples"),
                 row("Peak control", with_unit(control.peak_m_s2, "m/s²"), "over all samples"),
                 row("Final control", with_unit(control.final_m_s2, "m/s²"), ""),
-                row("Vehicles", run.vehicles.to_string(), ""),
-                row("Duration", with_unit(Some(run.duration_s), "s"), &format!("{} steps", run.steps)),
-                row("Step", with_unit(Some(run.dt_s * 1e3), "ms"), ""),
             ],
-        }
+        )
+    }
+
+    fn run_table(&self) -> Table {
+        let run = &self.run;
+        numbers(
+            "Run",
+            vec![
+                row("Vehicles", run.vehicles.to_string(), ""),
+                row("Duration", with_unit(Some(run.duration_s), "s"), ""),
+                row("Step", with_unit(Some(run.dt_s * 1e3), "ms"), ""),
+                row("Steps", run.steps.to_string(), ""),
+            ],
+        )
     }
 
     fn violations(&self) -> Vec<Block> {
@@ -118,7 +147,7 @@ impl Report {
                 Column::words("Vehicles"),
                 Column::numbers("From"),
                 Column::numbers("To"),
-                Column::numbers("Smallest distance"),
+                Column::numbers("Smallest"),
                 Column::numbers("At"),
             ],
             rows: rows.collect(),
@@ -225,8 +254,13 @@ fn section(heading: &str, blocks: Vec<Block>) -> Section {
     Section { heading: heading.to_owned(), blocks }
 }
 
+fn numbers(caption: &str, rows: Vec<Vec<Cell>>) -> Table {
+    Table { caption: caption.to_owned(), columns: vec![Column::words("Quantity"), Column::numbers("Value")], rows }
+}
+
 fn row(name: &str, value: String, remark: &str) -> Vec<Cell> {
-    vec![name.into(), value.into(), remark.into()]
+    let name = if remark.is_empty() { name.into() } else { Cell::Noted(name.to_owned(), remark.to_owned()) };
+    vec![name, value.into()]
 }
 
 fn with_unit(number: Option<f64>, unit: &str) -> String {

@@ -81,6 +81,8 @@ pub enum Block {
     List(Vec<String>),
     /// A table.
     Table(Table),
+    /// Small tables side by side, as many as fit.
+    Tables(Vec<Table>),
     /// Figures side by side, as many as fit.
     Figures(Vec<Figure>),
     /// A command to be typed.
@@ -119,6 +121,8 @@ pub struct Column {
 pub enum Cell {
     /// Words or a number.
     Text(String),
+    /// Words or a number, and a remark in small print below.
+    Noted(String, String),
     /// A judgement.
     Badge(Badge),
 }
@@ -223,6 +227,7 @@ impl Block {
             Self::Text(text) => html! { p { (text) } },
             Self::List(items) => html! { ul { @for item in items { li { (item) } } } },
             Self::Table(table) => table.render(),
+            Self::Tables(tables) => html! { div.tables { @for table in tables { (table.render()) } } },
             Self::Figures(figures) => html! {
                 div.figures {
                     @for figure in figures {
@@ -270,6 +275,7 @@ impl Cell {
     fn render(&self) -> Markup {
         match self {
             Self::Text(text) => html! { (text) },
+            Self::Noted(text, note) => html! { (text) small { (note) } },
             Self::Badge(badge) => badge.render(),
         }
     }
