@@ -1,6 +1,6 @@
 //! `tautline run`: fly a scenario and leave a recording, figures and a report.
 
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -23,6 +23,8 @@ use crate::report::{EndedEarly, Findings, Performance, Report, Run};
 use crate::scenario::{Override, PlantSpec, Scenario, Source};
 use crate::sim::{self, Ending, Flight};
 
+/// Exit code of a second Ctrl-C, as shells give it.
+const INTERRUPTED_TWICE: i32 = 130;
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
 /// Threads that a flight has work for: one for the law and one for the audit.
@@ -106,7 +108,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
     let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
-    folder.open(arguments.force)?;
+    let _lock = folder.open(arguments.force)?;
     let mut course = Course::new();
     let report = threads.install(|| fly(&scenario, law, &folder, console, &interrupted, &mut course))?;
     let pictures = Pictures {
@@ -203,11 +205,16 @@ fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: Metric
     })
 }
 
-/// Set by Ctrl-C (and by a request to terminate).
+/// Set by Ctrl-C (and by a request to terminate). The second one does not wait for the step to end.
 fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
+    let again = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(INTERRUPTED_TWICE);
+        }
+    };
+    ctrlc::set_handler(again)
         .map_err(|error| Failure::machine(format!("cannot listen to Ctrl-C: {error}")))?;
     Ok(interrupted)
 }
@@ -231,7 +238,8 @@ impl RunFolder {
     }
 
     /// Makes the folder ready. A finished run in it is kept unless `force` says otherwise.
-    fn open(&self, force: bool) -> Result<(), Failure> {
+    /// The lock keeps another run out until it is dropped, where the system can lock a folder.
+    fn open(&self, force: bool) -> Result<Option<File>, Failure> {
         let report = self.report();
         if report.exists() && !force {
             return Err(Failure::input(
@@ -244,10 +252,17 @@ impl RunFolder {
                 .with_help("give a folder that can be written to with --out")
         };
         fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
+        let lock = File::open(&self.path).ok();
+        if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
+            return Err(Failure::input(
+                format!("another run is writing to {}", self.path.display()),
+                "wait for it, or give another folder with --out",
+            ));
+        }
         // From here on the old report would describe another recording.
         match fs::remove_file(&report) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
-            _ => Ok(()),
+            _ => Ok(lock),
         }
     }
 }
