@@ -14,6 +14,7 @@ use super::{Exit, Failure};
 use crate::formation::affine_dimension;
 use crate::metrics::Metrics;
 use crate::plant;
+use crate::preflight::{FLATNESS, Preflight};
 use crate::record::StateHash;
 use crate::record::mcap::{Header, McapRecorder};
 use crate::report::{EndedEarly, Findings, Performance, Report, Run};
@@ -22,8 +23,6 @@ use crate::sim::{self, Ending, Flight};
 
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
-/// Offsets below this share of the extent do not make a start or a formation leave its line or plane.
-const FLATNESS: f64 = 1e-9;
 
 /// Arguments of `tautline run`.
 #[derive(Debug, Args)]
@@ -82,6 +81,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    for warning in Preflight::of(&scenario)?.warnings {
+        console.warn(&warning.to_string());
+    }
     let interrupted = interruption()?;
     let report = threads.install(|| fly(&scenario, &folder, console, &interrupted))?;
     report.write(&folder.report())?;
