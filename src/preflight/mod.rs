@@ -124,16 +124,16 @@ impl Preflight {
     /// connected graph.
     ///
     /// # The longest step
-    /// The law's forces are -(1/N) times the gradient of the sum of V_ij over the pairs. The Hessian of one V_ij in the
+    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
     /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
     /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at the certified separation of
     /// the pair with the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
-    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) L_G, whose
+    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
     /// largest eigenvalue on the complete graph is V''max: omega^2 <= V''max. Relative velocities decay at the rate 1/s
     /// there, so the fastest rate is max(omega, 1/s) and the step [`STEP_PER_MODE`] of its inverse.
     ///
     /// The Laplacian law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues
-    /// 0 <= mu <= N of L_G have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
+    /// 0 <= mu <= N of `L_G` have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
     ///
     /// # Errors
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
@@ -261,7 +261,7 @@ impl Preflight {
             code: Code::CommonModeUnstable,
             message: format!(
                 "The mean velocity grows as exp({rate_per_s} t), since the law cannot move the centre of mass: rounding of \
-                 {rounding:.0e} m/s is 1 m/s after {:.0} s.",
+                 {rounding:.0e} m/s grows to 1 m/s in {:.0} s.",
                 -rounding.ln() / rate_per_s
             ),
         })

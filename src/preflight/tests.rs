@@ -301,7 +301,10 @@ fn the_json_has_the_promised_keys_and_codes() {
 #[test]
 fn the_words_say_what_the_numbers_say() {
     let pentagon = check(&scenario("pentagon", &[]));
-    assert_eq!(pentagon.headline(), "READY: no two vehicles ever closer than 2.055307 m (delta 2 m), 2 warnings");
+    assert_eq!(
+        pentagon.headline(),
+        "READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings"
+    );
     let text = pentagon.text();
     for said in
         ["margin of relative velocities 1.000000 1/s", "0.00417 s (at most 0.00259 s)", "rank 7: in the plane rigid"]

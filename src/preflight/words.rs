@@ -45,8 +45,8 @@ impl std::fmt::Display for Warning {
 }
 
 impl Preflight {
-    /// The check in one line: `READY: no two vehicles ever closer than 2.055307 m (delta 2 m), 2 warnings`, or
-    /// `REFUSED: start-on-line`.
+    /// The check in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings`,
+    /// or `REFUSED: start-on-line`.
     #[must_use]
     pub fn headline(&self) -> String {
         let refusing: Vec<_> =
@@ -57,7 +57,7 @@ impl Preflight {
         let promise = match self.certified_m {
             Some(certified_m) => {
                 format!(
-                    "no two vehicles ever closer than {} m (delta {} m)",
+                    "certified never closer than {} m in continuous time (delta {} m)",
                     six_decimals_down(certified_m),
                     self.delta_m
                 )
@@ -133,8 +133,8 @@ impl Preflight {
             format!("{said} (needs {})", rigidity.needed)
         };
         let convergence = match self.rigidity.rigid {
-            Some(true) if self.controls_distances => ", exponential convergence near the goal",
-            Some(false) if self.controls_distances => ", algebraic convergence at best",
+            Some(true) if self.controls_distances && !self.refuses() => ", exponential convergence near the goal",
+            Some(false) if self.controls_distances && !self.refuses() => ", algebraic convergence at best",
             _ => "",
         };
         format!("rank {rank}: in the plane {}, in space {}{convergence}", place(2), place(3))
