@@ -43,6 +43,7 @@ pub mod graph;
 pub mod law;
 pub mod metrics;
 pub mod plant;
+pub mod preflight;
 pub mod record;
 pub mod report;
 pub mod scenario;

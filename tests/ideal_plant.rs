@@ -127,10 +127,10 @@ fn free_motion_is_exact_for_drag_and_for_its_opposite() {
     }
 }
 
-/// Largest rise of the energy above its least value so far.
-fn largest_rise(scenario: &Scenario, a22_per_s: f64) -> f64 {
+/// Largest rise of the energy above its least value so far, over so many tenths of a second.
+fn largest_rise(scenario: &Scenario, a22_per_s: f64, tenths: u32) -> f64 {
     let mut law = scenario.law().expect("a law");
-    let times_s: Vec<_> = (0..=600).map(|k| f64::from(k) * 0.1).collect();
+    let times_s: Vec<_> = (0..=tenths).map(|k| f64::from(k) * 0.1).collect();
     let solved = ideal::solve(law.as_mut(), &scenario.start, a22_per_s, &times_s, Tolerances::default());
     let energies = solved.expect("a solution").states.into_iter().map(|state| law.energy(&state).expect("an energy"));
     let (mut least, mut rise) = (f64::INFINITY, 0.0_f64);
@@ -145,10 +145,11 @@ fn largest_rise(scenario: &Scenario, a22_per_s: f64) -> f64 {
 fn the_energy_never_rises_and_does_where_the_plant_feeds_in_more_than_the_law_takes_out() {
     for name in ["pentagon", "circle"] {
         let scenario = scenario(name, &[]);
-        let rise = largest_rise(&scenario, scenario.a22_per_s);
+        let rise = largest_rise(&scenario, scenario.a22_per_s, 600);
         assert!(rise < ENERGY_ROUNDING, "{name}: {rise}");
-        // The law takes out (1 + a22) |v|^2 for the a22 that it knows.
-        assert!(largest_rise(&scenario, scenario.a22_per_s + 1.5) > 1e-3);
+        // The law takes out (1 + a22) |v|^2 for the a22 that it knows. Not for long: the common velocity grows from
+        // rounding until distances drown in it.
+        assert!(largest_rise(&scenario, scenario.a22_per_s + 1.5, 200) > 1e-3);
     }
 }
 

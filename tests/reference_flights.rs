@@ -62,6 +62,10 @@ fn position_of_first_at(log: &Log, time_s: f64) -> Vector3<f64> {
     row(&sample.swarm.positions_m, 0)
 }
 
+/// Where single precision leaves the pentagon: 6 m from the middle a vehicle slower than half a unit of rounding a step,
+/// 2.4e-7 m * 240 Hz = 5.7e-5 m/s, does not move; the law restores a distance at 2.2/s or more, on both ends of an edge.
+const SINGLE_PRECISION_FLOOR_M: f64 = 2.0 * 5.7e-5 / 2.2;
+
 #[test]
 fn the_pentagon_is_flown_clear_and_reached_as_the_reference_says() {
     for precision in ["single", "double"] {
@@ -84,7 +88,8 @@ fn the_pentagon_is_flown_clear_and_reached_as_the_reference_says() {
         assert!((36.0..=38.0).contains(&reached_at_s), "reached at {reached_at_s} s");
         let off_m = (position_of_first_at(&log, 10.0) - Vector3::from(PENTAGON_FIRST_AT_10_S_M)).norm();
         assert!(off_m <= POSITION_TOLERANCE_M, "vehicle 1 is off by {off_m} m at t = 10 s in {precision} precision");
-        assert!(summary.max_edge_error_m < 1e-5, "{} m at the end", summary.max_edge_error_m);
+        let floor_m = if precision == "single" { SINGLE_PRECISION_FLOOR_M } else { 1e-5 };
+        assert!(summary.max_edge_error_m < floor_m, "{} m at the end", summary.max_edge_error_m);
     }
 }
 

@@ -33,6 +33,11 @@ impl Console {
         };
     }
 
+    /// Says something that must not stand between a reader and what was asked for: on standard error.
+    pub(super) fn warn(self, text: &str) {
+        Self { data_on_stdout: true, ..self }.say(text);
+    }
+
     /// A progress bar on a terminal, nothing in a pipe.
     pub(super) fn progress(self, total: u64, message: String) -> ProgressBar {
         if self.quiet || !io::stderr().is_terminal() {

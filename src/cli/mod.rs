@@ -3,6 +3,7 @@
 //! Exit codes are the same for all commands: see [`Exit`]. Human text goes to standard output, or to standard error
 //! where standard output carries data.
 
+mod check;
 mod completions;
 mod console;
 mod diagnostic;
@@ -53,6 +54,8 @@ struct Arguments {
 enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),
+    /// Say what is known before the first step: stability, certified separation, step, traps.
+    Check(check::CheckArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -75,6 +78,7 @@ pub fn main() -> ExitCode {
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Check(arguments) => check::check(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),

@@ -17,8 +17,10 @@ use crate::formation::affine_dimension;
 use crate::law::Law;
 use crate::metrics::Metrics;
 use crate::plant;
+use crate::preflight::{FLATNESS, Preflight};
 use crate::record::StateHash;
 use crate::record::mcap::{Header, McapRecorder};
+use crate::report::page;
 use crate::report::{EndedEarly, Findings, Performance, Report, Run};
 use crate::scenario::{Override, PlantSpec, Scenario, Source};
 use crate::sim::{self, Ending, Flight};
@@ -29,8 +31,6 @@ const INTERRUPTED_TWICE: i32 = 130;
 const PROGRESS_EVERY: u64 = 64;
 /// Threads that a flight has work for: one for the law and one for the audit.
 const THREADS_OF_USE: usize = 2;
-/// Offsets below this share of the extent do not make a start or a formation leave its line or plane.
-const FLATNESS: f64 = 1e-9;
 
 /// Arguments of `tautline run`.
 #[derive(Debug, Args)]
@@ -105,6 +105,14 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         .num_threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    let warnings = Preflight::of(&scenario)?.warnings;
+    for warning in &warnings {
+        console.warn(&warning.to_string());
+    }
+    let warnings: Vec<_> = warnings
+        .into_iter()
+        .map(|warning| page::Warning { code: warning.code.name().to_owned(), message: warning.message })
+        .collect();
     let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
     let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
@@ -114,7 +122,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let pictures = Pictures {
         scenario: &scenario,
         course: (!arguments.no_figures).then_some(&course),
-        warnings: &[],
+        warnings: &warnings,
         command: &arguments.command(),
     };
     let page = pictures.write(&folder.path, &report)?;
@@ -214,8 +222,7 @@ fn interruption() -> Result<Arc<AtomicBool>, Failure> {
             std::process::exit(INTERRUPTED_TWICE);
         }
     };
-    ctrlc::set_handler(again)
-        .map_err(|error| Failure::machine(format!("cannot listen to Ctrl-C: {error}")))?;
+    ctrlc::set_handler(again).map_err(|error| Failure::machine(format!("cannot listen to Ctrl-C: {error}")))?;
     Ok(interrupted)
 }
 

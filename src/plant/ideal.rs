@@ -114,7 +114,7 @@ pub fn solve(
         return Err(IdealError::Times { entry });
     }
     let flow = Flow::new(law, start, a22_per_s);
-    let mut solver = Solver::begin(&flow, 0.0, packed(start), tolerances, FIRST_STEP_S)?;
+    let mut solver = Solver::begin(&flow, 0.0, &packed(start), tolerances, FIRST_STEP_S)?;
     let mut closest = None;
     for (pair, approach) in pairs(solver.method.y()) {
         offer(&mut closest, pair, approach.separation_m, 0.0);
@@ -144,7 +144,7 @@ impl Plant for Ideal {
     fn step(&mut self, law: &mut dyn Law, _held: &Rows, dt_s: f64) -> Result<(), PlantError> {
         let flow = Flow::new(law, &self.swarm, self.a22_per_s);
         let first_step_s = self.step_s.min(dt_s);
-        let mut solver = Solver::begin(&flow, 0.0, packed(&self.swarm), Tolerances::default(), first_step_s)?;
+        let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), first_step_s)?;
         solver.advance(dt_s, &mut |_| Ok(()))?;
         self.step_s = solver.method.h();
         self.swarm = solver.swarm();
@@ -182,7 +182,7 @@ impl<'a, 'law> Solver<'a, 'law> {
     fn begin(
         flow: &'a Flow<'law>,
         time_s: f64,
-        state: Vec<f64>,
+        state: &[f64],
         tolerances: Tolerances,
         step_s: f64,
     ) -> Result<Self, IdealError> {
@@ -193,7 +193,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         let method = Method::dop853().rtol(relative).atol(absolute).h_max(LONGEST_STEP_S).max_steps(usize::MAX);
         let mut method = method.h0(step_s.min(LONGEST_STEP_S));
         // The end of the interval only tells the direction of time.
-        method.init(flow, time_s, f64::INFINITY, &state).map_err(|_| IdealError::Stalled { time_s })?;
+        method.init(flow, time_s, f64::INFINITY, &state.to_vec()).map_err(|_| IdealError::Stalled { time_s })?;
         match flow.take_failure() {
             Some(source) => Err(IdealError::Law { time_s, source }),
             None => Ok(Self { method, flow, tolerances }),
@@ -231,7 +231,7 @@ impl<'a, 'law> Solver<'a, 'law> {
             if undefined.is_some() {
                 // Accepted by its error alone, on stages that the law has no answer for.
                 let before = self.method.y_prev().clone();
-                *self = Self::begin(self.flow, time_s, before, self.tolerances, step_s / 4.0)?;
+                *self = Self::begin(self.flow, time_s, &before, self.tolerances, step_s / 4.0)?;
                 continue;
             }
             if step_s < free_step_s {
@@ -245,7 +245,7 @@ impl<'a, 'law> Solver<'a, 'law> {
 
     /// The state at a time within the last step, solved anew from the beginning of that step.
     fn within_last_step(&self, time_s: f64) -> Result<Vec<f64>, IdealError> {
-        let (from_s, before) = (self.method.t_prev(), self.method.y_prev().clone());
+        let (from_s, before) = (self.method.t_prev(), self.method.y_prev());
         let mut again = Self::begin(self.flow, from_s, before, self.tolerances, time_s - from_s)?;
         again.advance(time_s, &mut |_| Ok(()))?;
         Ok(again.method.y().clone())

@@ -1,0 +1,361 @@
+//! What is known before the first step: stability, the certified separation, the step that it asks for, and whether the
+//! formation can be reached at all.
+//!
+//! [`Preflight::of`] computes numbers from a scenario alone, without flying it, and says in [`Warning`]s what stands in
+//! the way. Its fields are the keys of `tautline check --json`.
+
+mod rigidity;
+mod words;
+
+use serde::Serialize;
+
+use crate::formation::{affine_dimension, closest_pair};
+use crate::graph::Graph;
+use crate::law::{Certificate, EdgeTension, ParameterError};
+use crate::scenario::{LawSpec, PlantSpec, Precision, Scenario, Space};
+use crate::swarm::{Rows, Swarm, row, set_row};
+
+pub use rigidity::{MOST_RANKED, RANK_TOLERANCE, Rigidity};
+
+/// Offsets below this share of the extent do not make a start or a formation leave its line or plane: far above rounding
+/// (1e-16), far below any offset that is meant.
+pub const FLATNESS: f64 = 1e-9;
+
+/// Part of the fastest mode's time 1/omega that a step may take (theory: semi-implicit Euler is stable below 2/omega and
+/// keeps an honest energy up to about this).
+pub const STEP_PER_MODE: f64 = 0.3;
+
+/// Most vehicles for which the algebraic connectivity of a graph that is not complete is computed, at O(N^3): a second or
+/// two.
+pub const MOST_CONNECTED: usize = 1000;
+
+/// A velocity margin up to this part of its two terms is rounding of eigenvalues, not damping.
+const MARGIN_ROUNDING: f64 = 1e-12;
+
+/// What is known before the first step. SI units; what does not apply or is not known is null.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Preflight {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Number of vehicles N.
+    pub vehicles: usize,
+    /// The space that they live in: 2 the plane z = 0, 3 space.
+    pub dimensions: usize,
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
+    /// Second smallest eigenvalue lambda2 of the graph's Laplacian; null for a graph of more than [`MOST_CONNECTED`]
+    /// vehicles that is not complete.
+    pub algebraic_connectivity: Option<f64>,
+    /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: relative velocities
+    /// are damped at least at this rate where it is positive, and grow where it is negative.
+    pub velocity_margin_per_s: Option<f64>,
+    /// Rate a22 at which the swarm's mean velocity grows \[1/s\]; negative where it decays.
+    pub common_mode_rate_per_s: f64,
+    /// Energy E(0) of the start \[m^2/s^2\].
+    pub energy_initial: Option<f64>,
+    /// Separation below which no pair ever comes \[m\].
+    pub certified_m: Option<f64>,
+    /// Why nothing is certified, a sentence each.
+    pub certificate_void: Vec<String>,
+    /// The scenario's step \[s\].
+    pub dt_s: f64,
+    /// Longest honest step \[s\], see [`Preflight::of`].
+    pub dt_max_s: Option<f64>,
+    /// Dimension of the smallest flat that holds the start and its relative velocities: 0 point, 1 line, 2 plane, 3 space.
+    pub start_dimension: usize,
+    /// Smallest distance of two vehicles at the start, less delta \[m\].
+    pub start_margin_m: Option<f64>,
+    /// Dimension of the smallest flat that holds the formation.
+    pub formation_dimension: usize,
+    /// Smallest desired distance, less delta \[m\]: the tension of an edge exists only where it is positive.
+    pub formation_margin_m: Option<f64>,
+    /// Infinitesimal rigidity of the formation on its graph, in the space that the swarm lives in.
+    pub rigidity: Rigidity,
+    /// What stands in the way, the worst first.
+    pub warnings: Vec<Warning>,
+    #[serde(skip)]
+    controls_distances: bool,
+}
+
+/// Something that stands in the way of a flight.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// Stable name.
+    pub code: Code,
+    /// A sentence or two, with the remedy where there is one.
+    pub message: String,
+}
+
+/// What a [`Warning`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Code {
+    /// Relative velocities are not damped.
+    RelativeVelocityUnstable,
+    /// The start lies on a line that the law never leaves, and the formation does not.
+    StartOnLine,
+    /// The start lies in a plane that the law never leaves, and the formation does not.
+    StartInPlane,
+    /// Nothing is certified about separations.
+    NoCertificate,
+    /// The formation can be bent without changing the length of an edge to first order.
+    NotRigid,
+    /// A flat formation in space: nothing resists motion out of its flat to first order.
+    FlatFormationInSpace,
+    /// The swarm's mean velocity grows by itself.
+    CommonModeUnstable,
+    /// The step is longer than the certified separation asks for.
+    DtTooLarge,
+}
+
+impl Code {
+    /// Whether the flight cannot do what it is for: the formation is out of reach, or nothing may be called stable.
+    #[must_use]
+    pub fn refuses(self) -> bool {
+        matches!(self, Self::RelativeVelocityUnstable | Self::StartOnLine | Self::StartInPlane)
+    }
+}
+
+impl Preflight {
+    /// Everything that is known about a scenario before the first step.
+    ///
+    /// # The velocity margin
+    /// With v~ = v - mean v and a velocity gain g the energy obeys dE/dt <= -(g lambda2/N - a22) sum |v~_i|^2 on every
+    /// connected graph.
+    ///
+    /// # The longest step
+    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
+    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
+    /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at the certified separation of
+    /// the pair with the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
+    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
+    /// largest eigenvalue on the complete graph is V''max: omega^2 <= V''max. Relative velocities decay at the rate 1/s
+    /// there, so the fastest rate is max(omega, 1/s) and the step [`STEP_PER_MODE`] of its inverse.
+    ///
+    /// The Laplacian law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues
+    /// 0 <= mu <= N of `L_G` have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
+    ///
+    /// # Errors
+    /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
+    pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
+        let certificate = scenario.law()?.certificate(&scenario.start);
+        let formation_dimension = scenario.formation.affine_dimension(FLATNESS);
+        let connectivity = connectivity(&scenario.graph);
+        let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
+        let mut found = Self {
+            scenario: scenario.name.clone(),
+            vehicles: scenario.count(),
+            dimensions: dimensions(scenario.space),
+            delta_m: scenario.delta_m,
+            algebraic_connectivity: connectivity,
+            velocity_margin_per_s: connectivity.map(|lambda2| velocity_margin(scenario, lambda2)),
+            common_mode_rate_per_s: scenario.a22_per_s,
+            energy_initial: certificate.energy_initial,
+            certified_m: certificate.certified_m,
+            certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+            dt_s: scenario.time.dt_s,
+            dt_max_s: dt_max_s(scenario, &certificate),
+            start_dimension: motion_dimension(&scenario.start),
+            start_margin_m: margin(&scenario.start.positions_m),
+            formation_dimension,
+            formation_margin_m: margin(&scenario.formation.slots_m),
+            rigidity: Rigidity::of(&scenario.formation, &scenario.graph, dimensions(scenario.space)),
+            warnings: Vec::new(),
+            controls_distances: controls_distances(scenario),
+        };
+        let warnings = [
+            found.relative_velocity_unstable(scenario),
+            found.start_too_flat(),
+            found.no_certificate(),
+            found.not_rigid(),
+            found.flat_formation_in_space(),
+            found.common_mode_unstable(scenario),
+            found.dt_too_large(scenario),
+        ];
+        found.warnings = warnings.into_iter().flatten().collect();
+        Ok(found)
+    }
+
+    /// Whether some warning refuses the flight ([`Code::refuses`]).
+    #[must_use]
+    pub fn refuses(&self) -> bool {
+        self.warnings.iter().any(|warning| warning.code.refuses())
+    }
+
+    fn relative_velocity_unstable(&self, scenario: &Scenario) -> Option<Warning> {
+        let rounding_per_s = MARGIN_ROUNDING * (velocity_gain(scenario).abs() + scenario.a22_per_s.abs());
+        // Fiedler: lambda2 is at most N/(N - 1) times the smallest degree.
+        let most = |graph: &Graph| {
+            let count = graph.count() as f64;
+            velocity_margin(scenario, smallest_degree(graph) as f64 * count / (count - 1.0).max(1.0))
+        };
+        let margin_per_s = self.velocity_margin_per_s.unwrap_or_else(|| most(&scenario.graph));
+        (margin_per_s <= rounding_per_s).then(|| Warning {
+            code: Code::RelativeVelocityUnstable,
+            message: format!(
+                "Relative velocities are not damped: their margin is {} 1/s and must be positive. Add edges to the graph, \
+                 or reduce swarm.a22_per_s.",
+                words::rate(margin_per_s)
+            ),
+        })
+    }
+
+    fn start_too_flat(&self) -> Option<Warning> {
+        if !self.controls_distances || self.start_dimension >= self.formation_dimension {
+            return None;
+        }
+        let (code, flat) = match self.start_dimension {
+            0 | 1 => (Code::StartOnLine, "line"),
+            _ => (Code::StartInPlane, "plane"),
+        };
+        let message = format!(
+            "The start lies on a {flat}, the law pushes and pulls along the lines between vehicles, and so they never leave \
+             that {flat}: the formation cannot be reached. Offset a start, or add start.jitter_m."
+        );
+        Some(Warning { code, message: message.replace("on a plane", "in a plane") })
+    }
+
+    fn no_certificate(&self) -> Option<Warning> {
+        self.certified_m.is_none().then(|| Warning {
+            code: Code::NoCertificate,
+            message: format!("No separation is certified. {}", self.certificate_void.join(" ")).trim_end().to_owned(),
+        })
+    }
+
+    fn not_rigid(&self) -> Option<Warning> {
+        // Out of its own flat a flat formation is never rigid in space, which has a warning of its own.
+        let rigidity = if self.is_flat_in_space() {
+            self.rigidity.within(self.formation_dimension, self.vehicles)
+        } else {
+            self.rigidity
+        };
+        (self.controls_distances && rigidity.rigid == Some(false)).then(|| Warning {
+            code: Code::NotRigid,
+            message: format!(
+                "The formation is not rigid on its graph: {} of {} independent constraints hold it, so other shapes have \
+                 the same edges or are approached only slowly. Add edges to the graph.",
+                rigidity.rank.map_or("too few".to_owned(), |rank| rank.to_string()),
+                rigidity.needed
+            ),
+        })
+    }
+
+    fn flat_formation_in_space(&self) -> Option<Warning> {
+        (self.controls_distances && self.is_flat_in_space()).then(|| Warning {
+            code: Code::FlatFormationInSpace,
+            message:
+                "The formation is flat and the swarm lives in space: at the goal nothing resists motion out of the \
+                      flat to first order, so that part of the error falls as t^(-1/2), not exponentially. Set \
+                      swarm.dimensions to 2 if the swarm may stay in the plane."
+                    .to_owned(),
+        })
+    }
+
+    fn common_mode_unstable(&self, scenario: &Scenario) -> Option<Warning> {
+        let rate_per_s = self.common_mode_rate_per_s;
+        let rounding = match scenario.plant {
+            PlantSpec::Rapier(Precision::Single) => f64::from(f32::EPSILON),
+            PlantSpec::Rapier(Precision::Double) | PlantSpec::Ideal => f64::EPSILON,
+        };
+        (rate_per_s > 0.0).then(|| Warning {
+            code: Code::CommonModeUnstable,
+            message: format!(
+                "The mean velocity grows as exp({rate_per_s} t), since the law cannot move the centre of mass: rounding of \
+                 {rounding:.0e} m/s grows to 1 m/s in {:.0} s.",
+                -rounding.ln() / rate_per_s
+            ),
+        })
+    }
+
+    fn dt_too_large(&self, scenario: &Scenario) -> Option<Warning> {
+        let dt_max_s = self.dt_max_s.filter(|_| scenario.plant != PlantSpec::Ideal)?;
+        (self.dt_s > dt_max_s).then(|| Warning {
+            code: Code::DtTooLarge,
+            message: format!(
+                "The step of {} s is longer than {} s, {STEP_PER_MODE} of the time of the fastest possible mode: a flight \
+                 that comes so near may gain energy. The audit judges what is flown; reduce time.dt_s to be sure.",
+                words::significant(self.dt_s),
+                words::significant(dt_max_s)
+            ),
+        })
+    }
+
+    /// Whether the formation spans less of space than so many vehicles can.
+    fn is_flat_in_space(&self) -> bool {
+        self.dimensions == 3 && self.formation_dimension < 3.min(self.vehicles.saturating_sub(1))
+    }
+}
+
+fn dimensions(space: Space) -> usize {
+    match space {
+        Space::Plane => 2,
+        Space::Volume => 3,
+    }
+}
+
+/// Whether the law acts along the lines between vehicles and knows nothing but distances.
+fn controls_distances(scenario: &Scenario) -> bool {
+    match scenario.law {
+        LawSpec::EdgeTension { .. } => true,
+        LawSpec::Laplacian { .. } => false,
+    }
+}
+
+fn connectivity(graph: &Graph) -> Option<f64> {
+    (graph.is_complete() || graph.count() <= MOST_CONNECTED).then(|| graph.algebraic_connectivity())
+}
+
+fn velocity_gain(scenario: &Scenario) -> f64 {
+    match scenario.law {
+        LawSpec::EdgeTension { .. } => 1.0 + scenario.a22_per_s,
+        LawSpec::Laplacian { f2_per_s, .. } => f2_per_s,
+    }
+}
+
+fn velocity_margin(scenario: &Scenario, lambda2: f64) -> f64 {
+    velocity_gain(scenario) * (lambda2 / scenario.count().max(1) as f64) - scenario.a22_per_s
+}
+
+fn smallest_degree(graph: &Graph) -> usize {
+    let mut degrees = vec![0_usize; graph.count()];
+    for (i, j) in graph.edges() {
+        degrees[i] += 1;
+        degrees[j] += 1;
+    }
+    degrees.into_iter().min().unwrap_or(0)
+}
+
+/// See [`Preflight::of`].
+fn dt_max_s(scenario: &Scenario, certificate: &Certificate) -> Option<f64> {
+    let fastest_per_s = match scenario.law {
+        LawSpec::EdgeTension { alpha } => {
+            let (_, tightest_m) = scenario.formation.min_distance()?;
+            let tension = EdgeTension::new(alpha, scenario.delta_m, tightest_m).ok()?;
+            tension.second_derivative(certificate.certified_m?).sqrt().max(1.0)
+        }
+        LawSpec::Laplacian { f1_per_s2, f2_per_s } => {
+            let a22_per_s = scenario.a22_per_s;
+            f1_per_s2.sqrt().max((f2_per_s - a22_per_s).abs()).max(a22_per_s.abs())
+        }
+    };
+    Some(STEP_PER_MODE / fastest_per_s)
+}
+
+/// Dimension of the flat, moving with the swarm's mean velocity, that forces along the lines between vehicles never
+/// leave: that of the positions and the relative velocities together, each by its own extent.
+fn motion_dimension(start: &Swarm) -> usize {
+    let count = start.count();
+    let mut directions = Rows::zeros(2 * count);
+    for (place, rows) in [(0, &start.positions_m), (count, &start.velocities_m_s)] {
+        // From the first vehicle, whose own row is zero: the flat goes through the origin.
+        let from_first = |i: usize| row(rows, i) - row(rows, 0);
+        let extent = (0..count).map(|i| from_first(i).amax()).fold(0.0, f64::max);
+        if extent > 0.0 {
+            (0..count).for_each(|i| set_row(&mut directions, place + i, from_first(i) / extent));
+        }
+    }
+    affine_dimension(&directions, FLATNESS)
+}
+
+#[cfg(test)]
+mod tests;

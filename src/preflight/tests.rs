@@ -1,0 +1,318 @@
+use nalgebra::Vector3;
+
+use super::*;
+use crate::formation::Formation;
+use crate::scenario::{Override, Source};
+
+/// Certified separations are printed with 6 digits.
+const PRINTED_M: f64 = 1e-6;
+/// A few roundings of numbers of order 1.
+const ROUNDING: f64 = 1e-12;
+
+fn scenario(name: &str, sets: &[&str]) -> Scenario {
+    let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("a key and a value")).collect();
+    Scenario::read(&Source::Builtin(name.to_owned()), &overrides).expect("a scenario")
+}
+
+fn check(scenario: &Scenario) -> Preflight {
+    Preflight::of(scenario).expect("a law")
+}
+
+fn codes(scenario: &Scenario) -> Vec<Code> {
+    check(scenario).warnings.iter().map(|warning| warning.code).collect()
+}
+
+/// Vehicles of a formation of radius 10 m that start a little off it, delta = 1 m.
+fn swarm(formation: Formation, graph: Graph, a22_per_s: f64) -> Scenario {
+    let mut start = Swarm::at_rest(&formation.slots_m * 1.5);
+    start.positions_m[(0, 1)] += 0.1;
+    let mut scenario = Scenario::new("swarm", start, formation, 1.0, 10.0);
+    scenario.graph = graph;
+    scenario.a22_per_s = a22_per_s;
+    scenario.plant = PlantSpec::Rapier(Precision::Double);
+    scenario.validate().expect("a scenario that can be flown");
+    scenario
+}
+
+fn ring(count: usize, graph: Graph, a22_per_s: f64) -> Scenario {
+    swarm(Formation::circle(count, 10.0), graph, a22_per_s)
+}
+
+#[test]
+fn the_pentagon_has_the_known_numbers() {
+    let found = check(&scenario("pentagon", &[]));
+    assert!((found.certified_m.expect("a certificate") - 2.055_307).abs() < PRINTED_M);
+    assert_eq!(found.algebraic_connectivity, Some(5.0));
+    assert!((found.velocity_margin_per_s.expect("a margin") - 1.0).abs() < ROUNDING);
+    assert_eq!(found.common_mode_rate_per_s, 0.1);
+    assert_eq!((found.start_dimension, found.formation_dimension), (2, 2));
+    assert_eq!((found.rigidity.rank, found.rigidity.needed, found.rigidity.rigid), (Some(7), 7, Some(true)));
+    assert!((found.start_margin_m.expect("a pair") - (9.01_f64.sqrt() - 2.0)).abs() < ROUNDING);
+    assert!((found.formation_margin_m.expect("a pair") - 1.0).abs() < ROUNDING);
+    assert!((found.dt_max_s.expect("a bound") * 387.0 - 1.0).abs() < 5e-3, "{:?}", found.dt_max_s);
+    let codes: Vec<_> = found.warnings.iter().map(|warning| warning.code).collect();
+    assert_eq!(codes, [Code::CommonModeUnstable, Code::DtTooLarge]);
+    assert!(!found.refuses());
+}
+
+#[test]
+fn a_flight_without_traps_has_no_warnings() {
+    let quiet = scenario("pentagon", &["swarm.a22_per_s=0", "time.dt_s=0.0025"]);
+    assert_eq!(check(&quiet).warnings, []);
+}
+
+#[test]
+fn relative_velocities_of_a_star_are_damped_up_to_ten_vehicles_and_not_beyond() {
+    for (count, margin_per_s, unstable) in [(10, 0.01, false), (11, 0.0, true), (12, -0.1 / 12.0, true)] {
+        let star = ring(count, Graph::star(count), 0.1);
+        let found = check(&star);
+        assert!((found.velocity_margin_per_s.expect("a margin") - margin_per_s).abs() < ROUNDING, "{count}");
+        assert_eq!(codes(&star).contains(&Code::RelativeVelocityUnstable), unstable, "{count}");
+        assert_eq!(found.refuses(), unstable);
+    }
+    assert!(!codes(&ring(12, Graph::star(12), 0.0)).contains(&Code::RelativeVelocityUnstable));
+}
+
+#[test]
+fn a_star_too_large_for_its_eigenvalues_is_refused_by_its_degrees() {
+    let count = MOST_CONNECTED + 1;
+    let radius_m = 2.0 * count as f64;
+    let star = swarm(Formation::circle(count, radius_m), Graph::star(count), 0.1);
+    let found = check(&star);
+    assert_eq!((found.algebraic_connectivity, found.velocity_margin_per_s), (None, None));
+    assert_eq!((found.rigidity.rank, found.rigidity.rigid), (None, Some(false)));
+    assert!(found.refuses());
+    let undamped = swarm(Formation::circle(count, radius_m), Graph::star(count), -0.1);
+    assert!(!check(&undamped).refuses(), "drag damps relative velocities on every graph");
+}
+
+#[test]
+fn the_margin_of_the_baseline_is_that_of_its_own_gain() {
+    let found = check(&scenario("pentagon-laplacian", &["law.f2_per_s=0.3"]));
+    assert!((found.velocity_margin_per_s.expect("a margin") - 0.2).abs() < ROUNDING);
+    assert!(check(&scenario("pentagon-laplacian", &["law.f2_per_s=0.05"])).refuses());
+}
+
+#[test]
+fn a_start_on_a_line_is_refused_where_the_formation_leaves_it() {
+    let line = scenario("pentagon-collinear", &[]);
+    assert_eq!((check(&line).start_dimension, codes(&line)[0]), (1, Code::StartOnLine));
+    assert!(check(&line).refuses());
+    let jittered = scenario("pentagon-collinear", &["start.jitter_m=0.01"]);
+    assert!(!codes(&jittered).contains(&Code::StartOnLine));
+    let baseline = "law={kind=\"laplacian\", delta_m=2.0}";
+    assert!(!codes(&scenario("pentagon-collinear", &[baseline])).contains(&Code::StartOnLine));
+    let (start, formation) = (Formation::line(4, 3.0), Formation::line(4, 2.0));
+    let shrink = Scenario::new("shrink", Swarm::at_rest(start.slots_m), formation, 1.0, 10.0);
+    assert!(!codes(&shrink).contains(&Code::StartOnLine), "a line is reached from a line");
+}
+
+#[test]
+fn relative_velocities_leave_a_line_and_common_ones_do_not() {
+    let mut line = scenario("pentagon-collinear", &[]);
+    line.start.velocities_m_s.column_mut(1).fill(1.0);
+    assert_eq!(check(&line).start_dimension, 1);
+    line.start.velocities_m_s[(2, 1)] = 1.1;
+    assert_eq!(check(&line).start_dimension, 2);
+    assert!(!check(&line).refuses());
+}
+
+#[test]
+fn a_start_in_a_plane_is_refused_where_the_formation_leaves_it() {
+    let sphere = Formation::sphere(8, 5.0);
+    let mut flat = Scenario::new("flat", Swarm::at_rest(Formation::grid(8, 3.0).slots_m), sphere.clone(), 1.0, 10.0);
+    assert_eq!(codes(&flat)[0], Code::StartInPlane);
+    assert!(check(&flat).refuses() && check(&flat).warnings[0].message.contains("in a plane"));
+    set_row(&mut flat.start.positions_m, 3, Vector3::new(10.0, 0.0, 0.5));
+    assert!(!codes(&flat).contains(&Code::StartInPlane));
+    flat.start = Swarm::at_rest(Formation::line(8, 3.0).slots_m);
+    assert_eq!(codes(&flat)[0], Code::StartOnLine);
+    let solid = Scenario::new("solid", Swarm::at_rest(&sphere.slots_m * 2.0), sphere, 1.0, 10.0);
+    assert_eq!(codes(&solid), [], "a sphere from a larger one");
+}
+
+#[test]
+fn a_flat_formation_in_space_converges_algebraically() {
+    let circle = scenario("circle", &["swarm.dimensions=3"]);
+    let found = check(&circle);
+    assert!(codes(&circle).contains(&Code::FlatFormationInSpace) && !codes(&circle).contains(&Code::NotRigid));
+    assert_eq!((found.rigidity.rank, found.rigidity.needed, found.rigidity.rigid), (Some(9), 12, Some(false)));
+    assert!(!codes(&scenario("circle", &[])).contains(&Code::FlatFormationInSpace));
+    let mut triangle = ring(3, Graph::complete(3), 0.0);
+    triangle.space = Space::Volume;
+    assert_eq!(check(&triangle).rigidity.rigid, Some(true), "three slots are rigid in space");
+    assert_eq!(codes(&triangle), []);
+}
+
+#[test]
+fn a_formation_that_its_edges_do_not_hold_is_not_rigid() {
+    // Two triangles on a common side are rigid in the plane; without that side the square shears.
+    let sides = [(0, 1), (1, 2), (2, 3), (3, 0)];
+    let braced: Vec<_> = sides.into_iter().chain([(0, 2)]).collect();
+    let graph = |edges: &[(usize, usize)]| Graph::from_edges(4, edges).expect("a graph");
+    let (loose, tight) = (ring(4, graph(&sides), 0.0), ring(4, graph(&braced), 0.0));
+    assert_eq!((check(&loose).rigidity.rank, check(&loose).rigidity.needed), (Some(4), 5));
+    assert!(codes(&loose).contains(&Code::NotRigid));
+    assert_eq!((check(&tight).rigidity.rank, check(&tight).rigidity.rigid), (Some(5), Some(true)));
+    assert!(!codes(&tight).contains(&Code::NotRigid));
+    let mut in_space = loose;
+    in_space.space = Space::Volume;
+    assert!(codes(&in_space).contains(&Code::NotRigid) && codes(&in_space).contains(&Code::FlatFormationInSpace));
+}
+
+#[test]
+fn enough_edges_in_a_degenerate_place_do_not_make_a_formation_rigid() {
+    // Two triangles joined by three bars: rigid, but for parallel bars of equal length, along which it shears.
+    let edges = [(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (0, 3), (1, 4), (2, 5)];
+    let prism = |shift_m: f64| {
+        let points = [[0.0, 0.0], [4.0, 0.0], [2.0, 3.0], [0.0, 9.0], [4.0 + shift_m, 9.0], [2.0, 12.0]];
+        let formation = Formation::points(Rows::from_fn(6, |i, axis| if axis < 2 { points[i][axis] } else { 0.0 }));
+        Rigidity::of(&formation, &Graph::from_edges(6, &edges).expect("a graph"), 2)
+    };
+    assert_eq!((prism(0.0).rank, prism(0.0).rigid), (Some(8), Some(false)));
+    assert_eq!((prism(1.0).rank, prism(1.0).rigid), (Some(9), Some(true)));
+}
+
+#[test]
+fn the_closed_form_of_the_complete_graph_is_the_counted_rank() {
+    for formation in [
+        Formation::line(5, 2.0),
+        Formation::circle(6, 3.0),
+        Formation::grid(9, 2.0),
+        Formation::sphere(7, 3.0),
+        Formation::circle(2, 3.0),
+        Formation::circle(3, 3.0),
+        Formation::sphere(40, 9.0),
+    ] {
+        let graph = Graph::complete(formation.count());
+        assert_eq!(Rigidity::of(&formation, &graph, 3).rank, Some(rigidity::rank(&formation, &graph)), "{formation:?}");
+    }
+}
+
+#[test]
+fn the_constraints_needed_are_those_of_a_rigid_body() {
+    let needed =
+        |count, dimensions| Rigidity::of(&Formation::line(count, 1.0), &Graph::complete(count), dimensions).needed;
+    assert_eq!([2, 3, 4, 5].map(|count| needed(count, 2)), [1, 3, 5, 7]);
+    assert_eq!([2, 3, 4, 5].map(|count| needed(count, 3)), [1, 3, 6, 9]);
+}
+
+#[test]
+fn the_mean_velocity_is_unstable_exactly_where_a22_is_positive() {
+    assert!(codes(&ring(5, Graph::complete(5), 1e-9)).contains(&Code::CommonModeUnstable));
+    for a22 in [0.0, -0.1] {
+        assert!(!codes(&ring(5, Graph::complete(5), a22)).contains(&Code::CommonModeUnstable));
+    }
+}
+
+#[test]
+fn nothing_is_certified_without_a_barrier_or_a_complete_graph() {
+    let star = ring(5, Graph::star(5), 0.0);
+    for (scenario, reason) in [(star, "graph is not complete"), (scenario("pentagon-laplacian", &[]), "no barrier")] {
+        let found = check(&scenario);
+        assert!(codes(&scenario).contains(&Code::NoCertificate) && found.certified_m.is_none());
+        assert!(found.certificate_void.iter().any(|void| void.contains(reason)), "{:?}", found.certificate_void);
+    }
+    assert!(!codes(&ring(5, Graph::complete(5), 0.0)).contains(&Code::NoCertificate));
+}
+
+#[test]
+fn the_longest_step_follows_the_fastest_mode() {
+    let pentagon = scenario("pentagon", &[]);
+    let found = check(&pentagon);
+    let tension = EdgeTension::new(1.0, 2.0, 3.0).expect("a tension");
+    let omega_per_s = 0.3 / found.dt_max_s.expect("a bound");
+    // The stiffest pair at the certified separation, by finite differences of V'.
+    let (l, h) = (found.certified_m.expect("a certificate"), 1e-6);
+    let stiffness_per_s2 = (tension.derivative(l + h) - tension.derivative(l - h)) / (2.0 * h);
+    assert!((omega_per_s.powi(2) / stiffness_per_s2 - 1.0).abs() < 1e-6);
+    // No pair is stiffer there, and none pulls across itself more stiffly.
+    for d in [3.0, 3.5, 27.0_f64.sqrt(), 6.0] {
+        let other = EdgeTension::new(1.0, 2.0, d).expect("a tension");
+        let nearest_m = other.push_side_root(5.0 * found.energy_initial.expect("an energy"));
+        assert!(other.second_derivative(nearest_m) <= omega_per_s.powi(2) * (1.0 + ROUNDING));
+        let across = (1..2000).map(|k| f64::from(k) * 0.01 + 2.06).map(|l| other.derivative(l) / l);
+        assert!(across.fold(0.0, f64::max) < other.second_derivative(d));
+    }
+    let fine = scenario("pentagon", &[&format!("time.dt_s={}", 0.999 * found.dt_max_s.expect("a bound"))]);
+    let coarse = scenario("pentagon", &[&format!("time.dt_s={}", 1.001 * found.dt_max_s.expect("a bound"))]);
+    assert!(!codes(&fine).contains(&Code::DtTooLarge) && codes(&coarse).contains(&Code::DtTooLarge));
+    let ideal = scenario("pentagon", &["plant.kind=ideal"]);
+    assert!(!codes(&ideal).contains(&Code::DtTooLarge), "the ideal plant chooses its own steps");
+}
+
+#[test]
+fn the_longest_step_of_soft_laws_follows_their_damping() {
+    let wide = swarm(Formation::circle(5, 1e6), Graph::complete(5), 0.0);
+    assert_eq!(check(&wide).dt_max_s, Some(0.3), "relative velocities decay at 1/s");
+    let baseline = |sets: &[&str]| check(&scenario("pentagon-laplacian", sets)).dt_max_s.expect("a bound");
+    assert!((baseline(&[]) - 0.3).abs() < ROUNDING);
+    assert!((baseline(&["law.f1_per_s2=9"]) - 0.1).abs() < ROUNDING);
+    assert!((baseline(&["law.f2_per_s=6.1"]) - 0.05).abs() < ROUNDING);
+    assert_eq!(check(&ring(5, Graph::star(5), 0.0)).dt_max_s, None);
+}
+
+#[test]
+fn a_large_complete_swarm_is_checked_without_its_matrices() {
+    let count = 1000;
+    let found = check(&swarm(Formation::sphere(count, 100.0), Graph::complete(count), 0.0));
+    assert_eq!((found.algebraic_connectivity, found.rigidity.rank), (Some(1000.0), Some(3 * count - 6)));
+    assert_eq!(found.rigidity.rigid, Some(true));
+}
+
+#[test]
+fn the_json_has_the_promised_keys_and_codes() {
+    let json = serde_json::to_value(check(&scenario("circle", &["swarm.dimensions=3"]))).expect("plain data");
+    let keys = [
+        "algebraic_connectivity",
+        "velocity_margin_per_s",
+        "common_mode_rate_per_s",
+        "certified_m",
+        "certificate_void",
+        "dt_max_s",
+        "start_dimension",
+        "formation_dimension",
+        "rigidity",
+        "warnings",
+        "energy_initial",
+        "start_margin_m",
+    ];
+    for key in keys {
+        assert!(json.get(key).is_some(), "{key}");
+    }
+    assert_eq!(json["rigidity"], serde_json::json!({"rank": 9, "needed": 12, "rigid": false}));
+    for warning in json["warnings"].as_array().expect("a list") {
+        assert_eq!(warning.as_object().expect("a table").keys().collect::<Vec<_>>(), ["code", "message"]);
+    }
+    for code in [
+        Code::RelativeVelocityUnstable,
+        Code::StartOnLine,
+        Code::StartInPlane,
+        Code::NoCertificate,
+        Code::NotRigid,
+        Code::FlatFormationInSpace,
+        Code::CommonModeUnstable,
+        Code::DtTooLarge,
+    ] {
+        assert_eq!(serde_json::to_value(code).expect("a name"), code.name());
+    }
+}
+
+#[test]
+fn the_words_say_what_the_numbers_say() {
+    let pentagon = check(&scenario("pentagon", &[]));
+    assert_eq!(
+        pentagon.headline(),
+        "READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings"
+    );
+    let text = pentagon.text();
+    for said in
+        ["margin of relative velocities 1.000000 1/s", "0.00417 s (at most 0.00259 s)", "rank 7: in the plane rigid"]
+    {
+        assert!(text.contains(said), "{said:?} in\n{text}");
+    }
+    let line = check(&scenario("pentagon-collinear", &[]));
+    assert_eq!(line.headline(), "REFUSED: start-on-line");
+    assert!(line.warnings[0].to_string().starts_with("warning [start-on-line]: The start lies on a line"));
+    assert_eq!([0.0, 0.3, 1.5, 2.5e-7].map(words::significant), ["0.00", "0.300", "1.50", "2.50e-7"]);
+}

@@ -1,0 +1,164 @@
+//! A pre-flight check in words: one line, and a table.
+
+use std::fmt::Write as _;
+
+use super::{Code, Preflight, Warning};
+
+/// A rate \[1/s\] to six decimals, with its sign.
+pub(super) fn rate(rate_per_s: f64) -> String {
+    format!("{rate_per_s:.6}")
+}
+
+/// A positive number to three significant digits.
+pub(super) fn significant(number: f64) -> String {
+    if number == 0.0 || (1e-6..1e6).contains(&number.abs()) {
+        let digits = if number == 0.0 { 0.0 } else { number.abs().log10().floor() };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 8")]
+        let decimals = (2.0 - digits).clamp(0.0, 8.0) as usize;
+        format!("{number:.decimals$}")
+    } else {
+        format!("{number:.2e}")
+    }
+}
+
+impl Code {
+    /// The stable name, such as `start-on-line`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RelativeVelocityUnstable => "relative-velocity-unstable",
+            Self::StartOnLine => "start-on-line",
+            Self::StartInPlane => "start-in-plane",
+            Self::NoCertificate => "no-certificate",
+            Self::NotRigid => "not-rigid",
+            Self::FlatFormationInSpace => "flat-formation-in-space",
+            Self::CommonModeUnstable => "common-mode-unstable",
+            Self::DtTooLarge => "dt-too-large",
+        }
+    }
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "warning [{}]: {}", self.code.name(), self.message)
+    }
+}
+
+impl Preflight {
+    /// The check in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings`,
+    /// or `REFUSED: start-on-line`.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        let refusing: Vec<_> =
+            self.warnings.iter().map(|warning| warning.code).filter(|code| code.refuses()).map(Code::name).collect();
+        if !refusing.is_empty() {
+            return format!("REFUSED: {}", refusing.join(", "));
+        }
+        let promise = match self.certified_m {
+            Some(certified_m) => {
+                format!(
+                    "certified never closer than {} m in continuous time (delta {} m)",
+                    six_decimals_down(certified_m),
+                    self.delta_m
+                )
+            }
+            None => "no separation is certified".to_owned(),
+        };
+        let warnings = match self.warnings.len() {
+            0 => "no warnings".to_owned(),
+            1 => "1 warning".to_owned(),
+            n => format!("{n} warnings"),
+        };
+        format!("READY: {promise}, {warnings}")
+    }
+
+    /// The numbers as a short table, a line each, with a line end.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for (name, content) in [
+            ("stability", self.stability_line()),
+            ("certificate", self.certificate_line()),
+            ("step", self.step_line()),
+            ("start", self.start_line()),
+            ("formation", self.formation_line()),
+            ("rigidity", self.rigidity_line()),
+        ] {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{name:<12} {content}");
+        }
+        text
+    }
+
+    fn stability_line(&self) -> String {
+        let connectivity = self.algebraic_connectivity.map_or("unknown".to_owned(), |number| format!("{number:.6}"));
+        let margin = self.velocity_margin_per_s.map_or("unknown".to_owned(), rate);
+        format!(
+            "margin of relative velocities {margin} 1/s (algebraic connectivity {connectivity}), growth of the common \
+             velocity {} 1/s",
+            self.common_mode_rate_per_s
+        )
+    }
+
+    fn certificate_line(&self) -> String {
+        let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
+        match self.certified_m {
+            Some(certified_m) => format!("{} m, from {energy}", six_decimals_down(certified_m)),
+            None => format!("none. {} {energy}", self.certificate_void.join(" ")).trim_end().to_owned(),
+        }
+    }
+
+    fn step_line(&self) -> String {
+        let most = self.dt_max_s.map_or("no bound is known".to_owned(), |dt| format!("at most {} s", significant(dt)));
+        format!("{} s ({most})", significant(self.dt_s))
+    }
+
+    fn start_line(&self) -> String {
+        format!("{}, nearest pair {} m above delta", flat(self.start_dimension), margin(self.start_margin_m))
+    }
+
+    fn formation_line(&self) -> String {
+        format!("{}, nearest slots {} m above delta", flat(self.formation_dimension), margin(self.formation_margin_m))
+    }
+
+    fn rigidity_line(&self) -> String {
+        let rank = self.rigidity.rank.map_or("unknown".to_owned(), |rank| rank.to_string());
+        let place = |dimensions: usize| {
+            let rigidity = self.rigidity.within(dimensions, self.vehicles);
+            let said = match rigidity.rigid {
+                Some(true) => "rigid",
+                Some(false) => "not rigid",
+                None => "unknown",
+            };
+            format!("{said} (needs {})", rigidity.needed)
+        };
+        let convergence = match self.rigidity.rigid {
+            Some(true) if self.controls_distances && !self.refuses() => ", exponential convergence near the goal",
+            Some(false) if self.controls_distances && !self.refuses() => ", algebraic convergence at best",
+            _ => "",
+        };
+        format!("rank {rank}: in the plane {}, in space {}{convergence}", place(2), place(3))
+    }
+}
+
+/// A length \[m\] rounded down to six decimals, so that "never closer than" stays true.
+fn six_decimals_down(length_m: f64) -> String {
+    let shown = format!("{length_m:.6}");
+    match shown.parse::<f64>() {
+        Ok(rounded) if rounded > length_m => format!("{:.6}", rounded - 1e-6),
+        _ => shown,
+    }
+}
+
+fn flat(dimension: usize) -> &'static str {
+    match dimension {
+        0 => "in a point",
+        1 => "on a line",
+        2 => "in a plane",
+        _ => "in space",
+    }
+}
+
+fn margin(margin_m: Option<f64>) -> String {
+    margin_m.map_or("-".to_owned(), |margin_m| format!("{margin_m:.6}"))
+}

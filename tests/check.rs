@@ -1,0 +1,110 @@
+//! `tautline check` and the warnings of `tautline run`, through the program.
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn tautline(arguments: &[&str]) -> (i32, String, String) {
+    let output = Command::cargo_bin("tautline").expect("the program").args(arguments).output().expect("an end");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+    (output.status.code().expect("a code"), text(output.stdout), text(output.stderr))
+}
+
+fn json(arguments: &[&str]) -> (i32, Value) {
+    let arguments: Vec<_> = ["check"].iter().chain(arguments).chain(&["--json"]).copied().collect();
+    let (code, out, _) = tautline(&arguments);
+    (code, serde_json::from_str(&out).expect("JSON alone on standard output"))
+}
+
+fn codes(found: &Value) -> Vec<&str> {
+    found["warnings"].as_array().expect("a list").iter().filter_map(|warning| warning["code"].as_str()).collect()
+}
+
+#[test]
+fn the_pentagon_is_ready_with_the_known_numbers() {
+    let (code, found) = json(&["pentagon"]);
+    assert_eq!((code, found["algebraic_connectivity"].as_f64()), (0, Some(5.0)));
+    let number = |key: &str| found[key].as_f64().expect("a number");
+    assert!((number("certified_m") - 2.055_307).abs() < 1e-5);
+    assert!((number("velocity_margin_per_s") - 1.0).abs() < 1e-9);
+    assert_eq!(codes(&found), ["common-mode-unstable", "dt-too-large"]);
+}
+
+#[test]
+fn a_star_of_twelve_is_refused() {
+    let star = [
+        "circle",
+        "--set",
+        "start={shape=\"circle\", radius_m=12.0, jitter_m=0.1}",
+        "--set",
+        "swarm.count=12",
+        "--set",
+        "formation.radius_m=10.0",
+        "--set",
+        "graph={kind=\"star\"}",
+    ];
+    let (code, found) = json(&star);
+    assert!((found["velocity_margin_per_s"].as_f64().expect("a number") + 0.1 / 12.0).abs() < 1e-9, "{found}");
+    assert_eq!((code, codes(&found)[0]), (1, "relative-velocity-unstable"));
+    let (code, found) = json(&[&star[..], &["--set", "swarm.count=10"]].concat());
+    assert_eq!(code, 0, "ten are damped: {found}");
+}
+
+#[test]
+fn a_circle_in_space_is_warned_of_and_a_line_is_refused() {
+    let (code, found) = json(&["circle", "--set", "swarm.dimensions=3"]);
+    assert!(code == 0 && codes(&found).contains(&"flat-formation-in-space"), "{found}");
+    let (code, found) = json(&["pentagon-collinear"]);
+    assert!(code == 1 && codes(&found).contains(&"start-on-line"), "{found}");
+}
+
+#[test]
+fn wrong_input_is_told_apart_from_a_bad_flight() {
+    for arguments in [
+        &["check", "no-such-scenario"][..],
+        &["check", "pentagon", "--set", "law.delta_m=3.0"],
+        &["check", "pentagon", "--set", "nonsense"],
+        &["check", "--nonsense"],
+    ] {
+        let (code, out, err) = tautline(arguments);
+        assert_eq!((code, out.as_str()), (2, ""), "{arguments:?}: {err}");
+        assert!(!err.is_empty());
+    }
+}
+
+#[test]
+fn words_go_to_standard_output_and_quiet_says_nothing() {
+    let (code, out, err) = tautline(&["check"]);
+    assert!(code == 0 && out.starts_with("READY: ") && out.contains("warning [dt-too-large]: ") && err.is_empty());
+    assert_eq!(tautline(&["check", "pentagon-collinear", "--quiet"]), (1, String::new(), String::new()));
+}
+
+#[test]
+fn run_warns_before_it_flies_and_not_when_quiet() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("a path in Unicode");
+    let run = ["run", "pentagon-collinear", "--set", "time.duration_s=1.5", "--force", "--out", out];
+    let (code, _, err) = tautline(&run);
+    assert!(
+        code == 1 && err.contains("warning [start-on-line]: ") && err.contains("warning [dt-too-large]: "),
+        "{err}"
+    );
+    let (_, out, err) = tautline(&[&run[..], &["--quiet"]].concat());
+    assert_eq!((out.as_str(), err.as_str()), ("", ""));
+}
+
+#[test]
+fn run_flies_the_ideal_plant_when_asked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("a path in Unicode");
+    let run = ["run", "pentagon", "--plant", "ideal", "--set", "time.duration_s=3", "--json", "--out", out];
+    let (code, report, err) = tautline(&run);
+    let report: Value = serde_json::from_str(&report).expect("JSON alone on standard output");
+    assert_eq!(code, 1, "three seconds are too short to reach the formation");
+    assert!((report["separation"]["min_m"].as_f64().expect("a number") - 2.460_353).abs() < 2e-6, "{report}");
+    assert!(report["audit"]["rapier"]["contact_pairs"].is_null());
+    assert!(err.contains("common-mode-unstable") && !err.contains("dt-too-large"), "{err}");
+    let (code, ..) = tautline(&["run", "pentagon", "--plant", "perfect", "--out", out]);
+    assert_eq!(code, 2);
+}
