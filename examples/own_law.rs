@@ -14,7 +14,7 @@ use tautline::scenario::{Scenario, Source};
 use tautline::swarm::{Rows, Swarm, row, set_row};
 use tautline::{plant, sim};
 
-/// u_i = -(p_i - h_i) - 2 v_i + 4 sum_j (p_i - p_j) / |p_i - p_j|^4
+/// `u_i = -(p_i - h_i) - 2 v_i + 4 sum_j (p_i - p_j) / |p_i - p_j|^4`
 struct SpringsAndRepulsion {
     formation: Formation,
 }

@@ -21,8 +21,14 @@ pub(super) struct Failure {
     exit: Exit,
     message: String,
     help: Option<String>,
-    source: Option<NamedSource<String>>,
-    label: Option<LabeledSpan>,
+    place: Option<Box<Excerpt>>,
+}
+
+/// Where in a text an error stands.
+#[derive(Debug)]
+struct Excerpt {
+    source: NamedSource<String>,
+    label: LabeledSpan,
 }
 
 impl Failure {
@@ -41,7 +47,7 @@ impl Failure {
     }
 
     fn plain(exit: Exit, message: String) -> Self {
-        Self { exit, message, help: None, source: None, label: None }
+        Self { exit, message, help: None, place: None }
     }
 
     /// Shows the error on standard error.
@@ -70,11 +76,12 @@ impl Diagnostic for Failure {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.source.as_ref().map(|source| source as &dyn SourceCode)
+        self.place.as_ref().map(|place| &place.source as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        self.label.clone().map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = _>>)
+        let label = self.place.as_ref()?.label.clone();
+        Some(Box::new(std::iter::once(label)))
     }
 }
 
@@ -91,8 +98,12 @@ impl From<ScenarioError> for Failure {
         };
         Self {
             help: error.help().map(str::to_owned),
-            source: error.place().map(|place| NamedSource::new(&place.source, harmless(&place.text))),
-            label: error.place().map(|place| LabeledSpan::underline(place.span.clone())),
+            place: error.place().map(|place| {
+                Box::new(Excerpt {
+                    source: NamedSource::new(&place.source, harmless(&place.text)),
+                    label: LabeledSpan::underline(place.span.clone()),
+                })
+            }),
             ..Self::plain(Exit::WrongInput, message)
         }
     }

@@ -16,20 +16,17 @@ pub(super) struct ListArguments {
 
 pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
     let text = match &arguments.show {
-        Some(name) => match builtin::find(name) {
-            Some(builtin) => builtin.toml.to_owned(),
-            None => {
-                return Err(Failure::input(
-                    format!("there is no built-in scenario `{name}`"),
-                    "`tautline list` shows their names",
-                ));
-            }
-        },
-        None => {
-            let width = builtin::all().iter().map(|builtin| builtin.name.len()).max().unwrap_or(0);
-            builtin::all().iter().map(|b| format!("{:width$}  {}\n", b.name, b.summary)).collect()
-        }
+        Some(name) => builtin::find(name).map(|builtin| builtin.toml.to_owned()).ok_or_else(|| {
+            Failure::input(format!("there is no built-in scenario `{name}`"), "`tautline list` shows their names")
+        })?,
+        None => table(),
     };
     console::data(&text)?;
     Ok(Exit::Good)
+}
+
+fn table() -> String {
+    let width = builtin::all().iter().map(|builtin| builtin.name.len()).max().unwrap_or(0);
+    let lines: Vec<_> = builtin::all().iter().map(|b| format!("{:width$}  {}\n", b.name, b.summary)).collect();
+    lines.concat()
 }

@@ -173,10 +173,10 @@ fn fly(
     let closed = recording.finish();
     let flight = flown?;
     closed?;
-    Ok(report(scenario, &header, &flight, metrics, state_hash.finish()))
+    Ok(report(scenario, &header, &flight, &metrics, state_hash.finish()))
 }
 
-fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: Metrics<'_>, state_hash: String) -> Report {
+fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: &Metrics<'_>, state_hash: String) -> Report {
     let reason = match &flight.ending {
         Ending::Completed => None,
         Ending::Interrupted => Some("interrupted".to_owned()),

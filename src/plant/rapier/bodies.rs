@@ -159,7 +159,11 @@ fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vecto
     handle
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "rounding to the engine's precision is what is meant")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::unnecessary_cast,
+    reason = "rounding to the engine's precision is what is meant"
+)]
 fn real(x: f64) -> Real {
     x as Real
 }
