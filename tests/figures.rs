@@ -218,7 +218,7 @@ fn paths_have_a_cross_at_each_start_a_ring_at_each_end_and_equal_axes() {
         let strokes: Vec<_> =
             drawing.all("line").into_iter().filter(|line| line.attribute("stroke") == Some(color)).collect();
         let at_start = strokes.iter().filter(|line| {
-            let middle = (number_of(line, "x1") + number_of(line, "x2")) / 2.0;
+            let middle = f64::midpoint(number_of(line, "x1"), number_of(line, "x2"));
             (middle - start.0).abs() <= PLACE
         });
         assert_eq!(at_start.count(), 2, "a cross of two strokes at the start of vehicle {}", i + 1);

@@ -117,7 +117,7 @@ fn energy_rise(log: &Log) -> f64 {
     })
 }
 
-/// Largest difference between E(0) - E(t) and the integral of sum |v_i - mean v|^2 up to t, relative to E(0).
+/// Largest difference between E(0) - E(t) and the integral of `sum |v_i - mean v|^2` up to t, relative to E(0).
 fn energy_imbalance(log: &Log) -> f64 {
     let loss = |sample: &OwnedSample| {
         let mean = sample.swarm.mean_velocity_m_s();

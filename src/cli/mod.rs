@@ -1,7 +1,7 @@
 //! The program, a file a command. The only room that prints.
 //!
-//! Exit codes are the same for all commands: see [`Exit`]. Human text goes to standard output, or to standard error
-//! where standard output carries data.
+//! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
+//! Human text goes to standard output, or to standard error where standard output carries data.
 
 mod check;
 mod completions;
