@@ -17,7 +17,7 @@ use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, first_row_not_finite, row
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
-const SIDE_BY_SIDE_FROM: usize = 64;
+const SIDE_BY_SIDE_FROM: usize = 512;
 
 /// What a flight left behind besides its recording.
 #[derive(Clone, Debug)]
