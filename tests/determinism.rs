@@ -39,6 +39,8 @@ kind = "edge-tension"
 delta_m = 2.0
 [time]
 duration_s = 0.1
+[judge]
+hold_s = 0.1
 "#;
 
 /// A run by one build of the program, into a folder of its own.
