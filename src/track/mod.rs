@@ -1,0 +1,100 @@
+//! Recorded motion as plain data: what a reader gives and the judge takes.
+//!
+//! A recording is a stream of [`Item`]s in order of time, whoever wrote it: instants of vehicles, or pieces of their
+//! curves. Nothing here says what happens between two instants; the judge is told that.
+
+use nalgebra::Vector3;
+
+/// A vehicle at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Which vehicle: an index into [`Tracks::vehicles`].
+    pub vehicle: usize,
+    /// Time since the recording's epoch \[s\].
+    pub time_s: f64,
+    /// Position \[m\].
+    pub position_m: Vector3<f64>,
+    /// Velocity \[m/s\], where the recording has one.
+    pub velocity_m_s: Option<Vector3<f64>>,
+    /// Radius of the vehicle \[m\], where the recording has one.
+    pub radius_m: Option<f64>,
+}
+
+/// A piece of a vehicle's curve: its position at time t is the sum of `coefficients[k] (t - from_s)^k`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Piece {
+    /// Which vehicle: an index into [`Tracks::vehicles`].
+    pub vehicle: usize,
+    /// Where the piece begins \[s\] since the recording's epoch.
+    pub from_s: f64,
+    /// Where it ends \[s\]; after `from_s`.
+    pub to_s: f64,
+    /// Coefficients \[m/s^k\], the constant one first; at least one.
+    pub coefficients: Vec<Vector3<f64>>,
+}
+
+/// What a recording says next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Item {
+    /// A vehicle was seen.
+    Sample(Sample),
+    /// A vehicle flies a known curve.
+    Piece(Piece),
+}
+
+impl Item {
+    /// When the item begins \[s\].
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        match self {
+            Self::Sample(sample) => sample.time_s,
+            Self::Piece(piece) => piece.from_s,
+        }
+    }
+
+    /// Whose it is.
+    #[must_use]
+    pub fn vehicle(&self) -> usize {
+        match self {
+            Self::Sample(sample) => sample.vehicle,
+            Self::Piece(piece) => piece.vehicle,
+        }
+    }
+}
+
+/// How a recording counts time.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Clock {
+    /// The unit that the recording writes: `s`, `ms`, `us` or `ns`.
+    pub unit: &'static str,
+    /// Whether the unit was inferred from the numbers and not given by the format or by the user.
+    pub inferred: bool,
+    /// What was taken from every time so that no digit of a clock in nanoseconds is lost \[ns\].
+    pub epoch_ns: i64,
+}
+
+/// A recording being read.
+///
+/// Items come in order of time ([`Item::time_s`]), and those of one vehicle at strictly increasing times; pieces of one
+/// vehicle do not overlap. A reader whose source is in another order sorts it and says so in its notes.
+pub trait Tracks {
+    /// Why reading failed: names file, place, value and remedy.
+    type Error;
+
+    /// Names of the vehicles known so far, in order of first appearance (numbers in order of value where all are
+    /// numbers). It may grow as the recording is read; an index keeps its meaning.
+    fn vehicles(&self) -> &[String];
+
+    /// Appends the next items to `items`, some ten thousand at a time; `false` when there are none left.
+    ///
+    /// # Errors
+    /// When the recording cannot be read further; what was appended before stays true.
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, Self::Error>;
+
+    /// How time is counted.
+    fn clock(&self) -> &Clock;
+
+    /// What a person should know about how the recording was read, a sentence each: that rows were sorted, that the unit
+    /// of time was inferred.
+    fn notes(&self) -> &[String];
+}
