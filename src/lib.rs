@@ -47,3 +47,4 @@ pub mod report;
 pub mod scenario;
 pub mod sim;
 pub mod swarm;
+pub mod validate;

@@ -6,9 +6,11 @@
 mod completions;
 mod console;
 mod diagnostic;
+mod folder;
 mod list;
 mod run;
 mod schema;
+mod validate;
 
 use std::process::ExitCode;
 
@@ -52,6 +54,8 @@ struct Arguments {
 enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),
+    /// Reproduce the paper and judge every claim, ours and the paper's.
+    Validate(validate::ValidateArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -74,11 +78,20 @@ pub fn main() -> ExitCode {
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Validate(arguments) => validate::validate(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),
     };
     done.unwrap_or_else(|failure| failure.show()).into()
+}
+
+/// A pool of so many threads, or one a core.
+fn threads(count: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(count.map_or(0, usize::from))
+        .build()
+        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))
 }
 
 #[cfg(test)]

@@ -1,7 +1,5 @@
 //! `tautline run`: fly a scenario and leave a recording and a report.
 
-use std::fs;
-use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use super::console::{self, Console};
+use super::folder::OutFolder;
 use super::{Exit, Failure};
 use crate::formation::affine_dimension;
 use crate::metrics::Metrics;
@@ -20,6 +19,8 @@ use crate::report::{EndedEarly, Findings, Performance, Report, Run};
 use crate::scenario::{Override, Scenario, Source};
 use crate::sim::{self, Ending, Flight};
 
+/// The recording's name in the folder of a run.
+const RECORDING: &str = "run.mcap";
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
 /// Offsets below this share of the extent do not make a start or a formation leave its line or plane.
@@ -69,12 +70,10 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
     let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
-    let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
+    let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
+    let folder = OutFolder::at(path, "report.json");
     folder.open(arguments.force)?;
-    let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .build()
-        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    let threads = super::threads(arguments.threads)?;
     let interrupted = interruption()?;
     let report = threads.install(|| fly(&scenario, &folder, console, &interrupted))?;
     report.write(&folder.report())?;
@@ -83,7 +82,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     for reason in &report.verdict.reasons {
         console.say(reason);
     }
-    console.say(&format!("wrote {} and {}", folder.recording().display(), folder.report().display()));
+    console.say(&format!("wrote {} and {}", folder.file(RECORDING).display(), folder.report().display()));
     if arguments.json {
         let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
         console::data(&json)?;
@@ -92,9 +91,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
-fn fly(scenario: &Scenario, folder: &RunFolder, console: Console, interrupted: &AtomicBool) -> Result<Report, Failure> {
+fn fly(scenario: &Scenario, folder: &OutFolder, console: Console, interrupted: &AtomicBool) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
-    let mut recording = McapRecorder::create(&folder.recording(), &header)?;
+    let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
     let mut state_hash = StateHash::new();
 
@@ -160,44 +159,4 @@ fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
         .map_err(|error| Failure::machine(format!("cannot listen to Ctrl-C: {error}")))?;
     Ok(interrupted)
-}
-
-/// The folder that a run leaves behind. It is finished once it holds a report.
-struct RunFolder {
-    path: PathBuf,
-}
-
-impl RunFolder {
-    fn at(path: PathBuf) -> Self {
-        Self { path }
-    }
-
-    fn recording(&self) -> PathBuf {
-        self.path.join("run.mcap")
-    }
-
-    fn report(&self) -> PathBuf {
-        self.path.join("report.json")
-    }
-
-    /// Makes the folder ready. A finished run in it is kept unless `force` says otherwise.
-    fn open(&self, force: bool) -> Result<(), Failure> {
-        let report = self.report();
-        if report.exists() && !force {
-            return Err(Failure::input(
-                format!("{} holds a finished run", self.path.display()),
-                "give another folder with --out, or overwrite the run with --force",
-            ));
-        }
-        let machine = |path: &Path, error: &io::Error| {
-            Failure::machine(format!("cannot write {}: {error}", path.display()))
-                .with_help("give a folder that can be written to with --out")
-        };
-        fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
-        // From here on the old report would describe another recording.
-        match fs::remove_file(&report) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
-            _ => Ok(()),
-        }
-    }
 }

@@ -1,0 +1,50 @@
+//! The folder that a command leaves behind.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::Failure;
+
+/// A folder that is finished once it holds its report.
+pub(super) struct OutFolder {
+    path: PathBuf,
+    report: &'static str,
+}
+
+impl OutFolder {
+    pub(super) fn at(path: impl Into<PathBuf>, report: &'static str) -> Self {
+        Self { path: path.into(), report }
+    }
+
+    /// A file in the folder.
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// The report.
+    pub(super) fn report(&self) -> PathBuf {
+        self.file(self.report)
+    }
+
+    /// Makes the folder ready. A finished one is kept unless `force` says otherwise.
+    pub(super) fn open(&self, force: bool) -> Result<(), Failure> {
+        let report = self.report();
+        if report.exists() && !force {
+            return Err(Failure::input(
+                format!("{} holds a finished run", self.path.display()),
+                "give another folder with --out, or overwrite the run with --force",
+            ));
+        }
+        let machine = |path: &Path, error: &io::Error| {
+            Failure::machine(format!("cannot write {}: {error}", path.display()))
+                .with_help("give a folder that can be written to with --out")
+        };
+        fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
+        // From here on the old report would describe something else.
+        match fs::remove_file(&report) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Every claim of ours and of the paper, judged by measurement.
+//!
+//! [`validate`] flies and computes everything anew and returns [`Claim`]s in a fixed order. Claims and trials run side by
+//! side on the threads of the current rayon pool; every random start has a stream of its own and every sum is taken in
+//! index order, so the answer does not depend on the number of threads.
+//!
+//! A statement of the paper that fails is reported as refuted, with our own measurement: what must hold then is the
+//! refutation. [`Validation::pass`] asks every claim to be as expected.
+
+mod claim;
+mod law;
+mod page;
+mod starts;
+mod tension;
+mod words;
+
+pub use claim::{Claim, Kind, Values};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::law::{LawError, ParameterError, TensionError};
+use crate::scenario::ScenarioError;
+use crate::sim::SimError;
+
+/// Version of the keys of `validate.json`: raised when one is renamed, removed or changes its meaning.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Claims about one thing.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Group {
+    /// Stable name.
+    pub id: &'static str,
+    /// What they are about.
+    pub title: &'static str,
+    /// The claims.
+    pub claims: Vec<Claim>,
+}
+
+/// The result of [`validate`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Validation {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// Version of the program that judged.
+    pub version: &'static str,
+    /// Whether every claim is as expected.
+    pub pass: bool,
+    /// All claims.
+    pub groups: Vec<Group>,
+}
+
+/// Why a validation could not be carried out. None of these can happen in a program that works.
+#[derive(Debug, thiserror::Error)]
+pub enum ValidateError {
+    /// A tension does not exist.
+    #[error(transparent)]
+    Tension(#[from] TensionError),
+    /// A law cannot be made.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// A law has no answer.
+    #[error(transparent)]
+    Law(#[from] LawError),
+    /// A scenario cannot be flown.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A flight failed.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+}
+
+/// Counts finished work, from any thread.
+#[derive(Clone, Copy)]
+pub(crate) struct Progress<'a>(&'a (dyn Fn(u64) + Sync));
+
+impl Progress<'_> {
+    fn advance(&self, units: u64) {
+        (self.0)(units);
+    }
+}
+
+/// A file of claims: its name, its subject, the units of work that it counts, and its judgement.
+struct Part {
+    id: &'static str,
+    title: &'static str,
+    work: u64,
+    judge: fn(&Progress<'_>) -> Result<Vec<Claim>, ValidateError>,
+}
+
+const PARTS: [Part; 2] = [
+    Part { id: "tension", title: "The edge tension", work: 1, judge: tension::judge },
+    Part { id: "law", title: "The law at single instants", work: 1, judge: law::judge },
+];
+
+/// Units of work that [`validate`] counts in all.
+#[must_use]
+pub fn work() -> u64 {
+    PARTS.iter().map(|part| part.work).sum()
+}
+
+/// Judges every claim. `progress` is told how many further units of [`work`] are done, from any thread.
+///
+/// # Errors
+/// [`ValidateError`] when a claim could not be tried.
+pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Result<Validation, ValidateError> {
+    let progress = Progress(progress);
+    let groups = PARTS
+        .par_iter()
+        .map(|part| Ok(Group { id: part.id, title: part.title, claims: (part.judge)(&progress)? }))
+        .collect::<Result<Vec<_>, ValidateError>>()?;
+    Ok(Validation {
+        schema_version: SCHEMA_VERSION,
+        version: env!("CARGO_PKG_VERSION"),
+        pass: groups.iter().flat_map(|group| &group.claims).all(|claim| claim.pass),
+        groups,
+    })
+}
+
+impl Validation {
+    /// All claims in their order.
+    pub fn claims(&self) -> impl Iterator<Item = &Claim> {
+        self.groups.iter().flat_map(|group| &group.claims)
+    }
+
+    /// The claim of this id.
+    #[must_use]
+    pub fn claim(&self, id: &str) -> Option<&Claim> {
+        self.claims().find(|claim| claim.id == id)
+    }
+
+    /// `validate.json`.
+    ///
+    /// # Errors
+    /// When the result cannot be written as JSON, which its types rule out.
+    pub fn to_json(&self) -> serde_json::Result<String> {
+        serde_json::to_string_pretty(self).map(|json| json + "\n")
+    }
+}
