@@ -1,7 +1,9 @@
 //! The loop: sense, law, actuate, plant, observe, judge, record.
 //!
-//! [`fly`] takes any [`Law`] and any [`Plant`] and holds the command constant over each step (sample-and-hold). The
-//! audit sweeps every step, the step that a refusal shortened too. Nothing is allocated per step.
+//! [`fly`] takes any [`Law`] and any [`Plant`]. The law is asked at the beginning of each step, and what it commands is
+//! recorded; the plant holds the command over the step (sample-and-hold) or, where it stands for continuous time, asks
+//! the law itself. The audit sweeps every step, the step that a refusal shortened too. The loop allocates nothing per
+//! step.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -82,6 +84,12 @@ pub enum SimError {
         step: u64,
         /// The vehicle, from 0.
         vehicle: usize,
+    },
+    /// The plant could not be solved any further.
+    #[error("step {step}: the equation of motion cannot be solved to its tolerances")]
+    Stalled {
+        /// The step, from 1.
+        step: u64,
     },
     /// The judge refused what it was shown.
     #[error(transparent)]
@@ -193,7 +201,9 @@ impl<'a> Cockpit<'a> {
         let (mut flown, mut part, mut shortest) = (0, whole, whole);
         while flown < whole {
             let seconds = |parts: u64| dt_s * (parts as f64 / whole as f64);
-            self.move_vehicles(step, seconds(part))?;
+            if let Err(undefined) = self.move_vehicles(step, seconds(part))? {
+                return Ok(Err(undefined));
+            }
             if part > 1 && self.is_refused() {
                 self.plant.restore(&self.state);
                 part /= 2;
@@ -217,16 +227,20 @@ impl<'a> Cockpit<'a> {
         Ok(Ok(()))
     }
 
-    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<(), SimError> {
+    /// Moves the vehicles from `state` to `next`. The inner error ends the flight: the law is undefined on the way.
+    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<Result<(), LawError>, SimError> {
         let began = Instant::now();
-        self.plant
-            .step(&self.control, dt_s)
-            .map_err(|PlantError::NotFinite { vehicle }| SimError::StateNotFinite { step, vehicle })?;
+        match self.plant.step(self.law, &self.control, dt_s) {
+            Ok(()) => {}
+            Err(PlantError::LawUndefined(undefined)) => return Ok(Err(undefined)),
+            Err(PlantError::NotFinite { vehicle }) => return Err(SimError::StateNotFinite { step, vehicle }),
+            Err(PlantError::Stalled) => return Err(SimError::Stalled { step }),
+        }
         self.plant.observe(&mut self.next);
         self.performance.physics += began.elapsed();
         match self.next.first_not_finite() {
             Some(vehicle) => Err(SimError::StateNotFinite { step, vehicle }),
-            None => Ok(()),
+            None => Ok(Ok(())),
         }
     }
 

@@ -133,10 +133,12 @@ impl From<SimError> for Failure {
         match error {
             SimError::Record(error) => error.into(),
             SimError::Audit(error) => error.into(),
-            SimError::CommandNotFinite { .. } | SimError::StateNotFinite { .. } => Self::input(
-                error.to_string(),
-                "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
-            ),
+            SimError::CommandNotFinite { .. } | SimError::StateNotFinite { .. } | SimError::Stalled { .. } => {
+                Self::input(
+                    error.to_string(),
+                    "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
+                )
+            }
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::plant;
 use crate::record::StateHash;
 use crate::record::mcap::{Header, McapRecorder};
 use crate::report::{EndedEarly, Findings, Performance, Report, Run};
-use crate::scenario::{Override, Scenario, Source};
+use crate::scenario::{Override, PlantSpec, Scenario, Source};
 use crate::sim::{self, Ending, Flight};
 
 /// The recording's name in the folder of a run.
@@ -35,6 +35,10 @@ pub(super) struct RunArguments {
     /// Set any key of the scenario for this run; may be given several times.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
+    /// What moves the vehicles: rigid bodies, or the equation of motion solved in continuous time. Short for
+    /// `--set plant.kind=...`.
+    #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
+    plant: Option<String>,
     /// Folder for the recording and the report \[default: out/<scenario name>\].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -57,6 +61,7 @@ impl Default for RunArguments {
         Self {
             scenario: "pentagon".to_owned(),
             overrides: Vec::new(),
+            plant: None,
             out: None,
             force: false,
             json: false,
@@ -68,7 +73,9 @@ impl Default for RunArguments {
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+    let plant = arguments.plant.iter().map(|kind| format!("plant.kind={kind}"));
+    let overrides = arguments.overrides.iter().cloned().chain(plant);
+    let overrides = overrides.map(|text| Override::parse(&text)).collect::<Result<Vec<_>, _>>()?;
     let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "report.json");
@@ -131,7 +138,7 @@ fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: Metric
         formation_dimension: scenario.formation.affine_dimension(FLATNESS),
         certificate: &flight.certificate,
         audit: &flight.audit,
-        engine_contact_pairs: Some(flight.engine_contacts.len() as u64),
+        engine_contact_pairs: (scenario.plant != PlantSpec::Ideal).then_some(flight.engine_contacts.len() as u64),
         summary: &metrics.finish(),
         run: &Run {
             duration_s: flight.duration_s,

@@ -175,6 +175,7 @@ fn plant(file: &PlantFile) -> PlantSpec {
     match (file.kind, file.precision) {
         (PlantKind::Rapier, PrecisionFile::Single) => PlantSpec::Rapier(Precision::Single),
         (PlantKind::Rapier, PrecisionFile::Double) => PlantSpec::Rapier(Precision::Double),
+        (PlantKind::Ideal, _) => PlantSpec::Ideal,
     }
 }
 

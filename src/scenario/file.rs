@@ -274,9 +274,9 @@ pub(super) enum GraphKind {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct PlantFile {
-    /// The engine.
+    /// What moves the vehicles.
     pub(super) kind: PlantKind,
-    /// Floating-point precision of the engine: 32 or 64 bits.
+    /// Floating-point precision of Rapier: 32 or 64 bits. The ideal plant has no choice of it.
     pub(super) precision: PrecisionFile,
 }
 
@@ -284,9 +284,11 @@ pub(super) struct PlantFile {
 #[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum PlantKind {
-    /// Rapier rigid bodies.
+    /// Rapier rigid bodies, the command held over each step.
     #[default]
     Rapier,
+    /// The equation p'' = a22 v + u solved to 12 digits in continuous time: what Rapier is measured against.
+    Ideal,
 }
 
 /// Floating-point precision.

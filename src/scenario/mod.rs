@@ -91,6 +91,8 @@ pub enum LawSpec {
 pub enum PlantSpec {
     /// Rapier rigid bodies at the given floating-point precision.
     Rapier(Precision),
+    /// The equation of motion solved in continuous time with the law inside, in double precision.
+    Ideal,
 }
 
 /// Floating-point precision of the physics engine.

@@ -68,12 +68,17 @@ impl Scenario {
             writeln!(out, "]")?;
         }
 
-        let PlantSpec::Rapier(precision) = self.plant;
-        let precision = match precision {
-            Precision::Single => "single",
-            Precision::Double => "double",
-        };
-        writeln!(out, "\n[plant]\nkind = \"rapier\"\nprecision = \"{precision}\"")?;
+        writeln!(out, "\n[plant]")?;
+        match self.plant {
+            PlantSpec::Rapier(precision) => {
+                let precision = match precision {
+                    Precision::Single => "single",
+                    Precision::Double => "double",
+                };
+                writeln!(out, "kind = \"rapier\"\nprecision = \"{precision}\"")?;
+            }
+            PlantSpec::Ideal => writeln!(out, "kind = \"ideal\"")?,
+        }
 
         writeln!(out, "\n[time]")?;
         writeln!(out, "duration_s = {}", number(self.time.duration_s))?;

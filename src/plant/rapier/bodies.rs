@@ -5,6 +5,7 @@ use engine::prelude::{
     RigidBodyBuilder, RigidBodyHandle, Vector,
 };
 
+use crate::law::Law;
 use crate::plant::{Plant, PlantError};
 use crate::scenario::{Scenario, Space};
 use crate::swarm::{Pair, Rows, Swarm};
@@ -56,12 +57,12 @@ impl Bodies {
 }
 
 impl Plant for Bodies {
-    fn step(&mut self, control: &Rows, dt_s: f64) -> Result<(), PlantError> {
+    fn step(&mut self, _law: &mut dyn Law, held: &Rows, dt_s: f64) -> Result<(), PlantError> {
         self.set_dt(dt_s);
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
             body.reset_forces(false);
-            body.add_force(vector(control, i) * real(self.mass_kg[i]), true);
+            body.add_force(vector(held, i) * real(self.mass_kg[i]), true);
         }
         self.world.step();
         match self.world.quarantine().bodies().first() {

@@ -1,0 +1,376 @@
+//! The ideal plant: p'' = a22 v + u(p, v) (equation (1)) solved in continuous time, with the law inside the right-hand
+//! side: nothing is sampled or held.
+//!
+//! [`solve`] is the oracle that every physics run is measured against; [`plant`] puts the same solution behind
+//! [`Plant`] so that a scenario can be flown in it.
+//!
+//! # Method
+//! Dormand and Prince's explicit Runge-Kutta method of order 8 with error control (Hairer, Norsett and Wanner,
+//! *Solving Ordinary Differential Equations I*, II.5), from the crate `differential-equations`. Nothing is interpolated:
+//! solver steps end at the times asked for, and a closest approach within a step is found by solving anew from the
+//! step's beginning. (The crate's own dense output was measured to be off by 2e-8 m where its steps are by 1e-13 m.)
+//!
+//! # At the edge of the law
+//! A trial step may ask the law about states that it has no answer for, such as a pair inside delta. Such a step is
+//! refused and tried again shorter. Where no step is short enough, the solution itself ends there, and the law's reason
+//! is the error.
+
+use std::cell::RefCell;
+
+use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinary};
+use differential_equations::ode::{ODE, OrdinaryNumericalMethod as _};
+use nalgebra::Vector3;
+
+use super::{Plant, PlantError};
+use crate::law::{Law, LawError};
+use crate::scenario::Scenario;
+use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
+
+/// First step that is tried \[s\]: the error control lengthens it tenfold a step, or shortens it.
+const FIRST_STEP_S: f64 = 1e-3;
+/// Longest step \[s\]: where nothing accelerates, the error control alone would let a pair pass each other unseen.
+const LONGEST_STEP_S: f64 = 0.125;
+/// A step, or what is left to the time asked for, that is shorter than this part of that time is rounding.
+const RESOLUTION: f64 = 1e-14;
+/// Time to which a closest approach is found \[s\]. The distance is flat there: it is off by (1e-7 s)^2/2 times its second
+/// derivative, less than 1e-12 m up to 200 m/s^2.
+const CLOSEST_RESOLUTION_S: f64 = 1e-7;
+
+/// Error allowed per solver step in each coordinate: `absolute + relative * |value|`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// Part of the coordinate.
+    pub relative: f64,
+    /// In m for positions, in m/s for velocities.
+    pub absolute: f64,
+}
+
+impl Default for Tolerances {
+    /// 1e-12 of either kind: the reference flights change by less than 1e-11 m when it is 1e-13.
+    fn default() -> Self {
+        Self { relative: 1e-12, absolute: 1e-12 }
+    }
+}
+
+/// Why there is no solution.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum IdealError {
+    /// The law has no answer from some time on.
+    #[error("the solution ends at {time_s} s: {source}")]
+    Law {
+        /// The last time that was reached \[s\].
+        time_s: f64,
+        /// Why.
+        source: LawError,
+    },
+    /// No step is short enough for the tolerances, or the motion leaves the range of numbers.
+    #[error("the solution cannot be continued at {time_s} s: no step is short enough for its tolerances")]
+    Stalled {
+        /// The last time that was reached \[s\].
+        time_s: f64,
+    },
+    /// The times do not ascend from 0, or are not finite.
+    #[error("time {} is out of order: times ascend from 0 and are finite", entry + 1)]
+    Times {
+        /// The first such entry, from 0.
+        entry: usize,
+    },
+    /// A tolerance is not a positive finite number.
+    #[error("tolerances must be positive finite numbers")]
+    Tolerances,
+}
+
+/// A solution at the times asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// The state at each time.
+    pub states: Vec<Swarm>,
+    /// The closest that any pair came from time 0 to the last time: over the whole of it, not at the times asked for
+    /// only. None for fewer than two vehicles.
+    pub closest: Option<ClosestApproach>,
+}
+
+/// Solves p'' = a22 v + u(p, v) from `start` at time 0 and hands out the states at `times_s` \[s\], ascending from 0.
+///
+/// # Accuracy
+/// The error per solver step is at most that of the tolerances, and stable motion forgets it: on the reference flights
+/// positions and the closest approach are good to 1e-11 m. A pair is taken to turn from closing to opening at most once
+/// a solver step.
+///
+/// # Errors
+/// [`IdealError`]: the law has no answer on the way, the times do not ascend, or the tolerances cannot be met.
+pub fn solve(
+    law: &mut dyn Law,
+    start: &Swarm,
+    a22_per_s: f64,
+    times_s: &[f64],
+    tolerances: Tolerances,
+) -> Result<Solution, IdealError> {
+    let in_order = |&entry: &usize| {
+        let before_s = if entry == 0 { 0.0 } else { times_s[entry - 1] };
+        times_s[entry].is_finite() && times_s[entry] >= before_s
+    };
+    if let Some(entry) = (0..times_s.len()).find(|entry| !in_order(entry)) {
+        return Err(IdealError::Times { entry });
+    }
+    let flow = Flow::new(law, start, a22_per_s);
+    let mut solver = Solver::begin(&flow, 0.0, packed(start), tolerances, FIRST_STEP_S)?;
+    let mut closest = None;
+    for (pair, approach) in pairs(solver.method.y()) {
+        offer(&mut closest, pair, approach.separation_m, 0.0);
+    }
+    let mut states = Vec::with_capacity(times_s.len());
+    for &time_s in times_s {
+        solver.advance(time_s, &mut |solver| solver.search_last_step(&mut closest))?;
+        states.push(solver.swarm());
+    }
+    Ok(Solution { states, closest })
+}
+
+/// A swarm that moves as equation (1) says, at the scenario's start.
+#[must_use]
+pub fn plant(scenario: &Scenario) -> Box<dyn Plant> {
+    Box::new(Ideal { swarm: scenario.start.clone(), a22_per_s: scenario.a22_per_s, step_s: FIRST_STEP_S })
+}
+
+struct Ideal {
+    swarm: Swarm,
+    a22_per_s: f64,
+    /// Solver step that the error control came to last.
+    step_s: f64,
+}
+
+impl Plant for Ideal {
+    fn step(&mut self, law: &mut dyn Law, _held: &Rows, dt_s: f64) -> Result<(), PlantError> {
+        let flow = Flow::new(law, &self.swarm, self.a22_per_s);
+        let first_step_s = self.step_s.min(dt_s);
+        let mut solver = Solver::begin(&flow, 0.0, packed(&self.swarm), Tolerances::default(), first_step_s)?;
+        solver.advance(dt_s, &mut |_| Ok(()))?;
+        self.step_s = solver.method.h();
+        self.swarm = solver.swarm();
+        Ok(())
+    }
+
+    fn observe(&self, swarm: &mut Swarm) {
+        swarm.clone_from(&self.swarm);
+    }
+
+    fn restore(&mut self, swarm: &Swarm) {
+        self.swarm.clone_from(swarm);
+    }
+}
+
+impl From<IdealError> for PlantError {
+    fn from(error: IdealError) -> Self {
+        match error {
+            IdealError::Law { source, .. } => Self::LawUndefined(source),
+            IdealError::Stalled { .. } | IdealError::Times { .. } | IdealError::Tolerances => Self::Stalled,
+        }
+    }
+}
+
+/// Order 8, 12 stages and 4 that go unused. A state is all positions, then all velocities, each an axis after the other.
+type Method = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Vec<f64>, 8, 12, 16>;
+
+struct Solver<'a, 'law> {
+    method: Method,
+    flow: &'a Flow<'law>,
+    tolerances: Tolerances,
+}
+
+impl<'a, 'law> Solver<'a, 'law> {
+    fn begin(
+        flow: &'a Flow<'law>,
+        time_s: f64,
+        state: Vec<f64>,
+        tolerances: Tolerances,
+        step_s: f64,
+    ) -> Result<Self, IdealError> {
+        let Tolerances { relative, absolute } = tolerances;
+        if ![relative, absolute].iter().all(|tolerance| *tolerance > 0.0 && tolerance.is_finite()) {
+            return Err(IdealError::Tolerances);
+        }
+        let method = Method::dop853().rtol(relative).atol(absolute).h_max(LONGEST_STEP_S).max_steps(usize::MAX);
+        let mut method = method.h0(step_s.min(LONGEST_STEP_S));
+        // The end of the interval only tells the direction of time.
+        method.init(flow, time_s, f64::INFINITY, &state).map_err(|_| IdealError::Stalled { time_s })?;
+        match flow.take_failure() {
+            Some(source) => Err(IdealError::Law { time_s, source }),
+            None => Ok(Self { method, flow, tolerances }),
+        }
+    }
+
+    /// Solves up to `until_s`, showing itself to `observe` after every accepted step.
+    fn advance(
+        &mut self,
+        until_s: f64,
+        observe: &mut dyn FnMut(&Self) -> Result<(), IdealError>,
+    ) -> Result<(), IdealError> {
+        if self.method.y().is_empty() {
+            // An empty state has no error to control.
+            return Ok(());
+        }
+        let mut undefined = None;
+        while until_s - self.method.t() > RESOLUTION * until_s {
+            let (time_s, free_step_s) = (self.method.t(), self.method.h());
+            let step_s = free_step_s.min(until_s - time_s);
+            if step_s <= RESOLUTION * until_s {
+                return Err(
+                    undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })
+                );
+            }
+            self.method.set_h(step_s);
+            let stepped = self.method.step(self.flow);
+            undefined = self.flow.take_failure();
+            if stepped.is_err() {
+                return Err(IdealError::Stalled { time_s });
+            }
+            if self.method.t() == time_s {
+                continue;
+            }
+            if undefined.is_some() {
+                // Accepted by its error alone, on stages that the law has no answer for.
+                let before = self.method.y_prev().clone();
+                *self = Self::begin(self.flow, time_s, before, self.tolerances, step_s / 4.0)?;
+                continue;
+            }
+            if step_s < free_step_s {
+                // Shortened to end at the time asked for, not by the error control.
+                self.method.set_h(self.method.h().max(free_step_s));
+            }
+            observe(self)?;
+        }
+        Ok(())
+    }
+
+    /// The state at a time within the last step, solved anew from the beginning of that step.
+    fn within_last_step(&self, time_s: f64) -> Result<Vec<f64>, IdealError> {
+        let (from_s, before) = (self.method.t_prev(), self.method.y_prev().clone());
+        let mut again = Self::begin(self.flow, from_s, before, self.tolerances, time_s - from_s)?;
+        again.advance(time_s, &mut |_| Ok(()))?;
+        Ok(again.method.y().clone())
+    }
+
+    /// Looks for a closer approach in the last step: at its end, and where the distance of a pair stops falling.
+    fn search_last_step(&self, closest: &mut Option<ClosestApproach>) -> Result<(), IdealError> {
+        let (from_s, to_s) = (self.method.t_prev(), self.method.t());
+        for (pair, after) in pairs(self.method.y()) {
+            offer(closest, pair, after.separation_m, to_s);
+            let before = Approach::of(self.method.y_prev(), pair);
+            // A pair that stays away even at twice its speed is not looked at closely.
+            let reach_m = 2.0 * before.speed_m_s.max(after.speed_m_s) * (to_s - from_s);
+            let nearest_m = before.separation_m.min(after.separation_m) - reach_m;
+            let may_be_closest = closest.is_none_or(|closest| nearest_m < closest.separation_m);
+            if before.is_closing && !after.is_closing && may_be_closest {
+                let (time_s, separation_m) = self.turn(pair)?;
+                offer(closest, pair, separation_m, time_s);
+            }
+        }
+        Ok(())
+    }
+
+    /// When a pair turns that closes at the beginning of the last step and opens at its end, and its distance then.
+    fn turn(&self, pair: Pair) -> Result<(f64, f64), IdealError> {
+        let (mut low_s, mut high_s) = (self.method.t_prev(), self.method.t());
+        loop {
+            let middle_s = low_s + 0.5 * (high_s - low_s);
+            let approach = Approach::of(&self.within_last_step(middle_s)?, pair);
+            if high_s - low_s <= CLOSEST_RESOLUTION_S.max(high_s * RESOLUTION) {
+                return Ok((middle_s, approach.separation_m));
+            }
+            if approach.is_closing {
+                low_s = middle_s;
+            } else {
+                high_s = middle_s;
+            }
+        }
+    }
+
+    fn swarm(&self) -> Swarm {
+        let mut swarm = self.flow.scratch.borrow().swarm.clone();
+        unpack(self.method.y(), &mut swarm);
+        swarm
+    }
+}
+
+/// The right-hand side. The solver asks it through a shared reference, so what changes is in a cell.
+struct Flow<'law> {
+    a22_per_s: f64,
+    scratch: RefCell<Scratch<'law>>,
+}
+
+struct Scratch<'law> {
+    law: &'law mut dyn Law,
+    swarm: Swarm,
+    control: Rows,
+    /// Why the law had no answer, the last time that it had none.
+    failure: Option<LawError>,
+}
+
+impl<'law> Flow<'law> {
+    fn new(law: &'law mut dyn Law, swarm: &Swarm, a22_per_s: f64) -> Self {
+        let control = Rows::zeros(swarm.count());
+        Self { a22_per_s, scratch: RefCell::new(Scratch { law, swarm: swarm.clone(), control, failure: None }) }
+    }
+
+    fn take_failure(&self) -> Option<LawError> {
+        self.scratch.borrow_mut().failure.take()
+    }
+}
+
+impl ODE<f64, Vec<f64>> for Flow<'_> {
+    fn diff(&self, _time_s: f64, state: &Vec<f64>, rates: &mut Vec<f64>) {
+        let Scratch { law, swarm, control, failure } = &mut *self.scratch.borrow_mut();
+        unpack(state, swarm);
+        if let Err(undefined) = law.control(swarm, control) {
+            *failure = Some(undefined);
+            // An error estimate that is not a number refuses the step.
+            rates.fill(f64::NAN);
+            return;
+        }
+        let (velocities, half) = (swarm.velocities_m_s.as_slice(), state.len() / 2);
+        rates[..half].copy_from_slice(velocities);
+        for ((rate, v), u) in rates[half..].iter_mut().zip(velocities).zip(control.as_slice()) {
+            *rate = self.a22_per_s * v + u;
+        }
+    }
+}
+
+fn packed(swarm: &Swarm) -> Vec<f64> {
+    swarm.positions_m.iter().chain(swarm.velocities_m_s.iter()).copied().collect()
+}
+
+fn unpack(state: &[f64], swarm: &mut Swarm) {
+    let (positions, velocities) = state.split_at(state.len() / 2);
+    swarm.positions_m.as_mut_slice().copy_from_slice(positions);
+    swarm.velocities_m_s.as_mut_slice().copy_from_slice(velocities);
+}
+
+/// How a pair moves.
+struct Approach {
+    separation_m: f64,
+    speed_m_s: f64,
+    is_closing: bool,
+}
+
+impl Approach {
+    fn of(state: &[f64], pair: Pair) -> Self {
+        let count = state.len() / 6;
+        let apart = |axis: usize| state[axis * count + pair.second()] - state[axis * count + pair.first()];
+        let (r, v) = (Vector3::from([0, 1, 2].map(apart)), Vector3::from([3, 4, 5].map(apart)));
+        Self { separation_m: r.norm(), speed_m_s: v.norm(), is_closing: r.dot(&v) < 0.0 }
+    }
+}
+
+fn pairs(state: &[f64]) -> impl Iterator<Item = (Pair, Approach)> {
+    let count = state.len() / 6;
+    (0..count)
+        .flat_map(move |i| (i + 1..count).map(move |j| Pair::new(i, j)))
+        .map(|pair| (pair, Approach::of(state, pair)))
+}
+
+fn offer(closest: &mut Option<ClosestApproach>, pair: Pair, separation_m: f64, time_s: f64) {
+    if closest.is_none_or(|closest| separation_m < closest.separation_m) {
+        *closest = Some(ClosestApproach { pair, separation_m, time_s });
+    }
+}

@@ -1,0 +1,329 @@
+//! The ideal plant solves p'' = a22 v + u: reference flights, free motion, energy, and the edge of the law.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Vector3;
+use tautline::formation::{Formation, largest_edge_error_m};
+use tautline::graph::Graph;
+use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, Law, LawError};
+use tautline::plant::ideal::{self, IdealError, Solution, Tolerances};
+use tautline::plant::{Plant, PlantError};
+use tautline::scenario::{Override, PlantSpec, Scenario, Source};
+use tautline::sim::{self, Ending};
+use tautline::swarm::{Pair, Rows, Swarm, row, set_row};
+
+/// The reference values are printed with 7 digits after the point.
+const PRINTED_M: f64 = 1e-7;
+/// The reference minima are printed with 6 digits after the point.
+const PRINTED_MINIMUM_M: f64 = 1e-6;
+/// Reference times of closest approach are printed with 3 digits (2 for the circle) after the point.
+const PRINTED_TIME_S: f64 = 6e-3;
+/// Energies are printed with 8 digits after the point.
+const PRINTED_ENERGY: f64 = 1e-8;
+/// Rounding of an energy of a few m^2/s^2 and the solver's error in it.
+const ENERGY_ROUNDING: f64 = 1e-9;
+/// Solver error of a flight of tens of seconds at 1e-12 a step, amplified by a22 > 0 where it is.
+const SOLVED_M: f64 = 1e-11;
+
+fn scenario(name: &str, sets: &[&str]) -> Scenario {
+    let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("a key and a value")).collect();
+    Scenario::read(&Source::Builtin(name.to_owned()), &overrides).expect("a scenario")
+}
+
+fn solve(scenario: &Scenario, times_s: &[f64]) -> Solution {
+    let mut law = scenario.law().expect("a law");
+    ideal::solve(law.as_mut(), &scenario.start, scenario.a22_per_s, times_s, Tolerances::default()).expect("a solution")
+}
+
+fn edge_error_m(scenario: &Scenario, swarm: &Swarm) -> f64 {
+    largest_edge_error_m(&swarm.positions_m, &scenario.formation, &scenario.graph)
+}
+
+/// A law that commands nothing.
+struct Free;
+
+impl Law for Free {
+    fn name(&self) -> &'static str {
+        "free"
+    }
+
+    fn control(&mut self, _swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
+        control.fill(0.0);
+        Ok(())
+    }
+}
+
+#[test]
+fn the_pentagon_flies_as_the_reference_says() {
+    let pentagon = scenario("pentagon", &[]);
+    let solution = solve(&pentagon, &[10.0, 120.0]);
+    let reference = Vector3::new(4.318_055_1, -1.043_487_6, 0.0);
+    let found = row(&solution.states[0].positions_m, 0);
+    assert!((found - reference).amax() < PRINTED_M, "{found}");
+    let closest = solution.closest.expect("a closest approach");
+    assert!((closest.separation_m - 2.460_353).abs() < PRINTED_MINIMUM_M, "{closest:?}");
+    assert!((closest.time_s - 2.151).abs() < PRINTED_TIME_S, "{closest:?}");
+    assert!([Pair::new(0, 2), Pair::new(1, 2)].contains(&closest.pair), "{closest:?}");
+    let error_m = edge_error_m(&pentagon, &solution.states[1]);
+    assert!(error_m < 1e-11, "{error_m}");
+    let energy = pentagon.law().expect("a law").energy(&pentagon.start).expect("an energy");
+    assert!((energy - 3.656_742_96).abs() < PRINTED_ENERGY, "{energy}");
+}
+
+#[test]
+fn a_wrong_sign_of_a22_does_not_fly_as_the_reference_says() {
+    let pentagon = scenario("pentagon", &[]);
+    let mut law = pentagon.law().expect("a law");
+    let solved = ideal::solve(law.as_mut(), &pentagon.start, -0.1, &[10.0], Tolerances::default()).expect("a solution");
+    assert!((row(&solved.states[0].positions_m, 0).x - 4.318_055_1).abs() > 1e3 * PRINTED_M);
+}
+
+#[test]
+fn the_circle_flies_as_the_reference_says() {
+    let circle = scenario("circle", &[]);
+    let solution = solve(&circle, &[44.2, 44.3, 120.0]);
+    let closest = solution.closest.expect("a closest approach");
+    assert!((closest.separation_m - 1.238_135).abs() < PRINTED_MINIMUM_M, "{closest:?}");
+    assert!((closest.time_s - 4.18).abs() < PRINTED_TIME_S, "{closest:?}");
+    assert_eq!(closest.pair, Pair::new(2, 3));
+    let energy = circle.law().expect("a law").energy(&circle.start).expect("an energy");
+    assert!((energy - 4.479_772_16).abs() < PRINTED_ENERGY, "{energy}");
+    let errors = solution.states.iter().map(|state| edge_error_m(&circle, state)).collect::<Vec<_>>();
+    assert!(errors[0] > 1e-2 && errors[1] < 1e-2 && errors[2] < 1e-11, "{errors:?}");
+}
+
+#[test]
+fn the_baseline_collides_as_the_reference_says() {
+    let solution = solve(&scenario("pentagon-laplacian", &[]), &[20.0]);
+    let closest = solution.closest.expect("a closest approach");
+    assert!((closest.separation_m - 1.5327).abs() < 1e-4 && (closest.time_s - 3.63).abs() < PRINTED_TIME_S);
+}
+
+#[test]
+fn a_straight_line_is_never_left_and_its_minimum_is_the_known_one() {
+    let line = scenario("pentagon-collinear", &[]);
+    let solution = solve(&line, &[120.0]);
+    let last = &solution.states[0];
+    assert_eq!(last.positions_m.column(1).amax(), 0.0);
+    let closest = solution.closest.expect("a closest approach");
+    assert!((closest.separation_m - 2.458_145).abs() < PRINTED_MINIMUM_M, "{closest:?}");
+    assert!((edge_error_m(&line, last) - 8.57).abs() < 1e-2);
+}
+
+#[test]
+fn free_motion_is_exact_for_drag_and_for_its_opposite() {
+    let mut start = Swarm::at_rest(Formation::line(2, 5.0).slots_m);
+    set_row(&mut start.velocities_m_s, 0, Vector3::new(0.3, -1.0, 2.0));
+    let v = row(&start.velocities_m_s, 0);
+    for a22 in [-1.5_f64, -0.1, 0.1] {
+        let times_s = [0.0, 0.5, 0.5, 3.0, 20.0];
+        let solved = ideal::solve(&mut Free, &start, a22, &times_s, Tolerances::default()).expect("a solution");
+        assert_eq!(solved.states[0], start);
+        for (state, t) in solved.states.iter().zip(times_s) {
+            let scale = (a22 * t).exp().max(1.0);
+            assert!((row(&state.velocities_m_s, 0) - v * (a22 * t).exp()).amax() < SOLVED_M * scale);
+            assert!((row(&state.positions_m, 0) - v * ((a22 * t).exp_m1() / a22)).amax() < 10.0 * SOLVED_M * scale);
+        }
+    }
+}
+
+/// Largest rise of the energy above its least value so far.
+fn largest_rise(scenario: &Scenario, a22_per_s: f64) -> f64 {
+    let mut law = scenario.law().expect("a law");
+    let times_s: Vec<_> = (0..=600).map(|k| f64::from(k) * 0.1).collect();
+    let solved = ideal::solve(law.as_mut(), &scenario.start, a22_per_s, &times_s, Tolerances::default());
+    let energies = solved.expect("a solution").states.into_iter().map(|state| law.energy(&state).expect("an energy"));
+    let (mut least, mut rise) = (f64::INFINITY, 0.0_f64);
+    for energy in energies {
+        rise = rise.max(energy - least);
+        least = least.min(energy);
+    }
+    rise
+}
+
+#[test]
+fn the_energy_never_rises_and_does_where_the_plant_feeds_in_more_than_the_law_takes_out() {
+    for name in ["pentagon", "circle"] {
+        let scenario = scenario(name, &[]);
+        let rise = largest_rise(&scenario, scenario.a22_per_s);
+        assert!(rise < ENERGY_ROUNDING, "{name}: {rise}");
+        // The law takes out (1 + a22) |v|^2 for the a22 that it knows.
+        assert!(largest_rise(&scenario, scenario.a22_per_s + 1.5) > 1e-3);
+    }
+}
+
+#[test]
+fn tighter_tolerances_change_the_reference_flights_by_less_than_the_stated_error() {
+    for name in ["pentagon", "circle"] {
+        let scenario = scenario(name, &[]);
+        let times_s: Vec<_> = (1..=60).map(f64::from).collect();
+        let [default, tight] = [1e-12, 1e-13].map(|tolerance| {
+            let tolerances = Tolerances { relative: tolerance, absolute: tolerance };
+            let mut law = scenario.law().expect("a law");
+            ideal::solve(law.as_mut(), &scenario.start, scenario.a22_per_s, &times_s, tolerances).expect("a solution")
+        });
+        let apart = |other: &Solution| {
+            let of = |(a, b): (&Swarm, &Swarm)| (&a.positions_m - &b.positions_m).amax();
+            default.states.iter().zip(&other.states).map(of).fold(0.0, f64::max)
+        };
+        assert!(apart(&tight) < SOLVED_M, "{name}: {}", apart(&tight));
+        let separation = |solution: &Solution| solution.closest.expect("a closest approach").separation_m;
+        let gap_m = (separation(&default) - separation(&tight)).abs();
+        assert!(gap_m < SOLVED_M, "{name}: {gap_m}");
+    }
+}
+
+#[test]
+fn the_closest_approach_is_found_between_the_times_asked_for() {
+    // Two free vehicles pass each other at 0.3 m after 10.0123 s; the only time asked for is 50 s later.
+    let mut start = Swarm::at_rest(Rows::zeros(2));
+    set_row(&mut start.positions_m, 1, Vector3::new(10.0123, 0.3, 0.0));
+    set_row(&mut start.velocities_m_s, 1, Vector3::new(-1.0, 0.0, 0.0));
+    let solved = ideal::solve(&mut Free, &start, 0.0, &[60.0], Tolerances::default()).expect("a solution");
+    let closest = solved.closest.expect("a closest approach");
+    assert!((closest.separation_m - 0.3).abs() < 1e-12 && (closest.time_s - 10.0123).abs() < 1e-6, "{closest:?}");
+}
+
+/// Two vehicles of the edge tension, 3 m apart with delta = 2 m, thrown at each other.
+fn thrown(closing_m_s: f64) -> (EdgeTensionLaw, Swarm) {
+    let formation = Formation::line(2, 3.0);
+    let parameters = EdgeTensionParameters { alpha: 1.0, delta_m: 2.0, a22_per_s: 0.0 };
+    let law = EdgeTensionLaw::new(&Graph::complete(2), &formation, parameters).expect("a law");
+    let mut start = Swarm::at_rest(formation.slots_m);
+    set_row(&mut start.velocities_m_s, 1, Vector3::new(-closing_m_s, 0.0, 0.0));
+    (law, start)
+}
+
+#[test]
+fn a_hard_throw_stays_above_its_certificate_although_trial_steps_leave_the_law() {
+    let (mut law, start) = thrown(40.0);
+    let certified_m = law.certificate(&start).certified_m.expect("a certificate");
+    let solved = ideal::solve(&mut law, &start, 0.0, &[5.0], Tolerances::default()).expect("a solution");
+    let closest = solved.closest.expect("a closest approach");
+    assert!(certified_m < 2.01, "the throw is hard: {certified_m}");
+    assert!(closest.separation_m > certified_m, "{closest:?}");
+}
+
+/// A law that brakes nothing and has no answer within 2 m.
+struct Wall;
+
+impl Law for Wall {
+    fn name(&self) -> &'static str {
+        "wall"
+    }
+
+    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
+        control.fill(0.0);
+        let separation_m = tautline::swarm::separation(&swarm.positions_m, 0, 1);
+        let hit = LawError::Collision { pair: Pair::new(0, 1), separation_m, delta_m: 2.0 };
+        if separation_m > 2.0 { Ok(()) } else { Err(hit) }
+    }
+}
+
+#[test]
+fn a_solution_that_runs_into_the_edge_of_the_law_ends_there_with_the_laws_reason() {
+    let (_, start) = thrown(1.0);
+    let ended = ideal::solve(&mut Wall, &start, 0.0, &[0.5, 5.0], Tolerances::default());
+    match ended {
+        Err(IdealError::Law { time_s, source: LawError::Collision { pair, .. } }) => {
+            assert!((time_s - 1.0).abs() < 1e-9, "{time_s}");
+            assert_eq!(pair, Pair::new(0, 1));
+        }
+        other => panic!("{other:?}"),
+    }
+    let before = ideal::solve(&mut Wall, &start, 0.0, &[0.999], Tolerances::default());
+    assert!(before.is_ok(), "the negative twin: {before:?}");
+}
+
+#[test]
+fn a_start_that_the_law_refuses_is_refused() {
+    let (mut law, mut start) = thrown(0.0);
+    set_row(&mut start.positions_m, 1, Vector3::new(1.5, 0.0, 0.0));
+    let refused = ideal::solve(&mut law, &start, 0.0, &[1.0], Tolerances::default());
+    assert!(matches!(refused, Err(IdealError::Law { time_s: 0.0, source: LawError::Collision { .. } })), "{refused:?}");
+}
+
+#[test]
+fn wrong_times_and_tolerances_are_refused_and_motion_beyond_numbers_stalls() {
+    let (mut law, start) = thrown(0.0);
+    let mut solve = |a22: f64, times_s: &[f64], tolerance: f64| {
+        let tolerances = Tolerances { relative: tolerance, absolute: 1e-12 };
+        ideal::solve(&mut law, &start, a22, times_s, tolerances).map(drop)
+    };
+    assert_eq!(solve(0.0, &[1.0, 0.5], 1e-12), Err(IdealError::Times { entry: 1 }));
+    assert_eq!(solve(0.0, &[-1.0], 1e-12), Err(IdealError::Times { entry: 0 }));
+    assert_eq!(solve(0.0, &[f64::NAN], 1e-12), Err(IdealError::Times { entry: 0 }));
+    for tolerance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(solve(0.0, &[1.0], tolerance), Err(IdealError::Tolerances));
+    }
+    assert_eq!(solve(0.0, &[], 1e-12), Ok(()));
+    let nan = solve(f64::NAN, &[1.0], 1e-12);
+    assert!(matches!(nan, Err(IdealError::Stalled { .. } | IdealError::Law { .. })), "{nan:?}");
+    let mut runaway = Swarm::at_rest(Rows::zeros(2));
+    runaway.velocities_m_s[(0, 0)] = 1.0;
+    let stalled = ideal::solve(&mut Free, &runaway, 100.0, &[10.0], Tolerances::default());
+    assert!(matches!(stalled, Err(IdealError::Stalled { .. } | IdealError::Law { .. })), "{stalled:?}");
+}
+
+#[test]
+fn an_empty_swarm_and_a_single_vehicle_have_no_closest_approach() {
+    for count in [0, 1] {
+        let start = Swarm::at_rest(Rows::zeros(count));
+        let solved = ideal::solve(&mut Free, &start, 0.1, &[1.0], Tolerances::default()).expect("a solution");
+        assert_eq!((solved.states.len(), solved.closest), (1, None));
+    }
+}
+
+#[test]
+fn the_ideal_plant_flies_the_same_solution_whatever_the_step() {
+    let solved = solve(&scenario("pentagon", &[]), &[10.0]);
+    for dt in ["0.1", "0.004166666666666667"] {
+        let scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=10", &format!("time.dt_s={dt}")]);
+        assert_eq!(scenario.plant, PlantSpec::Ideal);
+        let mut law = scenario.law().expect("a law");
+        let mut plant = tautline::plant::for_scenario(&scenario);
+        let carry_on = &mut |_| ControlFlow::Continue(());
+        let flight = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut (), carry_on).expect("a flight");
+        let gap_m = (&flight.last.positions_m - &solved.states[0].positions_m).amax();
+        assert!(gap_m < SOLVED_M, "dt = {dt}: {gap_m}");
+        assert!(flight.engine_contacts.is_empty() && flight.ending == Ending::Completed);
+    }
+}
+
+#[test]
+fn the_ideal_plant_asks_the_law_it_is_given_and_ends_where_that_has_no_answer() {
+    let (_, start) = thrown(1.0);
+    let mut scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=5"]);
+    let mut plant = tautline::plant::for_scenario(&scenario);
+    let held = Rows::zeros(5);
+    assert!(plant.step(&mut Free, &held, 1.0).is_ok());
+    let mut after = scenario.start.clone();
+    plant.observe(&mut after);
+    assert_eq!(after, scenario.start, "without a command nothing moves");
+
+    scenario = Scenario::new("wall", start, Formation::line(2, 3.0), 0.5, 5.0);
+    scenario.plant = PlantSpec::Ideal;
+    let mut plant = tautline::plant::for_scenario(&scenario);
+    assert!(matches!(plant.step(&mut Wall, &held, 2.0), Err(PlantError::LawUndefined(_))));
+    let mut plant = tautline::plant::for_scenario(&scenario);
+    let carry_on = &mut |_| ControlFlow::Continue(());
+    let flight = sim::fly(&scenario, &mut Wall, plant.as_mut(), &mut (), carry_on).expect("a flight");
+    assert!(matches!(flight.ending, Ending::LawUndefined(LawError::Collision { .. })));
+    assert!((flight.duration_s - 1.0).abs() <= scenario.time.dt_s, "{}", flight.duration_s);
+}
+
+#[test]
+fn the_same_solution_has_the_same_bits() {
+    let circle = scenario("circle", &[]);
+    assert_eq!(solve(&circle, &[3.0, 30.0]), solve(&circle, &[3.0, 30.0]));
+}
+
+#[test]
+fn the_resolved_scenario_names_the_ideal_plant_and_reads_back() {
+    let ideal = scenario("pentagon", &["plant.kind=ideal", "plant.precision=double"]);
+    let text = ideal.resolved_toml();
+    assert!(text.contains("[plant]\nkind = \"ideal\"\n"), "{text}");
+    let again = Scenario::read(&Source::Text { name: "again.toml".to_owned(), text }, &[]).expect("a scenario");
+    assert_eq!(again, ideal);
+    assert_ne!(again.sha256_hex(), scenario("pentagon", &[]).sha256_hex());
+}
