@@ -7,19 +7,29 @@
 //! A statement of the paper that fails is reported as refuted, with our own measurement: what must hold then is the
 //! refutation. [`Validation::pass`] asks every claim to be as expected.
 
+mod certificate;
 mod claim;
+mod detectors;
+mod equilibria;
+mod experiments;
+mod flights;
+mod ladder;
 mod law;
 mod page;
+mod rates;
 mod starts;
 mod tension;
 mod words;
 
 pub use claim::{Claim, Kind, Values};
+pub use ladder::Rung;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::law::{LawError, ParameterError, TensionError};
+use crate::plant::PlantError;
+use crate::plant::ideal::IdealError;
 use crate::scenario::ScenarioError;
 use crate::sim::SimError;
 
@@ -48,6 +58,8 @@ pub struct Validation {
     pub pass: bool,
     /// All claims.
     pub groups: Vec<Group>,
+    /// Rapier against continuous time, from coarse to fine steps.
+    pub ladder: Vec<Rung>,
 }
 
 /// Why a validation could not be carried out. None of these can happen in a program that works.
@@ -65,6 +77,12 @@ pub enum ValidateError {
     /// A scenario cannot be flown.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// There is no solution in continuous time.
+    #[error(transparent)]
+    Ideal(#[from] IdealError),
+    /// A plant could not carry out a step.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
     /// A flight failed.
     #[error(transparent)]
     Sim(#[from] SimError),
@@ -88,15 +106,32 @@ struct Part {
     judge: fn(&Progress<'_>) -> Result<Vec<Claim>, ValidateError>,
 }
 
-const PARTS: [Part; 2] = [
+const PARTS: [Part; 7] = [
     Part { id: "tension", title: "The edge tension", work: 1, judge: tension::judge },
     Part { id: "law", title: "The law at single instants", work: 1, judge: law::judge },
+    Part {
+        id: "certificate",
+        title: "Energy and certificate",
+        work: certificate::STARTS as u64 + 1,
+        judge: certificate::judge,
+    },
+    Part { id: "figures", title: "The paper's figures", work: 6, judge: experiments::judge },
+    Part {
+        id: "equilibria",
+        title: "Where the law comes to rest",
+        work: equilibria::FLIGHTS,
+        judge: equilibria::judge,
+    },
+    Part { id: "rates", title: "Rates near the formation", work: 5, judge: rates::judge },
+    Part { id: "detectors", title: "The judges and the engine", work: 3, judge: detectors::judge },
 ];
+/// The flights of the ladder, and free decay.
+const LADDER_WORK: u64 = 2 * ladder::STEPS_HZ.len() as u64 + 1;
 
 /// Units of work that [`validate`] counts in all.
 #[must_use]
 pub fn work() -> u64 {
-    PARTS.iter().map(|part| part.work).sum()
+    PARTS.iter().map(|part| part.work).sum::<u64>() + LADDER_WORK
 }
 
 /// Judges every claim. `progress` is told how many further units of [`work`] are done, from any thread.
@@ -105,15 +140,24 @@ pub fn work() -> u64 {
 /// [`ValidateError`] when a claim could not be tried.
 pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Result<Validation, ValidateError> {
     let progress = Progress(progress);
-    let groups = PARTS
-        .par_iter()
-        .map(|part| Ok(Group { id: part.id, title: part.title, claims: (part.judge)(&progress)? }))
-        .collect::<Result<Vec<_>, ValidateError>>()?;
+    let parts = || {
+        PARTS
+            .par_iter()
+            .map(|part| Ok(Group { id: part.id, title: part.title, claims: (part.judge)(&progress)? }))
+            .collect::<Result<Vec<_>, ValidateError>>()
+    };
+    let engine = || Ok((ladder::climb(&progress)?, ladder::free_decay(&progress)?));
+    let (groups, engine): (_, Result<_, ValidateError>) = rayon::join(parts, engine);
+    let (mut groups, (ladder, free_decay)) = (groups?, engine?);
+    let mut claims = ladder::claims(&ladder);
+    claims.push(free_decay);
+    groups.push(Group { id: "engine", title: "The engine against continuous time", claims });
     Ok(Validation {
         schema_version: SCHEMA_VERSION,
         version: env!("CARGO_PKG_VERSION"),
         pass: groups.iter().flat_map(|group| &group.claims).all(|claim| claim.pass),
         groups,
+        ladder,
     })
 }
 

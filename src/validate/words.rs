@@ -1,15 +1,18 @@
 //! Numbers in sentences: no more digits than every machine agrees on.
 
-/// The power of ten that bounds a rounding error from above with a factor of 3 to spare, as `1e-14`: rounding differs
-/// between machines, its size does not.
+/// Decades in which bounds are given.
+const DECADES: f64 = 3.0;
+/// Exponent of the smallest bound: what is smaller is rounding, whose size differs between machines.
+const SMALLEST: f64 = -12.0;
+
+/// A bound on a rounding or truncation error from above, as `below 1e-9`: a power of 1000, at least 1e-12, with a factor
+/// of 3 to spare.
 pub(super) fn bound(error: f64) -> String {
-    if error == 0.0 {
-        return "exactly 0".to_owned();
-    }
     if !error.is_finite() {
         return "not a number".to_owned();
     }
-    format!("below 1e{:.0}", (3.0 * error.abs()).log10().ceil())
+    let exponent = DECADES * ((3.0 * error.abs()).log10() / DECADES).ceil();
+    format!("below 1e{:.0}", exponent.max(SMALLEST))
 }
 
 #[cfg(test)]
@@ -17,10 +20,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bound_is_a_power_of_ten_above_three_times_the_error() {
-        assert_eq!(bound(2e-16), "below 1e-15");
-        assert_eq!(bound(-4e-16), "below 1e-14");
-        assert_eq!(bound(0.0), "exactly 0");
+    fn a_bound_is_a_power_of_1000_above_three_times_the_error() {
+        assert_eq!(bound(0.0), "below 1e-12");
+        assert_eq!(bound(2e-16), "below 1e-12");
+        assert_eq!(bound(-4e-13), "below 1e-9");
+        assert_eq!(bound(5e-4), "below 1e0");
         assert_eq!(bound(f64::NAN), "not a number");
         assert_eq!(bound(f64::INFINITY), "not a number");
     }
