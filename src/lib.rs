@@ -4,7 +4,7 @@
 //! every step of every pair and says whether any two came closer than a safety distance delta. Data flows one way:
 //!
 //! ```text
-//! scenario -> sim ( sense -> law -> actuate -> plant -> observe ) -> record -> audit / metrics -> report
+//! scenario -> sim ( sense -> law -> actuate -> plant -> observe ) -> record -> audit / metrics / figures -> report
 //! ```
 //!
 //! # Fly a scenario
@@ -37,6 +37,7 @@
 pub mod audit;
 #[cfg(feature = "program")]
 pub mod cli;
+pub mod figures;
 pub mod formation;
 pub mod graph;
 pub mod law;

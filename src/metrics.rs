@@ -22,7 +22,7 @@ pub struct Metrics<'a> {
     /// First instant from which everything was within the judge's tolerances up to now \[s\].
     good_since_s: Option<f64>,
     last_s: f64,
-    last_positions_m: Rows,
+    rms_position_error_m: f64,
     max_edge_error_m: f64,
     disagreement_m_s: f64,
     common_m_s: f64,
@@ -84,7 +84,7 @@ impl<'a> Metrics<'a> {
             samples: 0,
             good_since_s: None,
             last_s: 0.0,
-            last_positions_m: Rows::zeros(0),
+            rms_position_error_m: f64::NAN,
             max_edge_error_m: f64::NAN,
             disagreement_m_s: f64::NAN,
             common_m_s: f64::NAN,
@@ -99,24 +99,31 @@ impl<'a> Metrics<'a> {
         let positions_m = &sample.swarm.positions_m;
         self.samples += 1;
         self.last_s = sample.time_s;
-        if self.last_positions_m.nrows() == positions_m.nrows() {
-            self.last_positions_m.copy_from(positions_m);
-        } else {
-            self.last_positions_m = positions_m.clone();
-        }
+        self.rms_position_error_m = procrustes_rms_m(positions_m, self.formation);
         self.max_edge_error_m = largest_edge_error_m(positions_m, self.formation, self.graph);
         self.disagreement_m_s = sample.swarm.disagreement_m_s();
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.final_control_m_s2 = largest_norm(sample.control);
         self.peak_control_m_s2 = larger(self.peak_control_m_s2, self.final_control_m_s2);
-        if let Some(energy) = sample.energy {
-            let before = self.energy.unwrap_or(EnergyRange { initial: energy, last: energy, max: energy });
-            self.energy = Some(EnergyRange { last: energy, max: larger(before.max, energy), ..before });
-        }
+        self.observe_energy(sample.energy);
         let good = self.max_edge_error_m <= self.judge.edge_error_m
+            && self.rms_position_error_m <= self.judge.edge_error_m
             && self.disagreement_m_s <= self.judge.disagreement_m_s
             && sample.swarm.first_not_finite().is_none();
         self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
+    }
+
+    /// A sample without energy has none at the end either.
+    fn observe_energy(&mut self, energy: Option<f64>) {
+        match (&mut self.energy, energy) {
+            (Some(range), Some(energy)) => {
+                range.last = energy;
+                range.max = larger(range.max, energy);
+            }
+            (Some(range), None) => range.last = f64::NAN,
+            (None, Some(energy)) => self.energy = Some(EnergyRange { initial: energy, last: energy, max: energy }),
+            (None, None) => {}
+        }
     }
 
     /// Largest error of a desired distance at the last sample \[m\].
@@ -141,7 +148,7 @@ impl<'a> Metrics<'a> {
             reached_at_s: self.good_since_s.filter(|_| reached),
             held_s,
             max_edge_error_m: self.max_edge_error_m,
-            rms_position_error_m: procrustes_rms_m(&self.last_positions_m, self.formation),
+            rms_position_error_m: self.rms_position_error_m,
             disagreement_m_s: self.disagreement_m_s,
             common_m_s: self.common_m_s,
             peak_control_m_s2: self.peak_control_m_s2,

@@ -12,7 +12,7 @@ use crate::audit::{AuditError, AuditOutcome, Auditor, StepFinding, Violation, sw
 use crate::law::{Certificate, Law, LawError};
 use crate::plant::{Plant, PlantError};
 use crate::record::{Event, RecordError, Recorder, Sample};
-use crate::scenario::Scenario;
+use crate::scenario::{MAX_HALVINGS, Scenario};
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, first_row_not_finite, row};
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
@@ -107,8 +107,10 @@ pub enum SimError {
 /// A step that takes more than half of the clearance above the law's barrier from some pair is refused, undone and flown
 /// in halves (at most [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between.
 ///
+/// The scenario must be one that [`Scenario::validate`] accepts, and law and plant of its number of vehicles.
+///
 /// # Errors
-/// [`SimError`]; what was recorded up to then stays recorded.
+/// [`SimError`]; what was recorded up to then stays recorded, with the reason as its last event.
 pub fn fly(
     scenario: &Scenario,
     law: &mut dyn Law,
@@ -119,7 +121,7 @@ pub fn fly(
     let certificate = law.certificate(&scenario.start);
     let mut cockpit = Cockpit::new(scenario, law, plant, recorder)?;
     let began = Instant::now();
-    let ending = cockpit.fly(carry_on)?;
+    let ending = cockpit.fly(carry_on).inspect_err(|error| cockpit.note(error))?;
     cockpit.performance.wall = began.elapsed();
     Ok(cockpit.land(ending, certificate))
 }
@@ -154,6 +156,9 @@ impl<'a> Cockpit<'a> {
     ) -> Result<Self, SimError> {
         let mut state = scenario.start.clone();
         plant.observe(&mut state);
+        if let Some(vehicle) = state.first_not_finite() {
+            return Err(SimError::StateNotFinite { step: 0, vehicle });
+        }
         Ok(Self {
             auditor: Auditor::new(scenario.count(), scenario.delta_m)?,
             next: state.clone(),
@@ -182,7 +187,6 @@ impl<'a> Cockpit<'a> {
             if let Err(undefined) = self.advance(step)? {
                 return self.end_early(Ending::LawUndefined(undefined));
             }
-            self.steps = step;
             if self.scenario.time.records(step) {
                 self.record_sample()?;
             }
@@ -195,23 +199,39 @@ impl<'a> Cockpit<'a> {
 
     /// Flies one step, in halves where it is refused. The inner error ends the flight: the law is undefined.
     fn advance(&mut self, step: u64) -> Result<Result<(), LawError>, SimError> {
+        let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
+        let mut shortest = whole;
+        let flown = self.fly_parts(step, whole, &mut shortest)?;
+        if shortest < whole {
+            let dt_s = self.scenario.time.dt_s;
+            let (time_s, dt_s) = ((step - 1) as f64 * dt_s, dt_s * (shortest as f64 / whole as f64));
+            self.recorder.event(&Event::StepRefined { time_s, dt_s })?;
+        }
+        Ok(flown)
+    }
+
+    /// Flies the `whole` parts of a step, as many at once as are not refused; the fewest at once are `shortest`.
+    fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<Result<(), LawError>, SimError> {
         let dt_s = self.scenario.time.dt_s;
-        let start_s = (step - 1) as f64 * dt_s;
-        let whole = 1_u64 << self.scenario.time.max_halvings;
-        let (mut flown, mut part, mut shortest) = (0, whole, whole);
+        let seconds = |parts: u64| dt_s * (parts as f64 / whole as f64);
+        let (mut flown, mut part) = (0, whole);
         while flown < whole {
-            let seconds = |parts: u64| dt_s * (parts as f64 / whole as f64);
             if let Err(undefined) = self.move_vehicles(step, seconds(part))? {
                 return Ok(Err(undefined));
             }
             if part > 1 && self.is_refused() {
                 self.plant.restore(&self.state);
                 part /= 2;
-                shortest = shortest.min(part);
+                *shortest = part.min(*shortest);
                 continue;
             }
             flown += part;
-            self.time_s = if flown == whole { step as f64 * dt_s } else { start_s + seconds(flown) };
+            if flown == whole {
+                self.steps = step;
+                self.time_s = step as f64 * dt_s;
+            } else {
+                self.time_s = (step - 1) as f64 * dt_s + seconds(flown);
+            }
             std::mem::swap(&mut self.state, &mut self.next);
             if let Err(undefined) = self.judge_and_command(Some(step))? {
                 return Ok(Err(undefined));
@@ -219,10 +239,6 @@ impl<'a> Cockpit<'a> {
             while part < whole && flown.is_multiple_of(2 * part) {
                 part *= 2;
             }
-        }
-        if shortest < whole {
-            let dt_s = dt_s * (shortest as f64 / whole as f64);
-            self.recorder.event(&Event::StepRefined { time_s: start_s, dt_s })?;
         }
         Ok(Ok(()))
     }
@@ -340,6 +356,14 @@ impl<'a> Cockpit<'a> {
         }
         self.recorder.event(&Event::EndedEarly { time_s: self.time_s, reason })?;
         Ok(ending)
+    }
+
+    /// Says in the recording why it ends here, unless it is the recording that failed.
+    fn note(&mut self, error: &SimError) {
+        if !matches!(error, SimError::Record(_)) {
+            // The error at hand is the one to report.
+            let _ = self.recorder.event(&Event::EndedEarly { time_s: self.time_s, reason: error.to_string() });
+        }
     }
 
     fn land(self, ending: Ending, certificate: Certificate) -> Flight {

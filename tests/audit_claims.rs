@@ -233,7 +233,7 @@ fn motions() -> impl Strategy<Value = Motion> {
         (0.0..40.0_f64).prop_map(|step_m| Motion::OneFast { step_m }),
         Just(Motion::AllInOnePlace),
         (-3.0..0.0_f64).prop_map(|exponent| Motion::Lattice { step_m: 10_f64.powf(exponent) }),
-        (3.3..3.6_f64, 0.02..0.09_f64).prop_map(|(gap_m, step_m)| Motion::Couples { gap_m, step_m }),
+        (3.3..3.6_f64, 0.02..0.06_f64).prop_map(|(gap_m, step_m)| Motion::Couples { gap_m, step_m }),
     ]
 }
 
@@ -326,9 +326,9 @@ fn searched_separation(from: &Rows, to: &Rows, i: usize, j: usize) -> f64 {
 
 #[test]
 fn when_couples_part_and_strangers_close_up_the_strangers_are_found() {
-    // After four steps couples are 2.86 m apart and strangers, 3.46 m at the start, are 2.80 m apart: with motion this
-    // small, only the closest pair's own parting says that others must be looked at.
-    let flight = fly(64, 4, Motion::Couples { gap_m: 3.46, step_m: 0.0825 }, 0);
+    // After 17 steps couples are 2.88 m apart, and strangers, 3.46 m at the start, 2.78 m. With motion this small, only
+    // the parting of the closest pair says that others must be looked at.
+    let flight = fly(64, 17, Motion::Couples { gap_m: 3.46, step_m: 0.02 }, 0);
     let mut auditor = Auditor::new(64, DELTA_M).unwrap();
     auditor.start(flight[0].0, &flight[0].1).unwrap();
     let by_step: Vec<_> =
@@ -336,7 +336,7 @@ fn when_couples_part_and_strangers_close_up_the_strangers_are_found() {
     assert_eq!(by_step, full_sweep(&flight).closest_by_step[1..]);
     // The first of a couple has an even index.
     let strangers = by_step.iter().map(|closest| closest.is_some_and(|closest| closest.pair.first() % 2 == 1));
-    assert_eq!(strangers.collect::<Vec<_>>(), [false, false, false, true]);
+    assert_eq!(strangers.collect::<Vec<_>>()[14..], [false, false, true]);
 }
 
 proptest! {
@@ -345,7 +345,7 @@ proptest! {
     #[test]
     fn leaving_pairs_out_changes_no_bit_of_the_answer(
         n in prop_oneof![2..60_usize, 60..200_usize],
-        steps in 1..12_usize,
+        steps in 1..20_usize,
         motion in motions(),
         seed: u64,
     ) {

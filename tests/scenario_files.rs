@@ -108,7 +108,7 @@ fn every_wrong_input_is_refused_at_its_place_with_a_remedy() {
         ("duration_s = 1.0", "duration_s = 1e12", "2.40e14 steps; at most 1e9", (14, 14)),
         ("duration_s = 1.0", "duration_s = nan", "the duration is not a number", (14, 14)),
         ("[time]", "[time]\nrecord_hz = 0", "the recording rate is 0", (14, 13)),
-        ("[time]", "[time]\nmax_halvings = 31", "at most 30 times", (14, 16)),
+        ("[time]", "[time]\nmax_halvings = 21", "at most 20 times", (14, 16)),
         ("[time]", "[judge]\nhold_s = -1\n[time]", "the hold time is -1", (14, 10)),
         ("[time]", "[judge]\nedge_error_m = 0\n[time]", "the edge error is 0", (14, 16)),
         ("\"pair\"", "\"a/../b\"", "the name holds '/'", (1, 8)),

@@ -6,12 +6,14 @@ use std::io::Write as _;
 use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
 
 use super::Exit;
-use crate::audit::AuditError;
 use crate::law::ParameterError;
 use crate::record::RecordError;
 use crate::report::ArtefactError;
 use crate::scenario::ScenarioError;
 use crate::sim::SimError;
+
+/// Longest line of a source that is shown in a frame \[bytes\].
+const LONGEST_LINE: usize = 400;
 
 /// An error on its way to the user, with the exit code that it means.
 #[derive(Debug)]
@@ -78,6 +80,10 @@ impl Diagnostic for Failure {
 
 impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
+        // miette shows whole lines, and none beyond 65,535 columns; the error's own text shows a part of any line.
+        if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
+            return Self::plain(Exit::WrongInput, error.to_string());
+        }
         let field = error.field().filter(|_| error.place().is_none());
         let message = match field {
             Some(field) => format!("{field}: {}", error.message()),
@@ -122,23 +128,17 @@ impl From<ParameterError> for Failure {
     }
 }
 
-impl From<AuditError> for Failure {
-    fn from(error: AuditError) -> Self {
-        Self::plain(Exit::WrongInput, error.to_string())
-    }
-}
-
 impl From<SimError> for Failure {
     fn from(error: SimError) -> Self {
         match error {
             SimError::Record(error) => error.into(),
-            SimError::Audit(error) => error.into(),
-            SimError::CommandNotFinite { .. } | SimError::StateNotFinite { .. } | SimError::Stalled { .. } => {
-                Self::input(
-                    error.to_string(),
-                    "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
-                )
-            }
+            SimError::Audit(_)
+            | SimError::CommandNotFinite { .. }
+            | SimError::StateNotFinite { .. }
+            | SimError::Stalled { .. } => Self::input(
+                error.to_string(),
+                "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
+            ),
         }
     }
 }

@@ -17,6 +17,10 @@ impl OutFolder {
         Self { path: path.into(), report }
     }
 
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// A file in the folder.
     pub(super) fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)

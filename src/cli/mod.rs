@@ -8,6 +8,7 @@ mod console;
 mod diagnostic;
 mod folder;
 mod list;
+mod pictures;
 mod run;
 mod schema;
 mod validate;
@@ -84,14 +85,6 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => completions::completions(&arguments),
     };
     done.unwrap_or_else(|failure| failure.show()).into()
-}
-
-/// A pool of so many threads, or one a core.
-fn threads(count: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(count.map_or(0, usize::from))
-        .build()
-        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))
 }
 
 #[cfg(test)]

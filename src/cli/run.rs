@@ -1,4 +1,4 @@
-//! `tautline run`: fly a scenario and leave a recording and a report.
+//! `tautline run`: fly a scenario and leave a recording, figures and a report.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -9,8 +9,11 @@ use clap::Args;
 
 use super::console::{self, Console};
 use super::folder::OutFolder;
+use super::pictures::Pictures;
 use super::{Exit, Failure};
+use crate::figures::Course;
 use crate::formation::affine_dimension;
+use crate::law::Law;
 use crate::metrics::Metrics;
 use crate::plant;
 use crate::record::StateHash;
@@ -23,11 +26,14 @@ use crate::sim::{self, Ending, Flight};
 const RECORDING: &str = "run.mcap";
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
+/// Threads that a flight has work for: one for the law and one for the audit.
+const THREADS_OF_USE: usize = 2;
 /// Offsets below this share of the extent do not make a start or a formation leave its line or plane.
 const FLATNESS: f64 = 1e-9;
 
 /// Arguments of `tautline run`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct RunArguments {
     /// A scenario file, or the name of a built-in scenario.
     #[arg(default_value = "pentagon")]
@@ -39,19 +45,22 @@ pub(super) struct RunArguments {
     /// `--set plant.kind=...`.
     #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
     plant: Option<String>,
-    /// Folder for the recording and the report \[default: out/<scenario name>\].
+    /// Folder for the recording and the report; by default out/NAME, where NAME is the scenario's.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Overwrite a folder that holds a finished run.
     #[arg(long)]
     force: bool,
+    /// Draw no figures.
+    #[arg(long)]
+    no_figures: bool,
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use; the recording has the same bits for any number \[default: one a core\].
+    /// Threads to use, of which two are of use, by default one a core; the recording has the same bits for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
@@ -64,10 +73,22 @@ impl Default for RunArguments {
             plant: None,
             out: None,
             force: false,
+            no_figures: false,
             json: false,
             quiet: false,
             threads: None,
         }
+    }
+}
+
+impl RunArguments {
+    /// The command that flies the same again, for a shell.
+    fn command(&self) -> String {
+        let mut words = vec!["tautline", "run", &self.scenario];
+        words.extend(self.overrides.iter().flat_map(|text| ["--set", text]));
+        words.extend(self.plant.iter().flat_map(|plant| ["--plant", plant]));
+        // Only a zero byte cannot be quoted, and no argument has one.
+        shlex::try_join(words.iter().copied()).unwrap_or_else(|_| words.join(" "))
     }
 }
 
@@ -77,19 +98,38 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let overrides = arguments.overrides.iter().cloned().chain(plant);
     let overrides = overrides.map(|text| Override::parse(&text)).collect::<Result<Vec<_>, _>>()?;
     let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
+    let law = scenario.law()?;
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))
+        .build()
+        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    let interrupted = interruption()?;
+    // Nothing is written before everything that can be wrong with the input has been looked at.
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "report.json");
     folder.open(arguments.force)?;
-    let threads = super::threads(arguments.threads)?;
-    let interrupted = interruption()?;
-    let report = threads.install(|| fly(&scenario, &folder, console, &interrupted))?;
+    let mut course = Course::new();
+    let report = threads.install(|| fly(&scenario, law, &folder, console, &interrupted, &mut course))?;
+    let pictures = Pictures {
+        scenario: &scenario,
+        course: (!arguments.no_figures).then_some(&course),
+        warnings: &[],
+        command: &arguments.command(),
+    };
+    let page = pictures.write(folder.path(), &report)?;
     report.write(&folder.report())?;
 
     console.say(&format!("{}\n{}", report.headline(), report.text()));
     for reason in &report.verdict.reasons {
         console.say(reason);
     }
-    console.say(&format!("wrote {} and {}", folder.file(RECORDING).display(), folder.report().display()));
+    console.say(&format!(
+        "wrote {}, {} and {}",
+        folder.file(RECORDING).display(),
+        folder.report().display(),
+        page.display()
+    ));
     if arguments.json {
         let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
         console::data(&json)?;
@@ -98,7 +138,14 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
-fn fly(scenario: &Scenario, folder: &OutFolder, console: Console, interrupted: &AtomicBool) -> Result<Report, Failure> {
+fn fly(
+    scenario: &Scenario,
+    mut law: Box<dyn Law>,
+    folder: &OutFolder,
+    console: Console,
+    interrupted: &AtomicBool,
+    course: &mut Course,
+) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
@@ -111,9 +158,8 @@ fn fly(scenario: &Scenario, folder: &OutFolder, console: Console, interrupted: &
         }
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut law = scenario.law()?;
     let mut plant = plant::for_scenario(scenario);
-    let mut recorders = (&mut recording, (&mut metrics, &mut state_hash));
+    let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, course)));
     let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
     progress.finish_and_clear();
     let closed = recording.finish();

@@ -28,8 +28,8 @@ pub(super) struct ValidateArguments {
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use; the result is the same for any number \[default: one a core\].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Threads to use, by default one a core; the result is the same for any number.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }
 
@@ -39,7 +39,10 @@ pub(super) fn validate(arguments: &ValidateArguments) -> Result<Exit, Failure> {
     if !arguments.markdown {
         folder.open(arguments.force)?;
     }
-    let threads = super::threads(arguments.threads)?;
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .build()
+        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
     let bar = console.progress(validate::work(), "validate".to_owned());
     let judged = threads.install(|| validate::validate(&|units| bar.inc(units)));
     bar.finish_and_clear();

@@ -12,7 +12,7 @@ use crate::swarm::{Pair, Rows, row, separation, set_row};
 
 pub use fit::{RigidMotion, affine_dimension, best_rigid_motion, procrustes_rms_m};
 
-/// The target shape: slot h_i for vehicle i.
+/// The target shape: slot `h_i` for vehicle i.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formation {
     /// N x 3 positions of the slots \[m\].
@@ -86,7 +86,7 @@ impl Formation {
         self.slots_m.nrows()
     }
 
-    /// Desired distance d_ij between vehicles `i` and `j` \[m\].
+    /// Desired distance `d_ij` between vehicles `i` and `j` \[m\].
     ///
     /// # Panics
     /// If a vehicle is out of range.
@@ -151,7 +151,7 @@ pub fn closest_pair(positions_m: &Rows) -> Option<(Pair, f64)> {
     closest
 }
 
-/// Largest error of a desired distance over the edges of the graph, max |l_ij - d_ij| \[m\]; 0 without edges.
+/// Largest error of a desired distance over the edges of the graph, `max |l_ij - d_ij|` \[m\]; 0 without edges.
 ///
 /// NaN where a position of an edge is NaN, or where positions, formation and graph do not have the same number of
 /// vehicles.

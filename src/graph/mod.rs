@@ -1,7 +1,7 @@
 //! Who senses whom: undirected simple graphs over the vehicles of a swarm.
 //!
-//! The laws sum over the neighbours j in N_i of vehicle i; what they promise depends on the graph's Laplacian L_G
-//! and on its algebraic connectivity, the second smallest eigenvalue of L_G.
+//! The laws sum over the neighbours j in `N_i` of vehicle i; what they promise depends on the graph's Laplacian `L_G`
+//! and on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
 
 use std::ops::Range;
 
@@ -233,13 +233,13 @@ impl Graph {
         parents
     }
 
-    /// The Laplacian L_G, N x N: degrees on the diagonal, -1 for each edge. Takes 8 N^2 bytes.
+    /// The Laplacian `L_G`, N x N: degrees on the diagonal, -1 for each edge. Takes 8 N^2 bytes.
     #[must_use]
     pub fn laplacian(&self) -> DMatrix<f64> {
         self.weighted_laplacian(|_, _| 1.0)
     }
 
-    /// The Laplacian L_w, N x N, for a weight per edge; `weight(i, j)` is asked once for each edge i < j, in row
+    /// The Laplacian `L_w`, N x N, for a weight per edge; `weight(i, j)` is asked once for each edge i < j, in row
     /// order. A weight may be negative. Takes 8 N^2 bytes.
     #[must_use]
     pub fn weighted_laplacian(&self, mut weight: impl FnMut(usize, usize) -> f64) -> DMatrix<f64> {
@@ -254,7 +254,7 @@ impl Graph {
         laplacian
     }
 
-    /// The algebraic connectivity, the second smallest eigenvalue of L_G: positive exactly where the graph is
+    /// The algebraic connectivity, the second smallest eigenvalue of `L_G`: positive exactly where the graph is
     /// connected, and 0 for fewer than two vehicles.
     ///
     /// N in closed form for the complete graph and exactly 0 for a disconnected one; otherwise all eigenvalues are

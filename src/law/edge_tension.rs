@@ -28,13 +28,17 @@ pub struct EdgeTensionParameters {
 /// u_i = -(1/N) sum_{j in N_i} [ (1 + a22)(v_i - v_j) + w_ij (p_i - p_j) ],    w_ij = V'_ij(l_ij)/l_ij
 /// ```
 ///
-/// The desired distance of an edge is that of the formation's slots. The sum of all u_i is zero: the law cannot move
+/// The desired distance of an edge is that of the formation's slots. The sum of all `u_i` is zero: the law cannot move
 /// the centre of mass.
 ///
 /// # Energy
-/// E = 1/2 sum |v_i - mean v|^2 + (1/N) sum of V_ij over the edges. On the complete graph dE/dt = -sum |v_i - mean v|^2
-/// exactly, whatever a22 is, which is what [`Law::certificate`] rests on. On a graph of algebraic connectivity
-/// lambda2, dE/dt <= -\[(1 + a22) lambda2/N - a22\] sum |v_i - mean v|^2.
+/// ```text
+/// E = 1/2 sum |v_i - mean v|^2 + (1/N) sum over edges of V_ij(l_ij)
+/// dE/dt = -sum |v_i - mean v|^2                                        complete graph, whatever a22 is
+/// dE/dt <= -[(1 + a22) lambda2/N - a22] sum |v_i - mean v|^2           graph of algebraic connectivity lambda2
+/// ```
+///
+/// [`Law::certificate`] rests on the second line.
 ///
 /// # Cost
 /// O(edges) time a step without allocation, and 8 bytes of memory an edge (24 where the graph is not complete).
@@ -76,8 +80,8 @@ impl EdgeTensionLaw {
         Ok(Self { graph: graph.clone(), formation: formation.clone(), parameters, kernel, tightest })
     }
 
-    /// The same control from the weighted Laplacian, equation (9): U = -(1/N) \[L_w(P) P + (1 + a22) L_G V\] with
-    /// w_ij = V'_ij(l_ij)/l_ij, N x 3 \[m/s^2\].
+    /// The same control from the weighted Laplacian, equation (9): `U = -(1/N) [L_w(P) P + (1 + a22) L_G V]` with
+    /// `w_ij = V'_ij(l_ij)/l_ij`, N x 3 \[m/s^2\].
     ///
     /// Equal to [`Law::control`] to rounding, and there to check it: it takes O(N^2) memory and O(N^3) time.
     ///
@@ -128,9 +132,10 @@ impl Law for EdgeTensionLaw {
         check_count(self.graph.count(), control.nrows())?;
         control.fill(0.0);
         self.kernel.add_pulls(&swarm.positions_m, control).map_err(|_| self.fault(swarm))?;
-        *control *= self.parameters.alpha;
-        add_laplacian_product(&self.graph, &swarm.velocities_m_s, 1.0 + self.parameters.a22_per_s, control);
-        *control /= -(swarm.count() as f64);
+        let per_vehicle = -1.0 / swarm.count().max(1) as f64;
+        let EdgeTensionParameters { alpha, a22_per_s, .. } = self.parameters;
+        *control *= alpha * per_vehicle;
+        add_laplacian_product(&self.graph, &swarm.velocities_m_s, (1.0 + a22_per_s) * per_vehicle, control);
         check_range(control)
     }
 
@@ -142,7 +147,7 @@ impl Law for EdgeTensionLaw {
         Some(self.parameters.delta_m)
     }
 
-    /// On the complete graph V_ij(l_ij(t)) <= N E(0) for every pair, for ever. In s = (l - delta)/K all tensions are
+    /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair, for ever. In s = (l - delta)/K all tensions are
     /// the same function, so the pair that may come closest is the one with the smallest K, and one root
     /// ([`EdgeTension::push_side_root`]) answers for all pairs.
     ///

@@ -1,4 +1,4 @@
-//! The edge-tension sums over all edges, eight edges at a time.
+//! The edge-tension sums over all edges, a block of edges at a time.
 //!
 //! The loops over lanes hold nothing but IEEE additions, multiplications, divisions, square roots and selections, which
 //! the compiler turns into whatever vector instructions were found at run time. Nothing is fused or reordered, and sums
@@ -6,14 +6,19 @@
 //! nor on the level of optimisation.
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
 
+use pulp::{Simd, WithSimd};
+
 use super::tension;
 use crate::graph::Graph;
 use crate::swarm::Rows;
 
-/// Edges that are evaluated together.
+/// Number of partial sums that a long sum is split into, whatever the machine's vectors hold.
 const LANES: usize = 8;
-/// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty.
-const LISTED_UP_TO: usize = 24;
+/// Edges that are evaluated together, a multiple of [`LANES`].
+const BLOCK: usize = 32;
+/// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. Around
+/// this number both ways take the same time.
+const LISTED_UP_TO: usize = 16;
 
 type Lanes = [f64; LANES];
 
@@ -38,12 +43,6 @@ enum Edges {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct OutOfDomain;
 
-/// Up to [`LANES`] edges: the differences p_i - p_j along each axis, and 1/K.
-struct Chunk {
-    offset_m: [Lanes; 3],
-    inverse_k_per_m: Lanes,
-}
-
 impl Kernel {
     /// `inverse_k_per_m` holds 1/K for each edge of the graph in row order.
     pub(super) fn new(graph: &Graph, delta_m: f64, inverse_k_per_m: Vec<f64>) -> Self {
@@ -55,214 +54,252 @@ impl Kernel {
         Self { delta_m, edges, inverse_k_per_m, arch: pulp::Arch::new() }
     }
 
-    /// Adds (1/alpha) sum_j w_ij (p_i - p_j) over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
+    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
     /// Both tables have a row for each vehicle of the graph.
     pub(super) fn add_pulls(&self, positions_m: &Rows, sums: &mut Rows) -> Result<(), OutOfDomain> {
-        let axes = columns(positions_m);
-        let sums = columns_mut(sums);
-        self.arch.dispatch(
-            #[inline(always)]
-            || match &self.edges {
-                Edges::All(count) => self.add_pulls_by_row(*count, axes, sums),
-                Edges::Listed(edges) => self.add_pulls_by_list(edges, axes, sums),
-            },
-        )
+        self.arch.dispatch(AddPulls { kernel: self, axes: columns(positions_m), sums: columns_mut(sums) })
     }
 
     /// (1/alpha) sum of V over all edges.
     pub(super) fn potential(&self, positions_m: &Rows) -> Result<f64, OutOfDomain> {
-        let axes = columns(positions_m);
-        self.arch.dispatch(
-            #[inline(always)]
-            || match &self.edges {
-                Edges::All(count) => self.potential_by_row(*count, axes),
-                Edges::Listed(edges) => self.potential_by_list(edges, axes),
-            },
-        )
+        self.arch.dispatch(Potential { kernel: self, axes: columns(positions_m) })
     }
+}
+
+/// Arguments of [`Kernel::add_pulls`].
+struct AddPulls<'a> {
+    kernel: &'a Kernel,
+    axes: [&'a [f64]; 3],
+    sums: [&'a mut [f64]; 3],
+}
+
+impl WithSimd for AddPulls<'_> {
+    type Output = Result<(), OutOfDomain>;
 
     #[inline(always)]
-    fn add_pulls_by_row(&self, count: usize, axes: [&[f64]; 3], mut sums: [&mut [f64]; 3]) -> Result<(), OutOfDomain> {
-        let mut outside = 0;
-        let mut rest = self.inverse_k_per_m.as_slice();
-        for i in 0..count {
-            let mut own = [[0.0; LANES]; 3];
-            rest = for_each_chunk_of_row(self.delta_m, i, axes, rest, |from, len, chunk| {
-                let weights = chunk.weights(self.delta_m, len, &mut outside);
-                for axis in 0..3 {
-                    let mut pull = [0.0; LANES];
-                    for k in 0..LANES {
-                        pull[k] = weights[k] * chunk.offset_m[axis][k];
-                        own[axis][k] += pull[k];
-                    }
-                    let theirs = &mut sums[axis][from..from + len];
-                    if let Ok(theirs) = <&mut Lanes>::try_from(&mut *theirs) {
-                        for k in 0..LANES {
-                            theirs[k] -= pull[k];
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let Self { kernel, axes, mut sums } = self;
+        let mut block = Block::new(kernel.delta_m);
+        match &kernel.edges {
+            Edges::All(count) => {
+                for (i, row) in rows(*count, &kernel.inverse_k_per_m) {
+                    let mut of_own = [[0.0; LANES]; 3];
+                    for (c, inverse) in row.chunks(BLOCK).enumerate() {
+                        let first = i + 1 + c * BLOCK;
+                        block.fill_from_row(i, first, inverse, axes);
+                        block.turn_into_pulls();
+                        for axis in 0..3 {
+                            let pulls = &block.edges_m[axis];
+                            for lanes in pulls.as_chunks::<LANES>().0.iter().take(inverse.len().div_ceil(LANES)) {
+                                for k in 0..LANES {
+                                    of_own[axis][k] += lanes[k];
+                                }
+                            }
+                            let theirs = &mut sums[axis][first..first + inverse.len()];
+                            theirs.iter_mut().zip(pulls).for_each(|(sum, pull)| *sum -= pull);
                         }
-                    } else {
-                        theirs.iter_mut().zip(pull).for_each(|(sum, pull)| *sum -= pull);
+                    }
+                    for axis in 0..3 {
+                        sums[axis][i] += total(of_own[axis]);
                     }
                 }
-            });
-            for axis in 0..3 {
-                sums[axis][i] += total(own[axis]);
             }
-        }
-        within(outside)
-    }
-
-    #[inline(always)]
-    fn add_pulls_by_list(
-        &self,
-        edges: &[[usize; 2]],
-        axes: [&[f64]; 3],
-        sums: [&mut [f64]; 3],
-    ) -> Result<(), OutOfDomain> {
-        let mut outside = 0;
-        for (edges, inverse) in edges.chunks(LANES).zip(self.inverse_k_per_m.chunks(LANES)) {
-            let chunk = Chunk::of_list(self.delta_m, edges, axes, inverse);
-            let weights = chunk.weights(self.delta_m, edges.len(), &mut outside);
-            for axis in 0..3 {
-                for (k, &[i, j]) in edges.iter().enumerate() {
-                    let pull = weights[k] * chunk.offset_m[axis][k];
-                    sums[axis][i] += pull;
-                    sums[axis][j] -= pull;
+            Edges::Listed(edges) => {
+                for (edges, inverse) in edges.chunks(BLOCK).zip(kernel.inverse_k_per_m.chunks(BLOCK)) {
+                    block.fill_from_list(edges, inverse, axes);
+                    block.turn_into_pulls();
+                    for (sums, pulls) in sums.iter_mut().zip(&block.edges_m) {
+                        for (&[i, j], pull) in edges.iter().zip(pulls) {
+                            sums[i] += pull;
+                            sums[j] -= pull;
+                        }
+                    }
                 }
             }
         }
-        within(outside)
-    }
-
-    #[inline(always)]
-    fn potential_by_row(&self, count: usize, axes: [&[f64]; 3]) -> Result<f64, OutOfDomain> {
-        let (mut outside, mut sum) = (0, [0.0; LANES]);
-        let mut rest = self.inverse_k_per_m.as_slice();
-        for i in 0..count {
-            rest = for_each_chunk_of_row(self.delta_m, i, axes, rest, |_, len, chunk| {
-                chunk.add_values(self.delta_m, len, &mut sum, &mut outside);
-            });
-        }
-        within(outside).map(|()| total(sum))
-    }
-
-    #[inline(always)]
-    fn potential_by_list(&self, edges: &[[usize; 2]], axes: [&[f64]; 3]) -> Result<f64, OutOfDomain> {
-        let (mut outside, mut sum) = (0, [0.0; LANES]);
-        for (edges, inverse) in edges.chunks(LANES).zip(self.inverse_k_per_m.chunks(LANES)) {
-            let chunk = Chunk::of_list(self.delta_m, edges, axes, inverse);
-            chunk.add_values(self.delta_m, edges.len(), &mut sum, &mut outside);
-        }
-        within(outside).map(|()| total(sum))
+        block.within()
     }
 }
 
-/// Calls `each(first later vehicle, number of lanes in use, chunk)` along row `i` of the complete graph. Takes the
-/// row's 1/K from the front of `inverse_k_per_m` and returns what is behind them.
-#[inline(always)]
-fn for_each_chunk_of_row<'a>(
-    delta_m: f64,
-    i: usize,
-    axes: [&[f64]; 3],
-    inverse_k_per_m: &'a [f64],
-    mut each: impl FnMut(usize, usize, Chunk),
-) -> &'a [f64] {
-    let from = i + 1;
-    let (row, rest) = inverse_k_per_m.split_at(axes[0].len() - from);
-    let (full, partial) = row.as_chunks::<LANES>();
-    let own = axes.map(|axis| axis[i]);
-    let [x, y, z] = axes.map(|axis| axis[from..].as_chunks::<LANES>());
-    for (c, (((inverse, x), y), z)) in full.iter().zip(x.0).zip(y.0).zip(z.0).enumerate() {
-        let offset_m = [(own[0], x), (own[1], y), (own[2], z)].map(|(own, others)| others.map(|other| own - other));
-        each(from + c * LANES, LANES, Chunk { offset_m, inverse_k_per_m: *inverse });
-    }
-    if !partial.is_empty() {
-        let mut chunk = Chunk::padding(delta_m);
-        for (k, &inverse) in partial.iter().enumerate() {
-            chunk.inverse_k_per_m[k] = inverse;
-            chunk.offset_m[0][k] = own[0] - x.1[k];
-            chunk.offset_m[1][k] = own[1] - y.1[k];
-            chunk.offset_m[2][k] = own[2] - z.1[k];
-        }
-        each(from + full.len() * LANES, partial.len(), chunk);
-    }
-    rest
+/// Arguments of [`Kernel::potential`].
+struct Potential<'a> {
+    kernel: &'a Kernel,
+    axes: [&'a [f64]; 3],
 }
 
-impl Chunk {
-    /// Pairs at a distance where every function is finite.
-    #[inline(always)]
-    fn padding(delta_m: f64) -> Self {
-        Self { offset_m: [[2.0 * delta_m + 1.0; LANES], [0.0; LANES], [0.0; LANES]], inverse_k_per_m: [1.0; LANES] }
-    }
+impl WithSimd for Potential<'_> {
+    type Output = Result<f64, OutOfDomain>;
 
     #[inline(always)]
-    fn of_list(delta_m: f64, edges: &[[usize; 2]], axes: [&[f64]; 3], inverse_k_per_m: &[f64]) -> Self {
-        let mut chunk = Self::padding(delta_m);
-        for (k, (&[i, j], &inverse)) in edges.iter().zip(inverse_k_per_m).take(LANES).enumerate() {
-            chunk.inverse_k_per_m[k] = inverse;
-            for (offset_m, axis) in chunk.offset_m.iter_mut().zip(axes) {
-                offset_m[k] = axis[i] - axis[j];
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let Self { kernel, axes } = self;
+        let mut block = Block::new(kernel.delta_m);
+        let mut sum = [0.0; LANES];
+        match &kernel.edges {
+            Edges::All(count) => {
+                for (i, row) in rows(*count, &kernel.inverse_k_per_m) {
+                    for (c, inverse) in row.chunks(BLOCK).enumerate() {
+                        block.fill_from_row(i, i + 1 + c * BLOCK, inverse, axes);
+                        block.add_values(&mut sum);
+                    }
+                }
+            }
+            Edges::Listed(edges) => {
+                for (edges, inverse) in edges.chunks(BLOCK).zip(kernel.inverse_k_per_m.chunks(BLOCK)) {
+                    block.fill_from_list(edges, inverse, axes);
+                    block.add_values(&mut sum);
+                }
             }
         }
-        chunk
+        block.within().map(|()| total(sum))
+    }
+}
+
+/// Each vehicle of the complete graph with the values of its edges to all later ones.
+#[inline(always)]
+fn rows(count: usize, mut values: &[f64]) -> impl Iterator<Item = (usize, &[f64])> {
+    (0..count).map(move |i| {
+        let (row, rest) = values.split_at(count - i - 1);
+        values = rest;
+        (i, row)
+    })
+}
+
+/// Up to [`BLOCK`] edges.
+struct Block {
+    delta_m: f64,
+    /// Number of edges.
+    len: usize,
+    /// Along each axis `p_i - p_j` of the edges.
+    edges_m: [[f64; BLOCK]; 3],
+    inverse_k_per_m: [f64; BLOCK],
+    /// Positive once some distance was not in (delta, infinity).
+    outside: u64,
+}
+
+impl Block {
+    #[inline(always)]
+    fn new(delta_m: f64) -> Self {
+        Self { delta_m, len: 0, edges_m: [[0.0; BLOCK]; 3], inverse_k_per_m: [0.0; BLOCK], outside: 0 }
     }
 
     #[inline(always)]
-    fn distances(&self) -> Lanes {
-        let [x, y, z] = &self.offset_m;
-        std::array::from_fn(|k| (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt())
+    fn within(&self) -> Result<(), OutOfDomain> {
+        if self.outside == 0 { Ok(()) } else { Err(OutOfDomain) }
     }
 
-    /// w_ij/alpha = V'/(alpha l) of each edge, 0 in the lanes from `len`. `outside` becomes positive where some
-    /// distance is not in (delta, infinity).
+    /// The edges from vehicle `i` to the vehicles from `first` on, as many as there are 1/K.
     #[inline(always)]
-    fn weights(&self, delta_m: f64, len: usize, outside: &mut u64) -> Lanes {
-        let distances = self.distances();
-        let mut weights = [0.0; LANES];
-        for k in 0..LANES {
-            let (distance, inverse_k) = (distances[k], self.inverse_k_per_m[k]);
-            *outside |= u64::from(!(distance > delta_m && distance < f64::INFINITY));
-            let s = (distance - delta_m) * inverse_k;
-            let (numerator, denominator) = tension::slope_fraction(s, s - tension::REST);
-            weights[k] = inverse_k * numerator / (denominator * distance);
+    fn fill_from_row(&mut self, i: usize, first: usize, inverse_k_per_m: &[f64], axes: [&[f64]; 3]) {
+        let len = inverse_k_per_m.len();
+        for (edges, axis) in self.edges_m.iter_mut().zip(axes) {
+            let own = axis[i];
+            edges.iter_mut().zip(&axis[first..first + len]).for_each(|(edge, other)| *edge = own - other);
         }
-        clear_from(len, &mut weights);
-        weights
+        self.pad(inverse_k_per_m);
     }
 
-    /// Adds V/alpha of each edge of the first `len` lanes to `sum`, lane by lane. `outside` as in [`Chunk::weights`].
     #[inline(always)]
-    fn add_values(&self, delta_m: f64, len: usize, sum: &mut Lanes, outside: &mut u64) {
-        let distances = self.distances();
-        let mut values = [0.0; LANES];
-        for k in 0..LANES {
-            *outside |= u64::from(!(distances[k] > delta_m && distances[k] < f64::INFINITY));
-            let s = (distances[k] - delta_m) * self.inverse_k_per_m[k];
-            values[k] = tension::value(s, s - tension::REST);
+    fn fill_from_list(&mut self, list: &[[usize; 2]], inverse_k_per_m: &[f64], axes: [&[f64]; 3]) {
+        for (edges, axis) in self.edges_m.iter_mut().zip(axes) {
+            edges.iter_mut().zip(list).for_each(|(edge, &[i, j])| *edge = axis[i] - axis[j]);
         }
-        clear_from(len, &mut values);
-        for k in 0..LANES {
-            sum[k] += values[k];
+        self.pad(inverse_k_per_m);
+    }
+
+    /// Fills the last lanes with edges at a distance where every function is finite.
+    #[inline(always)]
+    fn pad(&mut self, inverse_k_per_m: &[f64]) {
+        self.len = inverse_k_per_m.len();
+        self.inverse_k_per_m[..self.len].copy_from_slice(inverse_k_per_m);
+        for k in self.len..self.len.next_multiple_of(LANES).min(BLOCK) {
+            self.inverse_k_per_m[k] = 1.0;
+            self.edges_m[0][k] = 2.0 * self.delta_m + 1.0;
+            self.edges_m[1][k] = 0.0;
+            self.edges_m[2][k] = 0.0;
+        }
+    }
+
+    /// Multiplies each edge by `w_ij/alpha = V'/(alpha l)`.
+    #[inline(always)]
+    fn turn_into_pulls(&mut self) {
+        let chunks = self.len.div_ceil(LANES);
+        let [x, y, z] = self.edges_m.each_mut().map(|edges| edges.as_chunks_mut::<LANES>().0);
+        let inverse = self.inverse_k_per_m.as_chunks::<LANES>().0;
+        for (((x, y), z), inverse_k) in x.iter_mut().zip(y).zip(z).zip(inverse).take(chunks) {
+            let outside;
+            ([*x, *y, *z], outside) = pulls(self.delta_m, [*x, *y, *z], *inverse_k);
+            self.outside |= outside;
+        }
+        for edges in &mut self.edges_m {
+            edges[self.len..].iter_mut().take(LANES).for_each(|pull| *pull = 0.0);
+        }
+    }
+
+    /// Adds V/alpha of each edge to `sum`, and leaves it in the place of the x axis.
+    #[inline(always)]
+    fn add_values(&mut self, sum: &mut Lanes) {
+        let chunks = self.len.div_ceil(LANES);
+        let [x, y, z] = self.edges_m.each_mut().map(|edges| edges.as_chunks_mut::<LANES>().0);
+        let inverse = self.inverse_k_per_m.as_chunks::<LANES>().0;
+        for (((x, y), z), inverse_k) in x.iter_mut().zip(y).zip(z).zip(inverse).take(chunks) {
+            let outside;
+            (*x, outside) = values(self.delta_m, [*x, *y, *z], *inverse_k);
+            self.outside |= outside;
+        }
+        self.edges_m[0][self.len..].iter_mut().take(LANES).for_each(|value| *value = 0.0);
+        for values in self.edges_m[0].as_chunks::<LANES>().0.iter().take(chunks) {
+            for k in 0..LANES {
+                sum[k] += values[k];
+            }
         }
     }
 }
 
+/// The length of an edge, and 1 where it is not in (delta, infinity).
 #[inline(always)]
-fn clear_from(len: usize, lanes: &mut Lanes) {
-    if len < LANES {
-        lanes[len..].fill(0.0);
+fn distance_m(delta_m: f64, x: f64, y: f64, z: f64) -> (f64, u64) {
+    let distance_m = (x * x + y * y + z * z).sqrt();
+    (distance_m, u64::from(!(distance_m > delta_m && distance_m < f64::INFINITY)))
+}
+
+/// The edges times `w_ij/alpha`, and 1 where some length is not in (delta, infinity). Arrays go in and out by value:
+/// with nothing that may alias, the loop becomes vector instructions.
+#[inline(always)]
+fn pulls(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> ([Lanes; 3], u64) {
+    let [mut x, mut y, mut z] = edges_m;
+    let mut outside = 0;
+    for k in 0..LANES {
+        let (distance_m, out) = distance_m(delta_m, x[k], y[k], z[k]);
+        outside |= out;
+        let s = (distance_m - delta_m) * inverse_k_per_m[k];
+        let (numerator, denominator) = tension::slope_fraction(s, s - tension::REST);
+        let weight = inverse_k_per_m[k] * numerator / (denominator * distance_m);
+        x[k] *= weight;
+        y[k] *= weight;
+        z[k] *= weight;
     }
+    ([x, y, z], outside)
+}
+
+/// V/alpha of the edges, and 1 where some length is not in (delta, infinity).
+#[inline(always)]
+fn values(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> (Lanes, u64) {
+    let [x, y, z] = edges_m;
+    let mut values = [0.0; LANES];
+    let mut outside = 0;
+    for k in 0..LANES {
+        let (distance_m, out) = distance_m(delta_m, x[k], y[k], z[k]);
+        outside |= out;
+        let s = (distance_m - delta_m) * inverse_k_per_m[k];
+        values[k] = tension::value(s, s - tension::REST);
+    }
+    (values, outside)
 }
 
 #[inline(always)]
 fn total(lanes: Lanes) -> f64 {
     ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
-}
-
-#[inline(always)]
-fn within(outside: u64) -> Result<(), OutOfDomain> {
-    if outside == 0 { Ok(()) } else { Err(OutOfDomain) }
 }
 
 fn columns(rows: &Rows) -> [&[f64]; 3] {

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::swarm::{Rows, Swarm};
+use crate::swarm::{Rows, Swarm, row};
 
 /// The Laplacian law on an undirected graph of N vehicles, equation (3):
 ///
@@ -15,13 +15,17 @@ use crate::swarm::{Rows, Swarm};
 /// u_i = -(1/N) sum_{j in N_i} [ f1 ((p_i - h_i) - (p_j - h_j)) + f2 (v_i - v_j) ]
 /// ```
 ///
-/// It reaches the slots h_i up to a common translation from any start on a connected graph, and does not keep vehicles
-/// apart. The source's gains are f1 = 1 and f2 = 1 + a22.
+/// It reaches the slots `h_i` up to a common translation from any start on a connected graph, and does not keep
+/// vehicles apart. The source's gains are f1 = 1 and f2 = 1 + a22.
 ///
 /// # Energy
-/// On the complete graph, with e_i = p_i - h_i, E = 1/2 sum |v_i - mean v|^2 + (f1/2) sum |e_i - mean e|^2 and
-/// dE/dt = (a22 - f2) sum |v_i - mean v|^2: for f1 > 0 it is a Lyapunov function wherever f2 >= a22. On other graphs, and
-/// for f1 <= 0, none is given.
+/// On the complete graph, with `e_i = p_i - h_i`,
+///
+/// ```text
+/// E = 1/2 sum |v_i - mean v|^2 + (f1/2) sum |e_i - mean e|^2,    dE/dt = (a22 - f2) sum |v_i - mean v|^2
+/// ```
+///
+/// For f1 > 0 this is a Lyapunov function wherever f2 >= a22. On other graphs, and for f1 <= 0, none is given.
 ///
 /// # Cost
 /// O(N) a step on the complete graph, O(edges) on others, without allocation.
@@ -31,7 +35,7 @@ pub struct LaplacianLaw {
     formation: Formation,
     f1_per_s2: f64,
     f2_per_s: f64,
-    /// Scratch: p_i - h_i.
+    /// Scratch: `p_i - h_i`.
     errors_m: Rows,
 }
 
@@ -59,9 +63,9 @@ impl Law for LaplacianLaw {
         self.errors_m.copy_from(&swarm.positions_m);
         self.errors_m -= &self.formation.slots_m;
         control.fill(0.0);
-        add_laplacian_product(&self.graph, &self.errors_m, self.f1_per_s2, control);
-        add_laplacian_product(&self.graph, &swarm.velocities_m_s, self.f2_per_s, control);
-        *control /= -(swarm.count() as f64);
+        let per_vehicle = -1.0 / swarm.count().max(1) as f64;
+        add_laplacian_product(&self.graph, &self.errors_m, self.f1_per_s2 * per_vehicle, control);
+        add_laplacian_product(&self.graph, &swarm.velocities_m_s, self.f2_per_s * per_vehicle, control);
         check_range(control)
     }
 
@@ -70,8 +74,9 @@ impl Law for LaplacianLaw {
             return None;
         }
         check_state(self.graph.count(), swarm).ok()?;
-        let errors_m = &swarm.positions_m - &self.formation.slots_m;
-        let energy = relative_kinetic_energy(swarm) + 0.5 * self.f1_per_s2 * sum_of_squares_about_mean(&errors_m);
+        let error_m = |i| row(&swarm.positions_m, i) - row(&self.formation.slots_m, i);
+        let potential = 0.5 * self.f1_per_s2 * sum_of_squares_about_mean(swarm.count(), error_m);
+        let energy = relative_kinetic_energy(swarm) + potential;
         energy.is_finite().then_some(energy)
     }
 

@@ -14,9 +14,11 @@ pub use edge_tension::{EdgeTensionLaw, EdgeTensionParameters};
 pub use laplacian::LaplacianLaw;
 pub use tension::{EdgeTension, TensionError};
 
+use nalgebra::Vector3;
+
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::swarm::{Pair, Rows, Swarm, first_row_not_finite, mean_row, row, set_row};
+use crate::swarm::{Pair, Rows, Swarm, first_row_not_finite, row};
 
 /// A control law: a function from the swarm's state to an acceleration per vehicle.
 pub trait Law: Send {
@@ -152,31 +154,32 @@ fn check_range(control: &Rows) -> Result<(), LawError> {
     first_row_not_finite(control).map_or(Ok(()), |_| Err(LawError::OutOfRange))
 }
 
-/// Adds `gain` L_G X to `sums`, where X has a row for each vehicle: row i gains `gain` times the sum of x_i - x_j over
-/// the neighbours j of i. On the complete graph this is N (x_i - mean x) and takes O(N).
+/// Adds `gain L_G X` to `sums`, where X has a row for each vehicle: row i gains `gain` times the sum of `x_i - x_j`
+/// over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)` and takes O(N) for all rows.
 fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows) {
-    if graph.is_complete() {
-        let gain = gain * graph.count() as f64;
-        for (rows, mut sums) in rows.column_iter().zip(sums.column_iter_mut()) {
-            let mean = rows.sum() / graph.count() as f64;
-            sums.iter_mut().zip(rows.iter()).for_each(|(sum, x)| *sum += gain * (x - mean));
+    let count = graph.count().max(1);
+    for (x, sums) in rows.as_slice().chunks_exact(count).zip(sums.as_mut_slice().chunks_exact_mut(count)) {
+        if graph.is_complete() {
+            let mean = x.iter().sum::<f64>() / count as f64;
+            let gain = gain * count as f64;
+            sums.iter_mut().zip(x).for_each(|(sum, x)| *sum += gain * (x - mean));
+        } else {
+            for (i, j) in graph.edges() {
+                let difference = gain * (x[i] - x[j]);
+                sums[i] += difference;
+                sums[j] -= difference;
+            }
         }
-        return;
-    }
-    for (i, j) in graph.edges() {
-        let difference = (row(rows, i) - row(rows, j)) * gain;
-        set_row(sums, i, row(sums, i) + difference);
-        set_row(sums, j, row(sums, j) - difference);
     }
 }
 
-/// 1/2 sum |v_i - mean v|^2 \[m^2/s^2\].
+/// `1/2 sum |v_i - mean v|^2` \[m^2/s^2\].
 fn relative_kinetic_energy(swarm: &Swarm) -> f64 {
-    0.5 * sum_of_squares_about_mean(&swarm.velocities_m_s)
+    0.5 * sum_of_squares_about_mean(swarm.count(), |i| row(&swarm.velocities_m_s, i))
 }
 
-/// Sum of |x_i - mean x|^2 over the rows of a table.
-fn sum_of_squares_about_mean(rows: &Rows) -> f64 {
-    let mean = mean_row(rows);
-    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm_squared()).sum()
+/// Sum of `|x_i - mean x|^2` over the vehicles.
+fn sum_of_squares_about_mean(count: usize, x: impl Fn(usize) -> Vector3<f64>) -> f64 {
+    let mean = (0..count).map(&x).sum::<Vector3<f64>>() / count.max(1) as f64;
+    (0..count).map(|i| (x(i) - mean).norm_squared()).sum()
 }

@@ -1,4 +1,7 @@
 //! The edge tension (5), (6): the potential that holds one pair of vehicles apart and together.
+#![expect(clippy::inline_always, reason = "the vectorised sums of the kernel are made of the functions here")]
+
+use std::hint::select_unpredictable;
 
 /// asinh(1) = ln(1 + sqrt 2), the scaled clearance s = (l - delta)/K of the minimum.
 pub(super) const REST: f64 = 0.881_373_587_019_543;
@@ -229,9 +232,10 @@ pub(super) fn slope_fraction(s: f64, h: f64) -> (f64, f64) {
 #[inline(always)]
 fn decay_complements(s: f64, h: f64) -> (f64, f64) {
     let near_barrier = s < 0.5 * REST;
-    let power = expm1(-2.0 * if near_barrier { s } else { h });
-    let of_s = if near_barrier { -power } else { (1.0 - REST_DECAY) - REST_DECAY * power };
-    let of_h = if near_barrier { 1.0 - (1.0 + power) * (1.0 / REST_DECAY) } else { -power };
+    // Branches would make the compiler take both exponentials.
+    let power = expm1(-2.0 * select_unpredictable(near_barrier, s, h));
+    let of_s = select_unpredictable(near_barrier, -power, (1.0 - REST_DECAY) - REST_DECAY * power);
+    let of_h = select_unpredictable(near_barrier, 1.0 - (1.0 + power) * (1.0 / REST_DECAY), -power);
     (of_s, of_h)
 }
 

@@ -28,8 +28,8 @@ pub trait Plant: Send {
     /// Puts the vehicles back into a state that [`Plant::observe`] gave: a step that was refused is undone.
     fn restore(&mut self, swarm: &Swarm);
 
-    /// Appends the pairs whose keep-out balls overlap at the end of the last step by the plant's own collision
-    /// detection, in index order. A plant without one appends nothing.
+    /// Appends the pairs whose keep-out balls overlapped when the plant's own collision detection last looked, in index
+    /// order. A plant without one appends nothing.
     fn keep_out_contacts(&self, _pairs: &mut Vec<Pair>) {}
 }
 

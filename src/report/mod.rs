@@ -1,14 +1,18 @@
-//! `report.json` and the verdict in words.
+//! `report.json`, `report.html` and the verdict in words.
 //!
 //! A [`Report`] is built from what the loop, the judge and the metrics found, and knows how to say it: as JSON with
-//! stable keys, as one line, and as a short table. The keys are those of the structures below, in their order; units
-//! are in the names, vehicles are numbered from 1. What does not apply, or is not a finite number, is null.
+//! stable keys, as a page for people, as one line, and as a short table. The keys are those of the structures below, in
+//! their order; units are in the names, vehicles are numbered from 1. What does not apply, or is not a finite number, is
+//! null.
 
 mod artefact;
+mod html;
+pub mod page;
 mod verdict;
 mod words;
 
 pub use artefact::{ArtefactError, write_atomically};
+pub use html::RunPage;
 
 use std::path::Path;
 

@@ -212,7 +212,7 @@ fn a_clear_run_that_reached_its_formation_passes_without_reasons() {
 
 #[test]
 fn a_violation_is_told_with_its_pair_distance_and_time() {
-    let case = Case { audit: passing(1.5327), ..Case::good() };
+    let case = Case { audit: passing(1.5327), certificate: Certificate::void(Void::NoBarrier), ..Case::good() };
     assert_eq!(
         case.reason(),
         "Vehicles 1 and 2 came to 1.533 m of each other at 0.50 s; the safety distance is 2.000 m."
@@ -226,6 +226,15 @@ fn a_violation_is_told_with_its_pair_distance_and_time() {
 fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
     let case = Case { audit: passing(DELTA_M - 1e-7), ..Case::good() };
     assert!(case.report().headline().contains("came to 1.9999999 m (delta 2.000 m)"));
+}
+
+#[test]
+fn a_flight_below_its_certificate_does_not_pass_even_where_it_is_clear() {
+    let case = Case { audit: passing(2.04), ..Case::good() };
+    assert_eq!(
+        case.reason(),
+        "The law certifies 2.055 m in continuous time, and vehicles 1-2 came to 2.040 m: the time step is too long."
+    );
 }
 
 #[test]

@@ -10,6 +10,7 @@ pub(super) fn verdict(findings: &Findings<'_>) -> Verdict {
         violation(findings),
         disagreement(findings),
         undecided(findings),
+        broken_certificate(findings),
         ended_early(findings),
         not_reached(findings),
         too_flat(findings),
@@ -63,6 +64,19 @@ fn ended_early(findings: &Findings<'_>) -> Option<String> {
     Some(format!("The run ended early, at {}: {}.", seconds(ended.time_s), ended.reason.trim_end_matches('.')))
 }
 
+/// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier.
+fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
+    let (certified_m, closest) = (findings.certificate.certified_m?, findings.audit.closest?);
+    (closest.separation_m < certified_m).then(|| {
+        format!(
+            "The law certifies {} m in continuous time, and vehicles {} came to {} m: the time step is too long.",
+            metres(certified_m),
+            closest.pair,
+            metres_below(closest.separation_m, certified_m),
+        )
+    })
+}
+
 fn not_reached(findings: &Findings<'_>) -> Option<String> {
     let (summary, judge) = (findings.summary, findings.judge);
     if summary.reached_at_s.is_some() {
@@ -76,6 +90,13 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
         format!(
             "at the end a distance is still wrong by {} m, and {} m are allowed",
             metres(summary.max_edge_error_m),
+            judge.edge_error_m
+        )
+    } else if summary.rms_position_error_m > judge.edge_error_m {
+        format!(
+            "at the end every edge has its length and the shape is another one: vehicles are {} m (root mean square) \
+             from the formation, and {} m are allowed",
+            metres(summary.rms_position_error_m),
             judge.edge_error_m
         )
     } else {

@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 
 use super::{Report, Status};
 
-/// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero.
+/// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or
+/// fill a line.
 pub(super) fn metres(number: f64) -> String {
-    if number != 0.0 && number.abs() < 5e-3 { format!("{number:.1e}") } else { format!("{number:.3}") }
+    if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { format!("{number:.3}") } else { format!("{number:.1e}") }
 }
 
 /// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller.
@@ -155,7 +156,10 @@ impl Report {
 
     fn energy_line(&self) -> String {
         let energy = &self.energy;
-        let ratio = energy.max_over_initial.map(|ratio| format!(", at most {ratio:.6} of the initial"));
+        let ratio = energy.max_over_initial.map(|ratio| match ratio {
+            ..1e3 => format!(", at most {ratio:.6} of the initial"),
+            _ => format!(", at most {ratio:.1e} of the initial"),
+        });
         format!(
             "initial {}, final {} m^2/s^2{}",
             or_dash(energy.initial),
@@ -169,7 +173,8 @@ impl Report {
         format!(
             "{} vehicles, {} s in {} steps of {:.3} ms, state {}",
             run.vehicles,
-            run.duration_s,
+            // To a microsecond, without the zeros that a fixed number of decimals would show.
+            (run.duration_s * 1e6).round() / 1e6,
             run.steps,
             run.dt_s * 1e3,
             run.state_hash.get(..12).unwrap_or(&run.state_hash)

@@ -24,6 +24,9 @@ pub struct Override {
     value: Range<usize>,
 }
 
+/// Most parts of a path: `start.positions_m.2.x` has four.
+const MAX_DEPTH: usize = 8;
+
 impl Override {
     /// Reads `key.path=value`.
     ///
@@ -48,6 +51,11 @@ impl Override {
             }
             path.push(key);
             start += part.len() + 1;
+        }
+        if path.len() > MAX_DEPTH {
+            return Err(ScenarioError::new(format!("the path has {} parts", path.len()))
+                .with_help(format!("no key of a scenario has more than {MAX_DEPTH}"))
+                .with_place(place(0..equals)));
         }
         let value = trimmed(text, equals + 1..text.len());
         let parsed = Self { text: text.to_owned(), path, value };

@@ -4,9 +4,9 @@ use std::fmt::Display;
 
 use super::error::ScenarioError;
 use super::neighbours::Spaced;
-use super::{LawSpec, Scenario, Space, TimeSpec};
+use super::{LawSpec, PlantSpec, Precision, Scenario, Space, TimeSpec};
 use crate::graph::Graph;
-use crate::swarm::{Pair, Rows, row};
+use crate::swarm::{Pair, Rows, mean_row, row};
 
 /// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such
 /// numbers stay finite in single precision too.
@@ -20,8 +20,15 @@ pub const SMALLEST: f64 = 1e-9;
 /// 1e-6 that decides whether a step is recorded ([`TimeSpec::records`]); at a microsecond a step it takes 17 minutes.
 pub const MAX_STEPS: f64 = 1e9;
 
-/// Most halvings of a step: 2^-30 of it is below a nanosecond for every step of less than a second.
-pub const MAX_HALVINGS: u32 = 30;
+/// Most halvings of a step. Up to here doubles tell the times of its parts apart to the end of the longest flight.
+pub const MAX_HALVINGS: u32 = 20;
+
+/// Distance at which the engine begins to act on two hulls that are about to touch \[m\]: hulls must stay so far from
+/// touching while no pair is closer than delta.
+pub const CONTACT_PREDICTION_M: f64 = 0.02;
+
+/// Largest error of a22 by the engine's rounding, as a share of a22.
+const DAMPING_RESOLUTION: f64 = 0.01;
 
 /// Longest name \[characters\].
 pub const MAX_NAME_CHARS: usize = 64;
@@ -70,10 +77,70 @@ impl Scenario {
         self.check_hulls()?;
         check_connected(&self.graph)?;
         self.check_time()?;
-        let judge = self.judge;
+        self.check_judge()?;
+        self.check_resolution()
+    }
+
+    fn check_judge(&self) -> Result<(), ScenarioError> {
+        let (judge, time) = (self.judge, self.time);
         positive("judge.edge_error_m", "the edge error", judge.edge_error_m)?;
         positive("judge.disagreement_m_s", "the disagreement", judge.disagreement_m_s)?;
-        at_least_zero("judge.hold_s", "the hold time", judge.hold_s)
+        at_least_zero("judge.hold_s", "the hold time", judge.hold_s)?;
+        if judge.hold_s > time.duration_s {
+            return Err(ScenarioError::new(format!(
+                "the formation is to be held for {} s in a flight of {} s",
+                judge.hold_s, time.duration_s
+            ))
+            .with_help("enlarge time.duration_s or reduce judge.hold_s")
+            .at("judge.hold_s"));
+        }
+        if time.record_hz * judge.hold_s < 1.0 && judge.hold_s > 0.0 {
+            return Err(ScenarioError::new(format!(
+                "{} samples a second cannot tell whether the formation is held for {} s",
+                time.record_hz, judge.hold_s
+            ))
+            .with_help(format!("set time.record_hz to at least {}", 1.0 / judge.hold_s))
+            .at("judge.hold_s")
+            .at("time.record_hz"));
+        }
+        Ok(())
+    }
+
+    /// Refuses what single precision would silently not move.
+    fn check_resolution(&self) -> Result<(), ScenarioError> {
+        if self.plant != PlantSpec::Rapier(Precision::Single) {
+            return Ok(());
+        }
+        let refuse = |said: String| {
+            Err(ScenarioError::new(said)
+                .with_help("set plant.precision to \"double\", or enlarge time.dt_s")
+                .at("time.dt_s")
+                .at("plant.precision"))
+        };
+        let (dt_s, half_ulp) = (self.time.dt_s, 0.5 * f64::from(f32::EPSILON));
+        let extent_m = extent_m(&self.start.positions_m).max(extent_m(&self.formation.slots_m));
+        let stalled_m_s = half_ulp * extent_m / dt_s;
+        if stalled_m_s > self.judge.disagreement_m_s {
+            return refuse(format!(
+                "in single precision, {extent_m:.3e} m from the middle of the swarm and in steps of {dt_s} s, a vehicle \
+                 slower than {stalled_m_s:.1e} m/s does not move"
+            ));
+        }
+        let drift_per_s = half_ulp / dt_s;
+        if self.a22_per_s != 0.0 && drift_per_s > DAMPING_RESOLUTION * self.a22_per_s.abs() {
+            return refuse(format!(
+                "in single precision and steps of {dt_s} s, a22 = {} 1/s is off by {drift_per_s:.1e} 1/s",
+                self.a22_per_s
+            ));
+        }
+        let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
+        match first_within(&self.start.positions_m, rounded_m) {
+            Some((pair, separation_m)) => refuse(format!(
+                "vehicles {pair} start {separation_m} m apart, which single precision cannot tell from delta = {} m",
+                self.delta_m
+            )),
+            None => Ok(()),
+        }
     }
 
     fn check_lengths(&self) -> Result<(), ScenarioError> {
@@ -185,15 +252,21 @@ impl Scenario {
         order.sort_by(|&i, &j| self.hull_radius_m[j].total_cmp(&self.hull_radius_m[i]));
         let &[i, j, ..] = &order[..] else { return Ok(()) };
         let touching_m = self.hull_radius_m[i] + self.hull_radius_m[j];
-        if touching_m <= self.delta_m {
+        if touching_m + CONTACT_PREDICTION_M <= self.delta_m {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the hulls of vehicles {} touch at {touching_m} m, before the safety distance delta = {} m",
+            "the hulls of vehicles {} touch at {touching_m} m, not {CONTACT_PREDICTION_M} m before the safety distance \
+             delta = {} m, and would disturb the flight",
             Pair::new(i, j),
             self.delta_m
         ))
-        .with_help(format!("set swarm.hull_radius_m to at most {}, or enlarge law.delta_m", self.delta_m / 2.0))
+        .with_help(match 0.5 * (self.delta_m - CONTACT_PREDICTION_M) {
+            largest_m if largest_m > 0.0 => {
+                format!("set swarm.hull_radius_m to at most {largest_m}, or enlarge law.delta_m")
+            }
+            _ => format!("law.delta_m must be more than {CONTACT_PREDICTION_M} m"),
+        })
         .at_entry("swarm.hull_radius_m", i)
         .at_entry("swarm.hull_radius_m", j)
         .at("law.delta_m"))
@@ -251,6 +324,12 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         return Ok(());
     };
     Err(ScenarioError::new(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
+}
+
+/// Largest distance of a row from the mean of all rows \[m\].
+fn extent_m(rows: &Rows) -> f64 {
+    let mean = mean_row(rows);
+    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm()).fold(0.0, f64::max)
 }
 
 /// Refuses a swarm in which nothing can be kept apart.

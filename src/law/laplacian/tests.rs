@@ -68,7 +68,7 @@ fn wrong_input_is_refused() -> Result<(), ParameterError> {
     assert_eq!(refusal(&Graph::complete(4), 1.0, 1.0), Some(ParameterError::Counts { graph: 4, formation: 5 }));
     assert!(matches!(refusal(&complete, f64::NAN, 1.0), Some(ParameterError::NotFinite { name: "f1", .. })));
     assert!(matches!(refusal(&complete, 1.0, f64::INFINITY), Some(ParameterError::NotFinite { name: "f2", .. })));
-    let mut law = LaplacianLaw::new(&complete, &formation, 1.0, 1.0)?;
+    let mut law = LaplacianLaw::new(&complete, &formation, 10.0, 1.0)?;
     let mut control = Rows::zeros(5);
     let mut swarm = swarm(5);
     assert_eq!(law.control(&swarm, &mut Rows::zeros(3)), Err(LawError::WrongCount { expected: 5, found: 3 }));

@@ -4,6 +4,7 @@ use super::*;
 const ROUNDING: f64 = 1e-14;
 
 /// alpha, delta, d, l, V, V', V'' from (5) and (6) as printed, evaluated with 80 digits.
+#[expect(clippy::unreadable_literal, reason = "digits as printed")]
 const REFERENCES: [(f64, f64, f64, f64, f64, f64, f64); 10] = [
     (1.0, 2.0, 3.0, 2.0000000009313226, 1218259586.8429644, -1.308096273347119e+18, 2.8091153570226765e+27),
     (1.0, 2.0, 3.0, 2.0625, 15.931339449740818, -289.2807336497159, 9294.577346941804),

@@ -4,11 +4,12 @@ use engine::prelude::{
     ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, LockedAxes, PhysicsWorld, Real,
     RigidBodyBuilder, RigidBodyHandle, Vector,
 };
+use nalgebra::Vector3;
 
 use crate::law::Law;
 use crate::plant::{Plant, PlantError};
-use crate::scenario::{Scenario, Space};
-use crate::swarm::{Pair, Rows, Swarm};
+use crate::scenario::{CONTACT_PREDICTION_M, Scenario, Space};
+use crate::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 
 /// Hulls meet hulls.
 const HULL: Group = Group::GROUP_1;
@@ -21,6 +22,9 @@ const HULL_RESTITUTION: Real = 0.5;
 pub(super) struct Bodies {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
+    /// Where the engine's origin is: the middle of the start, so that single precision resolves the swarm's own extent
+    /// wherever it flies.
+    origin_m: Vector3<f64>,
     mass_kg: Vec<f64>,
     a22_per_s: f64,
     dt_s: f64,
@@ -30,10 +34,12 @@ pub(super) struct Bodies {
 impl Bodies {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let mut world = empty_world();
-        let handles = (0..scenario.count()).map(|i| insert_vehicle(&mut world, scenario, i)).collect();
+        let origin_m = mean_row(&scenario.start.positions_m);
+        let handles = (0..scenario.count()).map(|i| insert_vehicle(&mut world, scenario, origin_m, i)).collect();
         let mut bodies = Self {
             world,
             handles,
+            origin_m,
             mass_kg: scenario.mass_kg.clone(),
             a22_per_s: scenario.a22_per_s,
             dt_s: f64::NAN,
@@ -62,7 +68,7 @@ impl Plant for Bodies {
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
             body.reset_forces(false);
-            body.add_force(vector(held, i) * real(self.mass_kg[i]), true);
+            body.add_force(reals(row(held, i)) * real(self.mass_kg[i]), true);
         }
         self.world.step();
         match self.world.quarantine().bodies().first() {
@@ -77,16 +83,16 @@ impl Plant for Bodies {
     fn observe(&self, swarm: &mut Swarm) {
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &self.world.bodies[handle];
-            set(&mut swarm.positions_m, i, body.translation());
-            set(&mut swarm.velocities_m_s, i, body.linvel());
+            set_row(&mut swarm.positions_m, i, self.origin_m + doubles(body.translation()));
+            set_row(&mut swarm.velocities_m_s, i, doubles(body.linvel()));
         }
     }
 
     fn restore(&mut self, swarm: &Swarm) {
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
-            body.set_translation(vector(&swarm.positions_m, i), true);
-            body.set_linvel(vector(&swarm.velocities_m_s, i), true);
+            body.set_translation(reals(row(&swarm.positions_m, i) - self.origin_m), true);
+            body.set_linvel(reals(row(&swarm.velocities_m_s, i)), true);
         }
     }
 
@@ -115,6 +121,7 @@ fn empty_world() -> PhysicsWorld {
     parameters.num_solver_iterations = 1;
     // The engine would clamp speeds at 400 m/s.
     parameters.normalized_max_linear_velocity = Real::MAX;
+    parameters.normalized_prediction_distance = real(CONTACT_PREDICTION_M);
     // Reused contacts report stale distances: evidence must be of this step.
     parameters.contact_recycling = false;
     // Continuous collision detection would shorten motion; the audit judges what happened.
@@ -122,14 +129,14 @@ fn empty_world() -> PhysicsWorld {
     world
 }
 
-fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, i: usize) -> RigidBodyHandle {
+fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vector3<f64>, i: usize) -> RigidBodyHandle {
     let locked = match scenario.space {
         Space::Plane => LockedAxes::ROTATION_LOCKED | LockedAxes::TRANSLATION_LOCKED_Z,
         Space::Volume => LockedAxes::ROTATION_LOCKED,
     };
     let body = RigidBodyBuilder::dynamic()
-        .translation(vector(&scenario.start.positions_m, i))
-        .linvel(vector(&scenario.start.velocities_m_s, i))
+        .translation(reals(row(&scenario.start.positions_m, i) - origin_m))
+        .linvel(reals(row(&scenario.start.velocities_m_s, i)))
         .locked_axes(locked)
         .can_sleep(false);
     let handle = world.bodies.insert(body);
@@ -157,11 +164,11 @@ fn real(x: f64) -> Real {
     x as Real
 }
 
-fn vector(rows: &Rows, i: usize) -> Vector {
-    Vector::new(real(rows[(i, 0)]), real(rows[(i, 1)]), real(rows[(i, 2)]))
+fn reals(v: Vector3<f64>) -> Vector {
+    Vector::new(real(v.x), real(v.y), real(v.z))
 }
 
 #[allow(clippy::useless_conversion, reason = "a widening in single precision only")]
-fn set(rows: &mut Rows, i: usize, v: Vector) {
-    (rows[(i, 0)], rows[(i, 1)], rows[(i, 2)]) = (v.x.into(), v.y.into(), v.z.into());
+fn doubles(v: Vector) -> Vector3<f64> {
+    Vector3::new(v.x.into(), v.y.into(), v.z.into())
 }

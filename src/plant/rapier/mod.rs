@@ -9,6 +9,10 @@
 //! step a vehicle moves on a straight line and a linear sweep of the step is exact. (With n iterations the position
 //! would gain `u dt^2 (n+1)/(2n)` instead of `u dt^2`.) The damping coefficient `c = (exp(-a22 dt) - 1)/dt` makes a free
 //! velocity exactly `v(0) exp(a22 t)`, the free motion of equation (1); it is negative for a22 > 0.
+//!
+//! # Contacts
+//! The engine looks for contacts before it moves the bodies, so those that it reports after a step are of the state
+//! before that step: evidence that comes one step late, and never the verdict.
 
 use crate::plant::Plant;
 use crate::scenario::{Precision, Scenario};

@@ -1,0 +1,332 @@
+//! A run thinned to what a figure can show.
+
+use crate::record::mcap::Entry;
+use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::swarm::{ClosestApproach, Rows, row, separation};
+
+/// Most spans of time that are kept: some four for each pixel of a figure's width.
+const MOST_SPANS: usize = 2048;
+/// Fewest that are kept, however many vehicles there are.
+const FEWEST_SPANS: usize = 64;
+/// Memory for the spans of a large swarm \[bytes\].
+const MEMORY_BYTES: usize = 32 * 1024 * 1024;
+/// Memory of one vehicle in one span \[bytes\]: a position and a control effort.
+const BYTES_PER_VEHICLE: usize = 32;
+
+/// Up to this many vehicles every pair has a line of its own in a figure.
+pub(super) const FEW_VEHICLES: usize = 12;
+
+/// The course of a run, folded from its samples in bounded memory.
+///
+/// Time is cut into spans of equally many samples; when there are too many, neighbours are merged. A span keeps the
+/// state at its start and the extremes within: the closest approach, the largest energy, control effort and velocity
+/// disagreement. So what a figure must show, the extreme, is never thinned out. Memory is at most some 32 MiB for up
+/// to 16 000 vehicles, whatever the length of the run.
+///
+/// A course is a [`Recorder`]: it can watch a run as it is flown, or [`Course::read`] a recording.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    vehicles: usize,
+    most_spans: usize,
+    samples_per_span: u64,
+    samples: u64,
+    spans: Vec<Span>,
+    /// The last sample, where no span begins with it.
+    last: Option<Span>,
+    closest: Option<ClosestApproach>,
+    energy_initial: Option<f64>,
+}
+
+/// A span of time.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Span {
+    /// Its start \[s\].
+    pub(super) time_s: f64,
+    /// Positions at its start \[m\].
+    pub(super) positions_m: Rows,
+    /// Largest control effort |u| of each vehicle within \[m/s^2\].
+    pub(super) control_m_s2: Vec<f64>,
+    /// Largest speed relative to the mean velocity within \[m/s\].
+    pub(super) disagreement_m_s: f64,
+    /// Largest energy within \[m^2/s^2\].
+    pub(super) energy: Option<f64>,
+    /// Closest approach within, between samples too.
+    pub(super) closest: Option<ClosestApproach>,
+    /// Smallest distance of each pair within \[m\], of the samples; empty for a large swarm. Pairs in index order.
+    pub(super) pair_min_m: Vec<f64>,
+}
+
+impl Course {
+    /// A course without samples.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The course of a recording, read one sample at a time.
+    ///
+    /// # Errors
+    /// The first error of the recording.
+    pub fn read(recording: impl IntoIterator<Item = Result<Entry, RecordError>>) -> Result<Self, RecordError> {
+        let mut course = Self::new();
+        for entry in recording {
+            if let Entry::Sample(sample) = entry? {
+                course.observe(&sample.as_sample());
+            }
+        }
+        Ok(course)
+    }
+
+    /// Takes one sample, in the order of time. One of another number of vehicles than the first is passed over.
+    pub fn observe(&mut self, sample: &Sample<'_>) {
+        let count = sample.swarm.count();
+        if self.samples == 0 {
+            self.vehicles = count;
+            let affordable = MEMORY_BYTES / (BYTES_PER_VEHICLE * count.max(1));
+            self.most_spans = affordable.clamp(FEWEST_SPANS, MOST_SPANS);
+            self.samples_per_span = 1;
+        }
+        if count != self.vehicles {
+            return;
+        }
+        let instant = Span::at(sample);
+        self.closest = closer(self.closest, instant.closest);
+        self.energy_initial = self.energy_initial.or(instant.energy);
+        if self.samples.is_multiple_of(self.samples_per_span) && self.spans.len() == self.most_spans {
+            self.halve();
+        }
+        match self.spans.last_mut() {
+            Some(span) if !self.samples.is_multiple_of(self.samples_per_span) => {
+                span.absorb(&instant);
+                self.last = Some(instant);
+            }
+            _ => {
+                self.spans.push(instant);
+                self.last = None;
+            }
+        }
+        self.samples += 1;
+    }
+
+    /// Merges every two spans into one.
+    fn halve(&mut self) {
+        let mut merged = Vec::with_capacity(self.most_spans);
+        let mut spans = std::mem::take(&mut self.spans).into_iter();
+        while let Some(mut span) = spans.next() {
+            if let Some(next) = spans.next() {
+                span.absorb(&next);
+            }
+            merged.push(span);
+        }
+        self.spans = merged;
+        self.samples_per_span *= 2;
+    }
+
+    /// Number of vehicles N; 0 without samples.
+    #[must_use]
+    pub fn vehicles(&self) -> usize {
+        self.vehicles
+    }
+
+    /// Samples seen.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Time of the last sample \[s\]; 0 without samples.
+    #[must_use]
+    pub fn end_s(&self) -> f64 {
+        self.spans().last().map_or(0.0, |last| last.time_s)
+    }
+
+    /// The closest that any pair came, between samples too where the recording says so.
+    #[must_use]
+    pub fn closest(&self) -> Option<ClosestApproach> {
+        self.closest
+    }
+
+    /// Energy of the first sample that has one \[m^2/s^2\].
+    #[must_use]
+    pub fn energy_initial(&self) -> Option<f64> {
+        self.energy_initial
+    }
+
+    /// All spans in order of time; the last is the last sample alone.
+    pub(super) fn spans(&self) -> impl Iterator<Item = &Span> + Clone {
+        self.spans.iter().chain(&self.last)
+    }
+
+    /// At most `most` of the spans (at least two), evenly spread, the first and the last among them.
+    pub(super) fn spread(&self, most: usize) -> Vec<&Span> {
+        let all: Vec<_> = self.spans().collect();
+        let most = most.max(2);
+        if all.len() <= most {
+            return all;
+        }
+        (0..most).map(|k| all[k * (all.len() - 1) / (most - 1)]).collect()
+    }
+
+    /// Whether every vehicle stays in one plane of constant z, up to rounding.
+    #[must_use]
+    pub fn is_level(&self) -> bool {
+        const FLATNESS: f64 = 1e-6;
+        let [x, y, z] = [0, 1, 2].map(|axis| self.extent(axis).map_or(0.0, |(low, high)| high - low));
+        z <= FLATNESS * x.max(y)
+    }
+
+    /// Smallest and largest coordinate along an axis \[m\]; none where nothing is finite.
+    pub(super) fn extent(&self, axis: usize) -> Option<(f64, f64)> {
+        let mut extent: Option<(f64, f64)> = None;
+        for span in self.spans() {
+            for x in span.positions_m.column(axis).iter().copied().filter(|x| x.is_finite()) {
+                let (low, high) = extent.unwrap_or((x, x));
+                extent = Some((low.min(x), high.max(x)));
+            }
+        }
+        extent
+    }
+}
+
+impl Recorder for Course {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.observe(sample);
+        Ok(())
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+impl Span {
+    fn at(sample: &Sample<'_>) -> Self {
+        let positions_m = &sample.swarm.positions_m;
+        let count = positions_m.nrows();
+        let effort = |i: usize| if i < sample.control.nrows() { row(sample.control, i).norm() } else { f64::NAN };
+        let few = count <= FEW_VEHICLES;
+        Self {
+            time_s: sample.time_s,
+            positions_m: positions_m.clone(),
+            control_m_s2: (0..count).map(effort).collect(),
+            disagreement_m_s: sample.swarm.disagreement_m_s(),
+            energy: sample.energy,
+            closest: sample.separation,
+            pair_min_m: if few {
+                pairs(count).map(|(i, j)| separation(positions_m, i, j)).collect()
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
+    /// Takes in the extremes of a later span.
+    fn absorb(&mut self, later: &Self) {
+        let raise = |kept: &mut f64, other: f64| *kept = kept.max(other);
+        self.control_m_s2.iter_mut().zip(&later.control_m_s2).for_each(|(kept, &other)| raise(kept, other));
+        self.pair_min_m.iter_mut().zip(&later.pair_min_m).for_each(|(kept, &other)| *kept = kept.min(other));
+        raise(&mut self.disagreement_m_s, later.disagreement_m_s);
+        self.energy = match (self.energy, later.energy) {
+            (Some(kept), Some(other)) => Some(kept.max(other)),
+            (kept, other) => kept.or(other),
+        };
+        self.closest = closer(self.closest, later.closest);
+    }
+}
+
+/// All pairs of `count` vehicles in index order.
+pub(super) fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> + Clone {
+    (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
+}
+
+/// The closer approach; the first of equals, and never one that is not a number.
+fn closer(a: Option<ClosestApproach>, b: Option<ClosestApproach>) -> Option<ClosestApproach> {
+    let mut closest: Option<ClosestApproach> = None;
+    for candidate in [a, b].into_iter().flatten().filter(|candidate| candidate.separation_m.is_finite()) {
+        if closest.is_none_or(|closest| candidate.separation_m < closest.separation_m) {
+            closest = Some(candidate);
+        }
+    }
+    closest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::{Pair, Swarm};
+
+    /// Two vehicles on the x axis, sampled every 0.01 s; sample `k` has distance, energy and effort of `f(k)`.
+    fn course(samples: u64, f: impl Fn(u64) -> f64) -> Course {
+        let mut course = Course::new();
+        for k in 0..samples {
+            let value = f(k);
+            let time_s = k as f64 * 0.01;
+            let swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, value, 0.0, 0.0]));
+            let control = Rows::from_row_slice(&[value, 0.0, 0.0, 0.0, 1.0, 0.0]);
+            let separation = ClosestApproach { pair: Pair::new(0, 1), separation_m: value, time_s };
+            course.observe(&Sample {
+                time_s,
+                step: k,
+                swarm: &swarm,
+                control: &control,
+                separation: Some(separation),
+                energy: Some(value),
+            });
+        }
+        course
+    }
+
+    #[test]
+    fn a_long_run_keeps_a_bounded_number_of_spans_and_both_of_its_ends() {
+        for samples in [1, 2, 2047, 2048, 2049, 100_000] {
+            let course = course(samples, |_| 3.0);
+            let spans: Vec<_> = course.spans().collect();
+            assert!(spans.len() <= MOST_SPANS + 1, "{} spans of {samples} samples", spans.len());
+            assert_eq!(spans[0].time_s, 0.0);
+            assert_eq!(spans[spans.len() - 1].time_s, (samples - 1) as f64 * 0.01);
+            assert!(spans.is_sorted_by(|a, b| a.time_s < b.time_s));
+        }
+    }
+
+    #[test]
+    fn an_extreme_of_one_sample_survives_every_thinning() {
+        let samples = 50_000;
+        for at in [1, 777, 12_345, samples - 1] {
+            let low = course(samples, |k| if k == at { 0.5 } else { 3.0 });
+            let smallest = low.spans().map(|span| span.pair_min_m[0]).fold(f64::INFINITY, f64::min);
+            assert_eq!(smallest, 0.5);
+            assert_eq!(
+                low.closest().map(|closest| (closest.separation_m, closest.time_s)),
+                Some((0.5, at as f64 * 0.01))
+            );
+            let high = course(samples, |k| if k == at { 9.0 } else { 3.0 });
+            assert_eq!(high.spans().map(|span| span.control_m_s2[0]).fold(0.0, f64::max), 9.0);
+            assert_eq!(high.spans().filter_map(|span| span.energy).fold(0.0, f64::max), 9.0);
+        }
+    }
+
+    #[test]
+    fn a_course_without_samples_has_nothing() {
+        let course = Course::new();
+        assert_eq!((course.vehicles(), course.samples(), course.end_s()), (0, 0, 0.0));
+        assert!(course.spans().next().is_none() && course.spread(8).is_empty() && course.extent(0).is_none());
+        assert!(course.is_level());
+    }
+
+    #[test]
+    fn samples_of_another_swarm_and_numbers_that_are_not_finite_are_passed_over() {
+        let mut course = course(3, |k| if k == 1 { f64::NAN } else { 3.0 });
+        let (swarm, control) = (Swarm::at_rest(Rows::zeros(5)), Rows::zeros(0));
+        course.observe(&Sample {
+            time_s: 9.0,
+            step: 9,
+            swarm: &swarm,
+            control: &control,
+            separation: None,
+            energy: None,
+        });
+        assert_eq!((course.samples(), course.end_s()), (3, 0.02));
+        assert_eq!(course.closest().map(|closest| closest.separation_m), Some(3.0));
+        assert_eq!(course.extent(0), Some((0.0, 3.0)));
+    }
+}

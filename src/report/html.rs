@@ -1,0 +1,283 @@
+//! `report.html`: a run's report for people.
+
+use super::page::{Badge, Block, Cell, Column, Page, Section, Table, Warning};
+use super::words::seconds;
+use super::{Performance, Report, Status};
+use crate::figures::Figure;
+use crate::scenario::{PlantSpec, Precision, Scenario};
+
+/// Most violations that are listed one by one.
+const LISTED_VIOLATIONS: usize = 50;
+
+/// What a run's page shows beside its report.
+#[derive(Clone, Copy, Debug)]
+pub struct RunPage<'a> {
+    /// What was flown.
+    pub scenario: &'a Scenario,
+    /// What was known to be doubtful before the first step.
+    pub warnings: &'a [Warning],
+    /// The run as charts.
+    pub figures: &'a [Figure],
+    /// The command that repeats the run.
+    pub command: &'a str,
+}
+
+impl Report {
+    /// The report as a self-contained HTML page.
+    ///
+    /// Two runs of one scenario give the same bytes but for the table of performance.
+    #[must_use]
+    pub fn to_html(&self, page: &RunPage<'_>) -> String {
+        self.page(page).render()
+    }
+
+    fn page(&self, page: &RunPage<'_>) -> Page {
+        let mut sections = vec![section("Numbers", vec![Block::Tables(self.numbers())])];
+        if !self.audit.violations.is_empty() {
+            sections.push(section("Violations", self.violations()));
+        }
+        if !page.figures.is_empty() {
+            sections.push(section("Figures", vec![Block::Figures(page.figures.to_vec())]));
+        }
+        sections.push(section("What was assumed", vec![Block::List(self.assumptions(page.scenario))]));
+        sections.push(section("Repeat it", self.repetition(page)));
+        sections.push(section("Performance", vec![Block::Table(self.performance.table())]));
+        Page {
+            title: self.scenario.name.clone(),
+            kind: "Flight report".to_owned(),
+            badge: Badge::judged(self.verdict.pass),
+            verdict: self.headline(),
+            reasons: self.verdict.reasons.clone(),
+            warnings: page.warnings.to_vec(),
+            sections,
+            foot: format!("Made by {} {}.", self.tool.name, self.tool.version),
+        }
+    }
+
+    fn numbers(&self) -> Vec<Table> {
+        vec![self.separation_table(), self.formation_table(), self.control_table(), self.run_table()]
+    }
+
+    fn separation_table(&self) -> Table {
+        let Self { separation, audit, .. } = self;
+        let pair = separation.min_pair.map(|[first, second]| format!("vehicles {first} and {second}"));
+        let at = separation.min_at_s.map(|at_s| format!("at {}", seconds(at_s)));
+        let closest = [pair, at].into_iter().flatten().collect::<Vec<_>>().join(" ");
+        let certificate = if separation.certified_m.is_some() {
+            "promised before the first step".to_owned()
+        } else {
+            separation.certificate_void.join(" ")
+        };
+        let status = match audit.status {
+            Status::Clear => "clear",
+            Status::Violation => "violation",
+            Status::Undecided => "undecided",
+        };
+        let sweep = format!("{} steps and {} pairs swept", audit.steps, audit.pairs_checked);
+        let contacts = audit.rapier.contact_pairs.map_or(NOT_KNOWN.to_owned(), |pairs| pairs.to_string());
+        numbers(
+            "Separation",
+            vec![
+                row("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
+                row("Smallest distance", with_unit(separation.min_m, "m"), &closest),
+                row("Certified distance", with_unit(separation.certified_m, "m"), &certificate),
+                row("Audit", status.to_owned(), &sweep),
+                row("Violations", audit.violations.len().to_string(), "times that a pair was closer than δ"),
+                row("Disagreements", audit.parry.disagreements.to_string(), "of closed form and shape cast"),
+                row("Contacts seen by the engine", contacts, "pairs whose keep-out balls overlapped"),
+            ],
+        )
+    }
+
+    fn formation_table(&self) -> Table {
+        let Self { formation, velocity, .. } = self;
+        let reached = formation.reached_at_s.map_or("not reached".to_owned(), seconds);
+        numbers(
+            "Formation",
+            vec![
+                row("Reached", reached, "and kept from then on to the end"),
+                row("Largest edge error", with_unit(formation.max_edge_error_m, "m"), "at the end"),
+                row("Position error", with_unit(formation.rms_position_error_m, "m"), "root mean square, at the end"),
+                row("Velocity disagreement", with_unit(velocity.disagreement_m_s, "m/s"), "at the end"),
+                row("Common velocity", with_unit(velocity.common_m_s, "m/s"), "at the end"),
+            ],
+        )
+    }
+
+    fn control_table(&self) -> Table {
+        let Self { energy, control, .. } = self;
+        numbers(
+            "Energy and control",
+            vec![
+                row("Initial energy E(0)", with_unit(energy.initial, "m²/s²"), ""),
+                row("Final energy", with_unit(energy.at_end, "m²/s²"), ""),
+                row("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all samples"),
+                row("Peak control", with_unit(control.peak_m_s2, "m/s²"), "over all samples"),
+                row("Final control", with_unit(control.final_m_s2, "m/s²"), ""),
+            ],
+        )
+    }
+
+    fn run_table(&self) -> Table {
+        let run = &self.run;
+        numbers(
+            "Run",
+            vec![
+                row("Vehicles", run.vehicles.to_string(), ""),
+                row("Duration", with_unit(Some(run.duration_s), "s"), ""),
+                row("Step", with_unit(Some(run.dt_s * 1e3), "ms"), ""),
+                row("Steps", run.steps.to_string(), ""),
+            ],
+        )
+    }
+
+    fn violations(&self) -> Vec<Block> {
+        let violations = &self.audit.violations;
+        let rows = violations.iter().take(LISTED_VIOLATIONS).map(|violation| {
+            let [first, second] = violation.pair;
+            let mut row = vec![Cell::from(format!("{first}-{second}"))];
+            let numbers =
+                [(violation.from_s, "s"), (violation.to_s, "s"), (violation.min_m, "m"), (violation.min_at_s, "s")];
+            row.extend(numbers.map(|(number, unit)| Cell::from(with_unit(number, unit))));
+            row
+        });
+        let table = Table {
+            caption: "Times that a pair was closer than δ".to_owned(),
+            columns: vec![
+                Column::words("Vehicles"),
+                Column::numbers("From"),
+                Column::numbers("To"),
+                Column::numbers("Smallest"),
+                Column::numbers("At"),
+            ],
+            rows: rows.collect(),
+        };
+        let mut blocks = vec![Block::Table(table)];
+        if let Some(more @ 1..) = violations.len().checked_sub(LISTED_VIOLATIONS) {
+            blocks.push(Block::Text(format!("{more} more are in report.json.")));
+        }
+        blocks
+    }
+
+    fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
+        let certificate = if self.separation.certified_m.is_some() {
+            "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on the \
+             control, no disturbance and continuous time: the law's energy never grows, so no pair's tension exceeds N E(0)."
+                .to_owned()
+        } else {
+            format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
+        };
+        let (time, judge) = (&scenario.time, &scenario.judge);
+        let (plant, command) = match scenario.plant {
+            PlantSpec::Rapier(precision) => (
+                format!(
+                    "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
+                     at constant speed. The engine computes in {}, law and audit in double precision (64 bits).",
+                    match precision {
+                        Precision::Single => "single precision (32 bits)",
+                        Precision::Double => "double precision (64 bits)",
+                    }
+                ),
+                "held over it",
+            ),
+            PlantSpec::Ideal => (
+                "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
+                 8th order in double precision (64 bits); the audit takes them to move on straight lines within a step."
+                    .to_owned(),
+                "recorded; the motion between follows the law in continuous time",
+            ),
+        };
+        vec![
+            certificate,
+            plant,
+            format!(
+                "Commands are computed once a step of {} ms and {command}. A step that would take more than half of a \
+                 pair's clearance is flown in halves, at most {} times halved.",
+                short(time.dt_s * 1e3),
+                time.max_halvings
+            ),
+            "The audit sweeps every pair over every whole step, so nothing passes between samples: the closed form of the \
+             smallest distance decides, in double precision and to 4 units of rounding of the pair's distance, and a shape \
+             cast by parry must agree. The engine's own contacts are evidence alone."
+                .to_owned(),
+            format!(
+                "Reached means: no edge is wrong by more than {0} m, the vehicles are within {0} m (root mean square) of the \
+                 formation, turned and perhaps mirrored, and none differs from the mean velocity by more than {1} m/s, from \
+                 then on to the end, for at least {2} s.",
+                judge.edge_error_m, judge.disagreement_m_s, judge.hold_s
+            ),
+            format!(
+                "Energy, control effort and errors are those of the recorded samples, at most {} a second; the smallest \
+                 distance is that of the whole run.",
+                short(time.record_hz)
+            ),
+        ]
+    }
+
+    fn repetition(&self, page: &RunPage<'_>) -> Vec<Block> {
+        vec![
+            Block::Command(page.command.to_owned()),
+            Block::Text(format!(
+                "The same program gives the same motion to the last bit, on any number of threads: the hash of all \
+                 recorded states is {}.",
+                self.run.state_hash
+            )),
+            Block::Folded {
+                summary: format!("The resolved scenario, SHA-256 {}", self.scenario.sha256),
+                text: page.scenario.resolved_toml(),
+            },
+        ]
+    }
+}
+
+impl Performance {
+    fn table(&self) -> Table {
+        let spent = [
+            ("From first to last step", self.wall_s, "s"),
+            ("Time flown over that", self.real_time_factor, ""),
+            ("In the law", self.law_s, "s"),
+            ("In the physics", self.physics_s, "s"),
+            ("In the audit", self.audit_s, "s"),
+            ("In the recorders", self.record_s, "s"),
+        ];
+        Table {
+            caption: "Wall-clock time, which alone differs from run to run".to_owned(),
+            columns: vec![Column::words("Where"), Column::numbers("Time")],
+            rows: spent.map(|(name, number, unit)| vec![name.into(), with_unit(number, unit).into()]).to_vec(),
+        }
+    }
+}
+
+const NOT_KNOWN: &str = "–";
+
+fn section(heading: &str, blocks: Vec<Block>) -> Section {
+    Section { heading: heading.to_owned(), blocks }
+}
+
+fn numbers(caption: &str, rows: Vec<Vec<Cell>>) -> Table {
+    Table { caption: caption.to_owned(), columns: vec![Column::words("Quantity"), Column::numbers("Value")], rows }
+}
+
+fn row(name: &str, value: String, remark: &str) -> Vec<Cell> {
+    let name = if remark.is_empty() { name.into() } else { Cell::Noted(name.to_owned(), remark.to_owned()) };
+    vec![name, value.into()]
+}
+
+fn with_unit(number: Option<f64>, unit: &str) -> String {
+    number.map_or(NOT_KNOWN.to_owned(), |number| format!("{} {unit}", short(number)).trim_end().to_owned())
+}
+
+/// A number with six significant digits at most, without zeros at its end; very small and very large ones in powers of
+/// ten.
+fn short(number: f64) -> String {
+    if number == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-3..1e7).contains(&number.abs()) {
+        return format!("{number:.3e}");
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 8")]
+    let decimals = (5.0 - number.abs().log10().floor()).max(0.0) as usize;
+    let text = format!("{number:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}

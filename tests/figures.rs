@@ -1,0 +1,375 @@
+//! Figures show what they claim: their SVG is read back and measured against its own axes.
+
+use roxmltree::{Document, Node};
+use tautline::figures::{self, Course, Figure, Yardsticks};
+use tautline::formation::Formation;
+use tautline::graph::Graph;
+use tautline::law::EdgeTension;
+use tautline::record::mcap::{Header, McapRecorder, McapRecording};
+use tautline::record::{Recorder as _, Sample};
+use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, separation, set_row};
+
+/// Drawings count in whole tenths of a pixel, and an axis in one of them less than its length.
+const PLACE: f64 = 2.0;
+const DELTA_M: f64 = 2.0;
+const CERTIFIED_M: f64 = 2.5;
+/// Stroke and width of the line at delta, as in the drawing.
+const DELTA_LINE: (&str, &str) = ("#1B1F24", "20");
+const CERTIFIED_LINE: (&str, &str) = ("#1B1F24", "13");
+
+/// A figure read back.
+struct Drawing<'a>(Document<'a>);
+
+impl<'a> Drawing<'a> {
+    fn of(figure: &'a Figure) -> Self {
+        Self(Document::parse(&figure.svg).unwrap_or_else(|error| panic!("{}: {error}\n{}", figure.name, figure.svg)))
+    }
+
+    fn all(&self, tag: &str) -> Vec<Node<'_, '_>> {
+        self.0.descendants().filter(|node| node.has_tag_name(("http://www.w3.org/2000/svg", tag))).collect()
+    }
+
+    fn words(&self) -> Vec<String> {
+        self.all("text").iter().map(|node| node.text().unwrap_or("").trim().to_owned()).collect()
+    }
+
+    /// Number and place of each tick: of the vertical axis (texts that end at it) or of the horizontal one.
+    fn ticks(&self, vertical: bool) -> Vec<(f64, f64)> {
+        let (anchor, dy, along) = if vertical { ("end", "0.5ex", "y") } else { ("middle", "0.76em", "x") };
+        let texts = self.all("text").into_iter();
+        let ticks =
+            texts.filter(|text| text.attribute("text-anchor") == Some(anchor) && text.attribute("dy") == Some(dy));
+        ticks
+            .filter_map(|text| {
+                let number = text.text()?.trim().replace('\u{2212}', "-").parse().ok()?;
+                Some((number, number_of(&text, along)))
+            })
+            .collect()
+    }
+
+    /// Where a number is on an axis.
+    fn place(&self, vertical: bool, number: f64) -> f64 {
+        let ticks = self.ticks(vertical);
+        let [(a, at_a), .., (b, at_b)] = ticks[..] else { panic!("{} ticks", ticks.len()) };
+        at_a + (number - a) / (b - a) * (at_b - at_a)
+    }
+
+    /// Corners of the polylines of a stroke and a width.
+    fn polylines(&self, (stroke, width): (&str, &str)) -> Vec<Vec<(f64, f64)>> {
+        let of_style = |node: &Node<'_, '_>| {
+            node.attribute("stroke") == Some(stroke) && node.attribute("stroke-width") == Some(width)
+        };
+        self.all("polyline").into_iter().filter(of_style).map(|node| corners(&node)).collect()
+    }
+
+    fn level(&self, style: (&str, &str)) -> f64 {
+        let levels: Vec<_> = self.polylines(style).into_iter().filter(|line| length(line) > 1000.0).collect();
+        let [level] = &levels[..] else { panic!("{} lines of {style:?}", levels.len()) };
+        assert_eq!(level.len(), 2);
+        assert_eq!(level[0].1, level[1].1, "the line is not level");
+        level[0].1
+    }
+
+    /// Circles of the plotting area: those of the legend are below all ticks.
+    fn rings(&self) -> Vec<(f64, f64)> {
+        let lowest = self.ticks(false).len();
+        assert!(lowest > 0, "no ticks");
+        let below = self
+            .all("text")
+            .iter()
+            .filter(|t| t.attribute("dy") == Some("0.76em"))
+            .map(|t| number_of(t, "y"))
+            .fold(0.0, f64::max);
+        let circles = self.all("circle").into_iter().map(|node| (number_of(&node, "cx"), number_of(&node, "cy")));
+        circles.filter(|&(_, y)| y < below).collect()
+    }
+}
+
+fn number_of(node: &Node<'_, '_>, attribute: &str) -> f64 {
+    node.attribute(attribute).and_then(|text| text.parse().ok()).unwrap_or_else(|| panic!("{attribute} of {node:?}"))
+}
+
+fn corners(node: &Node<'_, '_>) -> Vec<(f64, f64)> {
+    let points = node.attribute("points").expect("points").split_whitespace();
+    let corner = |pair: &str| pair.split_once(',').map(|(x, y)| (x.parse().expect("x"), y.parse().expect("y")));
+    points.map(|pair| corner(pair).expect("a pair")).collect()
+}
+
+fn length(line: &[(f64, f64)]) -> f64 {
+    line.windows(2).map(|ends| (ends[1].0 - ends[0].0).hypot(ends[1].1 - ends[0].1)).sum()
+}
+
+/// `count` vehicles 3 m apart on the x axis that all move `(0.5, 0.2, rise)` m/s for 10 s; the second one visits the
+/// first for an instant, `near_m` apart, at 4 s.
+fn samples(count: usize, rise_m_s: f64, near_m: f64, take: &mut dyn FnMut(&Sample<'_>)) {
+    for k in 0..=200_u32 {
+        let time_s = f64::from(k) * 0.05;
+        let mut swarm = Swarm::at_rest(Rows::zeros(count));
+        for i in 0..count {
+            let visiting = i == 1 && k == 80;
+            let x = if visiting { near_m } else { 3.0 * i as f64 };
+            set_row(&mut swarm.positions_m, i, [x + 0.5 * time_s, 0.2 * time_s, rise_m_s * time_s * i as f64].into());
+            set_row(&mut swarm.velocities_m_s, i, [0.5 / (1.0 + time_s), 0.2 * i as f64, 0.0].into());
+        }
+        let mut control = Rows::zeros(count);
+        control.column_mut(1).fill(2.0 - 0.1 * time_s);
+        let closest = (count > 1).then(|| ClosestApproach {
+            pair: Pair::new(0, 1),
+            separation_m: separation(&swarm.positions_m, 0, 1),
+            time_s,
+        });
+        take(&Sample {
+            time_s,
+            step: u64::from(k),
+            swarm: &swarm,
+            control: &control,
+            separation: closest,
+            energy: Some(4.0 - 0.3 * time_s),
+        });
+    }
+}
+
+fn course(count: usize) -> Course {
+    let mut course = Course::new();
+    samples(count, 0.0, 2.75, &mut |sample| course.observe(sample));
+    course
+}
+
+fn all_of(course: &Course, delta_m: f64) -> Vec<Figure> {
+    let (formation, graph) = (Formation::line(course.vehicles(), 4.0), Graph::complete(course.vehicles()));
+    let yardsticks = Yardsticks {
+        delta_m,
+        certified_m: Some(CERTIFIED_M),
+        shape: Some((&formation, &graph)),
+        edge_error_m: Some(0.01),
+        disagreement_m_s: Some(0.02),
+    };
+    figures::of_run(course, &yardsticks).expect("figures")
+}
+
+fn names(figures: &[Figure]) -> Vec<&str> {
+    figures.iter().map(|figure| figure.name.as_str()).collect()
+}
+
+#[test]
+fn the_lines_at_delta_and_at_the_certified_distance_are_at_their_numbers_on_the_axis() {
+    let course = course(3);
+    for delta_m in [1.0, DELTA_M, 2.9] {
+        let figure = figures::distances(&course, delta_m, None, "Distances").expect("a figure");
+        let drawing = Drawing::of(&figure);
+        let (found, expected) = (drawing.level(DELTA_LINE), drawing.place(true, delta_m));
+        assert!((found - expected).abs() <= PLACE, "delta {delta_m}: {found}, not {expected}");
+        let elsewhere = drawing.place(true, delta_m + 0.1);
+        assert!((found - elsewhere).abs() > PLACE, "a tenth of a metre would not be seen");
+    }
+    let figure = figures::distances(&course, DELTA_M, Some(CERTIFIED_M), "Distances").expect("a figure");
+    let drawing = Drawing::of(&figure);
+    let expected = drawing.place(true, CERTIFIED_M);
+    let dashes = drawing.polylines(CERTIFIED_LINE);
+    let on_level = dashes.iter().flatten().filter(|&&(_, y)| (y - expected).abs() <= PLACE).count();
+    assert!(on_level > 50, "{on_level} ends of dashes at the certified distance");
+}
+
+#[test]
+fn every_pair_of_a_small_swarm_has_a_line_and_the_closest_approach_is_marked() {
+    let figure = figures::distances(&course(4), DELTA_M, Some(CERTIFIED_M), "Distances").expect("a figure");
+    let drawing = Drawing::of(&figure);
+    let colors = ["#0072B2", "#D55E00", "#00936C", "#B85F95", "#9A7600", "#7D858E"];
+    for color in colors {
+        let lines = drawing.polylines((color, "15"));
+        assert_eq!(lines.iter().filter(|line| length(line) > 1000.0).count(), 1, "{color}");
+    }
+    for pair in ["1-2", "1-3", "1-4", "2-3", "2-4", "3-4"] {
+        assert!(drawing.words().iter().any(|words| words == pair), "{pair} in {:?}", drawing.words());
+    }
+    let expected = (drawing.place(false, 4.0), drawing.place(true, 2.75));
+    let rings = drawing.rings();
+    let &[(x, y)] = &rings[..] else { panic!("{rings:?}") };
+    assert!((x - expected.0).abs() <= PLACE && (y - expected.1).abs() <= PLACE, "({x}, {y}), not {expected:?}");
+    assert!(figure.description.contains("2.750 m, vehicles 1-2 at 4.00 s"), "{}", figure.description);
+    // The visit lasted one sample of two hundred; the line of the pair reaches down to it.
+    let lowest = drawing.polylines((colors[0], "15"))[0].iter().map(|&(_, y)| y).fold(0.0, f64::max);
+    assert!((lowest - expected.1).abs() <= PLACE, "{lowest}, not {}", expected.1);
+}
+
+#[test]
+fn paths_have_a_cross_at_each_start_a_ring_at_each_end_and_equal_axes() {
+    let figure = figures::paths(&course(3), "Paths").expect("a figure");
+    let drawing = Drawing::of(&figure);
+    let per_metre = |vertical| drawing.place(vertical, 1.0) - drawing.place(vertical, 0.0);
+    assert!((per_metre(false) + per_metre(true)).abs() < 0.01 * per_metre(false), "a metre differs between the axes");
+
+    let mut rings = drawing.rings();
+    rings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert_eq!(rings.len(), 3);
+    for (i, (x, y)) in rings.into_iter().enumerate() {
+        let expected = (drawing.place(false, 3.0 * i as f64 + 5.0), drawing.place(true, 2.0));
+        assert!((x - expected.0).abs() <= PLACE && (y - expected.1).abs() <= PLACE, "({x}, {y}), not {expected:?}");
+    }
+    for (i, color) in ["#0072B2", "#D55E00", "#00936C"].into_iter().enumerate() {
+        let paths = drawing.polylines((color, "15"));
+        let [path] = &paths[..] else { panic!("{} paths", paths.len()) };
+        let start = (drawing.place(false, 3.0 * i as f64), drawing.place(true, 0.0));
+        assert!(
+            (path[0].0 - start.0).abs() <= PLACE && (path[0].1 - start.1).abs() <= PLACE,
+            "{:?}, {start:?}",
+            path[0]
+        );
+        let strokes: Vec<_> =
+            drawing.all("line").into_iter().filter(|line| line.attribute("stroke") == Some(color)).collect();
+        let at_start = strokes.iter().filter(|line| {
+            let middle = (number_of(line, "x1") + number_of(line, "x2")) / 2.0;
+            (middle - start.0).abs() <= PLACE
+        });
+        assert_eq!(at_start.count(), 2, "a cross of two strokes at the start of vehicle {}", i + 1);
+    }
+    for word in ["1", "2", "3", "start", "end"] {
+        assert!(drawing.words().iter().any(|words| words == word), "{word}");
+    }
+}
+
+#[test]
+fn every_axis_names_its_unit() {
+    for (name, labels) in [
+        ("paths", ["x [m]", "y [m]"]),
+        ("distances", ["time [s]", "distance [m]"]),
+        ("control", ["time [s]", "control effort |u| [m/s²]"]),
+        ("energy", ["time [s]", "energy E [m²/s²]"]),
+        ("shape-error", ["time [s]", "largest edge error [m]"]),
+        ("disagreement", ["time [s]", "velocity disagreement [m/s]"]),
+    ] {
+        let figures = all_of(&course(3), DELTA_M);
+        let figure = figures.iter().find(|figure| figure.name == name).expect(name);
+        let words = Drawing::of(figure).words();
+        assert!(labels.iter().all(|label| words.iter().any(|word| word == label)), "{name}: {words:?}");
+    }
+}
+
+#[test]
+fn a_run_has_the_figures_that_it_has_data_for() {
+    let level = ["paths", "distances", "control", "energy", "shape-error", "disagreement"];
+    assert_eq!(names(&all_of(&course(3), DELTA_M)), level);
+    let mut in_space = Course::new();
+    samples(3, 0.3, 2.75, &mut |sample| in_space.observe(sample));
+    let figures = all_of(&in_space, DELTA_M);
+    assert_eq!(names(&figures)[..3], ["paths", "paths-3d", "distances"]);
+    let words = Drawing::of(&figures[1]).words();
+    for axis in ["x = ", "y = ", "z = "] {
+        assert!(words.iter().any(|word| word.starts_with(axis) && word.ends_with(" m")), "{axis}: {words:?}");
+    }
+    let mut without_energy = Course::new();
+    samples(1, 0.0, 0.0, &mut |sample| without_energy.observe(&Sample { energy: None, ..*sample }));
+    assert_eq!(names(&all_of(&without_energy, DELTA_M)), ["paths", "control", "shape-error", "disagreement"]);
+    for figure in all_of(&in_space, DELTA_M) {
+        assert!(figures::NAMES_OF_RUN.contains(&figure.name.as_str()), "{}", figure.name);
+    }
+}
+
+#[test]
+fn of_a_large_swarm_bands_and_the_closest_pairs_are_drawn() {
+    let figures = all_of(&course(60), DELTA_M);
+    let drawing = Drawing::of(&figures[1]);
+    let words = drawing.words();
+    for word in ["5 to 95 %", "25 to 75 %", "median", "smallest", "1-2"] {
+        assert!(words.iter().any(|words| words == word), "{word} in {words:?}");
+    }
+    assert_eq!(drawing.all("polygon").len(), 4, "two bands, each also in the legend");
+    let bytes: usize = figures.iter().map(|figure| figure.svg.len()).sum();
+    assert!(bytes < 400_000, "{bytes} bytes");
+}
+
+#[test]
+fn nothing_in_a_recording_makes_a_figure_fail_or_hold_a_number_that_is_none() {
+    let mut courses = vec![("without samples", Course::new())];
+    let mut one = Course::new();
+    let mut first = true;
+    samples(3, 0.0, 2.75, &mut |sample| {
+        if std::mem::take(&mut first) {
+            one.observe(sample);
+        }
+    });
+    courses.push(("of one sample", one));
+    for (name, number) in [("NaN", f64::NAN), ("infinite", f64::INFINITY), ("huge", 1e300), ("tiny", 1e-300)] {
+        for count in [1, 3, 20] {
+            let (mut energy, mut state, mut control) = (Course::new(), Course::new(), Course::new());
+            samples(count, 0.1, 2.75, &mut |sample| {
+                energy.observe(&Sample { energy: Some(number), ..*sample });
+                let mut swarm = sample.swarm.clone();
+                swarm.positions_m[(0, 1)] = number;
+                swarm.velocities_m_s[(0, 1)] = number;
+                let separation = sample.separation.map(|closest| ClosestApproach { separation_m: number, ..closest });
+                state.observe(&Sample { swarm: &swarm, separation, ..*sample });
+                let rows = Rows::from_element(count, number);
+                control.observe(&Sample { control: &rows, time_s: number, ..*sample });
+            });
+            courses.extend([(name, energy), (name, state), (name, control)]);
+        }
+    }
+    for (name, course) in &courses {
+        for delta_m in [DELTA_M, 0.0, 1e300, f64::NAN] {
+            for figure in all_of(course, delta_m) {
+                let drawing = Drawing::of(&figure);
+                let numbers = drawing.0.descendants().flat_map(|node| node.attributes());
+                for attribute in numbers.filter(|attribute| attribute.name() != "aria-label") {
+                    let value = attribute.value();
+                    assert!(!value.contains("NaN") && !value.contains("inf"), "{name}, {}: {value}", figure.name);
+                }
+            }
+            let space = figures::paths_in_space(course, "Paths").expect("a figure");
+            Drawing::of(&space);
+        }
+    }
+}
+
+#[test]
+fn a_recording_read_back_gives_the_same_bytes_as_the_run_that_was_watched() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    let mut recorder = McapRecorder::create(&path, &Header::new("line", "", 3, DELTA_M)).expect("a recording");
+    samples(3, 0.0, 2.75, &mut |sample| recorder.sample(sample).expect("recorded"));
+    recorder.finish().expect("closed");
+    let read = Course::read(McapRecording::open(&path).expect("opens")).expect("reads");
+    assert_eq!(all_of(&read, DELTA_M), all_of(&course(3), DELTA_M));
+}
+
+#[test]
+fn a_figure_escapes_its_title_and_refers_to_nothing() {
+    let hostile = "</title><script>alert('1')</script>\u{0} & \"quoted\"";
+    let mut figures = all_of(&course(3), DELTA_M);
+    figures.push(figures::paths_in_space(&course(3), hostile).expect("a figure"));
+    figures.push(figures::energy(&course(3), hostile).expect("a figure"));
+    for figure in &figures {
+        let drawing = Drawing::of(figure);
+        assert!(drawing.all("script").is_empty());
+        let plain = figure.svg.replace("http://www.w3.org/2000/svg", "");
+        for reference in ["http", "href", "url(", "@import", "data:"] {
+            assert!(!plain.contains(reference), "{}: {reference}", figure.name);
+        }
+        let root = drawing.0.root_element();
+        assert!(root.attribute("aria-label").is_some_and(|label| label.contains(&figure.description)));
+        assert_eq!(drawing.all("title")[0].text(), Some(figure.title.as_str()));
+        assert_eq!(drawing.all("desc")[0].text(), Some(figure.description.as_str()));
+    }
+}
+
+#[test]
+fn the_tension_has_its_barrier_and_its_minimum_where_the_formulas_say() {
+    let (delta_m, k_m) = (0.5, 1.0);
+    let rest_m = delta_m + k_m * 1.0_f64.asinh();
+    let tension = EdgeTension::new(1.0, delta_m, rest_m).expect("a tension");
+    let figure = figures::tension_curve(&tension, "Fig. 1").expect("a figure");
+    let drawing = Drawing::of(&figure);
+    let rings = drawing.rings();
+    let &[(x, y)] = &rings[..] else { panic!("{rings:?}") };
+    assert!((x - drawing.place(false, rest_m)).abs() <= PLACE && (y - drawing.place(true, 0.0)).abs() <= PLACE);
+    let curves = drawing.polylines(("#0072B2", "18"));
+    let curve = curves.iter().max_by(|a, b| length(a).total_cmp(&length(b))).expect("a curve");
+    let lowest = curve.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("a point");
+    // Near its minimum the curve is flat: a tenth of a pixel of height is some pixels of width.
+    assert!((lowest.0 - x).abs() < 50.0 && (lowest.1 - y).abs() <= PLACE, "{lowest:?}, not ({x}, {y})");
+    let barriers = drawing.polylines(("#1B1F24", "16"));
+    assert!(
+        barriers.iter().any(|line| (line[0].0 - drawing.place(false, delta_m)).abs() <= PLACE && length(line) > 1000.0)
+    );
+    assert!(figure.description.contains("Vmin = 2.7956"), "{}", figure.description);
+}

@@ -1,0 +1,147 @@
+//! A run that is stopped keeps what it recorded: up to the last flushed chunk when it is killed, all of it and a report
+//! when it is asked to stop.
+#![cfg(unix)]
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use program::{Ran, TAUTLINE, ran_by};
+use serde_json::Value;
+use tautline::record::mcap::McapRecording;
+use tautline::record::{Event, OwnedSample};
+use tempfile::TempDir;
+
+/// A swarm at rest stays where it is: with a22 > 0 rounding would drive it away in some hundred seconds.
+const DRAG: &str = "swarm.a22_per_s=-0.1";
+/// Longer than any test: 240 million steps.
+const FOREVER: &str = "time.duration_s=1e6";
+/// Some tens of chunks.
+const GROWN_BYTES: u64 = 1 << 20;
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A run that is under way. Killed when dropped, so that a test that fails leaves none behind.
+struct Underway {
+    child: Option<Child>,
+    folder: TempDir,
+}
+
+impl Underway {
+    /// Starts a run that will not end by itself and waits until its recording has grown.
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder for the run");
+        let child = Command::new(TAUTLINE)
+            .args(["run", "--json", "--quiet", "--out", "out", "--set", DRAG, "--set", FOREVER])
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        let underway = Self { child: Some(child), folder };
+        let began = Instant::now();
+        while fs::metadata(underway.recording()).map_or(0, |file| file.len()) < GROWN_BYTES {
+            assert!(began.elapsed() < PATIENCE, "the recording does not grow");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        underway
+    }
+
+    fn recording(&self) -> PathBuf {
+        self.folder.path().join("out/run.mcap")
+    }
+
+    fn report(&self) -> PathBuf {
+        self.folder.path().join("out/report.json")
+    }
+
+    /// Sends a signal and waits for the end.
+    fn end_by(&mut self, signal: &str) -> Output {
+        let child = self.child.take().expect("a run under way");
+        let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+        child.wait_with_output().expect("an end")
+    }
+}
+
+impl Drop for Underway {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let _ = child.kill().and_then(|()| child.wait());
+        }
+    }
+}
+
+/// Flies to the end, into a folder.
+fn flown(folder: &Path, out: &str, duration_s: u32) -> Ran {
+    let duration = format!("time.duration_s={duration_s}");
+    ran_by(TAUTLINE, folder, &["run", "--quiet", "--out", out, "--set", DRAG, "--set", &duration])
+}
+
+/// The first 10 s of a run that nobody stops.
+fn undisturbed(folder: &Path) -> Vec<OwnedSample> {
+    flown(folder, "undisturbed", 10);
+    let recording = McapRecording::open(&folder.join("undisturbed/run.mcap")).expect("a recording");
+    recording.read_all().expect("a whole recording").0
+}
+
+#[test]
+fn a_killed_run_can_be_read_up_to_the_last_chunk() {
+    let mut underway = Underway::new();
+    let ended = underway.end_by("KILL");
+    assert_eq!(ended.status.code(), None, "it had no chance to end by itself");
+    assert!(!underway.report().exists(), "an unfinished run has no report");
+
+    let recording = McapRecording::open(&underway.recording()).expect("a recording");
+    assert!(!recording.is_complete());
+    assert_eq!((recording.header().scenario_name.as_str(), recording.header().vehicles), ("pentagon", 5));
+    let (samples, _) = recording.read_all().expect("everything up to the last chunk");
+    let undisturbed = undisturbed(underway.folder.path());
+    assert!(samples.len() > undisturbed.len(), "{} samples", samples.len());
+    assert!(samples[..undisturbed.len()] == undisturbed, "what was read is what was flown");
+    assert!(samples.iter().enumerate().all(|(k, sample)| sample.step == 4 * k as u64), "without a gap");
+}
+
+#[test]
+fn a_killed_run_is_flown_again_without_force() {
+    let mut underway = Underway::new();
+    underway.end_by("KILL");
+    let again = flown(underway.folder.path(), "out", 60);
+    assert_eq!((again.exit, again.out.as_str(), again.err.as_str()), (Some(0), "", ""));
+    assert!(McapRecording::open(&underway.recording()).expect("a recording").read_all().is_ok());
+    assert!(underway.report().exists());
+}
+
+#[test]
+fn a_run_that_is_asked_to_stop_ends_with_a_report_on_what_it_flew() {
+    for signal in ["INT", "TERM"] {
+        let mut underway = Underway::new();
+        let ended = underway.end_by(signal);
+        assert_eq!(ended.status.code(), Some(1), "{signal}: not flown to its end is not passed");
+        assert_eq!(String::from_utf8_lossy(&ended.stderr), "");
+
+        let text = fs::read_to_string(underway.report()).expect("a report");
+        assert_eq!(String::from_utf8_lossy(&ended.stdout), text, "the report is printed as ever");
+        let report: Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(report["verdict"]["pass"], false);
+        let reasons = report["verdict"]["reasons"].as_array().expect("reasons");
+        assert!(
+            reasons.iter().any(|reason| reason.as_str().is_some_and(|said| said.contains("interrupted"))),
+            "{text}"
+        );
+        assert_eq!(report["audit"]["status"], "clear", "what was flown is judged");
+        assert_eq!(report["run"]["steps"], report["audit"]["steps"]);
+
+        let recording = McapRecording::open(&underway.recording()).expect("a recording");
+        let (samples, events) = recording.read_all().expect("a whole recording");
+        let last = samples.last().expect("samples");
+        assert_eq!(report["run"]["steps"], last.step, "the last instant is recorded");
+        assert_eq!(report["run"]["duration_s"], last.time_s);
+        let [Event::EndedEarly { time_s, reason }] = &events[..] else { panic!("{events:?}") };
+        assert_eq!((*time_s, reason.as_str()), (last.time_s, "interrupted"));
+    }
+}

@@ -1,0 +1,466 @@
+//! What the loop of sense, law, plant and judge keeps: no step jumps a barrier, nothing passes unseen, energy is not
+//! made, symmetries hold, and a flight that cannot go on ends with a name and with what was recorded.
+
+#[path = "support/flight.rs"]
+mod flight;
+
+use std::ops::ControlFlow;
+
+use flight::{Log, builtin, fly, fly_with};
+use nalgebra::{Rotation3, Vector3};
+use proptest::prelude::*;
+use tautline::audit::Status;
+use tautline::formation::Formation;
+use tautline::law::{Law, LawError};
+use tautline::plant::{self, Plant, PlantError};
+use tautline::record::{Event, OwnedSample};
+use tautline::scenario::{LawSpec, PlantSpec, Precision, Scenario};
+use tautline::sim::{self, Ending, SimError};
+use tautline::swarm::{Pair, Rows, Swarm, row, separation, set_row};
+
+/// A sum of ten tensions and five squares, relative to a sum that may be many times larger.
+const ENERGY_ROUNDING: f64 = 1e-12;
+/// The error of a first-order method measured at two steps gives an order of 1 up to terms of the order of dt.
+const ORDER: std::ops::RangeInclusive<f64> = 0.9..=1.1;
+
+/// A law whose commands are changed after the fact.
+struct Bent<F> {
+    inner: Box<dyn Law>,
+    /// Given how often the law was asked before, the state, and the command.
+    bend: F,
+    asked: u64,
+}
+
+impl<F> Bent<F> {
+    fn new(scenario: &Scenario, bend: F) -> Self {
+        Self { inner: scenario.law().expect("a law"), bend, asked: 0 }
+    }
+}
+
+impl<F: FnMut(u64, &Swarm, &mut Rows) -> Result<(), LawError> + Send> Law for Bent<F> {
+    fn name(&self) -> &'static str {
+        "bent"
+    }
+
+    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
+        self.inner.control(swarm, control)?;
+        self.asked += 1;
+        (self.bend)(self.asked - 1, swarm, control)
+    }
+
+    fn energy(&self, swarm: &Swarm) -> Option<f64> {
+        self.inner.energy(swarm)
+    }
+
+    fn barrier_m(&self) -> Option<f64> {
+        self.inner.barrier_m()
+    }
+}
+
+/// A plant that is lost after some steps: it says so, or it does not and shows a vehicle that is nowhere.
+struct Lost {
+    inner: Box<dyn Plant>,
+    steps_left: u32,
+    vehicle: usize,
+    says_so: bool,
+}
+
+impl Plant for Lost {
+    fn step(&mut self, law: &mut dyn Law, control: &Rows, dt_s: f64) -> Result<(), PlantError> {
+        self.inner.step(law, control, dt_s)?;
+        self.steps_left = self.steps_left.saturating_sub(1);
+        let lost = self.steps_left == 0 && self.says_so;
+        if lost { Err(PlantError::NotFinite { vehicle: self.vehicle }) } else { Ok(()) }
+    }
+
+    fn observe(&self, swarm: &mut Swarm) {
+        self.inner.observe(swarm);
+        if self.steps_left == 0 {
+            swarm.velocities_m_s[(self.vehicle, 1)] = f64::NAN;
+        }
+    }
+
+    fn restore(&mut self, swarm: &Swarm) {
+        self.inner.restore(swarm);
+    }
+}
+
+/// Two vehicles on the x axis with these velocities \[m/s\], and a third far away.
+fn duel(x_m: [f64; 2], speeds_m_s: [f64; 2], delta_m: f64, dt_s: f64, duration_s: f64) -> Scenario {
+    let mut start = Swarm::at_rest(Rows::from_row_slice(&[x_m[0], 0.0, 0.0, x_m[1], 0.0, 0.0, 0.0, 60.0, 0.0]));
+    start.velocities_m_s[(0, 0)] = speeds_m_s[0];
+    start.velocities_m_s[(1, 0)] = speeds_m_s[1];
+    let slots = Rows::from_row_slice(&[0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 4.0, 0.0]);
+    let mut scenario = Scenario::new("duel", start, Formation::points(slots), delta_m, duration_s);
+    scenario.time.dt_s = dt_s;
+    scenario.plant = PlantSpec::Rapier(Precision::Double);
+    scenario
+}
+
+fn refinements(log: &Log) -> Vec<(f64, f64)> {
+    let refined = |event: &Event| match *event {
+        Event::StepRefined { time_s, dt_s } => Some((time_s, dt_s)),
+        _ => None,
+    };
+    log.events.iter().filter_map(refined).collect()
+}
+
+// Energy
+
+/// Largest rise of the energy over what it had been before, relative to E(0).
+fn energy_rise(log: &Log) -> f64 {
+    let energies: Vec<f64> = log.samples.iter().filter_map(|sample| sample.energy).collect();
+    let mut least = energies[0];
+    energies.iter().fold(0.0, |rise: f64, &energy| {
+        least = least.min(energy);
+        rise.max((energy - least) / energies[0])
+    })
+}
+
+/// Largest difference between E(0) - E(t) and the integral of sum |v_i - mean v|^2 up to t, relative to E(0).
+fn energy_imbalance(log: &Log) -> f64 {
+    let loss = |sample: &OwnedSample| {
+        let mean = sample.swarm.mean_velocity_m_s();
+        (0..sample.swarm.count()).map(|i| (row(&sample.swarm.velocities_m_s, i) - mean).norm_squared()).sum::<f64>()
+    };
+    let initial = log.samples[0].energy.expect("the law has an energy");
+    let (mut lost, mut worst) = (0.0, 0.0_f64);
+    for pair in log.samples.windows(2) {
+        lost += 0.5 * (loss(&pair[0]) + loss(&pair[1])) * (pair[1].time_s - pair[0].time_s);
+        // A flight that ends in a collision has no energy there.
+        let Some(energy) = pair[1].energy else { break };
+        worst = worst.max((initial - energy - lost).abs() / initial);
+    }
+    worst
+}
+
+/// 40 s in steps of 1/`steps_per_s`, every one of them recorded.
+fn stepwise(name: &str, steps_per_s: u32) -> Scenario {
+    let mut scenario = builtin(name, &["plant.precision=double", "time.duration_s=40"]);
+    scenario.time.dt_s = 1.0 / f64::from(steps_per_s);
+    scenario.time.record_hz = f64::from(steps_per_s);
+    scenario
+}
+
+/// The law with the sign of its tension flipped: pairs that are too near pull, pairs that are too far push.
+fn flipped(scenario: &Scenario) -> impl Law {
+    let mut tension = scenario.law().expect("a law");
+    Bent::new(scenario, move |_, swarm: &Swarm, control: &mut Rows| {
+        let mut pull = Rows::zeros(swarm.count());
+        tension.control(&Swarm::at_rest(swarm.positions_m.clone()), &mut pull)?;
+        *control -= pull * 2.0;
+        Ok(())
+    })
+}
+
+#[test]
+fn energy_never_increases_and_is_lost_at_the_rate_of_the_theory_up_to_the_step() {
+    for name in ["pentagon", "circle"] {
+        let flights = [60, 120, 240, 480].map(|steps_per_s| fly(&stepwise(name, steps_per_s)).1);
+        for log in &flights {
+            assert!(energy_rise(log) <= ENERGY_ROUNDING, "{name}: {}", energy_rise(log));
+        }
+        let imbalances = flights.each_ref().map(energy_imbalance);
+        for pair in imbalances.windows(2) {
+            let order = (pair[0] / pair[1]).log2();
+            assert!(ORDER.contains(&order), "{name}: order {order} in {imbalances:?}");
+        }
+    }
+}
+
+#[test]
+fn with_the_sign_of_the_tension_flipped_both_energy_checks_fail() {
+    let scenario = stepwise("pentagon", 240);
+    let (_, log) = fly_with(&scenario, &mut flipped(&scenario), plant::for_scenario(&scenario).as_mut());
+    assert!(energy_rise(&log) > 1.0, "{}", energy_rise(&log));
+    assert!(energy_imbalance(&log) > 1.0, "{}", energy_imbalance(&log));
+}
+
+// Passing through
+
+/// Thrown at 1000 m/s past a vehicle at rest: 16.7 m a step, from 8.4 m before it to 8.3 m behind it.
+fn thrown() -> Scenario {
+    let mut scenario = duel([-41.7, 0.0], [1000.0, 0.0], 2.0, 1.0 / 60.0, 0.1);
+    scenario.law = LawSpec::Laplacian { f1_per_s2: 1.0, f2_per_s: 1.0 };
+    scenario.time.record_hz = 60.0;
+    scenario
+}
+
+#[test]
+fn a_vehicle_thrown_through_another_within_one_step_is_caught_by_both_detectors() {
+    let (flight, log) = fly(&thrown());
+    assert_eq!((flight.ending, flight.audit.status), (Ending::Completed, Status::Violation));
+    let [violation] = flight.audit.violations[..] else { panic!("{:?}", flight.audit.violations) };
+    assert_eq!(violation.pair, Pair::new(0, 1));
+    assert!(violation.min_m < 0.5, "{} m", violation.min_m);
+    let duration_s = violation.to_s - violation.from_s;
+    assert!((0.003..0.005).contains(&duration_s), "4 m at nearly 1000 m/s take {duration_s} s");
+    let cast_s = flight.audit.parry.min_toi_s.expect("the shape cast finds the contact too");
+    assert!((cast_s - violation.from_s).abs() < 1e-9, "{cast_s} s and {} s", violation.from_s);
+    assert_eq!(flight.audit.parry.disagreements, 0);
+    assert!(log.events.contains(&Event::ViolationBegan { pair: violation.pair, time_s: violation.from_s }));
+}
+
+#[test]
+fn looking_at_the_samples_alone_misses_that_vehicle_and_so_does_the_engine() {
+    let scenario = thrown();
+    let (flight, log) = fly(&scenario);
+    assert_eq!(log.samples.len() as u64, flight.steps + 1, "every step is a sample");
+    let apart_m = |sample: &OwnedSample| separation(&sample.swarm.positions_m, 0, 1);
+    let nearest_m = log.samples.iter().map(apart_m).fold(f64::INFINITY, f64::min);
+    assert!(nearest_m > scenario.delta_m, "{nearest_m} m");
+    assert!(flight.engine_contacts.is_empty(), "{:?}", flight.engine_contacts);
+}
+
+// Refused steps
+
+/// Closing at 20 m/s with 0.4 m to go before the barrier.
+fn barrier_ahead(dt_s: f64) -> Scenario {
+    duel([-1.2, 1.2], [10.0, -10.0], 2.0, dt_s, 5.0)
+}
+
+#[test]
+fn a_step_that_would_jump_the_barrier_is_flown_in_parts() {
+    for dt_s in [1.0 / 240.0, 1.0 / 60.0, 0.125, 0.25, 0.5] {
+        let scenario = barrier_ahead(dt_s);
+        let (flight, log) = fly(&scenario);
+        assert_eq!((flight.ending, flight.audit.status), (Ending::Completed, Status::Clear), "dt = {dt_s} s");
+        assert_eq!(flight.steps, scenario.time.steps());
+        assert!(flight.audit.steps > flight.steps, "the judge sees the parts");
+        let refined = refinements(&log);
+        assert!(!refined.is_empty());
+        for (time_s, part_s) in refined {
+            assert!(part_s < dt_s && part_s >= dt_s / 1024.0, "{part_s} s");
+            assert_eq!((dt_s / part_s).log2().fract(), 0.0, "halves of halves");
+            assert_eq!((time_s / dt_s).fract(), 0.0, "a step begins at {time_s} s");
+        }
+    }
+}
+
+#[test]
+fn without_halvings_that_step_jumps_the_barrier_and_is_called_a_violation() {
+    let mut scenario = barrier_ahead(0.5);
+    scenario.time.max_halvings = 0;
+    let (flight, log) = fly(&scenario);
+    assert_eq!(flight.audit.status, Status::Violation);
+    assert_eq!(refinements(&log), []);
+}
+
+#[test]
+fn without_halvings_a_step_that_lands_within_the_barrier_ends_the_run_as_a_collision() {
+    let mut scenario = barrier_ahead(0.125);
+    scenario.time.max_halvings = 0;
+    let (flight, log) = fly(&scenario);
+    let Ending::LawUndefined(LawError::Collision { pair, separation_m, delta_m }) = flight.ending else {
+        panic!("{:?}", flight.ending)
+    };
+    assert_eq!((pair, delta_m), (Pair::new(0, 1), 2.0));
+    assert!(separation_m < delta_m);
+    assert_eq!(flight.audit.status, Status::Violation);
+    assert_eq!((flight.steps, flight.duration_s), (1, 0.125));
+    let last = log.samples.last().expect("samples");
+    assert_eq!((last.time_s, last.step, last.energy), (0.125, 1, None));
+    assert_eq!(&last.swarm, &flight.last);
+    assert!(last.control.iter().all(|&u| u == 0.0), "no command follows from a state without one");
+    let Some(Event::EndedEarly { time_s, reason }) = log.events.last() else { panic!("{:?}", log.events) };
+    assert!(*time_s == 0.125 && reason.contains("vehicles 1-2"), "{reason}");
+}
+
+#[test]
+fn a_law_without_a_barrier_is_never_refused_a_step() {
+    let mut scenario = barrier_ahead(1.0);
+    scenario.law = LawSpec::Laplacian { f1_per_s2: 1.0, f2_per_s: 1.0 };
+    let (flight, log) = fly(&scenario);
+    assert_eq!((refinements(&log), flight.audit.steps), (vec![], flight.steps));
+}
+
+// Endings
+
+#[test]
+fn a_law_that_commands_what_is_not_a_number_is_named_with_vehicle_and_step() {
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
+    for (bad, at) in [(f64::NAN, 0), (f64::INFINITY, 7), (f64::NEG_INFINITY, 239)] {
+        let mut law = Bent::new(&scenario, |asked, _: &Swarm, control: &mut Rows| {
+            if asked == at {
+                control[(3, 1)] = bad;
+            }
+            Ok(())
+        });
+        let (flown, log) = fly_with(&scenario, &mut law, plant::for_scenario(&scenario).as_mut());
+        let error = flown.expect_err("the command is not a number");
+        assert!(matches!(error, SimError::CommandNotFinite { step, vehicle: 3 } if step == at), "{error}");
+        assert!(error.to_string().starts_with(&format!("step {at}: ")) && error.to_string().contains("vehicle 4"));
+        assert!(log.samples.iter().all(|sample| sample.control.iter().all(|u| u.is_finite())));
+        let Some(Event::EndedEarly { reason, .. }) = log.events.last() else { panic!("{:?}", log.events) };
+        assert_eq!(*reason, error.to_string());
+    }
+}
+
+#[test]
+fn a_plant_that_loses_a_vehicle_is_named_with_vehicle_and_step() {
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
+    for (says_so, lost_at) in [(true, 1), (true, 9), (false, 0), (false, 1), (false, 9)] {
+        let inner = plant::for_scenario(&scenario);
+        let mut plant = Lost { inner, steps_left: lost_at, vehicle: 2, says_so };
+        let mut law = scenario.law().expect("a law");
+        let (flown, log) = fly_with(&scenario, law.as_mut(), &mut plant);
+        let error = flown.expect_err("the state is not a number");
+        let expected = u64::from(lost_at);
+        assert!(matches!(error, SimError::StateNotFinite { step, vehicle: 2 } if step == expected), "{error}");
+        assert!(error.to_string().contains("vehicle 3"), "{error}");
+        assert!(log.samples.iter().all(|sample| sample.swarm.first_not_finite().is_none()));
+    }
+}
+
+#[test]
+fn the_engine_itself_reports_a_vehicle_that_left_the_range_of_its_numbers() {
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
+    let mut law = Bent::new(&scenario, |asked, _: &Swarm, control: &mut Rows| {
+        if asked == 5 {
+            control[(1, 0)] = 1e39;
+        }
+        Ok(())
+    });
+    let (flown, _) = fly_with(&scenario, &mut law, plant::for_scenario(&scenario).as_mut());
+    let error = flown.expect_err("1e39 is infinite in single precision");
+    assert!(matches!(error, SimError::StateNotFinite { step: 6, vehicle: 1 }), "{error}");
+}
+
+#[test]
+fn a_law_that_becomes_undefined_ends_the_run_with_what_was_recorded() {
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
+    for undefined_at in [0, 1, 101] {
+        let mut law = Bent::new(
+            &scenario,
+            |asked, _: &Swarm, _: &mut Rows| {
+                if asked == undefined_at { Err(LawError::OutOfRange) } else { Ok(()) }
+            },
+        );
+        let (flown, log) = fly_with(&scenario, &mut law, plant::for_scenario(&scenario).as_mut());
+        let flight = flown.expect("an early end is no error");
+        assert_eq!(flight.ending, Ending::LawUndefined(LawError::OutOfRange));
+        assert_eq!((flight.steps, flight.audit.steps), (undefined_at, undefined_at));
+        let (_, undisturbed) = fly(&scenario);
+        let last = log.samples.last().expect("samples");
+        let before = &log.samples[..log.samples.len() - 1];
+        assert_eq!(before, &undisturbed.samples[..before.len()]);
+        assert_eq!((last.step, last.time_s), (undefined_at, flight.duration_s));
+        let Some(Event::EndedEarly { time_s, reason }) = log.events.last() else { panic!("{:?}", log.events) };
+        assert!(*time_s == flight.duration_s && reason.contains("too large for double precision"), "{reason}");
+    }
+}
+
+#[test]
+fn a_caller_that_breaks_off_gets_a_complete_flight_up_to_there() {
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
+    for (break_at, last_sample) in [(1, 1), (100, 100), (101, 101)] {
+        let mut log = Log::default();
+        let mut law = scenario.law().expect("a law");
+        let mut asked = Vec::new();
+        let flight =
+            sim::fly(&scenario, law.as_mut(), plant::for_scenario(&scenario).as_mut(), &mut log, &mut |step| {
+                asked.push(step);
+                if step == break_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .expect("breaking off is no error");
+        assert_eq!((flight.ending, flight.steps), (Ending::Interrupted, break_at));
+        assert_eq!(asked, (1..=break_at).collect::<Vec<_>>());
+        assert_eq!(log.samples.last().map(|sample| sample.step), Some(last_sample));
+        let steps: Vec<_> = log.samples.iter().map(|sample| sample.step).collect();
+        assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "no instant is recorded twice: {steps:?}");
+        assert!(matches!(log.events.last(), Some(Event::EndedEarly { reason, .. }) if reason == "interrupted"));
+    }
+}
+
+#[test]
+fn breaking_off_at_the_last_step_is_a_completed_flight() {
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
+    let mut law = scenario.law().expect("a law");
+    let flight = sim::fly(&scenario, law.as_mut(), plant::for_scenario(&scenario).as_mut(), &mut (), &mut |step| {
+        if step == 240 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!(flight.expect("a flight").ending, Ending::Completed);
+}
+
+#[test]
+fn samples_are_recorded_at_the_rate_that_was_asked_for() {
+    for (record_hz, samples) in [(60, 61), (1, 2), (240, 241), (1000, 241), (7, 8)] {
+        let scenario = builtin("pentagon", &["time.duration_s=1", &format!("time.record_hz={record_hz}")]);
+        let (_, log) = fly(&scenario);
+        assert_eq!(log.samples.len(), samples, "{record_hz} Hz");
+        assert_eq!(log.samples[0].time_s, 0.0);
+        assert_eq!(log.samples.last().map(|sample| sample.time_s), Some(1.0));
+        for sample in &log.samples {
+            assert_eq!(sample.time_s, sample.step as f64 * scenario.time.dt_s);
+        }
+    }
+}
+
+#[test]
+fn the_closest_approach_of_a_sample_is_that_of_all_steps_since_the_sample_before() {
+    let fine = fly(&builtin("pentagon", &["time.duration_s=5", "time.record_hz=240"])).1;
+    let coarse = fly(&builtin("pentagon", &["time.duration_s=5", "time.record_hz=2"])).1;
+    let mut from = 0;
+    for sample in &coarse.samples {
+        let since = fine.samples.iter().filter(|step| step.step == 0 || (from..=sample.step).contains(&step.step));
+        let since = since.filter(|step| sample.step == 0 || step.step > 0);
+        let least = since.filter_map(|step| step.separation).min_by(|a, b| a.separation_m.total_cmp(&b.separation_m));
+        assert_eq!(sample.separation, least, "at {} s", sample.time_s);
+        from = sample.step + 1;
+    }
+}
+
+// Symmetries
+
+/// Where the vehicles of a scenario are after its flight.
+fn end(scenario: &Scenario) -> Swarm {
+    scenario.validate().unwrap_or_else(|error| panic!("{error}"));
+    fly(scenario).0.last
+}
+
+fn moved(rows: &Rows, by: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Rows {
+    let mut moved = rows.clone();
+    (0..rows.nrows()).for_each(|i| set_row(&mut moved, i, by(row(rows, i))));
+    moved
+}
+
+fn relabelled(rows: &Rows, order: &[usize]) -> Rows {
+    Rows::from_fn(rows.nrows(), |i, axis| rows[(order[i], axis)])
+}
+
+fn small_flight() -> Scenario {
+    builtin("pentagon", &["plant.precision=double", "time.duration_s=4", "swarm.dimensions=3"])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn rotating_translating_and_relabelling_a_scenario_changes_nothing(
+        axis in prop::array::uniform3(-3.0..3.0_f64),
+        offset in prop::array::uniform3(-100.0..100.0_f64),
+        order in Just((0..5).collect::<Vec<_>>()).prop_shuffle(),
+    ) {
+        // Coordinates up to 100 m are rounded to 1e-14 m; the flight amplifies a difference by less than 1e4 in 4 s.
+        const TOLERANCE: f64 = 1e-10;
+        let plain = small_flight();
+        let rotation = Rotation3::new(Vector3::from(axis));
+        let offset = Vector3::from(offset);
+        let mut changed = plain.clone();
+        changed.start.positions_m = relabelled(&moved(&plain.start.positions_m, |p| rotation * p + offset), &order);
+        changed.start.velocities_m_s = relabelled(&moved(&plain.start.velocities_m_s, |v| rotation * v), &order);
+        changed.formation.slots_m = relabelled(&plain.formation.slots_m, &order);
+        let (expected, found) = (end(&plain), end(&changed));
+        let positions_m = relabelled(&moved(&expected.positions_m, |p| rotation * p + offset), &order);
+        let velocities_m_s = relabelled(&moved(&expected.velocities_m_s, |v| rotation * v), &order);
+        let off = (found.positions_m - positions_m).amax().max((found.velocities_m_s - velocities_m_s).amax());
+        prop_assert!(off <= TOLERANCE, "off by {off}");
+    }
+}
+
+#[test]
+fn a_start_that_is_another_one_is_not_taken_for_the_same() {
+    let mut other = small_flight();
+    other.start.positions_m[(0, 0)] += 1e-6;
+    assert!((end(&other).positions_m - end(&small_flight()).positions_m).amax() > 1e-8);
+}

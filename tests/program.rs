@@ -1,0 +1,319 @@
+//! The program does what its help says: commands, options, texts, JSON and exit codes.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use program::{Ran, TAUTLINE, ran_by};
+use serde_json::Value;
+use tautline::record::mcap::McapRecording;
+use tautline::scenario::builtin;
+use tempfile::TempDir;
+
+const GOOD: Option<i32> = Some(0);
+const BAD: Option<i32> = Some(1);
+const WRONG_INPUT: Option<i32> = Some(2);
+
+/// A flight that ends soon, and therefore without a formation.
+const SHORT: [&str; 2] = ["--set", "time.duration_s=1"];
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a folder for the run")
+}
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+/// `run` with these arguments, into `out` below the folder.
+fn run(folder: &Path, arguments: &[&str]) -> Ran {
+    ran(folder, &[&["run", "--out", "out"], arguments].concat())
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// Paths of all keys, lists taken as values.
+fn key_paths(value: &Value, path: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(object) => {
+            for (key, value) in object {
+                key_paths(value, &format!("{path}.{key}"), found);
+            }
+        }
+        _ => found.push(path.trim_start_matches('.').to_owned()),
+    }
+}
+
+#[test]
+fn the_pentagon_as_json_is_the_reference_flight() {
+    let folder = folder();
+    let Ran { exit, out, err } = run(folder.path(), &["pentagon", "--json"]);
+    let report = json(&out);
+    assert_eq!(exit, GOOD, "{err}");
+    assert_eq!(fs::read_to_string(folder.path().join("out/report.json")).expect("a report"), out, "one JSON, alone");
+
+    let number = |pointer: &str| report.pointer(pointer).and_then(Value::as_f64).expect(pointer);
+    let near = |pointer: &str, expected: f64, tolerance: f64| {
+        let found = number(pointer);
+        assert!((found - expected).abs() <= tolerance, "{pointer}: {found}, expected {expected}");
+    };
+    // The reference values, and how far a step of 1/240 s may be from them, are those of tests/reference_flights.rs.
+    near("/separation/min_m", 2.460_353, 0.002);
+    near("/separation/min_at_s", 2.151, 0.02);
+    near("/separation/certified_m", 2.055_307, 1e-5);
+    near("/energy/initial", 3.656_743, 1e-5);
+    near("/formation/reached_at_s", 37.0, 1.0);
+    assert!([vec![2, 3], vec![1, 3]].map(Value::from).contains(&report["separation"]["min_pair"]));
+    assert_eq!(report["verdict"], json(r#"{"pass": true, "reasons": []}"#));
+    assert_eq!(report["audit"]["status"], "clear");
+    assert_eq!(report["audit"]["violations"], json("[]"));
+    assert_eq!(report["audit"]["closed_form"]["min_m"], report["separation"]["min_m"]);
+    assert_eq!(report["audit"]["parry"], json(r#"{"min_toi_s": null, "disagreements": 0}"#));
+    assert_eq!(report["audit"]["pairs_checked"], 28_801 * 10);
+    assert_eq!(report["formation"]["reached"], true);
+    assert!(number("/energy/max_over_initial") <= 1.0);
+    assert_eq!(report["run"]["steps"], 28_800);
+}
+
+#[test]
+fn the_keys_of_the_report_are_the_documented_ones() {
+    let expected = [
+        "schema_version",
+        "scenario.name scenario.sha256",
+        "tool.name tool.version",
+        "verdict.pass verdict.reasons",
+        "separation.delta_m separation.min_m separation.min_at_s separation.min_pair separation.certified_m",
+        "separation.certificate_void",
+        "audit.status audit.violations audit.steps audit.pairs_checked audit.closed_form.min_m",
+        "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
+        "formation.reached formation.reached_at_s formation.max_edge_error_m formation.rms_position_error_m",
+        "energy.initial energy.final energy.max_over_initial",
+        "control.peak_m_s2 control.final_m_s2",
+        "velocity.disagreement_m_s velocity.common_m_s",
+        "run.duration_s run.dt_s run.steps run.vehicles run.state_hash",
+        "performance.wall_s performance.real_time_factor performance.law_s performance.physics_s",
+        "performance.audit_s performance.record_s",
+    ];
+    let mut expected: Vec<&str> = expected.iter().flat_map(|line| line.split(' ')).collect();
+    let report = json(&run(folder().path(), &["pentagon-laplacian", "--json", "--set", "time.duration_s=6"]).out);
+    let mut found = Vec::new();
+    key_paths(&report, "", &mut found);
+    expected.sort_unstable();
+    found.sort_unstable();
+    assert_eq!(found, expected);
+
+    let violation = report["audit"]["violations"][0].as_object().expect("a violation");
+    let keys: Vec<&str> = violation.keys().map(String::as_str).collect();
+    assert_eq!(keys, ["from_s", "min_at_s", "min_m", "pair", "to_s"]);
+}
+
+#[test]
+fn a_person_reads_the_verdict_first_and_where_the_files_are_last() {
+    let folder = folder();
+    let Ran { exit, out, err } = run(folder.path(), &[]);
+    assert_eq!((exit, err.as_str()), (GOOD, ""), "talk goes to standard output where it carries no data");
+    let lines: Vec<&str> = out.lines().collect();
+    assert!(lines[0].starts_with("CLEAR: never closer than 2.4"), "{out}");
+    assert!(lines[0].contains("(delta 2.000 m), formation reached at 3"), "{out}");
+    let last = lines[lines.len() - 1];
+    assert!(last.contains("run.mcap") && last.contains("report.json"), "{out}");
+    assert!(!out.contains('\u{1b}'), "no colour and no progress bar in a pipe");
+}
+
+#[test]
+fn with_json_talk_goes_to_standard_error_and_with_quiet_nowhere() {
+    let folder = folder();
+    let talking = run(folder.path(), &[&SHORT[..], &["--json"]].concat());
+    assert!(talking.err.starts_with("CLEAR: "), "{}", talking.err);
+    assert!(json(&talking.out).is_object());
+    let quiet = run(folder.path(), &[&SHORT[..], &["--json", "--quiet", "--force"]].concat());
+    assert_eq!((quiet.exit, quiet.err.as_str()), (talking.exit, ""));
+    assert!(json(&quiet.out).is_object());
+    let silent = run(folder.path(), &[&SHORT[..], &["--quiet", "--force"]].concat());
+    assert_eq!((silent.exit, silent.out.as_str(), silent.err.as_str()), (talking.exit, "", ""));
+}
+
+#[test]
+fn the_baseline_ends_in_a_violation_and_the_line_in_no_formation() {
+    let folder = folder();
+    let laplacian = run(folder.path(), &["pentagon-laplacian"]);
+    assert_eq!(laplacian.exit, BAD);
+    assert!(laplacian.out.starts_with("VIOLATION: vehicles "), "{}", laplacian.out);
+    assert!(laplacian.out.contains("came to 1.53"), "{}", laplacian.out);
+
+    let collinear = run(folder.path(), &["pentagon-collinear", "--force"]);
+    assert_eq!(collinear.exit, BAD);
+    assert!(collinear.out.starts_with("CLEAR: ") && collinear.out.contains("NOT reached"), "{}", collinear.out);
+    assert!(collinear.out.contains("The start lies on a line"), "{}", collinear.out);
+    let report = json(&fs::read_to_string(folder.path().join("out/report.json")).expect("a report"));
+    assert!(report["verdict"]["reasons"].to_string().contains("on a line"), "{report}");
+}
+
+#[test]
+fn without_arguments_the_pentagon_is_flown_into_out() {
+    let folder = folder();
+    let Ran { exit, out, err } = ran(folder.path(), &[]);
+    assert_eq!(exit, GOOD, "{err}");
+    assert!(out.starts_with("CLEAR: "), "{out}");
+    let run_folder = folder.path().join("out/pentagon");
+    let mut names: Vec<_> =
+        fs::read_dir(&run_folder).expect("the folder").map(|entry| entry.expect("an entry").file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["report.json", "run.mcap"], "nothing temporary is left");
+    let recording = McapRecording::open(&run_folder.join("run.mcap")).expect("a recording");
+    assert_eq!(recording.header().scenario_name, "pentagon");
+    let report = json(&fs::read_to_string(run_folder.join("report.json")).expect("a report"));
+    assert_eq!(report["scenario"]["sha256"], recording.header().scenario_sha256);
+    let (samples, events) = recording.read_all().expect("a whole recording");
+    assert_eq!((samples.len(), events.len()), (7201, 0));
+}
+
+#[test]
+fn a_finished_run_is_kept_unless_it_is_forced_away() {
+    let folder = folder();
+    assert_eq!(run(folder.path(), &SHORT).exit, BAD);
+    let files = || ["report.json", "run.mcap"].map(|name| fs::read(folder.path().join("out").join(name)).expect(name));
+    let before = files();
+    let refused = run(folder.path(), &["circle"]);
+    assert_eq!(refused.exit, WRONG_INPUT);
+    assert!(refused.err.contains("holds a finished run") && refused.err.contains("--force"), "{}", refused.err);
+    assert!(files() == before, "the run is as it was");
+    let forced = run(folder.path(), &["circle", "--set", "time.duration_s=1", "--force"]);
+    assert_eq!(forced.exit, BAD);
+    assert!(files() != before);
+}
+
+#[test]
+fn a_recording_without_a_report_is_not_a_finished_run() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("out")).expect("a folder");
+    fs::write(folder.path().join("out/run.mcap"), b"what a killed run left").expect("a file");
+    assert_eq!(run(folder.path(), &SHORT).exit, BAD, "it is flown, and not reached in a second");
+}
+
+#[test]
+fn an_override_changes_the_flight_and_is_part_of_its_identity() {
+    let folder = folder();
+    let report = |out: &str, sets: &[&str]| {
+        let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", *set]).collect();
+        json(&ran(folder.path(), &[&["run", "--json", "--quiet", "--out", out], &sets[..]].concat()).out)
+    };
+    let plain = report("a", &["time.duration_s=1"]);
+    let changed = report("b", &["time.duration_s=1", "law.delta_m=1.5", "name=mine", "time.dt_s=0.01"]);
+    assert_eq!(changed["separation"]["delta_m"], 1.5);
+    assert_eq!(changed["scenario"]["name"], "mine");
+    assert_eq!(changed["run"]["steps"], 100);
+    assert_ne!(changed["scenario"]["sha256"], plain["scenario"]["sha256"]);
+    assert_ne!(changed["run"]["state_hash"], plain["run"]["state_hash"]);
+}
+
+#[test]
+fn the_resolved_scenario_of_a_recording_flies_the_same_states_again() {
+    let folder = folder();
+    let first = json(&run(folder.path(), &["--json", "--set", "time.duration_s=2", "--set", "law.delta_m=1.75"]).out);
+    let recording = McapRecording::open(&folder.path().join("out/run.mcap")).expect("a recording");
+    fs::write(folder.path().join("again.toml"), &recording.header().scenario_toml).expect("a file");
+    let again = json(&run(folder.path(), &["again.toml", "--json", "--force"]).out);
+    assert_eq!(again["run"]["state_hash"], first["run"]["state_hash"]);
+    assert_eq!(again["scenario"], first["scenario"]);
+}
+
+#[test]
+fn list_names_every_built_in_and_shows_one_as_toml() {
+    let folder = folder();
+    let listed = ran(folder.path(), &["list"]);
+    assert_eq!((listed.exit, listed.out.lines().count()), (GOOD, builtin::all().len()));
+    for builtin in builtin::all() {
+        assert!(listed.out.contains(builtin.name) && listed.out.contains(builtin.summary), "{}", listed.out);
+        let shown = ran(folder.path(), &["list", "--show", builtin.name]);
+        assert_eq!((shown.exit, shown.out.as_str()), (GOOD, builtin.toml));
+    }
+    let unknown = ran(folder.path(), &["list", "--show", "hexagon"]);
+    assert_eq!((unknown.exit, unknown.out.as_str()), (WRONG_INPUT, ""));
+    assert!(unknown.err.contains("hexagon") && unknown.err.contains("tautline list"), "{}", unknown.err);
+}
+
+#[test]
+fn what_list_shows_can_be_saved_and_flown() {
+    let folder = folder();
+    let shown = ran(folder.path(), &["list", "--show", "circle"]);
+    fs::write(folder.path().join("mine.toml"), shown.out).expect("a file");
+    let Ran { exit, err, .. } = run(folder.path(), &["mine.toml"]);
+    assert_eq!(exit, GOOD, "{err}");
+}
+
+#[test]
+fn the_schema_is_json() {
+    let schema = ran(folder().path(), &["schema"]);
+    assert_eq!(schema.exit, GOOD);
+    assert_eq!(json(&schema.out)["title"], "tautline scenario");
+}
+
+#[test]
+fn every_shell_gets_a_completion_script() {
+    let folder = folder();
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = ran(folder.path(), &["completions", shell]);
+        assert_eq!(script.exit, GOOD, "{}", script.err);
+        for word in ["tautline", "run", "list", "schema", "completions"] {
+            assert!(script.out.contains(word), "{shell}: {word}");
+        }
+    }
+    assert_eq!(ran(folder.path(), &["completions", "tcsh"]).exit, WRONG_INPUT);
+}
+
+#[test]
+fn help_and_version_are_good_and_go_to_standard_output() {
+    let folder = folder();
+    let commands: [&[&str]; 4] = [&["--help"], &["run", "--help"], &["help", "list"], &["--version"]];
+    for arguments in commands {
+        let Ran { exit, out, err } = ran(folder.path(), arguments);
+        assert_eq!((exit, err.as_str()), (GOOD, ""), "{arguments:?}");
+        assert!(!out.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn wrong_usage_is_wrong_input() {
+    let folder = folder();
+    let commands: [&[&str]; 5] =
+        [&["fly"], &["run", "--fast"], &["run", "--threads", "0"], &["run", "--out"], &["run", "pentagon", "circle"]];
+    for arguments in commands {
+        let Ran { exit, out, err } = ran(folder.path(), arguments);
+        assert_eq!((exit, out.as_str()), (WRONG_INPUT, ""), "{arguments:?}");
+        assert!(err.starts_with("error: "), "{err}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing was written");
+}
+
+#[test]
+fn any_number_of_threads_is_taken() {
+    let folder = folder();
+    let Ran { exit, err, .. } = run(folder.path(), &[&SHORT[..], &["--threads", "65535"]].concat());
+    assert_eq!(exit, BAD, "flown, and not reached in a second: {err}");
+}
+
+#[test]
+fn a_reader_that_went_away_is_no_error_and_no_panic() {
+    let folder = folder();
+    let run = ["run", "--out", "out", "--json", "--quiet", "--set", "time.duration_s=45"];
+    let commands: [&[&str]; 5] = [&run, &["list"], &["schema"], &["completions", "zsh"], &["--help"]];
+    for arguments in commands {
+        let mut child = Command::new(TAUTLINE)
+            .args(arguments)
+            .current_dir(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
+        drop(child.stdout.take());
+        let done = child.wait_with_output().expect("an end");
+        let err = String::from_utf8_lossy(&done.stderr);
+        assert_eq!((done.status.code(), err.as_ref()), (GOOD, ""), "{arguments:?}");
+    }
+}

@@ -1,0 +1,127 @@
+//! `report.html` escapes what it is given, refers to nothing outside itself, and is the same for every run of a scenario
+//! but for its performance.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use tautline::figures::{self, Course};
+use tautline::report::page::{Badge, Block, Cell, Column, Page, Section, Table, Warning};
+
+const HOSTILE: &str = "</title></pre><script>alert(\"x\")</script>&amp;<img src=x onerror='y'>";
+
+fn hostile_page() -> Page {
+    let text = || HOSTILE.to_owned();
+    let table = || Table {
+        caption: text(),
+        columns: vec![Column::words(HOSTILE), Column::numbers(HOSTILE)],
+        rows: vec![vec![Cell::Noted(text(), text()), Cell::Badge(Badge { word: text(), ..Badge::judged(true) })]],
+    };
+    let figure = figures::paths(&Course::new(), HOSTILE).expect("a figure");
+    Page {
+        title: text(),
+        kind: text(),
+        badge: Badge::judged(false),
+        verdict: text(),
+        reasons: vec![text()],
+        warnings: vec![Warning { code: text(), message: text() }],
+        sections: vec![Section {
+            heading: text(),
+            blocks: vec![
+                Block::Text(text()),
+                Block::List(vec![text()]),
+                Block::Table(table()),
+                Block::Tables(vec![table()]),
+                Block::Figures(vec![figure]),
+                Block::Command(text()),
+                Block::Folded { summary: text(), text: text() },
+            ],
+        }],
+        foot: text(),
+    }
+}
+
+/// A page without what may look like a reference and is none.
+fn without_namespaces(html: &str) -> String {
+    html.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "").replace("href=\"data:,\"", "")
+}
+
+#[test]
+fn every_text_of_a_page_is_escaped() {
+    let html = hostile_page().render();
+    for raw in ["<script", "<img", "</pre><", "onerror='"] {
+        assert!(!html.contains(raw), "{raw} in {html}");
+    }
+    let escaped = html.matches("&lt;script&gt;").count();
+    assert!(escaped >= 20, "{escaped} texts were found");
+    assert!(html.contains("&amp;amp;"), "an entity in a text is a text");
+}
+
+#[test]
+fn a_table_has_headers_and_a_badge_says_in_words_what_its_colour_says() {
+    let html = hostile_page().render();
+    assert!(html.contains("<th scope=\"col\"") && html.contains("<th scope=\"row\"") && html.contains("<caption>"));
+    assert!(html.contains(">fail</strong>"));
+    assert!(html.contains("<html lang=\"en\">") && html.contains("name=\"viewport\""));
+}
+
+fn fly(folder: &Path, arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_tautline"))
+        .args(["run", "--quiet", "--force", "--out"])
+        .arg(folder)
+        .args(arguments)
+        .output()
+        .expect("the program runs");
+    assert!(output.status.code() <= Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+    fs::read_to_string(folder.join("report.html")).expect("a page")
+}
+
+#[test]
+fn two_runs_give_the_same_page_and_figures_but_for_the_performance() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let flown = ["circle", "--set", "time.duration_s=20"];
+    let runs = ["a", "b"].map(|name| {
+        fly(&folder.path().join(name), &[&flown[..], &["--threads", if name == "a" { "1" } else { "2" }]].concat())
+    });
+    let [a, b] = runs.each_ref().map(|html| html.split_once("<h2>Performance</h2>").expect("a performance part"));
+    assert_eq!(a.0, b.0);
+    assert_ne!(a.1, b.1, "wall-clock time is in the performance part");
+    for name in ["paths", "distances", "control", "energy", "shape-error", "disagreement"] {
+        let file = Path::new("figures").join(format!("{name}.svg"));
+        let [a, b] = ["a", "b"].map(|run| fs::read(folder.path().join(run).join(&file)).expect("a figure"));
+        assert_eq!(a, b, "{name}");
+        assert!(runs[0].contains(std::str::from_utf8(&a).expect("text")), "{name} is part of the page");
+    }
+}
+
+#[test]
+fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let html = fly(folder.path(), &["pentagon", "--set", "time.duration_s=2", "--set", "plant.precision=\"double\""]);
+    for part in [
+        "CLEAR: never closer than",
+        "Certified distance",
+        "The certified distance holds for the complete graph",
+        "double precision (64 bits), law and audit",
+        "tautline run pentagon --set &#39;time.duration_s=2&#39;",
+        "precision = &quot;double&quot;",
+    ] {
+        let part_quoted = part.replace("&#39;", "'");
+        assert!(html.contains(part) || html.contains(&part_quoted), "{part}");
+    }
+    let plain = without_namespaces(&html);
+    for reference in ["http", "href", "src=", "url(", "@import", "<script"] {
+        assert!(!plain.contains(reference), "{reference}");
+    }
+}
+
+#[test]
+fn figures_that_are_not_wanted_are_not_left_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let flown = ["pentagon", "--set", "time.duration_s=1"];
+    fly(folder.path(), &flown);
+    let figure = folder.path().join("figures/energy.svg");
+    assert!(figure.exists());
+    let html = fly(folder.path(), &[&flown[..], &["--no-figures"]].concat());
+    assert!(!figure.exists() && !html.contains("<svg"));
+}

@@ -1,0 +1,59 @@
+//! Scenarios read and flown, with everything that was recorded kept in memory.
+
+use std::ops::ControlFlow;
+
+use tautline::law::Law;
+use tautline::plant::{self, Plant};
+use tautline::record::{Event, OwnedSample, RecordError, Recorder, Sample};
+use tautline::scenario::{Override, Scenario, Source};
+use tautline::sim::{self, Flight, SimError};
+
+/// A built-in scenario with some keys set.
+pub(crate) fn builtin(name: &str, sets: &[&str]) -> Scenario {
+    let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
+    Scenario::read(&Source::Builtin(name.to_owned()), &overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Keeps every sample and every event.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Log {
+    pub(crate) samples: Vec<OwnedSample>,
+    pub(crate) events: Vec<Event>,
+}
+
+impl Recorder for Log {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.samples.push(OwnedSample {
+            time_s: sample.time_s,
+            step: sample.step,
+            swarm: sample.swarm.clone(),
+            control: sample.control.clone(),
+            separation: sample.separation,
+            energy: sample.energy,
+        });
+        Ok(())
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        self.events.push(event.clone());
+        Ok(())
+    }
+}
+
+/// Flies the scenario with its own law and plant.
+pub(crate) fn fly(scenario: &Scenario) -> (Flight, Log) {
+    let mut law = scenario.law().expect("the law of a valid scenario");
+    let (flown, log) = fly_with(scenario, law.as_mut(), plant::for_scenario(scenario).as_mut());
+    (flown.expect("a flight"), log)
+}
+
+/// Flies the scenario with another law or plant.
+pub(crate) fn fly_with(
+    scenario: &Scenario,
+    law: &mut dyn Law,
+    plant: &mut dyn Plant,
+) -> (Result<Flight, SimError>, Log) {
+    let mut log = Log::default();
+    let flown = sim::fly(scenario, law, plant, &mut log, &mut |_step| ControlFlow::Continue(()));
+    (flown, log)
+}
