@@ -9,12 +9,14 @@ use super::Failure;
 /// A folder that is finished once it holds its report.
 pub(super) struct OutFolder {
     path: PathBuf,
+    what: &'static str,
     report: &'static str,
 }
 
 impl OutFolder {
-    pub(super) fn at(path: impl Into<PathBuf>, report: &'static str) -> Self {
-        Self { path: path.into(), report }
+    /// The folder at `path` of a `what`, such as `run`, whose report has that name.
+    pub(super) fn at(path: impl Into<PathBuf>, what: &'static str, report: &'static str) -> Self {
+        Self { path: path.into(), what, report }
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -36,8 +38,8 @@ impl OutFolder {
         let report = self.report();
         if report.exists() && !force {
             return Err(Failure::input(
-                format!("{} holds a finished run", self.path.display()),
-                "give another folder with --out, or overwrite the run with --force",
+                format!("{} holds a finished {}", self.path.display(), self.what),
+                format!("give another folder with --out, or overwrite the {} with --force", self.what),
             ));
         }
         let machine = |path: &Path, error: &io::Error| {

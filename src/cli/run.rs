@@ -107,7 +107,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
-    let folder = OutFolder::at(path, "report.json");
+    let folder = OutFolder::at(path, "run", "report.json");
     folder.open(arguments.force)?;
     let mut course = Course::new();
     let report = threads.install(|| fly(&scenario, law, &folder, console, &interrupted, &mut course))?;

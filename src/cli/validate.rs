@@ -1,6 +1,7 @@
 //! `tautline validate`: judge every claim of ours and of the paper.
 
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -8,7 +9,10 @@ use super::console::{self, Console};
 use super::folder::OutFolder;
 use super::{Exit, Failure};
 use crate::report::write_atomically;
-use crate::validate;
+use crate::validate::{self, Validation};
+
+/// The page for people.
+const PAGE: &str = "validate.html";
 
 /// Arguments of `tautline validate`.
 #[derive(Debug, Args)]
@@ -22,8 +26,8 @@ pub(super) struct ValidateArguments {
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
-    /// Print the tables of docs/validation.md on standard output, and write no folder.
-    #[arg(long, conflicts_with_all = ["json", "out", "force"])]
+    /// Print the generated part of docs/validation.md on standard output, and nothing else there.
+    #[arg(long, conflicts_with = "json")]
     markdown: bool,
     /// Print no summary and no progress.
     #[arg(long)]
@@ -35,36 +39,38 @@ pub(super) struct ValidateArguments {
 
 pub(super) fn validate(arguments: &ValidateArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json || arguments.markdown, quiet: arguments.quiet };
-    let folder = OutFolder::at(&arguments.out, "validate.json");
-    if !arguments.markdown {
-        folder.open(arguments.force)?;
-    }
+    let folder = OutFolder::at(&arguments.out, "validation", "validate.json");
+    folder.open(arguments.force)?;
     let threads = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
     let bar = console.progress(validate::work(), "validate".to_owned());
-    let judged = threads.install(|| validate::validate(&|units| bar.inc(units)));
+    let validation = threads.install(|| validate::validate(&|units| bar.inc(units)));
     bar.finish_and_clear();
-    let validation = judged.map_err(|error| Failure::machine(format!("a claim could not be tried: {error}")))?;
 
+    let json = validation.to_json().map_err(|error| Failure::machine(format!("cannot write the result: {error}")))?;
+    leave(&folder, &validation, &json)?;
+    console.say(&format!("{}{}", validation.text(), validation.headline()));
+    console.say(&format!("wrote {} and {}", folder.report().display(), folder.file(PAGE).display()));
+    if arguments.json {
+        console::data(&json)?;
+    }
     if arguments.markdown {
         console::data(&validation.markdown())?;
-    } else {
-        let json =
-            validation.to_json().map_err(|error| Failure::machine(format!("cannot write the result: {error}")))?;
-        console.say(&format!("{}{}", validation.text(), validation.headline()));
-        leave(&arguments.out, &json)?;
-        console.say(&format!("wrote {}", folder.report().display()));
-        if arguments.json {
-            console::data(&json)?;
-        }
     }
     Ok(if validation.pass { Exit::Good } else { Exit::Bad })
 }
 
-/// Leaves the result in the folder; `validate.json`, which marks it as finished, comes last.
-fn leave(folder: &Path, json: &str) -> Result<(), Failure> {
-    write_atomically(&folder.join("validate.json"), json.as_bytes())?;
+/// Leaves figures, page and result in the folder; `validate.json`, which marks it as finished, comes last.
+fn leave(folder: &OutFolder, validation: &Validation, json: &str) -> Result<(), Failure> {
+    let figures = folder.file("figures");
+    fs::create_dir_all(&figures)
+        .map_err(|error| Failure::machine(format!("cannot write {}: {error}", figures.display())))?;
+    for figure in &validation.figures {
+        write_atomically(&figures.join(format!("{}.svg", figure.name)), figure.svg.as_bytes())?;
+    }
+    write_atomically(&folder.file(PAGE), validation.to_html().as_bytes())?;
+    write_atomically(&folder.report(), json.as_bytes())?;
     Ok(())
 }

@@ -125,6 +125,7 @@ fn tight() -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "certificate-is-tight",
         source: "the collision theorem",
+        finding: None,
         kind: Kind::Ours,
         statement: "The certificate cannot be improved: two vehicles head on use it up as they get faster.",
         expected: "clearance left over clearance certified falls towards 1".to_owned(),
@@ -141,6 +142,7 @@ fn energy(trials: &[Trial]) -> Claim {
     Claim {
         id: "energy-never-increases",
         source: "the stability theorem, complete graph",
+        finding: None,
         kind: Kind::Ours,
         statement: "In continuous time the energy E never increases.",
         expected: "no rise from one look to the next".to_owned(),
@@ -177,6 +179,7 @@ fn in_continuous_time(trials: &[Trial]) -> Claim {
     Claim {
         id: "certificate",
         source: "the collision theorem, complete graph",
+        finding: None,
         kind: Kind::Ours,
         statement: "No pair ever comes closer than the separation certified before the first step.",
         expected: "never broken".to_owned(),
@@ -201,6 +204,7 @@ fn in_the_engine(trials: &[Trial]) -> Claim {
     Claim {
         id: "certificate-in-the-engine",
         source: "the collision theorem, in discrete time",
+        finding: None,
         kind: Kind::Ours,
         statement: "In Rapier, with a step that resolves the tension at the certified separation, the certificate holds \
                     too.",
@@ -222,5 +226,68 @@ fn in_the_engine(trials: &[Trial]) -> Claim {
         tolerance: "0".to_owned(),
         reason: "the margin is far larger than the error of a step with omega dt <= 0.3",
         pass: broken == 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Starts in a short form of the claim.
+    const FEW: usize = 24;
+
+    fn fly_few() -> Vec<Trial> {
+        let starts = random_starts(SEED, FEW, DELTA_M).expect("starts");
+        starts.par_iter().map(|start| fly(start).expect("a flight")).collect()
+    }
+
+    #[test]
+    fn trials_have_the_same_bits_on_any_number_of_threads() {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(fly_few)
+        };
+        let bits = |trials: &[Trial]| -> Vec<[u64; 5]> {
+            let numbers = |t: &Trial| [t.certified_m, t.continuous_m, t.engine_m, t.dt_s, t.energy_rise];
+            trials.iter().map(|trial| numbers(trial).map(f64::to_bits)).collect()
+        };
+        assert_eq!(bits(&on(1)), bits(&on(3)));
+    }
+
+    #[test]
+    fn a_step_so_long_that_it_jumps_the_barrier_breaks_the_certificate_and_the_claim_says_so() {
+        // Head on at 5 m/s each from 3 m apart, one second a step: the vehicles change places between two looks.
+        let mut swarm = Swarm::at_rest(Formation::line(2, 3.0).slots_m);
+        (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (5.0, -5.0);
+        let scenario = Scenario::new("jump", swarm, Formation::line(2, 2.0), DELTA_M, 1.0);
+        let certified_m = scenario.law().expect("a law").certificate(&scenario.start).certified_m.expect("a promise");
+        let trial = |dt_s: f64| {
+            let flight = engine(&with_step(&scenario, Precision::Double, dt_s), |_| ()).expect("a flight");
+            let engine_m = flight.audit.closest.expect("two vehicles").separation_m;
+            Trial { delta_m: DELTA_M, certified_m, continuous_m: engine_m, engine_m, dt_s, energy_rise: 0.0 }
+        };
+        let honest = trial(honest_step_s(&scenario, certified_m).expect("a tension"));
+        assert!(in_the_engine(&[honest]).pass, "{honest:?}");
+        let jumped = trial(1.0);
+        assert!(!in_the_engine(&[honest, jumped]).pass, "{jumped:?}");
+        assert_eq!(in_the_engine(&[honest, jumped]).value("broken"), Some(1.0));
+    }
+
+    #[test]
+    fn an_energy_that_rises_or_is_no_number_is_a_claim_that_fails() {
+        let good = Trial {
+            delta_m: DELTA_M,
+            certified_m: 1.1,
+            continuous_m: 1.2,
+            engine_m: 1.2,
+            dt_s: 0.01,
+            energy_rise: 0.0,
+        };
+        assert!(energy(&[good]).pass);
+        for energy_rise in [1e-3, f64::NAN] {
+            assert!(!energy(&[good, Trial { energy_rise, ..good }]).pass);
+        }
+        let lost = Trial { continuous_m: f64::NAN, ..good };
+        assert!(!in_continuous_time(&[good, lost]).pass, "a separation that is no number keeps no promise");
     }
 }

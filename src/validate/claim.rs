@@ -3,13 +3,17 @@
 use serde::ser::SerializeMap as _;
 use serde::{Serialize, Serializer};
 
+use super::ValidateError;
+
 /// A statement of ours or of the paper, with what was measured about it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Claim {
     /// Stable name.
     pub id: &'static str,
-    /// Where the statement comes from: equation, figure or theorem of the paper, and the finding F1 to F7 it concerns.
+    /// Where the statement comes from: equation, figure or theorem.
     pub source: &'static str,
+    /// The finding about the paper, F1 to F7, that the claim measures.
+    pub finding: Option<&'static str>,
     /// Whose statement it is, and how it is expected to fare.
     pub kind: Kind,
     /// What is stated.
@@ -41,6 +45,23 @@ pub enum Kind {
 }
 
 impl Claim {
+    /// What stands in the place of claims that could not be tried.
+    pub(super) fn untried(error: &ValidateError) -> Self {
+        Self {
+            id: "tried",
+            source: "this program",
+            finding: None,
+            kind: Kind::Ours,
+            statement: "These claims can be tried.",
+            expected: "every flight can be flown".to_owned(),
+            measured: error.to_string(),
+            values: Values::default(),
+            tolerance: "none".to_owned(),
+            reason: "a law or a plant that gives up is broken",
+            pass: false,
+        }
+    }
+
     /// How the statement fared, in two words at most.
     #[must_use]
     pub fn outcome(&self) -> &'static str {

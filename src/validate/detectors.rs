@@ -1,11 +1,10 @@
 //! Three detectors, one answer: the closed form, parry's shape cast and the engine's own contacts.
 
-use rayon::prelude::*;
-
 use super::claim::{Claim, Kind};
 use super::flights::{builtin, engine};
 use super::{Progress, ValidateError};
 use crate::audit::Status;
+use crate::figures::Course;
 use crate::metrics::Metrics;
 use crate::sim::Flight;
 use crate::swarm::Pair;
@@ -16,17 +15,37 @@ const CONTACT_TOLERANCE_S: f64 = 1e-9;
 /// ladder measures for this step.
 const CLOSEST_TOLERANCE_M: f64 = 0.005;
 
+/// Closest approaches in continuous time \[m\], as an independent integrator gives them.
+const PENTAGON_MIN_M: f64 = 2.460_353;
+const CIRCLE_MIN_M: f64 = 1.238_135;
+
 /// A built-in scenario as `tautline run` flies it.
-struct Flown {
-    flight: Flight,
+#[derive(Debug)]
+pub(super) struct Flown {
+    pub(super) delta_m: f64,
+    pub(super) flight: Flight,
+    pub(super) course: Course,
     reached_at_s: Option<f64>,
 }
 
-fn fly(name: &str) -> Result<Flown, ValidateError> {
+/// The paper's three flights: Figs. 2, 3 and 4.
+#[derive(Debug)]
+pub(super) struct Flights {
+    pub(super) pentagon: Flown,
+    pub(super) circle: Flown,
+    pub(super) baseline: Flown,
+}
+
+fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, ValidateError> {
     let scenario = builtin(name)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
-    let flight = engine(&scenario, |sample| metrics.observe(sample))?;
-    Ok(Flown { reached_at_s: metrics.finish().reached_at_s, flight })
+    let mut course = Course::new();
+    let flight = engine(&scenario, |sample| {
+        metrics.observe(sample);
+        course.observe(sample);
+    })?;
+    progress.advance(1);
+    Ok(Flown { delta_m: scenario.delta_m, reached_at_s: metrics.finish().reached_at_s, flight, course })
 }
 
 /// Pairs in violation by the closed form, in index order.
@@ -44,18 +63,23 @@ fn names(pairs: &[Pair]) -> String {
     pairs.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
-    let flown = ["pentagon", "circle", "pentagon-laplacian"]
-        .par_iter()
-        .map(|name| fly(name).inspect(|_| progress.advance(1)))
-        .collect::<Result<Vec<_>, _>>()?;
-    let [pentagon, circle, baseline] = &flown[..] else { return Ok(Vec::new()) };
-    Ok(vec![
-        flown_clear("figure-2-in-the-engine", "Fig. 2", pentagon, 2.460_353),
-        flown_clear("figure-3-in-the-engine", "Fig. 3", circle, 1.238_135),
-        agree_on_clear(&pentagon.flight),
-        agree_on_violation(&baseline.flight),
-    ])
+/// Flies all three.
+pub(super) fn flights(progress: &Progress<'_>) -> Result<Flights, ValidateError> {
+    let (pentagon, (circle, baseline)) = rayon::join(
+        || fly("pentagon", progress),
+        || rayon::join(|| fly("circle", progress), || fly("pentagon-laplacian", progress)),
+    );
+    Ok(Flights { pentagon: pentagon?, circle: circle?, baseline: baseline? })
+}
+
+/// The claims about them.
+pub(super) fn claims(flights: &Flights) -> Vec<Claim> {
+    vec![
+        flown_clear("figure-2-in-the-engine", "Fig. 2", &flights.pentagon, PENTAGON_MIN_M),
+        flown_clear("figure-3-in-the-engine", "Fig. 3", &flights.circle, CIRCLE_MIN_M),
+        agree_on_clear(&flights.pentagon.flight),
+        agree_on_violation(&flights.baseline.flight),
+    ]
 }
 
 fn flown_clear(id: &'static str, source: &'static str, flown: &Flown, expected_m: f64) -> Claim {
@@ -64,6 +88,7 @@ fn flown_clear(id: &'static str, source: &'static str, flown: &Flown, expected_m
     Claim {
         id,
         source,
+        finding: None,
         kind: Kind::Ours,
         statement: "Rigid bodies in Rapier fly the figure with the program's defaults: clear and reached.",
         expected: format!("clear, reached, closest {expected_m} m as in continuous time"),
@@ -86,6 +111,7 @@ fn agree_on_clear(flight: &Flight) -> Claim {
     Claim {
         id: "detectors-on-a-clear-flight",
         source: "the audit",
+        finding: None,
         kind: Kind::Ours,
         statement: "On the pentagon's flight closed form, parry and Rapier find nothing, each by itself.",
         expected: "no violation, no contact, no overlap".to_owned(),
@@ -111,6 +137,7 @@ fn agree_on_violation(flight: &Flight) -> Claim {
     Claim {
         id: "detectors-on-a-violation",
         source: "the audit",
+        finding: None,
         kind: Kind::Ours,
         statement: "On the baseline's flight closed form, parry and Rapier find the same pairs.",
         expected: "the same pairs, and the first contact at the same time".to_owned(),

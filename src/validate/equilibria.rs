@@ -127,7 +127,8 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
     let in_order_m = rests.first().map_or(f64::NAN, |(rest, _)| rest.edge_error_m);
     Ok(Claim {
         id: "pentagon-orderings",
-        source: "the convergence theorem; F3",
+        source: "the convergence theorem",
+        finding: Some("F3"),
         kind: Kind::PaperRefuted,
         statement: "The law drives the vehicles to the desired formation from any start that is not on a line.",
         expected: "many starts come to rest elsewhere: the law has other equilibria".to_owned(),
@@ -183,7 +184,8 @@ fn polygon(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
     let list = POLYGON_TIMES_S.iter().zip(reached).map(|(time_s, reached)| format!("{reached} after {time_s} s"));
     Ok(Claim {
         id: "polygon-random-starts",
-        source: "the convergence theorem; F3",
+        source: "the convergence theorem",
+        finding: Some("F3"),
         kind: Kind::Ours,
         statement: "A 12-gon is formed from random starts in the plane, but slowly.",
         expected: "hardly ever within a minute, mostly within a quarter of an hour".to_owned(),

@@ -55,6 +55,7 @@ fn against_reference(id: &'static str, source: &'static str, statement: &'static
     Claim {
         id,
         source,
+        finding: None,
         kind: Kind::Ours,
         statement,
         expected: list(checks, |check| check.expected),
@@ -118,6 +119,7 @@ impl Experiment {
         Claim {
             id,
             source,
+            finding: None,
             kind: Kind::PaperHolds,
             statement,
             expected: format!("never below delta = {delta_m} m, and the formation reached"),
@@ -218,6 +220,7 @@ fn baseline() -> Result<Vec<Claim>, ValidateError> {
     Ok(vec![Claim {
         id: "figure-4",
         source: "Fig. 4, equation (3)",
+        finding: None,
         kind: Kind::PaperHolds,
         statement: "Under the Laplacian law (3) the same start reaches the pentagon, but vehicles come closer than delta.",
         expected: "reached; closest 1.5327 m at 3.63 s".to_owned(),
@@ -242,7 +245,8 @@ fn straight_line() -> Result<Vec<Claim>, ValidateError> {
     let off_line_m = states.iter().map(|state| state.positions_m.columns(1, 2).amax()).fold(0.0, f64::max);
     Ok(vec![Claim {
         id: "straight-line",
-        source: "the convergence theorem; F2",
+        source: "the convergence theorem",
+        finding: Some("F2"),
         kind: Kind::PaperRefuted,
         statement: "The law drives the vehicles to the formation from any start without overlap.",
         expected: "from an exactly straight line never: closest 2.458145 m, largest edge error 8.57 m for ever"
@@ -283,7 +287,8 @@ fn up_to_rigid_motion() -> Result<Vec<Claim>, ValidateError> {
     let farthest_m = offsets_m.fold(0.0, f64::max);
     Ok(vec![Claim {
         id: "up-to-rigid-motion",
-        source: "section 4, goal positions h_p; F6",
+        source: "section 4, goal positions h_p",
+        finding: Some("F6"),
         kind: Kind::PaperRefuted,
         statement: "The vehicles reach the goal positions.",
         expected: format!(
@@ -324,6 +329,7 @@ fn relative_motion() -> Result<Vec<Claim>, ValidateError> {
     Ok(vec![Claim {
         id: "relative-motion",
         source: "the stability theorem, complete graph",
+        finding: None,
         kind: Kind::Ours,
         statement: "On the complete graph a22 cancels: relative motion does not depend on it.",
         expected: "the same pentagon flight".to_owned(),

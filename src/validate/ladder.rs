@@ -162,6 +162,7 @@ fn converges(rungs: &[Rung]) -> Claim {
     Claim {
         id: "order-of-the-engine",
         source: "discrete time",
+        finding: None,
         kind: Kind::Ours,
         statement: "In double precision Rapier converges to continuous time with order 1.",
         expected: format!("an observed order of {} to {} from each step to its half", ORDER.start(), ORDER.end()),
@@ -190,6 +191,7 @@ fn single_precision(rungs: &[Rung]) -> Claim {
     Claim {
         id: "single-precision-floor",
         source: "discrete time",
+        finding: None,
         kind: Kind::Ours,
         statement: "In single precision the error falls to a floor of rounding; shorter steps than that are worse.",
         expected: format!("a floor of at most {SINGLE_FLOOR_M:e} m, above that of double precision, and more beyond"),
@@ -214,6 +216,7 @@ fn energy_excess(rungs: &[Rung]) -> Claim {
     Claim {
         id: "energy-excess-of-the-engine",
         source: "discrete time, dE/dt = -sum |v_i - mean v|^2",
+        finding: None,
         kind: Kind::Ours,
         statement: "In Rapier, E exceeds what the dissipation leaves of E(0) only in proportion to dt.",
         expected: format!("an observed order of {} to {}", ORDER.start(), ORDER.end()),
@@ -242,6 +245,7 @@ fn energy_rise(rungs: &[Rung]) -> Claim {
     Claim {
         id: "energy-of-the-engine",
         source: "the stability theorem, in discrete time",
+        finding: None,
         kind: Kind::Ours,
         statement: "In Rapier, E never rises along the pentagon's flight.",
         expected: "no rise above its lowest value so far".to_owned(),
@@ -257,6 +261,7 @@ fn no_ladder(id: &'static str) -> Claim {
     Claim {
         id,
         source: "discrete time",
+        finding: None,
         kind: Kind::Ours,
         statement: "There are steps to compare.",
         expected: "at least two".to_owned(),
@@ -303,6 +308,7 @@ pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, ValidateError
     Ok(Claim {
         id: "free-decay",
         source: "equation (1) with u = 0",
+        finding: None,
         kind: Kind::Ours,
         statement: "In Rapier a free velocity is v(0) exp(a22 t), whatever the step.",
         expected: "exact to rounding".to_owned(),

@@ -109,6 +109,7 @@ fn matrix_form(states: &[State]) -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "matrix-form",
         source: "equations (8), (9)",
+        finding: None,
         kind: Kind::PaperHolds,
         statement: "The sum over neighbours (8) and the weighted Laplacian (9) are the same law.",
         expected: "equal to rounding".to_owned(),
@@ -128,6 +129,7 @@ fn zero_sum(states: &[State]) -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "zero-net-control",
         source: "equation (8)",
+        finding: None,
         kind: Kind::Ours,
         statement: "The controls sum to zero: the law cannot move the centre of mass.",
         expected: "a zero mean".to_owned(),
@@ -150,6 +152,7 @@ fn energy_rate(states: &[State]) -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "energy-rate",
         source: "the stability theorem, complete graph",
+        finding: None,
         kind: Kind::Ours,
         statement: "On the complete graph dE/dt = -sum |v_i - mean v|^2, whatever a22 is.",
         expected: "equal at every state".to_owned(),
@@ -171,6 +174,7 @@ fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "energy-rate-on-graphs",
         source: "theory of the general graph",
+        finding: None,
         kind: Kind::Ours,
         statement: "On any graph dE/dt <= -[(1 + a22) lambda2/N - a22] sum |v_i - mean v|^2.",
         expected: "never more".to_owned(),
@@ -201,7 +205,8 @@ fn literal_baseline() -> Result<Claim, ValidateError> {
     let (at_goal, at_scaled) = (control_at(1.0)?, control_at(f2_per_s / f1_per_s2)?);
     Ok(Claim {
         id: "goal-as-printed",
-        source: "section 4, equation (3); F7",
+        source: "section 4, equation (3)",
+        finding: Some("F7"),
         kind: Kind::PaperRefuted,
         statement: "With h = [0; 1] (x) h_p the law (3) comes to rest at the goal h_p.",
         expected: "rest at (1 + a22) h_p instead: read h as goal positions h_p and goal velocities 0".to_owned(),

@@ -12,7 +12,9 @@ mod claim;
 mod detectors;
 mod equilibria;
 mod experiments;
+mod figures;
 mod flights;
+mod html;
 mod ladder;
 mod law;
 mod page;
@@ -24,9 +26,12 @@ mod words;
 pub use claim::{Claim, Kind, Values};
 pub use ladder::Rung;
 
+use std::time::Instant;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::figures::{Figure, FigureError};
 use crate::law::{LawError, ParameterError, TensionError};
 use crate::plant::PlantError;
 use crate::plant::ideal::IdealError;
@@ -52,19 +57,40 @@ pub struct Group {
 pub struct Validation {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Version of the program that judged.
-    pub version: &'static str,
+    /// What judged.
+    pub tool: Tool,
     /// Whether every claim is as expected.
     pub pass: bool,
     /// All claims.
     pub groups: Vec<Group>,
     /// Rapier against continuous time, from coarse to fine steps.
     pub ladder: Vec<Rung>,
+    /// The paper's figures, and the ladder's.
+    #[serde(skip)]
+    pub figures: Vec<Figure>,
+    /// Wall-clock time: the only part that differs from run to run.
+    pub performance: Performance,
 }
 
-/// Why a validation could not be carried out. None of these can happen in a program that works.
+/// The program that judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Tool {
+    /// Its name.
+    pub name: &'static str,
+    /// Its version.
+    pub version: &'static str,
+}
+
+/// Wall-clock time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Performance {
+    /// From start to end \[s\].
+    pub wall_s: f64,
+}
+
+/// Why claims could not be tried. None of these can happen in a program that works.
 #[derive(Debug, thiserror::Error)]
-pub enum ValidateError {
+pub(crate) enum ValidateError {
     /// A tension does not exist.
     #[error(transparent)]
     Tension(#[from] TensionError),
@@ -83,6 +109,9 @@ pub enum ValidateError {
     /// A plant could not carry out a step.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
     /// A flight failed.
     #[error(transparent)]
     Sim(#[from] SimError),
@@ -106,7 +135,7 @@ struct Part {
     judge: fn(&Progress<'_>) -> Result<Vec<Claim>, ValidateError>,
 }
 
-const PARTS: [Part; 7] = [
+const PARTS: [Part; 6] = [
     Part { id: "tension", title: "The edge tension", work: 1, judge: tension::judge },
     Part { id: "law", title: "The law at single instants", work: 1, judge: law::judge },
     Part {
@@ -123,42 +152,64 @@ const PARTS: [Part; 7] = [
         judge: equilibria::judge,
     },
     Part { id: "rates", title: "Rates near the formation", work: 5, judge: rates::judge },
-    Part { id: "detectors", title: "The judges and the engine", work: 3, judge: detectors::judge },
 ];
-/// The flights of the ladder, and free decay.
-const LADDER_WORK: u64 = 2 * ladder::STEPS_HZ.len() as u64 + 1;
+/// The ladder in both precisions, free motion, and three flights.
+const ENGINE_WORK: u64 = 2 * ladder::STEPS_HZ.len() as u64 + 1 + 3;
+
+const ENGINE_TITLE: &str = "The engine against continuous time";
 
 /// Units of work that [`validate`] counts in all.
 #[must_use]
 pub fn work() -> u64 {
-    PARTS.iter().map(|part| part.work).sum::<u64>() + LADDER_WORK
+    PARTS.iter().map(|part| part.work).sum::<u64>() + ENGINE_WORK
 }
 
 /// Judges every claim. `progress` is told how many further units of [`work`] are done, from any thread.
 ///
-/// # Errors
-/// [`ValidateError`] when a claim could not be tried.
-pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Result<Validation, ValidateError> {
-    let progress = Progress(progress);
+/// Claims that cannot be tried, because a flight of theirs fails, stand as one that fails.
+#[must_use]
+pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Validation {
+    let (began, progress) = (Instant::now(), Progress(progress));
     let parts = || {
-        PARTS
-            .par_iter()
-            .map(|part| Ok(Group { id: part.id, title: part.title, claims: (part.judge)(&progress)? }))
-            .collect::<Result<Vec<_>, ValidateError>>()
+        let judged = PARTS.par_iter().map(|part| group(part.id, part.title, (part.judge)(&progress)));
+        judged.collect::<Vec<_>>()
     };
-    let engine = || Ok((ladder::climb(&progress)?, ladder::free_decay(&progress)?));
-    let (groups, engine): (_, Result<_, ValidateError>) = rayon::join(parts, engine);
-    let (mut groups, (ladder, free_decay)) = (groups?, engine?);
-    let mut claims = ladder::claims(&ladder);
-    claims.push(free_decay);
-    groups.push(Group { id: "engine", title: "The engine against continuous time", claims });
-    Ok(Validation {
+    let engine = || -> Result<_, ValidateError> {
+        Ok((ladder::climb(&progress)?, ladder::free_decay(&progress)?, detectors::flights(&progress)?))
+    };
+    let (mut groups, engine) = rayon::join(parts, engine);
+    let engine = engine.and_then(|(ladder, free_decay, flights)| {
+        let figures = figures::draw(&flights, &ladder)?;
+        Ok((ladder, free_decay, flights, figures))
+    });
+    let (ladder, figures) = match engine {
+        Ok((ladder, free_decay, flights, figures)) => {
+            let mut claims = ladder::claims(&ladder);
+            claims.push(free_decay);
+            groups.push(Group { id: "engine", title: ENGINE_TITLE, claims });
+            let claims = detectors::claims(&flights);
+            groups.push(Group { id: "detectors", title: "The engine and the judges", claims });
+            (ladder, figures)
+        }
+        Err(error) => {
+            groups.push(group("engine", ENGINE_TITLE, Err(error)));
+            (Vec::new(), Vec::new())
+        }
+    };
+    Validation {
         schema_version: SCHEMA_VERSION,
-        version: env!("CARGO_PKG_VERSION"),
+        tool: Tool { name: env!("CARGO_PKG_NAME"), version: env!("CARGO_PKG_VERSION") },
         pass: groups.iter().flat_map(|group| &group.claims).all(|claim| claim.pass),
         groups,
         ladder,
-    })
+        figures,
+        performance: Performance { wall_s: began.elapsed().as_secs_f64() },
+    }
+}
+
+fn group(id: &'static str, title: &'static str, judged: Result<Vec<Claim>, ValidateError>) -> Group {
+    let claims = judged.unwrap_or_else(|error| vec![Claim::untried(&error)]);
+    Group { id, title, claims }
 }
 
 impl Validation {

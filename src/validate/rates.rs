@@ -87,7 +87,8 @@ fn bent_hexagon() -> Result<Claim, ValidateError> {
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
     Ok(Claim {
         id: "bent-hexagon",
-        source: "the convergence theorem; F4",
+        source: "the convergence theorem",
+        finding: Some("F4"),
         kind: Kind::PaperRefuted,
         statement: "The law converges to the formation exponentially, in space as in the plane.",
         expected: "a flat formation in space is reached as t^(-1/2): nothing resists a bend to first order".to_owned(),
@@ -121,7 +122,8 @@ fn common_rate(id: &'static str, statement: &'static str, rate_per_s: f64) -> Cl
     let error_per_s = rate_per_s - A22_PER_S;
     Claim {
         id,
-        source: "the stability theorem; F5",
+        source: "the stability theorem",
+        finding: Some("F5"),
         kind: Kind::PaperRefuted,
         statement,
         expected: format!("the common velocity grows at a22 = {A22_PER_S} 1/s"),
@@ -168,7 +170,8 @@ fn lost_to_rounding() -> Result<Claim, ValidateError> {
     let drift_m_s = flight.last.mean_velocity_m_s().norm();
     Ok(Claim {
         id: "lost-to-rounding",
-        source: "the stability theorem; F5",
+        source: "the stability theorem",
+        finding: Some("F5"),
         kind: Kind::PaperRefuted,
         statement: "Vehicles that have reached the formation stay in it.",
         expected: format!("with a22 = {A22_PER_S} 1/s rounding alone grows until it destroys the formation"),
@@ -217,6 +220,7 @@ fn stars() -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "star",
         source: "general graphs, a22 < (1 + a22) lambda2/N",
+        finding: None,
         kind: Kind::Ours,
         statement: "Relative velocities on a star grow at a22 - (1 + a22)/N: damped for 10 vehicles, not for 12.",
         expected: list(&expected),

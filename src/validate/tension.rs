@@ -35,6 +35,11 @@ fn unit_tension(delta_m: f64, k_m: f64) -> Result<EdgeTension, ValidateError> {
     tension.map_err(|error: TensionError| ValidateError::Tension(error))
 }
 
+/// The tension that Figure 1 plots.
+pub(super) fn of_figure_1() -> Result<EdgeTension, ValidateError> {
+    unit_tension(FIGURE_1_DELTA_M, FIGURE_1_K_M)
+}
+
 fn minimum() -> Result<Claim, ValidateError> {
     let tension = unit_tension(2.0, 1.0 / 1.0_f64.asinh())?;
     let rest_m = tension.rest_m();
@@ -45,6 +50,7 @@ fn minimum() -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "tension-minimum",
         source: "equations (5), (6)",
+        finding: None,
         kind: Kind::PaperHolds,
         statement: "The tension has its only minimum, 0, at the desired distance d = delta + K ln(3 + 2 sqrt 2)/2.",
         expected: "V(d) = V'(d) = 0, and V' changes sign at d".to_owned(),
@@ -63,12 +69,13 @@ fn minimum() -> Result<Claim, ValidateError> {
 }
 
 fn figure_1() -> Result<Claim, ValidateError> {
-    let of_caption = unit_tension(FIGURE_1_DELTA_M, FIGURE_1_K_M)?.minimum();
+    let of_caption = of_figure_1()?.minimum();
     let of_other = unit_tension(PRINTED_FOR_DELTA_M, FIGURE_1_K_M)?.minimum();
     let is_of_other = (of_other - FIGURE_1_PRINTED).abs() <= PRINTED_RESOLUTION;
     Ok(Claim {
         id: "figure-1-caption",
-        source: "Fig. 1, equation (5); F1",
+        source: "Fig. 1, equation (5)",
+        finding: Some("F1"),
         kind: Kind::PaperRefuted,
         statement: "With delta = 0.5, alpha = K = 1 the constant Vmin is 3.2956.",
         expected: "another number; 3.2956 is the constant of delta = 1".to_owned(),
@@ -120,6 +127,7 @@ fn slope() -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "tension-slope",
         source: "equation (6)",
+        finding: None,
         kind: Kind::Ours,
         statement: "V'(l) = (alpha/K) [1 - csch^2 s] is the derivative of V, from the barrier to far away.",
         expected: "equal to differences of V".to_owned(),
@@ -148,6 +156,7 @@ fn curvature() -> Result<Claim, ValidateError> {
     Ok(Claim {
         id: "tension-curvature",
         source: "equation (6)",
+        finding: None,
         kind: Kind::Ours,
         statement: "V''(l) = (2 alpha/K^2) coth(s) csch^2(s) is the derivative of V' and never negative: V is convex.",
         expected: "equal to differences of V'".to_owned(),
