@@ -50,3 +50,4 @@ pub mod scenario;
 pub mod sim;
 pub mod swarm;
 pub mod track;
+pub mod validate;

@@ -1,7 +1,10 @@
-//! `report.html` in a real browser: at the width of a phone and of a desktop, in light and in dark, nothing sticks out,
+//! `report.html` and `validate.html` in a real browser: at the width of a phone and of a desktop, in light and in dark, nothing sticks out,
 //! nothing is loaded from elsewhere, and nothing is complained about.
 //!
 //! Needs `chromium` (or the program that `CHROMIUM` names); `tests/run.sh` installs it.
+
+#[path = "support/release.rs"]
+mod release;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -188,6 +191,15 @@ fn a_report_of_a_violation_fits_too() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = flown(folder.path(), &["pentagon-laplacian"]);
     check(folder.path(), &page, "pentagon-laplacian", "VIOLATION", 6);
+}
+
+#[test]
+fn the_page_of_a_validation_fits_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("validation");
+    let validated = Command::new(release::program()).args(["validate", "--quiet", "--out"]).arg(&out).status();
+    assert!(validated.expect("the program runs").success());
+    check(folder.path(), &out.join("validate.html"), "Validation", "valid: all", 9);
 }
 
 #[test]

@@ -127,6 +127,14 @@ fn a_person_reads_the_verdict_first_and_where_the_files_are_last() {
 }
 
 #[test]
+fn the_readme_shows_what_the_program_prints() {
+    let readme = include_str!("../README.md");
+    let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a transcript");
+    let printed = run(folder().path(), &[]).out;
+    assert!(printed.starts_with(shown), "the README shows\n{shown}\nand the program prints\n{printed}");
+}
+
+#[test]
 fn with_json_talk_goes_to_standard_error_and_with_quiet_nowhere() {
     let folder = folder();
     let talking = run(folder.path(), &[&SHORT[..], &["--json"]].concat());

@@ -7,10 +7,12 @@ mod check;
 mod completions;
 mod console;
 mod diagnostic;
+mod folder;
 mod list;
 mod pictures;
 mod run;
 mod schema;
+mod validate;
 
 use std::process::ExitCode;
 
@@ -56,6 +58,8 @@ enum Command {
     Run(run::RunArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),
+    /// Reproduce the paper and judge every claim, ours and the paper's.
+    Validate(validate::ValidateArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -79,6 +83,7 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::check(&arguments),
+        Command::Validate(arguments) => validate::validate(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),

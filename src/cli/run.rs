@@ -1,7 +1,5 @@
 //! `tautline run`: fly a scenario and leave a recording, figures and a report.
 
-use std::fs::{self, File, TryLockError};
-use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use super::console::{self, Console};
+use super::folder::OutFolder;
 use super::pictures::Pictures;
 use super::{Exit, Failure};
 use crate::figures::Course;
@@ -27,6 +26,8 @@ use crate::sim::{self, Ending, Flight};
 
 /// Exit code of a second Ctrl-C, as shells give it.
 const INTERRUPTED_TWICE: i32 = 130;
+/// The recording's name in the folder of a run.
+const RECORDING: &str = "run.mcap";
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
 /// Threads that a flight has work for: one for the law and one for the audit.
@@ -115,7 +116,8 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         .collect();
     let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
-    let folder = RunFolder::at(arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name)));
+    let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
+    let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
     let mut course = Course::new();
     let report = threads.install(|| fly(&scenario, law, &folder, console, &interrupted, &mut course))?;
@@ -125,7 +127,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         warnings: &warnings,
         command: &arguments.command(),
     };
-    let page = pictures.write(&folder.path, &report)?;
+    let page = pictures.write(folder.path(), &report)?;
     report.write(&folder.report())?;
 
     console.say(&format!("{}\n{}", report.headline(), report.text()));
@@ -134,7 +136,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     }
     console.say(&format!(
         "wrote {}, {} and {}",
-        folder.recording().display(),
+        folder.file(RECORDING).display(),
         folder.report().display(),
         page.display()
     ));
@@ -149,13 +151,13 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 fn fly(
     scenario: &Scenario,
     mut law: Box<dyn Law>,
-    folder: &RunFolder,
+    folder: &OutFolder,
     console: Console,
     interrupted: &AtomicBool,
     course: &mut Course,
 ) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
-    let mut recording = McapRecorder::create(&folder.recording(), &header)?;
+    let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
     let mut state_hash = StateHash::new();
 
@@ -224,52 +226,4 @@ fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     };
     ctrlc::set_handler(again).map_err(|error| Failure::machine(format!("cannot listen to Ctrl-C: {error}")))?;
     Ok(interrupted)
-}
-
-/// The folder that a run leaves behind. It is finished once it holds a report.
-struct RunFolder {
-    path: PathBuf,
-}
-
-impl RunFolder {
-    fn at(path: PathBuf) -> Self {
-        Self { path }
-    }
-
-    fn recording(&self) -> PathBuf {
-        self.path.join("run.mcap")
-    }
-
-    fn report(&self) -> PathBuf {
-        self.path.join("report.json")
-    }
-
-    /// Makes the folder ready. A finished run in it is kept unless `force` says otherwise.
-    /// The lock keeps another run out until it is dropped, where the system can lock a folder.
-    fn open(&self, force: bool) -> Result<Option<File>, Failure> {
-        let report = self.report();
-        if report.exists() && !force {
-            return Err(Failure::input(
-                format!("{} holds a finished run", self.path.display()),
-                "give another folder with --out, or overwrite the run with --force",
-            ));
-        }
-        let machine = |path: &Path, error: &io::Error| {
-            Failure::machine(format!("cannot write {}: {error}", path.display()))
-                .with_help("give a folder that can be written to with --out")
-        };
-        fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
-        let lock = File::open(&self.path).ok();
-        if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
-            return Err(Failure::input(
-                format!("another run is writing to {}", self.path.display()),
-                "wait for it, or give another folder with --out",
-            ));
-        }
-        // From here on the old report would describe another recording.
-        match fs::remove_file(&report) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
-            _ => Ok(lock),
-        }
-    }
 }

@@ -10,6 +10,7 @@
 //! | [`shape_error`] | largest error of a desired distance |
 //! | [`disagreement`] | largest speed relative to the swarm's mean |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
+//! | [`convergence`] | an integrator's error over its step |
 //!
 //! [`of_run`] draws every one that a run has data for. All of them draw a [`Course`], which watches a run or reads a
 //! recording in bounded memory, and never fail for what is in it: what is not a finite number breaks a line, and a
@@ -20,6 +21,7 @@
 
 mod axis;
 mod chart;
+mod convergence;
 mod course;
 mod distances;
 mod histories;
@@ -27,6 +29,7 @@ mod paths;
 mod tension;
 mod thin;
 
+pub use convergence::{Step, convergence};
 pub use course::Course;
 pub use distances::distances;
 pub use histories::{control, disagreement, energy, shape_error};

@@ -19,6 +19,7 @@ mod validate;
 pub use error::{Field, Place, ScenarioError};
 pub use overrides::Override;
 pub use source::{MAX_FILE_BYTES, Source};
+pub(crate) use start::{offset, random, scatter};
 pub use validate::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,

@@ -19,7 +19,7 @@ use crate::swarm::{Rows, row, set_row};
 const TRIES: u32 = 1000;
 
 /// The random numbers of a seed.
-pub(super) fn random(seed: u64) -> ChaCha8Rng {
+pub(crate) fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
@@ -74,7 +74,7 @@ pub(super) fn jitter(
 }
 
 /// Uniform positions, one after the other, each tried again until it keeps its distance from those before it.
-fn scatter(
+pub(crate) fn scatter(
     count: usize,
     space: Space,
     half_extent_m: f64,
@@ -102,7 +102,7 @@ fn scatter(
 }
 
 /// Uniform in the square or cube of half side `half_extent_m` around the origin.
-fn offset(half_extent_m: f64, space: Space, random: &mut ChaCha8Rng) -> Vector3<f64> {
+pub(crate) fn offset(half_extent_m: f64, space: Space, random: &mut ChaCha8Rng) -> Vector3<f64> {
     let mut along = || half_extent_m * (2.0 * unit(random) - 1.0);
     let (x, y) = (along(), along());
     Vector3::new(x, y, if space == Space::Volume { along() } else { 0.0 })

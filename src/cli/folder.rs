@@ -1,0 +1,64 @@
+//! The folder that a command leaves behind.
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::Failure;
+
+/// A folder that is finished once it holds its report.
+pub(super) struct OutFolder {
+    path: PathBuf,
+    what: &'static str,
+    report: &'static str,
+}
+
+impl OutFolder {
+    /// The folder at `path` of a `what`, such as `run`, whose report has that name.
+    pub(super) fn at(path: impl Into<PathBuf>, what: &'static str, report: &'static str) -> Self {
+        Self { path: path.into(), what, report }
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A file in the folder.
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// The report.
+    pub(super) fn report(&self) -> PathBuf {
+        self.file(self.report)
+    }
+
+    /// Makes the folder ready. A finished one is kept unless `force` says otherwise.
+    /// The lock keeps another writer out until it is dropped, where the system can lock a folder.
+    pub(super) fn open(&self, force: bool) -> Result<Option<File>, Failure> {
+        let report = self.report();
+        if report.exists() && !force {
+            return Err(Failure::input(
+                format!("{} holds a finished {}", self.path.display(), self.what),
+                format!("give another folder with --out, or overwrite the {} with --force", self.what),
+            ));
+        }
+        let machine = |path: &Path, error: &io::Error| {
+            Failure::machine(format!("cannot write {}: {error}", path.display()))
+                .with_help("give a folder that can be written to with --out")
+        };
+        fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
+        let lock = File::open(&self.path).ok();
+        if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
+            return Err(Failure::input(
+                format!("another {} is writing to {}", self.what, self.path.display()),
+                "wait for it, or give another folder with --out",
+            ));
+        }
+        // From here on the old report would describe something else.
+        match fs::remove_file(&report) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
+            _ => Ok(lock),
+        }
+    }
+}

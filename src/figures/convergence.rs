@@ -1,0 +1,44 @@
+//! An integrator's error over its step.
+
+use super::axis::Axis;
+use super::chart::{Chart, INK, Line, PALETTE, Stroke};
+use super::{Figure, FigureError};
+
+/// One step length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Its length \[s\].
+    pub dt_s: f64,
+    /// Largest position error in double precision \[m\].
+    pub double_m: f64,
+    /// Largest position error in single precision \[m\].
+    pub single_m: f64,
+}
+
+/// Largest position error \[m\] over the step \[s\], both on logarithmic axes, in single and double precision, with the
+/// line of order 1 through the first error in double precision.
+///
+/// # Errors
+/// [`FigureError`] when the drawing library refuses.
+pub fn convergence(steps: &[Step], title: &str) -> Result<Figure, FigureError> {
+    let errors = steps.iter().flat_map(|step| [step.double_m, step.single_m]);
+    let x = Axis::log("step dt [s]", steps.iter().map(|step| step.dt_s));
+    let mut chart = Chart::new(x, Axis::log("largest position error [m]", errors));
+    let mut line = |error: fn(&Step) -> f64, stroke: Stroke, label: &str| {
+        let points = steps.iter().map(|step| (step.dt_s, error(step))).collect();
+        chart.lines.push(Line { points, stroke, label: Some(label.to_owned()) });
+    };
+    line(|step| step.double_m, Stroke::solid(PALETTE[0], 1.8), "double precision");
+    line(|step| step.single_m, Stroke::solid(PALETTE[1], 1.8), "single precision");
+    if let [first, .., last] = steps {
+        let points = [first, last].map(|step| (step.dt_s, first.double_m * step.dt_s / first.dt_s)).to_vec();
+        chart.lines.push(Line { points, stroke: Stroke::dashed(INK, 1.0), label: Some("order 1".to_owned()) });
+    }
+    let best = |error: fn(&Step) -> f64| steps.iter().map(error).fold(f64::INFINITY, f64::min);
+    let description = format!(
+        "Largest position error over the step: at best {:.1e} m in double and {:.1e} m in single precision.",
+        best(|step| step.double_m),
+        best(|step| step.single_m)
+    );
+    chart.figure("convergence", title, &description)
+}

@@ -1,0 +1,293 @@
+//! The energy and what it certifies, on random starts.
+
+use rayon::prelude::*;
+
+use super::claim::{Claim, Kind};
+use super::flights::{continuous, engine, times, with_step};
+use super::starts::{COUNTS, RandomStart, random_starts};
+use super::words::bound;
+use super::{Progress, ValidateError};
+use crate::formation::Formation;
+use crate::law::EdgeTension;
+use crate::scenario::{LawSpec, Precision, Scenario};
+use crate::swarm::{ClosestApproach, Swarm};
+
+/// Random starts.
+pub(super) const STARTS: usize = 500;
+const SEED: u64 = 2;
+const DELTA_M: f64 = 1.0;
+/// Flight from each start \[s\]; the closest approach comes within the first seconds.
+const DURATION_S: f64 = 10.0;
+/// Looks at the energy per second \[Hz\].
+const LOOKS_HZ: f64 = 8.0;
+/// The solver's error per step is 1e-12, and some hundred steps of it add up in E; relative to E(0).
+const ENERGY_TOLERANCE: f64 = 1e-9;
+/// Largest share of the fastest oscillation at the certified separation that a step may cover: omega dt <= 0.3.
+const STIFF_SHARE: f64 = 0.3;
+/// Longest step of the engine \[s\].
+const LONGEST_STEP_S: f64 = 1.0 / 240.0;
+
+/// Closing speeds of each of two vehicles \[m/s\].
+const HEAD_ON_M_S: [f64; 3] = [1.0, 4.0, 16.0];
+const HEAD_ON_NAMES: [&str; 3] = ["ratio_at_1_m_s", "ratio_at_4_m_s", "ratio_at_16_m_s"];
+/// How near to 1 the fastest pair comes.
+const TIGHT: f64 = 0.15;
+
+/// What one start gave.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    delta_m: f64,
+    certified_m: f64,
+    /// Closest approach in continuous time and in the engine \[m\].
+    continuous_m: f64,
+    engine_m: f64,
+    dt_s: f64,
+    /// Largest rise of E from one look to the next, over E(0), in continuous time.
+    energy_rise: f64,
+}
+
+impl Trial {
+    fn margin_m(&self, closest_m: f64) -> f64 {
+        closest_m - self.certified_m
+    }
+}
+
+/// The scenario that a random start is flown as.
+fn scenario(start: &RandomStart) -> Scenario {
+    let mut scenario = Scenario::new("start", start.swarm.clone(), start.formation.clone(), DELTA_M, DURATION_S);
+    scenario.space = start.space;
+    // The certificate does not depend on a22, the motion of the centre of mass does.
+    scenario.a22_per_s = 0.1;
+    scenario
+}
+
+/// The longest step that resolves the tension at the certified separation.
+fn honest_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, ValidateError> {
+    let LawSpec::EdgeTension { alpha } = scenario.law else { return Ok(LONGEST_STEP_S) };
+    let Some((_, rest_m)) = scenario.formation.min_distance() else { return Ok(LONGEST_STEP_S) };
+    let stiffness = EdgeTension::new(alpha, scenario.delta_m, rest_m)?.second_derivative(certified_m);
+    Ok(LONGEST_STEP_S.min(STIFF_SHARE / stiffness.sqrt()))
+}
+
+fn fly(start: &RandomStart) -> Result<Trial, ValidateError> {
+    let scenario = scenario(start);
+    let law = scenario.law()?;
+    let certificate = law.certificate(&scenario.start);
+    let certified_m = certificate.certified_m.unwrap_or(f64::NAN);
+    let solution = continuous(&scenario, &times(DURATION_S, LOOKS_HZ))?;
+    let energies: Vec<f64> = solution.states.iter().map(|state| law.energy(state).unwrap_or(f64::NAN)).collect();
+    let energy_initial = certificate.energy_initial.unwrap_or(f64::NAN);
+    let energy_rise = energies.windows(2).map(|pair| (pair[1] - pair[0]) / energy_initial).fold(0.0, larger);
+
+    let dt_s = honest_step_s(&scenario, certified_m)?;
+    let flight = engine(&with_step(&scenario, Precision::Double, dt_s), |_| ())?;
+    let nan = |closest: Option<ClosestApproach>| closest.map_or(f64::NAN, |closest| closest.separation_m);
+    Ok(Trial {
+        delta_m: scenario.delta_m,
+        certified_m,
+        continuous_m: nan(solution.closest),
+        engine_m: nan(flight.audit.closest),
+        dt_s,
+        energy_rise,
+    })
+}
+
+/// The larger number; NaN where either is.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
+    let trials = random_starts(SEED, STARTS, DELTA_M)?
+        .par_iter()
+        .map(|start| fly(start).inspect(|_| progress.advance(1)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let tight = tight()?;
+    progress.advance(1);
+    Ok(vec![energy(&trials), in_continuous_time(&trials), tight, in_the_engine(&trials)])
+}
+
+/// Two vehicles head on, from twice delta, at this closing speed of each \[m/s\]: clearance left over clearance certified.
+fn head_on(speed_m_s: f64) -> Result<f64, ValidateError> {
+    let mut swarm = Swarm::at_rest(Formation::line(2, 2.0 * DELTA_M).slots_m);
+    (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (speed_m_s, -speed_m_s);
+    let scenario = Scenario::new("head-on", swarm, Formation::line(2, 2.0 * DELTA_M), DELTA_M, 1.0);
+    let certified_m = scenario.law()?.certificate(&scenario.start).certified_m.unwrap_or(f64::NAN);
+    let closest = continuous(&scenario, &[scenario.time.duration_s])?.closest;
+    let min_m = closest.map_or(f64::NAN, |closest| closest.separation_m);
+    Ok((min_m - DELTA_M) / (certified_m - DELTA_M))
+}
+
+fn tight() -> Result<Claim, ValidateError> {
+    let ratios = HEAD_ON_M_S.iter().map(|&speed_m_s| head_on(speed_m_s)).collect::<Result<Vec<_>, _>>()?;
+    let list = HEAD_ON_M_S.iter().zip(&ratios).map(|(speed_m_s, ratio)| format!("{ratio:.3} at {speed_m_s} m/s"));
+    let last = ratios.last().copied().unwrap_or(f64::NAN);
+    Ok(Claim {
+        id: "certificate-is-tight",
+        source: "the collision theorem",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "The certificate cannot be improved: two vehicles head on use it up as they get faster.",
+        expected: "clearance left over clearance certified falls towards 1".to_owned(),
+        measured: list.collect::<Vec<_>>().join(", "),
+        values: super::Values(HEAD_ON_NAMES.into_iter().zip(ratios.iter().copied()).collect()),
+        tolerance: format!("{TIGHT} at the fastest"),
+        reason: "damping over the last metre takes a share of 1/speed of the energy",
+        pass: ratios.is_sorted_by(|a, b| a > b) && (1.0..1.0 + TIGHT).contains(&last),
+    })
+}
+
+fn energy(trials: &[Trial]) -> Claim {
+    let rise = trials.iter().map(|trial| trial.energy_rise).fold(0.0, larger);
+    Claim {
+        id: "energy-never-increases",
+        source: "the stability theorem, complete graph",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "In continuous time the energy E never increases.",
+        expected: "no rise from one look to the next".to_owned(),
+        measured: format!(
+            "largest rise {} of E(0) over {STARTS} random starts of {DURATION_S} s with {LOOKS_HZ} looks a second",
+            bound(rise)
+        ),
+        values: [("largest_rise_over_initial", rise)].into(),
+        tolerance: format!("{ENERGY_TOLERANCE:e}"),
+        reason: "the solver's tolerance of 1e-12 a step, summed over the steps",
+        pass: rise <= ENERGY_TOLERANCE,
+    }
+}
+
+fn population() -> String {
+    format!("{STARTS} random starts of {} to {} vehicles in plane and space", COUNTS.start(), COUNTS.end())
+}
+
+/// How many trials broke the certificate, the smallest margin, and the smallest ratio of what was left to what was
+/// promised.
+fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
+    // A NaN keeps no promise.
+    let broken = trials.iter().filter(|trial| !(trial.margin_m(closest_m(trial)) >= 0.0)).count();
+    let margin_m = trials.iter().map(|trial| trial.margin_m(closest_m(trial))).fold(f64::INFINITY, f64::min);
+    let ratio = trials
+        .iter()
+        .map(|trial| (closest_m(trial) - trial.delta_m) / (trial.certified_m - trial.delta_m))
+        .fold(f64::INFINITY, f64::min);
+    (broken, margin_m, ratio)
+}
+
+fn in_continuous_time(trials: &[Trial]) -> Claim {
+    let (broken, margin_m, ratio) = kept(trials, |trial| trial.continuous_m);
+    Claim {
+        id: "certificate",
+        source: "the collision theorem, complete graph",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "No pair ever comes closer than the separation certified before the first step.",
+        expected: "never broken".to_owned(),
+        measured: format!(
+            "broken {broken} times in {}; smallest margin {margin_m:.4} m, where clearance above delta was {ratio:.2} \
+             times the certified one or more",
+            population()
+        ),
+        values: [("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)]
+            .into(),
+        tolerance: "0".to_owned(),
+        reason: "continuous time is what the proof is about",
+        pass: broken == 0,
+    }
+}
+
+fn in_the_engine(trials: &[Trial]) -> Claim {
+    let (broken, margin_m, _) = kept(trials, |trial| trial.engine_m);
+    let differences_m = trials.iter().map(|trial| (trial.engine_m - trial.continuous_m).abs());
+    let difference_m = differences_m.fold(0.0, larger);
+    let shortest_s = trials.iter().map(|trial| trial.dt_s).fold(f64::INFINITY, f64::min);
+    Claim {
+        id: "certificate-in-the-engine",
+        source: "the collision theorem, in discrete time",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "In Rapier, with a step that resolves the tension at the certified separation, the certificate holds \
+                    too.",
+        expected: "never broken".to_owned(),
+        measured: format!(
+            "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} m \
+             of continuous time; steps of {:.2} ms to {:.2} ms, double precision",
+            population(),
+            shortest_s * 1e3,
+            LONGEST_STEP_S * 1e3
+        ),
+        values: [
+            ("broken", broken as f64),
+            ("smallest_margin_m", margin_m),
+            ("largest_difference_m", difference_m),
+            ("shortest_dt_s", shortest_s),
+        ]
+        .into(),
+        tolerance: "0".to_owned(),
+        reason: "the margin is far larger than the error of a step with omega dt <= 0.3",
+        pass: broken == 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Starts in a short form of the claim.
+    const FEW: usize = 24;
+
+    fn fly_few() -> Vec<Trial> {
+        let starts = random_starts(SEED, FEW, DELTA_M).expect("starts");
+        starts.par_iter().map(|start| fly(start).expect("a flight")).collect()
+    }
+
+    #[test]
+    fn trials_have_the_same_bits_on_any_number_of_threads() {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(fly_few)
+        };
+        let bits = |trials: &[Trial]| -> Vec<[u64; 5]> {
+            let numbers = |t: &Trial| [t.certified_m, t.continuous_m, t.engine_m, t.dt_s, t.energy_rise];
+            trials.iter().map(|trial| numbers(trial).map(f64::to_bits)).collect()
+        };
+        assert_eq!(bits(&on(1)), bits(&on(3)));
+    }
+
+    #[test]
+    fn a_step_so_long_that_it_jumps_the_barrier_breaks_the_certificate_and_the_claim_says_so() {
+        // Head on at 5 m/s each from 3 m apart, one second a step: the vehicles change places between two looks.
+        let mut swarm = Swarm::at_rest(Formation::line(2, 3.0).slots_m);
+        (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (5.0, -5.0);
+        let scenario = Scenario::new("jump", swarm, Formation::line(2, 2.0), DELTA_M, 1.0);
+        let certified_m = scenario.law().expect("a law").certificate(&scenario.start).certified_m.expect("a promise");
+        let trial = |dt_s: f64| {
+            let flight = engine(&with_step(&scenario, Precision::Double, dt_s), |_| ()).expect("a flight");
+            let engine_m = flight.audit.closest.expect("two vehicles").separation_m;
+            Trial { delta_m: DELTA_M, certified_m, continuous_m: engine_m, engine_m, dt_s, energy_rise: 0.0 }
+        };
+        let honest = trial(honest_step_s(&scenario, certified_m).expect("a tension"));
+        assert!(in_the_engine(&[honest]).pass, "{honest:?}");
+        let jumped = trial(1.0);
+        assert!(!in_the_engine(&[honest, jumped]).pass, "{jumped:?}");
+        assert_eq!(in_the_engine(&[honest, jumped]).value("broken"), Some(1.0));
+    }
+
+    #[test]
+    fn an_energy_that_rises_or_is_no_number_is_a_claim_that_fails() {
+        let good = Trial {
+            delta_m: DELTA_M,
+            certified_m: 1.1,
+            continuous_m: 1.2,
+            engine_m: 1.2,
+            dt_s: 0.01,
+            energy_rise: 0.0,
+        };
+        assert!(energy(&[good]).pass);
+        for energy_rise in [1e-3, f64::NAN] {
+            assert!(!energy(&[good, Trial { energy_rise, ..good }]).pass);
+        }
+        let lost = Trial { continuous_m: f64::NAN, ..good };
+        assert!(!in_continuous_time(&[good, lost]).pass, "a separation that is no number keeps no promise");
+    }
+}

@@ -1,0 +1,219 @@
+//! Where the law comes to rest, from many starts: F3.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::claim::{Claim, Kind};
+use super::words::bound;
+use super::{Progress, ValidateError};
+use crate::formation::{Formation, largest_edge_error_m};
+use crate::plant::ideal::{self, Tolerances};
+use crate::scenario::{Scenario, Space, offset, random, scatter};
+use crate::swarm::{Rows, Swarm, row, set_row};
+
+/// Orderings of five vehicles on a line, counted up to their mirror image.
+const ORDERINGS: u64 = 60;
+/// Random starts of the 12-gon.
+const POLYGON_STARTS: u64 = 40;
+/// Flights that are counted as work.
+pub(super) const FLIGHTS: u64 = ORDERINGS + POLYGON_STARTS;
+const SPACING_M: f64 = 3.0;
+const NOISE_M: f64 = 0.05;
+const SIDE_M: f64 = 3.0;
+const DELTA_M: f64 = 2.0;
+const POLYGON_COUNT: usize = 12;
+const POLYGON_RADIUS_M: f64 = 3.0;
+const POLYGON_DELTA_M: f64 = 1.0;
+const POLYGON_HALF_EXTENT_M: f64 = 6.0;
+const POLYGON_SPACING_M: f64 = 1.1;
+const SEED: u64 = 3;
+/// A flight long enough to come to rest \[s\].
+const ORDERING_S: f64 = 600.0;
+/// When the 12-gon is looked at \[s\].
+const POLYGON_TIMES_S: [f64; 4] = [60.0, 120.0, 300.0, 1000.0];
+const POLYGON_NAMES: [&str; 4] = ["after_60_s", "after_120_s", "after_300_s", "after_1000_s"];
+/// A formation counts as reached below this largest edge error \[m\].
+const REACHED_M: f64 = 0.01;
+/// A swarm is at rest where no vehicle is pulled by more \[m/s^2\].
+const REST_M_S2: f64 = 1e-9;
+/// Both tolerances must come to the same places.
+const COARSE: Tolerances = Tolerances { relative: 1e-10, absolute: 1e-10 };
+
+/// Where a flight came to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rest {
+    edge_error_m: f64,
+    /// Largest pull on a vehicle \[m/s^2\].
+    pull_m_s2: f64,
+}
+
+impl Rest {
+    fn reached(&self) -> bool {
+        self.edge_error_m < REACHED_M
+    }
+}
+
+/// Flies without the common mode (a22 = 0, on which relative motion does not depend) for a time.
+fn rest(
+    start: Rows,
+    formation: &Formation,
+    delta_m: f64,
+    duration_s: f64,
+    tolerances: Tolerances,
+) -> Result<Rest, ValidateError> {
+    let scenario = Scenario::new("rest", Swarm::at_rest(start), formation.clone(), delta_m, duration_s);
+    let mut law = scenario.law()?;
+    let solution = ideal::solve(law.as_mut(), &scenario.start, 0.0, &[duration_s], tolerances)?;
+    let mut control = Rows::zeros(scenario.count());
+    let last = solution.states.last().unwrap_or(&scenario.start);
+    law.control(last, &mut control)?;
+    Ok(Rest {
+        edge_error_m: largest_edge_error_m(&last.positions_m, formation, &scenario.graph),
+        pull_m_s2: (0..scenario.count()).map(|i| row(&control, i).norm()).fold(0.0, f64::max),
+    })
+}
+
+/// All orders of the vehicles 0 to 4, one of each pair of mirror images.
+fn orderings() -> Vec<[usize; 5]> {
+    let mut all = Vec::new();
+    for code in 0..5_usize.pow(5) {
+        let order = [0, 1, 2, 3, 4].map(|place| code / 5_usize.pow(place) % 5);
+        let is_permutation = (0..5).all(|vehicle| order.contains(&vehicle));
+        if is_permutation && order[0] < order[4] {
+            all.push(order);
+        }
+    }
+    all.sort_unstable();
+    all
+}
+
+/// A line along x in this order with transverse noise.
+fn line(order: [usize; 5], stream: u64) -> Rows {
+    let mut random = random(SEED);
+    random.set_stream(stream);
+    let mut positions_m = Rows::zeros(order.len());
+    for (place, &vehicle) in order.iter().enumerate() {
+        let noise_m = offset(NOISE_M, Space::Plane, &mut random).y;
+        set_row(&mut positions_m, vehicle, Vector3::new(SPACING_M * place as f64, noise_m, 0.0));
+    }
+    positions_m
+}
+
+pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
+    let (orderings, polygon) = rayon::join(|| pentagon_orderings(progress), || polygon(progress));
+    Ok(vec![orderings?, polygon?])
+}
+
+fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
+    let formation = Formation::pentagon(SIDE_M);
+    let orderings = orderings();
+    let fly = |place: usize, order: [usize; 5]| {
+        let start = line(order, place as u64);
+        let fly = |tolerances| rest(start.clone(), &formation, DELTA_M, ORDERING_S, tolerances);
+        Ok((fly(Tolerances::default())?, fly(COARSE)?))
+    };
+    let rests = orderings
+        .par_iter()
+        .enumerate()
+        .map(|(place, &order)| fly(place, order).inspect(|_| progress.advance(1)))
+        .collect::<Result<Vec<_>, ValidateError>>()?;
+
+    let reached = rests.iter().filter(|(rest, _)| rest.reached()).count();
+    let elsewhere: Vec<&Rest> = rests.iter().map(|(rest, _)| rest).filter(|rest| !rest.reached()).collect();
+    let pull_m_s2 = elsewhere.iter().map(|rest| rest.pull_m_s2).fold(0.0, f64::max);
+    let least_m = elsewhere.iter().map(|rest| rest.edge_error_m).fold(f64::INFINITY, f64::min);
+    let most_m = elsewhere.iter().map(|rest| rest.edge_error_m).fold(0.0, f64::max);
+    let changed = rests.iter().filter(|(fine, coarse)| fine.reached() != coarse.reached()).count();
+    let in_order_m = rests.first().map_or(f64::NAN, |(rest, _)| rest.edge_error_m);
+    Ok(Claim {
+        id: "pentagon-orderings",
+        source: "the convergence theorem",
+        finding: Some("F3"),
+        kind: Kind::PaperRefuted,
+        statement: "The law drives the vehicles to the desired formation from any start that is not on a line.",
+        expected: "many starts come to rest elsewhere: the law has other equilibria".to_owned(),
+        measured: format!(
+            "{reached} of the {} orderings of five vehicles on a line reach the pentagon; the other {} come to rest \
+             with every pull {} m/s^2 and a largest edge error of {least_m:.2} m to {most_m:.2} m (ordering 1, 2, 3, \
+             4, 5: {in_order_m:.2} m); {changed} outcomes change with a hundred times the solver's tolerance",
+            orderings.len(),
+            elsewhere.len(),
+            bound(pull_m_s2)
+        ),
+        values: [
+            ("orderings", orderings.len() as f64),
+            ("reached", reached as f64),
+            ("largest_pull_elsewhere_m_s2", pull_m_s2),
+            ("least_edge_error_elsewhere_m", least_m),
+            ("most_edge_error_elsewhere_m", most_m),
+            ("edge_error_in_order_m", in_order_m),
+            ("outcomes_changed", changed as f64),
+        ]
+        .into(),
+        tolerance: format!("at rest: {REST_M_S2:e} m/s^2; elsewhere: more than {REACHED_M} m off"),
+        reason: "after 600 s a flight that is still converging pulls more than that",
+        pass: orderings.len() as u64 == ORDERINGS
+            && reached > 0
+            && !elsewhere.is_empty()
+            && pull_m_s2 < REST_M_S2
+            && least_m > 10.0 * REACHED_M
+            && changed == 0,
+    })
+}
+
+/// How many flights have reached the 12-gon at each of the times.
+fn polygon(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
+    let formation = Formation::circle(POLYGON_COUNT, POLYGON_RADIUS_M);
+    let fly = |stream: u64| {
+        let mut random = random(SEED + 1);
+        random.set_stream(stream);
+        let (space, extent_m, spacing_m) = (Space::Plane, POLYGON_HALF_EXTENT_M, POLYGON_SPACING_M);
+        let start = scatter(POLYGON_COUNT, space, extent_m, spacing_m, &mut random)?;
+        let scenario = Scenario::new("polygon", Swarm::at_rest(start), formation.clone(), POLYGON_DELTA_M, 1.0);
+        let mut law = scenario.law()?;
+        let states = ideal::solve(law.as_mut(), &scenario.start, 0.0, &POLYGON_TIMES_S, COARSE)?.states;
+        let error_m = |state: &Swarm| largest_edge_error_m(&state.positions_m, &formation, &scenario.graph);
+        Ok(states.iter().map(|state| error_m(state) < REACHED_M).collect::<Vec<_>>())
+    };
+    let flights = (0..POLYGON_STARTS)
+        .into_par_iter()
+        .map(|stream| fly(stream).inspect(|_| progress.advance(1)))
+        .collect::<Result<Vec<_>, ValidateError>>()?;
+    let reached_by = |k: usize| flights.iter().filter(|flight| flight.get(k) == Some(&true)).count() as u64;
+    let reached = [0, 1, 2, 3].map(reached_by);
+    let list = POLYGON_TIMES_S.iter().zip(reached).map(|(time_s, reached)| format!("{reached} after {time_s} s"));
+    Ok(Claim {
+        id: "polygon-random-starts",
+        source: "the convergence theorem",
+        finding: Some("F3"),
+        kind: Kind::Ours,
+        statement: "A 12-gon is formed from random starts in the plane, but slowly.",
+        expected: "hardly ever within a minute, mostly within a quarter of an hour".to_owned(),
+        measured: format!(
+            "so many of {POLYGON_STARTS} starts have formed it (radius {POLYGON_RADIUS_M} m, delta {POLYGON_DELTA_M} \
+             m): {}",
+            list.collect::<Vec<_>>().join(", ")
+        ),
+        values: super::Values(POLYGON_NAMES.into_iter().zip(reached.map(|n| n as f64)).collect()),
+        tolerance: "at most 1 in 10 after the first time, at least 9 in 10 after the last".to_owned(),
+        reason: "a count of random starts",
+        pass: reached[0] * 10 <= POLYGON_STARTS && reached[3] * 10 >= 9 * POLYGON_STARTS,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_are_60_orderings_up_to_mirror_images() {
+        let orderings = orderings();
+        assert_eq!(orderings.len() as u64, ORDERINGS);
+        assert_eq!(orderings[0], [0, 1, 2, 3, 4]);
+        for order in &orderings {
+            let mut mirrored = *order;
+            mirrored.reverse();
+            assert!(!orderings.contains(&mirrored));
+        }
+    }
+}

@@ -1,0 +1,345 @@
+//! The paper's experiments, Figs. 2 to 4, flown in continuous time and held against an independent integrator.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::claim::{Claim, Kind};
+use super::flights::{builtin, continuous, reached_at_s, times};
+use super::words::bound;
+use super::{Progress, ValidateError};
+use crate::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
+use crate::plant::ideal::Solution;
+use crate::scenario::Scenario;
+use crate::swarm::{Rows, Swarm, row, set_row};
+
+/// Length of the paper's flights \[s\].
+const DURATION_S: f64 = 120.0;
+/// Looks at the flight, as often as the reference's \[Hz\].
+const RATE_HZ: f64 = 10.0;
+/// Reached means a largest edge error below this \[m\].
+const REACHED_M: f64 = 0.01;
+/// Error of a formation that is reached as well as doubles can hold it, after 120 s in which common motion has grown by
+/// e^12 \[m\].
+const CONVERGED_M: f64 = 1e-9;
+/// How far the start is turned to see what follows \[rad\].
+const TURN_RAD: f64 = 1.0;
+/// Coefficients \[1/s\] between which relative motion is compared, and when \[s\].
+const A22_PER_S: [f64; 3] = [-0.5, 0.0, 0.1];
+const COMPARED_S: f64 = 10.0;
+/// The figures of the reference are printed with 7 to 9 digits; half a unit of the last one \[its own unit\].
+const HALF_OF_6: f64 = 0.5e-6;
+const HALF_OF_8: f64 = 0.5e-8;
+
+/// A number of the independent integrator (8th-order Runge-Kutta, relative tolerance 1e-10) and ours.
+struct Check {
+    name: &'static str,
+    expected: f64,
+    measured: f64,
+    tolerance: f64,
+    /// Decimals to print.
+    decimals: usize,
+}
+
+impl Check {
+    fn passes(&self) -> bool {
+        (self.measured - self.expected).abs() <= self.tolerance
+    }
+}
+
+fn list(checks: &[Check], of: fn(&Check) -> f64) -> String {
+    let entries = checks.iter().map(|check| format!("{} {:.*}", check.name, check.decimals, of(check)));
+    entries.collect::<Vec<_>>().join(", ")
+}
+
+fn against_reference(id: &'static str, source: &'static str, statement: &'static str, checks: &[Check]) -> Claim {
+    Claim {
+        id,
+        source,
+        finding: None,
+        kind: Kind::Ours,
+        statement,
+        expected: list(checks, |check| check.expected),
+        measured: list(checks, |check| check.measured),
+        values: super::Values(checks.iter().map(|check| (check.name, check.measured)).collect()),
+        tolerance: "half a unit of the last digit of the reference".to_owned(),
+        reason: "the reference is an independent 8th-order Runge-Kutta integrator at relative tolerance 1e-10",
+        pass: checks.iter().all(Check::passes),
+    }
+}
+
+/// An experiment: the scenario, its flight, and its numbers.
+struct Experiment {
+    scenario: Scenario,
+    times_s: Vec<f64>,
+    solution: Solution,
+}
+
+impl Experiment {
+    fn fly(name: &str) -> Result<Self, ValidateError> {
+        Self::of(builtin(name)?)
+    }
+
+    fn of(scenario: Scenario) -> Result<Self, ValidateError> {
+        let times_s = times(DURATION_S, RATE_HZ);
+        let solution = continuous(&scenario, &times_s)?;
+        Ok(Self { scenario, times_s, solution })
+    }
+
+    fn energy_initial(&self) -> Result<f64, ValidateError> {
+        Ok(self.scenario.law()?.energy(&self.scenario.start).unwrap_or(f64::NAN))
+    }
+
+    fn certified_m(&self) -> Result<f64, ValidateError> {
+        Ok(self.scenario.law()?.certificate(&self.scenario.start).certified_m.unwrap_or(f64::NAN))
+    }
+
+    /// The closest approach \[m\] and its time \[s\]. Its pair is not told: mirror images come equally close.
+    fn closest(&self) -> (f64, f64) {
+        self.solution.closest.map_or((f64::NAN, f64::NAN), |closest| (closest.separation_m, closest.time_s))
+    }
+
+    fn reached_at_s(&self) -> f64 {
+        let Scenario { formation, graph, .. } = &self.scenario;
+        reached_at_s(&self.times_s, &self.solution.states, formation, graph, REACHED_M).unwrap_or(f64::NAN)
+    }
+
+    fn last_positions_m(&self) -> &Rows {
+        self.solution.states.last().map_or(&self.scenario.start.positions_m, |last| &last.positions_m)
+    }
+
+    fn last_edge_error_m(&self) -> f64 {
+        largest_edge_error_m(self.last_positions_m(), &self.scenario.formation, &self.scenario.graph)
+    }
+
+    /// The paper's statement about a figure under the edge-tension law: formed, and never below delta.
+    fn formed(&self, id: &'static str, source: &'static str, statement: &'static str) -> Claim {
+        let (min_m, at_s) = self.closest();
+        let (reached_at_s, error_m) = (self.reached_at_s(), self.last_edge_error_m());
+        let delta_m = self.scenario.delta_m;
+        Claim {
+            id,
+            source,
+            finding: None,
+            kind: Kind::PaperHolds,
+            statement,
+            expected: format!("never below delta = {delta_m} m, and the formation reached"),
+            measured: format!(
+                "closest {min_m:.6} m at {at_s:.3} s; largest edge error below {REACHED_M} m from \
+                 {reached_at_s:.1} s on, {} m after {DURATION_S} s",
+                bound(error_m)
+            ),
+            values: [
+                ("min_m", min_m),
+                ("min_at_s", at_s),
+                ("reached_at_s", reached_at_s),
+                ("final_edge_error_m", error_m),
+            ]
+            .into(),
+            tolerance: format!("{CONVERGED_M:e} m at the end"),
+            reason: "rounding, after common motion has grown by e^12",
+            pass: min_m > delta_m && reached_at_s.is_finite() && error_m <= CONVERGED_M,
+        }
+    }
+}
+
+pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
+    let parts: [fn() -> Result<Vec<Claim>, ValidateError>; 6] =
+        [pentagon, circle, baseline, straight_line, up_to_rigid_motion, relative_motion];
+    let judged = parts
+        .par_iter()
+        .map(|part| part().inspect(|_| progress.advance(1)))
+        .collect::<Result<Vec<_>, ValidateError>>()?;
+    Ok(judged.concat())
+}
+
+fn pentagon() -> Result<Vec<Claim>, ValidateError> {
+    let flight = Experiment::fly("pentagon")?;
+    let mut law = flight.scenario.law()?;
+    let mut control = Rows::zeros(flight.scenario.count());
+    law.control(&flight.scenario.start, &mut control)?;
+    let at_10_s = flight.times_s.iter().position(|&time_s| time_s == 10.0).map(|k| &flight.solution.states[k]);
+    let position = at_10_s.map_or_else(Vector3::zeros, |state| row(&state.positions_m, 0));
+    let (min_m, min_at_s) = flight.closest();
+    let check = |name, expected, measured, tolerance, decimals| Check { name, expected, measured, tolerance, decimals };
+    let checks = [
+        check("energy_initial_m2_s2", 3.656_742_96, flight.energy_initial()?, HALF_OF_8, 8),
+        check("certified_m", 2.055_307, flight.certified_m()?, HALF_OF_6, 6),
+        check("min_m", 2.460_353, min_m, HALF_OF_6, 6),
+        check("min_at_s", 2.151, min_at_s, 0.5e-3, 3),
+        check("reached_at_s", 36.5, flight.reached_at_s(), 0.05, 1),
+        check("vehicle_1_control_x_m_s2", 0.860_843_123, control[(0, 0)], 0.5e-9, 9),
+        check("vehicle_1_control_y_m_s2", -0.021_225_585, control[(0, 1)], 0.5e-9, 9),
+        check("vehicle_1_x_at_10_s_m", 4.318_055_1, position.x, 0.5e-7, 7),
+        check("vehicle_1_y_at_10_s_m", -1.043_487_6, position.y, 0.5e-7, 7),
+    ];
+    Ok(vec![
+        flight.formed(
+            "figure-2",
+            "Fig. 2, equation (8)",
+            "Five vehicles leave a line and form the pentagon without coming closer than delta.",
+        ),
+        against_reference(
+            "figure-2-reference",
+            "Fig. 2",
+            "The pentagon's flight agrees with an independent integrator.",
+            &checks,
+        ),
+    ])
+}
+
+fn circle() -> Result<Vec<Claim>, ValidateError> {
+    let flight = Experiment::fly("circle")?;
+    let (min_m, min_at_s) = flight.closest();
+    let check = |name, expected, measured, tolerance, decimals| Check { name, expected, measured, tolerance, decimals };
+    let checks = [
+        check("energy_initial_m2_s2", 4.479_772_16, flight.energy_initial()?, HALF_OF_8, 8),
+        check("certified_m", 1.019_476, flight.certified_m()?, HALF_OF_6, 6),
+        check("min_m", 1.238_135, min_m, HALF_OF_6, 6),
+        check("min_at_s", 4.18, min_at_s, 0.5e-2, 2),
+        check("reached_at_s", 44.3, flight.reached_at_s(), 0.05, 1),
+    ];
+    Ok(vec![
+        flight.formed(
+            "figure-3",
+            "Fig. 3, equation (8)",
+            "Six vehicles leave a line and form the circle without coming closer than delta.",
+        ),
+        against_reference(
+            "figure-3-reference",
+            "Fig. 3",
+            "The circle's flight agrees with an independent integrator.",
+            &checks,
+        ),
+    ])
+}
+
+fn baseline() -> Result<Vec<Claim>, ValidateError> {
+    let flight = Experiment::fly("pentagon-laplacian")?;
+    let (min_m, min_at_s) = flight.closest();
+    let (delta_m, error_m) = (flight.scenario.delta_m, flight.last_edge_error_m());
+    Ok(vec![Claim {
+        id: "figure-4",
+        source: "Fig. 4, equation (3)",
+        finding: None,
+        kind: Kind::PaperHolds,
+        statement: "Under the Laplacian law (3) the same start reaches the pentagon, but vehicles come closer than delta.",
+        expected: "reached; closest 1.5327 m at 3.63 s".to_owned(),
+        measured: format!(
+            "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s, largest \
+             edge error {} m after {DURATION_S} s",
+            flight.reached_at_s(),
+            bound(error_m)
+        ),
+        values: [("min_m", min_m), ("min_at_s", min_at_s), ("final_edge_error_m", error_m)].into(),
+        tolerance: "half a unit of the last digit".to_owned(),
+        reason: "the reference is an independent 8th-order Runge-Kutta integrator at relative tolerance 1e-10",
+        pass: (min_m - 1.5327).abs() <= 0.5e-4 && (min_at_s - 3.63).abs() <= 0.5e-2 && error_m <= CONVERGED_M,
+    }])
+}
+
+fn straight_line() -> Result<Vec<Claim>, ValidateError> {
+    let flight = Experiment::fly("pentagon-collinear")?;
+    let (min_m, _) = flight.closest();
+    let error_m = flight.last_edge_error_m();
+    let states = &flight.solution.states;
+    let off_line_m = states.iter().map(|state| state.positions_m.columns(1, 2).amax()).fold(0.0, f64::max);
+    Ok(vec![Claim {
+        id: "straight-line",
+        source: "the convergence theorem",
+        finding: Some("F2"),
+        kind: Kind::PaperRefuted,
+        statement: "The law drives the vehicles to the formation from any start without overlap.",
+        expected: "from an exactly straight line never: closest 2.458145 m, largest edge error 8.57 m for ever"
+            .to_owned(),
+        measured: format!(
+            "largest distance from the line {}; closest {min_m:.6} m; largest edge error {error_m:.2} m after \
+             {DURATION_S} s",
+            bound(off_line_m)
+        ),
+        values: [("off_line_m", off_line_m), ("min_m", min_m), ("final_edge_error_m", error_m)].into(),
+        tolerance: "0 from the line, half a unit of the last digit for the rest".to_owned(),
+        reason: "forces along the line have no other component, not even by rounding",
+        pass: off_line_m == 0.0 && (min_m - 2.458_145).abs() <= HALF_OF_6 && (error_m - 8.57).abs() <= 0.5e-2,
+    }])
+}
+
+/// F6: turn and mirror the start, and everything that follows is turned and mirrored with it.
+fn up_to_rigid_motion() -> Result<Vec<Claim>, ValidateError> {
+    let straight = Experiment::fly("pentagon")?;
+    let (sin, cos) = libm::sincos(TURN_RAD);
+    let mut scenario = straight.scenario.clone();
+    for i in 0..scenario.count() {
+        let start = row(&scenario.start.positions_m, i);
+        let turned = Vector3::new(cos * start.x + sin * start.y, sin * start.x - cos * start.y, 0.0);
+        set_row(&mut scenario.start.positions_m, i, turned);
+    }
+    let turned = Experiment::of(scenario)?;
+    let formation = &turned.scenario.formation;
+    let positions_m = turned.last_positions_m();
+    let fits_m = [straight.last_positions_m(), positions_m].map(|end_m| procrustes_rms_m(end_m, formation));
+    let fit_m = fits_m[0].max(fits_m[1]);
+    let motion = best_rigid_motion(positions_m, formation);
+    // In space a flat shape is turned over instead of mirrored: what counts is the motion within the plane.
+    let mirrored = motion.is_some_and(|motion| motion.rotation.fixed_view::<2, 2>(0, 0).determinant() < 0.0);
+    // The image of the x axis: a side of the pentagon.
+    let turn_rad = motion.map_or(f64::NAN, |motion| motion.rotation[(1, 0)].atan2(motion.rotation[(0, 0)]));
+    let offsets_m = (0..formation.count()).map(|i| (row(positions_m, i) - row(&formation.slots_m, i)).norm());
+    let farthest_m = offsets_m.fold(0.0, f64::max);
+    Ok(vec![Claim {
+        id: "up-to-rigid-motion",
+        source: "section 4, goal positions h_p",
+        finding: Some("F6"),
+        kind: Kind::PaperRefuted,
+        statement: "The vehicles reach the goal positions.",
+        expected: format!(
+            "only the shape: a start turned by {TURN_RAD} rad and mirrored gives an end turned by {TURN_RAD} rad and \
+             mirrored"
+        ),
+        measured: format!(
+            "best rigid fit {} m (rms) either way; turned by {turn_rad:.6} rad and {}; a vehicle is {farthest_m:.2} m \
+             from its slot",
+            bound(fit_m),
+            if mirrored { "mirrored" } else { "not mirrored" }
+        ),
+        values: [("fit_rms_m", fit_m), ("turn_rad", turn_rad), ("farthest_from_slot_m", farthest_m)].into(),
+        tolerance: format!("{CONVERGED_M:e} m for the fit, {CONVERGED_M:e} rad for the turn"),
+        reason: "rounding, after common motion has grown by e^12",
+        pass: fit_m <= CONVERGED_M && mirrored && (turn_rad - TURN_RAD).abs() <= CONVERGED_M && farthest_m > 0.1,
+    }])
+}
+
+/// Relative motion on the complete graph is the same for every a22.
+fn relative_motion() -> Result<Vec<Claim>, ValidateError> {
+    let differences = A22_PER_S
+        .par_iter()
+        .map(|&a22_per_s| {
+            let mut scenario = builtin("pentagon")?;
+            scenario.a22_per_s = a22_per_s;
+            Ok(continuous(&scenario, &[COMPARED_S])?.states)
+        })
+        .collect::<Result<Vec<_>, ValidateError>>()?;
+    let offsets = |states: &[Swarm]| -> Vec<Vector3<f64>> {
+        states.iter().flat_map(|s| (1..s.count()).map(|i| row(&s.positions_m, i) - row(&s.positions_m, 0))).collect()
+    };
+    let first = differences.first().map(|states| offsets(states)).unwrap_or_default();
+    let difference_m = differences
+        .iter()
+        .flat_map(|states| offsets(states).into_iter().zip(&first).map(|(a, b)| (a - b).norm()).collect::<Vec<_>>())
+        .fold(0.0, f64::max);
+    Ok(vec![Claim {
+        id: "relative-motion",
+        source: "the stability theorem, complete graph",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "On the complete graph a22 cancels: relative motion does not depend on it.",
+        expected: "the same pentagon flight".to_owned(),
+        measured: format!(
+            "relative positions after {COMPARED_S} s differ by {} m between a22 of {A22_PER_S:?} 1/s",
+            bound(difference_m)
+        ),
+        values: [("largest_difference_m", difference_m)].into(),
+        tolerance: format!("{CONVERGED_M:e} m"),
+        reason: "the solver's tolerance of 1e-12 a step",
+        pass: !first.is_empty() && difference_m <= CONVERGED_M,
+    }])
+}

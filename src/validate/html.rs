@@ -1,0 +1,97 @@
+//! `validate.html`.
+
+use super::{Claim, Group, Kind, Rung, Validation};
+use crate::report::page::{Badge, Block, Cell, Column, Page, Section, Table, Tone};
+
+impl Validation {
+    /// The result as a self-contained page: claims, figures and the ladder. Two validations by one program give the same
+    /// bytes.
+    #[must_use]
+    pub fn to_html(&self) -> String {
+        let failed = self.claims().filter(|claim| !claim.pass);
+        let mut sections: Vec<Section> = self.groups.iter().map(section).collect();
+        let convergence = |name: &str| name == "convergence";
+        let (of_ladder, of_paper): (Vec<_>, Vec<_>) =
+            self.figures.iter().cloned().partition(|figure| convergence(&figure.name));
+        sections.push(Section {
+            heading: "Convergence ladder".to_owned(),
+            blocks: vec![Block::Table(ladder(&self.ladder)), Block::Figures(of_ladder)],
+        });
+        sections.push(Section { heading: "The paper's figures".to_owned(), blocks: vec![Block::Figures(of_paper)] });
+        sections.push(Section {
+            heading: "Repeat it".to_owned(),
+            blocks: vec![Block::Command("tautline validate".to_owned())],
+        });
+        Page {
+            title: "Validation".to_owned(),
+            kind: "Every claim, ours and the paper's, judged by measurement".to_owned(),
+            badge: Badge::judged(self.pass),
+            verdict: self.headline(),
+            reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),
+            warnings: Vec::new(),
+            sections,
+            foot: format!("Made by {} {}.", self.tool.name, self.tool.version),
+        }
+        .render()
+    }
+}
+
+fn section(group: &Group) -> Section {
+    let table = Table {
+        caption: caption(group),
+        columns: vec![Column::words("Claim"), Column::words("Measured"), Column::words("Outcome")],
+        rows: group.claims.iter().map(row).collect(),
+    };
+    Section { heading: group.title.to_owned(), blocks: vec![Block::Table(table)] }
+}
+
+fn caption(group: &Group) -> String {
+    let (all, failed) = (group.claims.len(), group.claims.iter().filter(|claim| !claim.pass).count());
+    if failed == 0 {
+        format!("{all} claims, all as expected")
+    } else {
+        format!("{failed} of {all} claims not as expected")
+    }
+}
+
+fn row(claim: &Claim) -> Vec<Cell> {
+    let tone = match (claim.pass, claim.kind) {
+        (false, _) => Tone::Bad,
+        (true, Kind::PaperRefuted) => Tone::Neutral,
+        (true, _) => Tone::Good,
+    };
+    vec![
+        Cell::Noted(claim.statement.to_owned(), format!("{}; {}", claim.id, claim.source)),
+        Cell::Noted(
+            claim.measured.clone(),
+            format!("Expected: {}. Tolerance: {} ({}).", claim.expected, claim.tolerance, claim.reason),
+        ),
+        Cell::Badge(Badge { tone, word: claim.outcome().to_owned() }),
+    ]
+}
+
+fn ladder(rungs: &[Rung]) -> Table {
+    let number = |x: f64| Cell::from(format!("{x:.2e}"));
+    Table {
+        caption: "Largest position error of Rapier on the pentagon's flight, by step".to_owned(),
+        columns: vec![
+            Column::words("Step [s]"),
+            Column::numbers("Double precision [m]"),
+            Column::numbers("Order"),
+            Column::numbers("Single precision [m]"),
+            Column::numbers("Energy excess [m²/s²]"),
+        ],
+        rows: rungs
+            .iter()
+            .map(|rung| {
+                vec![
+                    Cell::from(format!("1/{:.0}", 1.0 / rung.dt_s)),
+                    number(rung.double_m),
+                    Cell::from(rung.order.map_or("–".to_owned(), |order| format!("{order:.3}"))),
+                    number(rung.single_m),
+                    number(rung.energy_excess_m2_s2),
+                ]
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,240 @@
+//! Rates of growth and decay near the formation: F4, F5 and the star.
+
+use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
+
+use super::claim::{Claim, Kind};
+use super::flights::{engine, with_step};
+use super::words::bound;
+use super::{Progress, ValidateError};
+use crate::formation::{Formation, largest_edge_error_m};
+use crate::graph::Graph;
+use crate::plant::ideal::{self, Tolerances};
+use crate::scenario::{Precision, Scenario, Space};
+use crate::swarm::{Rows, Swarm, set_row};
+
+const A22_PER_S: f64 = 0.1;
+/// The hexagon of the paper's second example.
+const HEXAGON: usize = 6;
+const RADIUS_M: f64 = 1.5;
+const DELTA_M: f64 = 1.0;
+/// How far the hexagon is bent out of its plane, root sum of squares \[m\].
+const BEND_M: f64 = 0.16;
+/// When the bend is measured \[s\]: early, and late enough for the power law.
+const BEND_TIMES_S: [f64; 4] = [100.0, 300.0, 10_000.0, 30_000.0];
+/// 1/A^2 grows linearly from its start, so the exponent at a bend A is -1/2 (1 - A^2/A(0)^2): 1 % short of its limit.
+const EXPONENT_TOLERANCE: f64 = 0.01;
+
+/// Common velocity for the growth of the common mode \[m/s\], and how long it grows \[s\].
+const COMMON_M_S: f64 = 1e-3;
+const COMMON_S: f64 = 100.0;
+/// The solver's tolerance and the rounding of 1e5 steps, over 100 s.
+const COMMON_TOLERANCE_PER_S: f64 = 1e-9;
+/// The engine's step where no closed form depends on it \[s\].
+const ENGINE_STEP_S: f64 = 1.0 / 60.0;
+/// Time by which rounding has grown by e^100 \[s\].
+const LOST_S: f64 = 1000.0;
+/// A formation is lost beyond this largest edge error \[m\].
+const LOST_M: f64 = 0.1;
+
+/// Common speed of a swarm that is lost \[m/s\].
+const RUNAWAY_M_S: f64 = 1e9;
+
+/// Stars: number of vehicles.
+const STARS: [usize; 3] = [10, 11, 12];
+const STAR_RADIUS_M: f64 = 3.0;
+/// Transverse speed of two followers \[m/s\], so small that edges stay straight to 1e-9 m.
+const STAR_M_S: f64 = 1e-6;
+const STAR_S: f64 = 100.0;
+/// Edges that bend by (1e-4 m)^2 pull back with some 1e-12 m/s^2, 1e-6 of the speed.
+const STAR_TOLERANCE_PER_S: f64 = 1e-6;
+/// Far below the speeds of the star.
+const FINE: Tolerances = Tolerances { relative: 1e-12, absolute: 1e-18 };
+
+pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
+    let parts: [fn() -> Result<Claim, ValidateError>; 5] =
+        [bent_hexagon, common_mode, common_mode_in_the_engine, lost_to_rounding, stars];
+    parts.par_iter().map(|part| part().inspect(|_| progress.advance(1))).collect()
+}
+
+fn hexagon() -> Formation {
+    Formation::circle(HEXAGON, RADIUS_M)
+}
+
+/// How far a swarm is from its best plane, root sum of squares \[m\].
+fn bend_m(positions_m: &Rows) -> f64 {
+    let centre = crate::swarm::mean_row(positions_m);
+    let centred = DMatrix::from_fn(positions_m.nrows(), 3, |i, axis| positions_m[(i, axis)] - centre[axis]);
+    centred.singular_values().iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// The hexagon at rest, bent like a saddle: z in proportion to the cosine of twice the angle.
+fn bent() -> Scenario {
+    let mut start = Swarm::at_rest(hexagon().slots_m);
+    for i in 0..HEXAGON {
+        let (x, y) = (start.positions_m[(i, 0)] / RADIUS_M, start.positions_m[(i, 1)] / RADIUS_M);
+        start.positions_m[(i, 2)] = BEND_M * (x * x - y * y) / (HEXAGON as f64 / 2.0).sqrt();
+    }
+    Scenario::new("bent", start, hexagon(), DELTA_M, LOST_S)
+}
+
+fn bent_hexagon() -> Result<Claim, ValidateError> {
+    let scenario = bent();
+    let mut law = scenario.law()?;
+    let solution = ideal::solve(law.as_mut(), &scenario.start, 0.0, &BEND_TIMES_S, Tolerances::default())?;
+    let at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
+    let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
+    let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
+    Ok(Claim {
+        id: "bent-hexagon",
+        source: "the convergence theorem",
+        finding: Some("F4"),
+        kind: Kind::PaperRefuted,
+        statement: "The law converges to the formation exponentially, in space as in the plane.",
+        expected: "a flat formation in space is reached as t^(-1/2): nothing resists a bend to first order".to_owned(),
+        measured: format!(
+            "a hexagon bent by {BEND_M} m still is by {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s and \
+             {at_10000_m:.3} m after 10000 s; exponent {exponent:.2} between 10000 s and 30000 s"
+        ),
+        values: [("after_100_s_m", at_100_m), ("after_300_s_m", at_300_m), ("exponent", exponent)].into(),
+        tolerance: format!("{EXPONENT_TOLERANCE} in the exponent"),
+        reason: "the power law is the limit for late times",
+        pass: (exponent + 0.5).abs() <= EXPONENT_TOLERANCE,
+    })
+}
+
+/// The hexagon in formation, moving as a whole.
+fn drifting() -> Scenario {
+    let mut start = Swarm::at_rest(hexagon().slots_m);
+    for i in 0..HEXAGON {
+        set_row(&mut start.velocities_m_s, i, Vector3::new(0.6, -0.8, 0.0) * COMMON_M_S);
+    }
+    let mut scenario = Scenario::new("drifting", start, hexagon(), DELTA_M, COMMON_S);
+    scenario.a22_per_s = A22_PER_S;
+    scenario
+}
+
+fn rate_per_s(last: &Swarm, duration_s: f64) -> f64 {
+    (last.mean_velocity_m_s().norm() / COMMON_M_S).ln() / duration_s
+}
+
+fn common_rate(id: &'static str, statement: &'static str, rate_per_s: f64) -> Claim {
+    let error_per_s = rate_per_s - A22_PER_S;
+    Claim {
+        id,
+        source: "the stability theorem",
+        finding: Some("F5"),
+        kind: Kind::PaperRefuted,
+        statement,
+        expected: format!("the common velocity grows at a22 = {A22_PER_S} 1/s"),
+        measured: format!("{rate_per_s:.6} 1/s over {COMMON_S} s, error {} 1/s", bound(error_per_s)),
+        values: [("rate_per_s", rate_per_s)].into(),
+        tolerance: format!("{COMMON_TOLERANCE_PER_S:e} 1/s"),
+        reason: "the solver's tolerance, or the rounding of the steps, over 100 s",
+        pass: error_per_s.abs() <= COMMON_TOLERANCE_PER_S,
+    }
+}
+
+fn common_mode() -> Result<Claim, ValidateError> {
+    let scenario = drifting();
+    let mut law = scenario.law()?;
+    let solution = ideal::solve(law.as_mut(), &scenario.start, A22_PER_S, &[COMMON_S], Tolerances::default())?;
+    let last = solution.states.last().unwrap_or(&scenario.start);
+    Ok(common_rate(
+        "common-mode",
+        "The formation is asymptotically stable for a22 > 0 (continuous time).",
+        rate_per_s(last, COMMON_S),
+    ))
+}
+
+fn common_mode_in_the_engine() -> Result<Claim, ValidateError> {
+    let flight = engine(&with_step(&drifting(), Precision::Double, ENGINE_STEP_S), |_| ())?;
+    Ok(common_rate(
+        "common-mode-in-the-engine",
+        "The formation is asymptotically stable for a22 > 0 (Rapier).",
+        rate_per_s(&flight.last, flight.duration_s),
+    ))
+}
+
+fn lost_to_rounding() -> Result<Claim, ValidateError> {
+    let mut scenario = with_step(&bent(), Precision::Double, ENGINE_STEP_S);
+    scenario.a22_per_s = A22_PER_S;
+    scenario.time.record_hz = 1.0;
+    let mut lost_at_s = f64::NAN;
+    let flight = engine(&scenario, |sample| {
+        let error_m = largest_edge_error_m(&sample.swarm.positions_m, &scenario.formation, &scenario.graph);
+        if lost_at_s.is_nan() && !(error_m <= LOST_M) {
+            lost_at_s = sample.time_s;
+        }
+    })?;
+    let drift_m_s = flight.last.mean_velocity_m_s().norm();
+    Ok(Claim {
+        id: "lost-to-rounding",
+        source: "the stability theorem",
+        finding: Some("F5"),
+        kind: Kind::PaperRefuted,
+        statement: "Vehicles that have reached the formation stay in it.",
+        expected: format!("with a22 = {A22_PER_S} 1/s rounding alone grows until it destroys the formation"),
+        measured: if lost_at_s.is_nan() {
+            format!("still in formation after {LOST_S} s")
+        } else {
+            format!(
+                "the same hexagon, started at rest, is lost before {LOST_S} s in double precision; its \
+                 common speed is then above {RUNAWAY_M_S:e} m/s"
+            )
+        },
+        values: [("lost_at_s", lost_at_s), ("final_common_m_s", drift_m_s)].into(),
+        tolerance: format!("lost: a largest edge error above {LOST_M} m"),
+        reason: "e^100 is 3e43, rounding starts near 1e-17 m/s",
+        pass: lost_at_s < LOST_S && drift_m_s > RUNAWAY_M_S,
+    })
+}
+
+/// Growth rate of the relative velocities of a star of so many vehicles in formation \[1/s\].
+fn star_rate_per_s(count: usize) -> Result<f64, ValidateError> {
+    let mut slots_m = Rows::zeros(count);
+    let rim = Formation::circle(count - 1, STAR_RADIUS_M);
+    slots_m.rows_mut(1, count - 1).copy_from(&rim.slots_m);
+    let formation = Formation::points(slots_m);
+    // Two followers move across the plane of the star, one up and one down: no edge resists, and the hub stays.
+    let mut start = Swarm::at_rest(formation.slots_m.clone());
+    (start.velocities_m_s[(1, 2)], start.velocities_m_s[(2, 2)]) = (STAR_M_S, -STAR_M_S);
+    let mut scenario = Scenario::new("star", start, formation, DELTA_M, STAR_S);
+    scenario.space = Space::Volume;
+    scenario.graph = Graph::star(count);
+    scenario.a22_per_s = A22_PER_S;
+    let mut law = scenario.law()?;
+    let solution = ideal::solve(law.as_mut(), &scenario.start, A22_PER_S, &[STAR_S], FINE)?;
+    let last = solution.states.last().unwrap_or(&scenario.start);
+    Ok((last.disagreement_m_s() / scenario.start.disagreement_m_s()).ln() / STAR_S)
+}
+
+fn stars() -> Result<Claim, ValidateError> {
+    let expected = STARS.map(|count| A22_PER_S - (1.0 + A22_PER_S) / count as f64);
+    let rates = STARS.par_iter().map(|&count| star_rate_per_s(count)).collect::<Result<Vec<_>, _>>()?;
+    let error_per_s = rates.iter().zip(expected).map(|(rate, expected)| (rate - expected).abs()).fold(0.0, f64::max);
+    let list = |rates: &[f64]| {
+        let entries = STARS.iter().zip(rates).map(|(count, rate)| format!("N = {count}: {:+.6} 1/s", rate + 0.0));
+        entries.collect::<Vec<_>>().join(", ")
+    };
+    Ok(Claim {
+        id: "star",
+        source: "general graphs, a22 < (1 + a22) lambda2/N",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "Relative velocities on a star grow at a22 - (1 + a22)/N: damped for 10 vehicles, not for 12.",
+        expected: list(&expected),
+        measured: format!("{}; largest error {} 1/s", list(&rounded(&rates)), bound(error_per_s)),
+        values: super::Values(
+            ["rate_10_per_s", "rate_11_per_s", "rate_12_per_s"].into_iter().zip(rates.iter().copied()).collect(),
+        ),
+        tolerance: format!("{STAR_TOLERANCE_PER_S:e} 1/s"),
+        reason: "edges that bend by 1e-4 m pull back with 1e-6 of the speed",
+        pass: error_per_s <= STAR_TOLERANCE_PER_S,
+    })
+}
+
+/// To what is printed, so that a rate of rounding size has no sign.
+fn rounded(rates: &[f64]) -> Vec<f64> {
+    rates.iter().map(|rate| (rate * 1e6).round() / 1e6).collect()
+}

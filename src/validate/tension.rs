@@ -1,0 +1,173 @@
+//! The edge tension (5), (6): its minimum and its derivatives.
+
+use super::claim::{Claim, Kind};
+use super::words::bound;
+use super::{Progress, ValidateError};
+use crate::law::{EdgeTension, TensionError};
+
+/// Figure 1 plots the tension for alpha = K = 1 and delta = 0.5 m, and prints the constant of delta = 1 m.
+const FIGURE_1_DELTA_M: f64 = 0.5;
+const FIGURE_1_K_M: f64 = 1.0;
+const FIGURE_1_PRINTED: f64 = 3.2956;
+const PRINTED_FOR_DELTA_M: f64 = 1.0;
+/// Half a unit of the last digit that the caption prints.
+const PRINTED_RESOLUTION: f64 = 0.5e-4;
+
+/// Clearances l - delta from 2^-40 m to 2^20 m: powers of two, so that l and both ends of every difference are exact.
+const CLEARANCE_EXPONENTS: std::ops::RangeInclusive<i32> = -40..=20;
+/// Half width of a difference over the clearance.
+const STEP: f64 = 1.0 / 1024.0;
+/// A difference of fourth order with this step is off by 4 STEP^4 = 4e-12 for truncation and by 1.5 eps/STEP = 3e-13 for
+/// rounding, relative to the terms that it subtracts; six times that.
+const DIFFERENCE_TOLERANCE: f64 = 3e-11;
+/// A few roundings of numbers of order 1.
+const ROUNDING: f64 = 1e-14;
+
+pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
+    let claims = vec![minimum()?, figure_1()?, slope()?, curvature()?];
+    progress.advance(1);
+    Ok(claims)
+}
+
+/// The tension of these lengths for alpha = 1.
+fn unit_tension(delta_m: f64, k_m: f64) -> Result<EdgeTension, ValidateError> {
+    let tension = EdgeTension::new(1.0, delta_m, delta_m + k_m * 1.0_f64.asinh());
+    tension.map_err(|error: TensionError| ValidateError::Tension(error))
+}
+
+/// The tension that Figure 1 plots.
+pub(super) fn of_figure_1() -> Result<EdgeTension, ValidateError> {
+    unit_tension(FIGURE_1_DELTA_M, FIGURE_1_K_M)
+}
+
+fn minimum() -> Result<Claim, ValidateError> {
+    let tension = unit_tension(2.0, 1.0 / 1.0_f64.asinh())?;
+    let rest_m = tension.rest_m();
+    // V' changes sign between the neighbours of d in double precision.
+    let bracketed = tension.derivative(rest_m.next_down()) <= 0.0 && tension.derivative(rest_m.next_up()) >= 0.0;
+    let literal = 1.0 / (1.0_f64.asinh()).tanh() + rest_m / tension.k_m() - tension.minimum();
+    let (value, slope) = (tension.value(rest_m), tension.derivative(rest_m));
+    Ok(Claim {
+        id: "tension-minimum",
+        source: "equations (5), (6)",
+        finding: None,
+        kind: Kind::PaperHolds,
+        statement: "The tension has its only minimum, 0, at the desired distance d = delta + K ln(3 + 2 sqrt 2)/2.",
+        expected: "V(d) = V'(d) = 0, and V' changes sign at d".to_owned(),
+        measured: format!(
+            "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) evaluated literally {}; V' {}",
+            bound(value),
+            bound(slope),
+            bound(literal),
+            if bracketed { "changes sign" } else { "does not change sign" }
+        ),
+        values: [("value_m2_s2", value), ("slope_m_s2", slope), ("literal_m2_s2", literal)].into(),
+        tolerance: format!("{ROUNDING:e} m^2/s^2"),
+        reason: "a few roundings of numbers of order 1",
+        pass: bracketed && [value, slope, literal].iter().all(|x| x.abs() <= ROUNDING),
+    })
+}
+
+fn figure_1() -> Result<Claim, ValidateError> {
+    let of_caption = of_figure_1()?.minimum();
+    let of_other = unit_tension(PRINTED_FOR_DELTA_M, FIGURE_1_K_M)?.minimum();
+    let is_of_other = (of_other - FIGURE_1_PRINTED).abs() <= PRINTED_RESOLUTION;
+    Ok(Claim {
+        id: "figure-1-caption",
+        source: "Fig. 1, equation (5)",
+        finding: Some("F1"),
+        kind: Kind::PaperRefuted,
+        statement: "With delta = 0.5, alpha = K = 1 the constant Vmin is 3.2956.",
+        expected: "another number; 3.2956 is the constant of delta = 1".to_owned(),
+        measured: format!("Vmin = {of_caption:.9} for delta = 0.5 and {of_other:.9} for delta = 1"),
+        values: [("minimum_delta_0_5_m2_s2", of_caption), ("minimum_delta_1_m2_s2", of_other)].into(),
+        tolerance: format!("{PRINTED_RESOLUTION:e}"),
+        reason: "half a unit of the last printed digit",
+        pass: is_of_other && (of_caption - FIGURE_1_PRINTED).abs() > PRINTED_RESOLUTION,
+    })
+}
+
+/// The derivative at `x` of `f` by the difference of fourth order over x - 2h .. x + 2h.
+fn difference(f: impl Fn(f64) -> f64, x: f64, h: f64) -> f64 {
+    (8.0 * (f(x + h) - f(x - h)) - (f(x + 2.0 * h) - f(x - 2.0 * h))) / (12.0 * h)
+}
+
+/// Largest error of `derivative` against differences of `f` over all clearances, relative to `scale`.
+fn largest_difference(
+    tension: &EdgeTension,
+    f: impl Fn(f64) -> f64,
+    derivative: impl Fn(f64) -> f64,
+    scale: impl Fn(f64, f64) -> f64,
+) -> f64 {
+    let delta_m = tension.delta_m();
+    CLEARANCE_EXPONENTS
+        .map(|exponent| {
+            let clearance_m = libm::exp2(f64::from(exponent));
+            let distance_m = delta_m + clearance_m;
+            let error = difference(&f, distance_m, STEP * clearance_m) - derivative(distance_m);
+            error.abs() / scale(distance_m, clearance_m)
+        })
+        .fold(0.0, f64::max)
+}
+
+fn decades() -> f64 {
+    f64::from(CLEARANCE_EXPONENTS.end() - CLEARANCE_EXPONENTS.start()) * std::f64::consts::LOG10_2
+}
+
+fn slope() -> Result<Claim, ValidateError> {
+    let tension = unit_tension(2.0, 1.0)?;
+    let (alpha, k_m) = (tension.alpha(), tension.k_m());
+    // Where V' changes sign its two terms are the scale: (alpha/K) (1 + csch^2 s) = 2 alpha/K - V'.
+    let error = largest_difference(
+        &tension,
+        |l| tension.value(l),
+        |l| tension.derivative(l),
+        |l, _| (2.0 * alpha / k_m - tension.derivative(l)).abs(),
+    );
+    Ok(Claim {
+        id: "tension-slope",
+        source: "equation (6)",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "V'(l) = (alpha/K) [1 - csch^2 s] is the derivative of V, from the barrier to far away.",
+        expected: "equal to differences of V".to_owned(),
+        measured: format!("largest relative error {error:.0e} over {:.0} decades of clearance", decades()),
+        values: [("largest_relative_error", error)].into(),
+        tolerance: format!("{DIFFERENCE_TOLERANCE:e}"),
+        reason: "truncation and rounding of a fourth-order difference with a step of 1/1024 of the clearance",
+        pass: error <= DIFFERENCE_TOLERANCE,
+    })
+}
+
+fn curvature() -> Result<Claim, ValidateError> {
+    let tension = unit_tension(2.0, 1.0)?;
+    // Far out V'' vanishes beside the change of V' that rounding alone makes.
+    let error = largest_difference(
+        &tension,
+        |l| tension.derivative(l),
+        |l| tension.second_derivative(l),
+        |l, clearance_m| tension.second_derivative(l) + tension.derivative(l).abs() / clearance_m,
+    );
+    let positive = CLEARANCE_EXPONENTS.into_iter().all(|e| {
+        let curvature = tension.second_derivative(tension.delta_m() + libm::exp2(f64::from(e)));
+        // Beyond some 350 K it is smaller than any double.
+        curvature > 0.0 || (curvature == 0.0 && e > 8)
+    });
+    Ok(Claim {
+        id: "tension-curvature",
+        source: "equation (6)",
+        finding: None,
+        kind: Kind::Ours,
+        statement: "V''(l) = (2 alpha/K^2) coth(s) csch^2(s) is the derivative of V' and never negative: V is convex.",
+        expected: "equal to differences of V'".to_owned(),
+        measured: format!(
+            "largest relative error {error:.0e} over {:.0} decades of clearance; {}",
+            decades(),
+            if positive { "never negative" } else { "negative somewhere" }
+        ),
+        values: [("largest_relative_error", error)].into(),
+        tolerance: format!("{DIFFERENCE_TOLERANCE:e}"),
+        reason: "truncation and rounding of a fourth-order difference with a step of 1/1024 of the clearance",
+        pass: positive && error <= DIFFERENCE_TOLERANCE,
+    })
+}

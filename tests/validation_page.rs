@@ -1,0 +1,101 @@
+//! `docs/validation.md` says what `tautline validate` measures, and every claim comes out as expected.
+
+#[path = "support/release.rs"]
+mod release;
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+const PAGE: &str = include_str!("../docs/validation.md");
+const BEGIN: &str = "<!-- begin: tautline validate --markdown -->\n";
+const END: &str = "<!-- end: tautline validate --markdown -->\n";
+
+/// The part of the page between the marks.
+fn generated(page: &str) -> Option<&str> {
+    page.split_once(BEGIN)?.1.split_once(END).map(|(part, _)| part)
+}
+
+/// The lines of which one text has more than the other.
+fn differences(page: &str, program: &str) -> String {
+    let only = |mark: &str, here: &str, there: &str| {
+        let lines = here.lines().filter(|line| !there.lines().any(|other| other == *line));
+        lines.map(|line| format!("{mark} {line}\n")).collect::<String>()
+    };
+    only("page:   ", page, program) + &only("program:", program, page)
+}
+
+#[test]
+fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |arguments: &[&str]| {
+        Command::new(release::program()).arg("validate").args(arguments).current_dir(folder.path()).output()
+    };
+    let done = run(&["--markdown", "--quiet"]).expect("the program");
+    let out = folder.path().join("out/validate");
+    let result = fs::read(out.join("validate.json")).expect("the result");
+    let result: Value = serde_json::from_slice(&result).expect("JSON");
+    let failed: Vec<_> = result["groups"]
+        .as_array()
+        .expect("groups")
+        .iter()
+        .flat_map(|group| group["claims"].as_array().expect("claims"))
+        .filter(|claim| claim["pass"] != true)
+        .collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    assert_eq!((done.status.code(), &result["pass"]), (Some(0), &Value::Bool(true)));
+
+    let program = String::from_utf8(done.stdout).expect("UTF-8");
+    let page = generated(PAGE).expect("two marks in docs/validation.md");
+    assert!(page == program, "docs/validation.md is not what the program measures:\n{}", differences(page, &program));
+
+    let kept = run(&["--quiet"]).expect("the program");
+    assert_eq!(kept.status.code(), Some(2), "a finished validation is not overwritten");
+    let html = fs::read_to_string(out.join("validate.html")).expect("the page");
+    for figure in ["1", "2a", "2b", "2c", "3a", "3b", "3c", "4"].map(|figure| format!("figure-{figure}")) {
+        let svg = fs::read_to_string(out.join(format!("figures/{figure}.svg"))).expect(&figure);
+        assert!(svg.starts_with("<svg") && html.contains(&svg), "{figure}");
+    }
+    assert!(out.join("figures/convergence.svg").is_file());
+    let ids = result["groups"].to_string();
+    for finding in 1..=7 {
+        assert!(ids.contains(&format!("\"finding\":\"F{finding}\"")), "F{finding} is measured");
+    }
+}
+
+#[test]
+fn a_page_with_another_number_is_noticed() {
+    let page = "a\nthe error is 1e-9 m\nb\n";
+    let program = "a\nthe error is 2e-9 m\nb\n";
+    let seen = differences(page, program);
+    assert_eq!(seen, "page:    the error is 1e-9 m\nprogram: the error is 2e-9 m\n");
+    assert!(differences(page, page).is_empty());
+    assert_eq!(generated("no marks"), None);
+}
+
+#[test]
+fn every_broken_variant_is_still_a_change_of_one_line_and_listed_on_the_page() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut variants = 0;
+    for entry in fs::read_dir(root.join("tests/mutants")).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        let text = fs::read_to_string(&path).expect(&name);
+        let field = |key: &str| {
+            let line = text.lines().find_map(|line| line.strip_prefix(key)).unwrap_or_else(|| panic!("{name}: {key}"));
+            line.trim().to_owned()
+        };
+        let source = fs::read_to_string(root.join(field("file:"))).expect(&name);
+        assert_eq!(source.matches(&field("from:")).count(), 1, "{name}: the line to break");
+        assert_ne!(field("from:"), field("to:"), "{name}");
+        let (what, test) = (field("what:"), field("test:"));
+        let test = test.split(' ').next_back().expect("a test");
+        let row =
+            PAGE.lines().find(|line| line.contains(&format!("`{name}`"))).unwrap_or_else(|| panic!("{name}: no row"));
+        assert!(row.contains(&what) && row.contains(test), "{name}: {row}");
+        variants += 1;
+    }
+    assert_eq!(variants, 10);
+}
