@@ -1,162 +1,13 @@
-//! `report.html` and `validate.html` in a real browser: at the width of a phone and of a desktop, in light and in dark, nothing sticks out,
-//! nothing is loaded from elsewhere, and nothing is complained about.
-//!
-//! Needs `chromium` (or the program that `CHROMIUM` names); `tests/run.sh` installs it.
+//! `report.html` in a real browser.
 
-#[path = "support/release.rs"]
-mod release;
+#[path = "support/browser.rs"]
+mod browser;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
 
-/// A page loads in a second or two; a browser that hangs is stopped.
-const PATIENCE: Duration = Duration::from_secs(120);
-const WIDTHS_PX: [u32; 3] = [320, 390, 1280];
-/// A contrast of text that people with moderately low vision read (WCAG 2.2, level AA).
-const CONTRAST: f64 = 4.5;
-
-/// Measures the page in the frame and writes what it found into the title.
-///
-/// A headless window is never narrower than some 500 pixels, so the page is put into a frame as wide as a phone.
-const PROBE: &str = r#"
-const frame = document.querySelector("iframe");
-frame.addEventListener("load", () => {
-  const page = frame.contentDocument, root = page.documentElement, view = frame.contentWindow;
-  const inside = element => element.closest(".scroll, pre, svg") !== null;
-  const stickingOut = [...page.body.querySelectorAll("*")].filter(element =>
-    !inside(element) && element.getBoundingClientRect().right > view.innerWidth + 0.5);
-  const rgb = color => color.match(/[\d.]+/g).map(Number);
-  const luminance = color => {
-    const [r, g, b] = rgb(color).map(c => c / 255).map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const background = element => {
-    for (let at = element; at; at = at.parentElement) {
-      const color = view.getComputedStyle(at).backgroundColor, alpha = rgb(color)[3];
-      if (alpha === undefined || alpha > 0) return color;
-    }
-    return "rgb(255, 255, 255)";
-  };
-  const contrast = (a, b) => {
-    const [x, y] = [luminance(a), luminance(b)].sort((p, q) => q - p);
-    return (x + 0.05) / (y + 0.05);
-  };
-  const texts = [...page.body.querySelectorAll("h1,h2,p,li,th,td,caption,small,code,summary,figcaption,.badge")];
-  const contrasts = texts.map(text => contrast(view.getComputedStyle(text).color, background(text)));
-  const drawings = [...page.querySelectorAll("figure > svg")].map(svg => {
-    const paper = svg.querySelector("rect"), words = svg.querySelector("text");
-    return contrast(view.getComputedStyle(paper).fill, view.getComputedStyle(words).fill);
-  });
-  document.title = JSON.stringify({
-    width: view.innerWidth, scroll_width: root.scrollWidth,
-    sticking_out: stickingOut.map(element => element.outerHTML.slice(0, 80)),
-    dark: view.matchMedia("(prefers-color-scheme: dark)").matches,
-    paper: luminance(view.getComputedStyle(page.body).backgroundColor),
-    contrast: Math.min(...contrasts), drawing_contrast: Math.min(...drawings),
-    figures: page.querySelectorAll("figure > svg").length,
-    loaded: view.performance.getEntriesByType("resource").length,
-    heading: page.querySelector("h1").textContent, verdict: page.querySelector(".verdict").textContent,
-  });
-});
-"#;
-
-fn browser() -> String {
-    std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned())
-}
-
-/// Runs the browser without a screen and waits for it.
-fn open(folder: &Path, page: &Path, flags: &[String]) -> Output {
-    let mut command = Command::new(browser());
-    command
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars"])
-        .args([
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-sync",
-            "--disable-dev-shm-usage",
-        ])
-        // A file may look into the frame of another file.
-        .args(["--allow-file-access-from-files", "--enable-logging=stderr", "--virtual-time-budget=5000"])
-        .arg(format!("--user-data-dir={}", folder.join("browser").display()))
-        .args(flags)
-        .arg(format!("file://{}", page.display()))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let mut child = command.spawn().unwrap_or_else(|error| {
-        panic!("cannot start `{}`: {error}; `sh tests/run.sh` installs the browser that this test needs", browser())
-    });
-    let (stdout, stderr) = (drain(child.stdout.take()), drain(child.stderr.take()));
-    let began = Instant::now();
-    let status = loop {
-        if let Some(status) = child.try_wait().expect("the browser can be waited for") {
-            break status;
-        }
-        if began.elapsed() > PATIENCE {
-            let _ = child.kill();
-            panic!("the browser took longer than {PATIENCE:?}");
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    };
-    Output { status, stdout: stdout.join().expect("read"), stderr: stderr.join().expect("read") }
-}
-
-fn drain(pipe: Option<impl std::io::Read + Send + 'static>) -> std::thread::JoinHandle<Vec<u8>> {
-    std::thread::spawn(move || {
-        let mut bytes = Vec::new();
-        if let Some(mut pipe) = pipe {
-            let _ = pipe.read_to_end(&mut bytes);
-        }
-        bytes
-    })
-}
-
-/// What the probe found, and what the browser's console said.
-fn probe(folder: &Path, page: &Path, width_px: u32, dark: bool) -> (serde_json::Value, Vec<String>) {
-    let wrapper = folder.join(format!("wrapper-{width_px}-{dark}.html"));
-    let html = format!(
-        "<!doctype html><meta charset=utf-8><title></title><body style=margin:0>\
-         <iframe style=\"width:{width_px}px;height:800px;border:0\"></iframe><script>{PROBE}\
-         frame.src = \"file://{}\";</script>",
-        page.display()
-    );
-    fs::write(&wrapper, html).expect("written");
-    let mut flags = vec!["--dump-dom".to_owned(), "--window-size=1400,900".to_owned()];
-    flags.extend(scheme(dark));
-    let output = open(folder, &wrapper, &flags);
-    let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    let found = dom.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next()).unwrap_or_default();
-    let found = found.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
-    let found = serde_json::from_str(&found).unwrap_or_else(|error| panic!("{error} in {found:?}\n{dom:.2000}\n{log}"));
-    let said = log.lines().filter(|line| line.contains(":CONSOLE")).map(str::to_owned).collect();
-    (found, said)
-}
-
-fn scheme(dark: bool) -> Option<String> {
-    dark.then(|| "--blink-settings=preferredColorScheme=0".to_owned())
-}
-
-fn check(folder: &Path, page: &Path, heading: &str, verdict: &str, figures: u64) {
-    for width_px in WIDTHS_PX {
-        for dark in [false, true] {
-            let (found, said) = probe(folder, page, width_px, dark);
-            let case = format!("{width_px} px, dark {dark}: {found}");
-            assert_eq!(found["width"], width_px, "{case}");
-            assert!(found["scroll_width"].as_u64() <= Some(u64::from(width_px)), "{case}");
-            assert_eq!(found["sticking_out"], serde_json::json!([]), "{case}");
-            assert_eq!(found["dark"], dark, "{case}");
-            assert_eq!(found["paper"].as_f64().is_some_and(|luminance| luminance < 0.1), dark, "{case}");
-            for contrast in ["contrast", "drawing_contrast"] {
-                assert!(found[contrast].as_f64().is_some_and(|found| found >= CONTRAST), "{case}");
-            }
-            assert_eq!((found["figures"].as_u64(), found["loaded"].as_u64()), (Some(figures), Some(0)), "{case}");
-            assert_eq!(found["heading"], heading, "{case}");
-            assert!(found["verdict"].as_str().is_some_and(|found| found.contains(verdict)), "{case}");
-            assert!(said.is_empty(), "{case}\n{}", said.join("\n"));
-        }
-    }
-}
+use browser::{check, open, probe};
 
 /// Flies a built-in scenario and gives the path of its page.
 fn flown(folder: &Path, arguments: &[&str]) -> PathBuf {
@@ -191,15 +42,6 @@ fn a_report_of_a_violation_fits_too() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = flown(folder.path(), &["pentagon-laplacian"]);
     check(folder.path(), &page, "pentagon-laplacian", "VIOLATION", 6);
-}
-
-#[test]
-fn the_page_of_a_validation_fits_too() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("validation");
-    let validated = Command::new(release::program()).args(["validate", "--quiet", "--out"]).arg(&out).status();
-    assert!(validated.expect("the program runs").success());
-    check(folder.path(), &out.join("validate.html"), "Validation", "valid: all", 9);
 }
 
 #[test]

@@ -1,5 +1,8 @@
-//! `docs/validation.md` says what `tautline validate` measures, and every claim comes out as expected.
+//! `docs/validation.md` says what `tautline validate` measures, every claim comes out as expected, and the page that it
+//! leaves can be read on any screen.
 
+#[path = "support/browser.rs"]
+mod browser;
 #[path = "support/release.rs"]
 mod release;
 
@@ -59,6 +62,7 @@ fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
         assert!(svg.starts_with("<svg") && html.contains(&svg), "{figure}");
     }
     assert!(out.join("figures/convergence.svg").is_file());
+    browser::check(folder.path(), &out.join("validate.html"), "Validation", "valid: all", 9);
     let ids = result["groups"].to_string();
     for finding in 1..=7 {
         assert!(ids.contains(&format!("\"finding\":\"F{finding}\"")), "F{finding} is measured");

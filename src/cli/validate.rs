@@ -16,6 +16,7 @@ const PAGE: &str = "validate.html";
 
 /// Arguments of `tautline validate`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct ValidateArguments {
     /// Folder for `validate.json` and the rest.
     #[arg(long, value_name = "DIR", default_value = "out/validate")]

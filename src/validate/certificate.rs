@@ -165,7 +165,7 @@ fn population() -> String {
 /// promised.
 fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
     // A NaN keeps no promise.
-    let broken = trials.iter().filter(|trial| !(trial.margin_m(closest_m(trial)) >= 0.0)).count();
+    let broken = trials.len() - trials.iter().filter(|trial| trial.margin_m(closest_m(trial)) >= 0.0).count();
     let margin_m = trials.iter().map(|trial| trial.margin_m(closest_m(trial))).fold(f64::INFINITY, f64::min);
     let ratio = trials
         .iter()

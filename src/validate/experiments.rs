@@ -143,8 +143,8 @@ impl Experiment {
 }
 
 pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
-    let parts: [fn() -> Result<Vec<Claim>, ValidateError>; 6] =
-        [pentagon, circle, baseline, straight_line, up_to_rigid_motion, relative_motion];
+    type Experiments = fn() -> Result<Vec<Claim>, ValidateError>;
+    let parts: [Experiments; 6] = [pentagon, circle, baseline, straight_line, up_to_rigid_motion, relative_motion];
     let judged = parts
         .par_iter()
         .map(|part| part().inspect(|_| progress.advance(1)))

@@ -240,8 +240,8 @@ fn energy_excess(rungs: &[Rung]) -> Claim {
 }
 
 fn energy_rise(rungs: &[Rung]) -> Claim {
-    let rise = rungs.iter().map(|rung| rung.energy_rise_m2_s2).fold(0.0, larger);
     const ROUNDING: f64 = 1e-12;
+    let rise = rungs.iter().map(|rung| rung.energy_rise_m2_s2).fold(0.0, larger);
     Claim {
         id: "energy-of-the-engine",
         source: "the stability theorem, in discrete time",

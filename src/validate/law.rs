@@ -186,7 +186,7 @@ fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, ValidateError> {
     })
 }
 
-/// Equation (3) with h as section 4 writes it, zeros over h_p: the goal is then a velocity.
+/// Equation (3) with h as section 4 writes it, zeros over `h_p`: the goal is then a velocity.
 fn literal_baseline() -> Result<Claim, ValidateError> {
     const A22_PER_S: f64 = 0.1;
     let goal = Formation::pentagon(3.0);

@@ -34,7 +34,7 @@ impl Validation {
     pub fn markdown(&self) -> String {
         let mut page = format!("{}.\n\n## Errata of the paper\n\n{}", capitalised(&self.headline()), self.errata());
         for group in &self.groups {
-            page += &format!("\n## {}\n", group.title);
+            page.extend(["\n## ", group.title, "\n"]);
             for claim in &group.claims {
                 page += &entry(claim);
             }
@@ -52,24 +52,21 @@ impl Validation {
             .collect();
         findings.sort_by_key(|&(finding, _)| finding);
         for (finding, Claim { id, statement, measured, .. }) in findings {
-            table += &format!("| {finding} | {statement} | {measured} | `{id}` |\n");
+            table.extend(["| ", finding, " | ", statement, " | ", measured, " | `", id, "` |\n"]);
         }
         table
     }
 
     fn ladder_table(&self) -> String {
-        let mut table =
-            "Largest position error on the pentagon's flight against continuous time, 10 looks a second for 10 \
-                         seconds.\n\n| step [s] | double precision [m] | order | single precision [m] | energy excess \
-                         [m^2/s^2] |\n| --- | --- | --- | --- | --- |\n"
-                .to_owned();
-        for Rung { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. } in &self.ladder {
+        let head = "Largest position error on the pentagon's flight against continuous time, 10 looks a second for 10 \
+                    seconds.\n\n| step [s] | double precision [m] | order | single precision [m] | energy excess \
+                    [m^2/s^2] |\n| --- | --- | --- | --- | --- |\n";
+        let rows = self.ladder.iter().map(|Rung { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. }| {
             let order = order.map_or("-".to_owned(), |order| format!("{order:.2}"));
             let hz = 1.0 / dt_s;
-            table +=
-                &format!("| 1/{hz:.0} | {double_m:.1e} | {order} | {single_m:.0e} | {energy_excess_m2_s2:.1e} |\n");
-        }
-        table
+            format!("| 1/{hz:.0} | {double_m:.1e} | {order} | {single_m:.0e} | {energy_excess_m2_s2:.1e} |\n")
+        });
+        std::iter::once(head.to_owned()).chain(rows).collect()
     }
 }
 

@@ -163,7 +163,8 @@ fn lost_to_rounding() -> Result<Claim, ValidateError> {
     let mut lost_at_s = f64::NAN;
     let flight = engine(&scenario, |sample| {
         let error_m = largest_edge_error_m(&sample.swarm.positions_m, &scenario.formation, &scenario.graph);
-        if lost_at_s.is_nan() && !(error_m <= LOST_M) {
+        let kept = error_m <= LOST_M;
+        if lost_at_s.is_nan() && !kept {
             lost_at_s = sample.time_s;
         }
     })?;
