@@ -25,7 +25,7 @@ fn generated(page: &str) -> Option<&str> {
 fn differences(page: &str, program: &str) -> String {
     let only = |mark: &str, here: &str, there: &str| {
         let lines = here.lines().filter(|line| !there.lines().any(|other| other == *line));
-        lines.map(|line| format!("{mark} {line}\n")).collect::<String>()
+        lines.fold(String::new(), |text, line| text + mark + " " + line + "\n")
     };
     only("page:   ", page, program) + &only("program:", program, page)
 }
