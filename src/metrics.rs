@@ -61,7 +61,7 @@ pub struct Summary {
     pub common_m_s: f64,
     /// Largest commanded acceleration of a vehicle, Euclidean norm, over all samples \[m/s^2\].
     pub peak_control_m_s2: f64,
-    /// Largest commanded acceleration of a vehicle at the end \[m/s^2\].
+    /// Largest commanded acceleration of a vehicle at the end \[m/s^2\]; NaN where the law had no answer there.
     pub final_control_m_s2: f64,
     /// Energy of the first sample that has one \[m^2/s^2\].
     pub energy_initial: Option<f64>,
@@ -103,14 +103,23 @@ impl<'a> Metrics<'a> {
         self.max_edge_error_m = largest_edge_error_m(positions_m, self.formation, self.graph);
         self.disagreement_m_s = sample.swarm.disagreement_m_s();
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
-        self.final_control_m_s2 = largest_norm(sample.control);
-        self.peak_control_m_s2 = larger(self.peak_control_m_s2, self.final_control_m_s2);
+        self.observe_control(sample.control);
         self.observe_energy(sample.energy);
         let good = self.max_edge_error_m <= self.judge.edge_error_m
             && self.rms_position_error_m <= self.judge.edge_error_m
             && self.disagreement_m_s <= self.judge.disagreement_m_s
             && sample.swarm.first_not_finite().is_none();
         self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
+    }
+
+    /// A sample without a command has none at the end either.
+    fn observe_control(&mut self, control: &Rows) {
+        if control.nrows() == 0 {
+            self.final_control_m_s2 = f64::NAN;
+            return;
+        }
+        self.final_control_m_s2 = largest_norm(control);
+        self.peak_control_m_s2 = larger(self.peak_control_m_s2, self.final_control_m_s2);
     }
 
     /// A sample without energy has none at the end either.

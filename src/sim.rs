@@ -49,6 +49,8 @@ pub enum Ending {
     Interrupted,
     /// The law had no answer for the state that was reached.
     LawUndefined(LawError),
+    /// The motion could not be carried on.
+    BrokeDown(Breakdown),
 }
 
 /// Wall-clock time by kind of work. Work done side by side counts in each kind.
@@ -66,9 +68,9 @@ pub struct Performance {
     pub record: Duration,
 }
 
-/// Why a flight could not be carried out.
-#[derive(Debug, thiserror::Error)]
-pub enum SimError {
+/// Why a motion could not be carried on. The state before is the last.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Breakdown {
     /// The law commanded something that is not a number.
     #[error("step {step}: the law's command for vehicle {} is not a finite number", vehicle + 1)]
     CommandNotFinite {
@@ -92,11 +94,50 @@ pub enum SimError {
         step: u64,
     },
     /// The judge refused what it was shown.
+    #[error("step {step}: {why}")]
+    Audit {
+        /// The step, from 1; 0 is the start.
+        step: u64,
+        /// The judge's reason.
+        why: AuditError,
+    },
+}
+
+/// Why there is no flight to report on.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// There is no judge for the scenario.
     #[error(transparent)]
     Audit(#[from] AuditError),
     /// The recording could not be kept.
     #[error(transparent)]
     Record(#[from] RecordError),
+}
+
+/// What stops the loop before its time.
+enum Stop {
+    /// The flight ends here.
+    Ended(Ending),
+    /// It cannot be recorded.
+    Unrecorded(RecordError),
+}
+
+impl From<LawError> for Stop {
+    fn from(undefined: LawError) -> Self {
+        Self::Ended(Ending::LawUndefined(undefined))
+    }
+}
+
+impl From<Breakdown> for Stop {
+    fn from(breakdown: Breakdown) -> Self {
+        Self::Ended(Ending::BrokeDown(breakdown))
+    }
+}
+
+impl From<RecordError> for Stop {
+    fn from(error: RecordError) -> Self {
+        Self::Unrecorded(error)
+    }
 }
 
 /// Flies a scenario under `law` in `plant` and hands every recorded instant to `recorder`.
@@ -110,7 +151,8 @@ pub enum SimError {
 /// The scenario must be one that [`Scenario::validate`] accepts, and law and plant of its number of vehicles.
 ///
 /// # Errors
-/// [`SimError`]; what was recorded up to then stays recorded, with the reason as its last event.
+/// [`SimError`]; what was recorded up to then stays recorded. A motion that cannot be carried on is no error but an
+/// [`Ending`], with the reason as the last event of the recording.
 pub fn fly(
     scenario: &Scenario,
     law: &mut dyn Law,
@@ -121,7 +163,7 @@ pub fn fly(
     let certificate = law.certificate(&scenario.start);
     let mut cockpit = Cockpit::new(scenario, law, plant, recorder)?;
     let began = Instant::now();
-    let ending = cockpit.fly(carry_on).inspect_err(|error| cockpit.note(error))?;
+    let ending = cockpit.fly(carry_on)?;
     cockpit.performance.wall = began.elapsed();
     Ok(cockpit.land(ending, certificate))
 }
@@ -156,9 +198,6 @@ impl<'a> Cockpit<'a> {
     ) -> Result<Self, SimError> {
         let mut state = scenario.start.clone();
         plant.observe(&mut state);
-        if let Some(vehicle) = state.first_not_finite() {
-            return Err(SimError::StateNotFinite { step: 0, vehicle });
-        }
         Ok(Self {
             auditor: Auditor::new(scenario.count(), scenario.delta_m)?,
             next: state.clone(),
@@ -178,47 +217,54 @@ impl<'a> Cockpit<'a> {
         })
     }
 
-    fn fly(&mut self, carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>) -> Result<Ending, SimError> {
-        if let Err(undefined) = self.judge_and_command(None)? {
-            return self.end_early(Ending::LawUndefined(undefined));
+    fn fly(&mut self, carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>) -> Result<Ending, RecordError> {
+        let ending = match self.fly_steps(carry_on) {
+            Ok(()) => return Ok(Ending::Completed),
+            Err(Stop::Ended(ending)) => ending,
+            Err(Stop::Unrecorded(error)) => return Err(error),
+        };
+        self.record_end(&ending)?;
+        Ok(ending)
+    }
+
+    fn fly_steps(&mut self, carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>) -> Result<(), Stop> {
+        if let Some(vehicle) = self.state.first_not_finite() {
+            return Err(Breakdown::StateNotFinite { step: 0, vehicle }.into());
         }
+        self.judge_and_command(None)?;
         self.record_sample()?;
         for step in 1..=self.scenario.time.steps() {
-            if let Err(undefined) = self.advance(step)? {
-                return self.end_early(Ending::LawUndefined(undefined));
-            }
+            self.advance(step)?;
             if self.scenario.time.records(step) {
                 self.record_sample()?;
             }
             if carry_on(step).is_break() && step < self.scenario.time.steps() {
-                return self.end_early(Ending::Interrupted);
+                return Err(Stop::Ended(Ending::Interrupted));
             }
         }
-        Ok(Ending::Completed)
+        Ok(())
     }
 
-    /// Flies one step, in halves where it is refused. The inner error ends the flight: the law is undefined.
-    fn advance(&mut self, step: u64) -> Result<Result<(), LawError>, SimError> {
+    /// Flies one step, in halves where it is refused.
+    fn advance(&mut self, step: u64) -> Result<(), Stop> {
         let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
         let mut shortest = whole;
-        let flown = self.fly_parts(step, whole, &mut shortest)?;
+        let flown = self.fly_parts(step, whole, &mut shortest);
         if shortest < whole {
             let dt_s = self.scenario.time.dt_s;
             let (time_s, dt_s) = ((step - 1) as f64 * dt_s, dt_s * (shortest as f64 / whole as f64));
             self.recorder.event(&Event::StepRefined { time_s, dt_s })?;
         }
-        Ok(flown)
+        flown
     }
 
     /// Flies the `whole` parts of a step, as many at once as are not refused; the fewest at once are `shortest`.
-    fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<Result<(), LawError>, SimError> {
+    fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<(), Stop> {
         let dt_s = self.scenario.time.dt_s;
         let seconds = |parts: u64| dt_s * (parts as f64 / whole as f64);
         let (mut flown, mut part) = (0, whole);
         while flown < whole {
-            if let Err(undefined) = self.move_vehicles(step, seconds(part))? {
-                return Ok(Err(undefined));
-            }
+            self.move_vehicles(step, seconds(part))?;
             if part > 1 && self.is_refused() {
                 self.plant.restore(&self.state);
                 part /= 2;
@@ -233,30 +279,27 @@ impl<'a> Cockpit<'a> {
                 self.time_s = (step - 1) as f64 * dt_s + seconds(flown);
             }
             std::mem::swap(&mut self.state, &mut self.next);
-            if let Err(undefined) = self.judge_and_command(Some(step))? {
-                return Ok(Err(undefined));
-            }
+            self.judge_and_command(Some(step))?;
             while part < whole && flown.is_multiple_of(2 * part) {
                 part *= 2;
             }
         }
-        Ok(Ok(()))
+        Ok(())
     }
 
-    /// Moves the vehicles from `state` to `next`. The inner error ends the flight: the law is undefined on the way.
-    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<Result<(), LawError>, SimError> {
+    /// Moves the vehicles from `state` to `next`.
+    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<(), Stop> {
         let began = Instant::now();
-        match self.plant.step(self.law, &self.control, dt_s) {
-            Ok(()) => {}
-            Err(PlantError::LawUndefined(undefined)) => return Ok(Err(undefined)),
-            Err(PlantError::NotFinite { vehicle }) => return Err(SimError::StateNotFinite { step, vehicle }),
-            Err(PlantError::Stalled) => return Err(SimError::Stalled { step }),
-        }
+        self.plant.step(self.law, &self.control, dt_s).map_err(|error| match error {
+            PlantError::LawUndefined(undefined) => Stop::from(undefined),
+            PlantError::NotFinite { vehicle } => Breakdown::StateNotFinite { step, vehicle }.into(),
+            PlantError::Stalled => Breakdown::Stalled { step }.into(),
+        })?;
         self.plant.observe(&mut self.next);
         self.performance.physics += began.elapsed();
         match self.next.first_not_finite() {
-            Some(vehicle) => Err(SimError::StateNotFinite { step, vehicle }),
-            None => Ok(Ok(())),
+            Some(vehicle) => Err(Breakdown::StateNotFinite { step, vehicle }.into()),
+            None => Ok(()),
         }
     }
 
@@ -279,7 +322,7 @@ impl<'a> Cockpit<'a> {
     }
 
     /// Audits the sweep that led to `state` (or the start) and asks the law for the next command.
-    fn judge_and_command(&mut self, step: Option<u64>) -> Result<Result<(), LawError>, SimError> {
+    fn judge_and_command(&mut self, step: Option<u64>) -> Result<(), Stop> {
         let Self { auditor, law, state, control, time_s, .. } = self;
         let (state, time_s): (&Swarm, f64) = (state, *time_s);
         let audit = move || {
@@ -300,19 +343,22 @@ impl<'a> Cockpit<'a> {
             if side_by_side { rayon::join(audit, command) } else { (audit(), command()) };
         self.performance.audit += audit_time;
         self.performance.law += law_time;
-        let finding = finding?;
+        let step = step.unwrap_or(0);
+        let commanded = commanded.map_err(Stop::from).and_then(|()| match first_row_not_finite(&self.control) {
+            Some(vehicle) => Err(Breakdown::CommandNotFinite { step, vehicle }.into()),
+            None => Ok(()),
+        });
+        if commanded.is_err() {
+            self.control = Rows::zeros(0);
+        }
+        let finding = finding.map_err(|why| Breakdown::Audit { step, why })?;
         if let Some(closest) = finding.closest {
             self.nearest_m = closest.separation_m;
             self.closest = self.closest.filter(|before| before.separation_m <= closest.separation_m).or(Some(closest));
         }
         record_violations(self.recorder, &finding)?;
         self.collect_engine_contacts()?;
-        if commanded.is_ok()
-            && let Some(vehicle) = first_row_not_finite(&self.control)
-        {
-            return Err(SimError::CommandNotFinite { step: step.unwrap_or(0), vehicle });
-        }
-        Ok(commanded)
+        commanded
     }
 
     fn collect_engine_contacts(&mut self) -> Result<(), RecordError> {
@@ -341,29 +387,18 @@ impl<'a> Cockpit<'a> {
         Ok(())
     }
 
-    /// Records the last instant and why it is the last. A law without an answer leaves a zero command.
-    fn end_early(&mut self, ending: Ending) -> Result<Ending, SimError> {
-        let reason = match &ending {
-            Ending::Completed => return Ok(ending),
+    /// Records the last instant, unless it has been, and why it is the last.
+    fn record_end(&mut self, ending: &Ending) -> Result<(), RecordError> {
+        let reason = match ending {
+            Ending::Completed => return Ok(()),
             Ending::Interrupted => "interrupted".to_owned(),
-            Ending::LawUndefined(why) => {
-                self.control.fill(0.0);
-                format!("the law is undefined: {why}")
-            }
+            Ending::LawUndefined(why) => format!("the law is undefined: {why}"),
+            Ending::BrokeDown(why) => why.to_string(),
         };
         if self.closest.is_some() {
             self.record_sample()?;
         }
-        self.recorder.event(&Event::EndedEarly { time_s: self.time_s, reason })?;
-        Ok(ending)
-    }
-
-    /// Says in the recording why it ends here, unless it is the recording that failed.
-    fn note(&mut self, error: &SimError) {
-        if !matches!(error, SimError::Record(_)) {
-            // The error at hand is the one to report.
-            let _ = self.recorder.event(&Event::EndedEarly { time_s: self.time_s, reason: error.to_string() });
-        }
+        self.recorder.event(&Event::EndedEarly { time_s: self.time_s, reason })
     }
 
     fn land(self, ending: Ending, certificate: Certificate) -> Flight {

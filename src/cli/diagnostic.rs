@@ -143,13 +143,9 @@ impl From<SimError> for Failure {
     fn from(error: SimError) -> Self {
         match error {
             SimError::Record(error) => error.into(),
-            SimError::Audit(_)
-            | SimError::CommandNotFinite { .. }
-            | SimError::StateNotFinite { .. }
-            | SimError::Stalled { .. } => Self::input(
-                error.to_string(),
-                "the motion left the range of numbers: shorten time.dt_s, or look for speeds and gains that grow",
-            ),
+            SimError::Audit(error) => {
+                Self::input(error.to_string(), "choose a safety distance and a number of vehicles that can be judged")
+            }
         }
     }
 }

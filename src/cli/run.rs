@@ -12,11 +12,9 @@ use super::folder::OutFolder;
 use super::pictures::Pictures;
 use super::{Exit, Failure};
 use crate::figures::Course;
-use crate::formation::affine_dimension;
-use crate::law::Law;
 use crate::metrics::Metrics;
 use crate::plant;
-use crate::preflight::{FLATNESS, Preflight};
+use crate::preflight::Preflight;
 use crate::record::StateHash;
 use crate::record::mcap::{Header, McapRecorder};
 use crate::report::page;
@@ -100,19 +98,19 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let overrides = arguments.overrides.iter().cloned().chain(plant);
     let overrides = overrides.map(|text| Override::parse(&text)).collect::<Result<Vec<_>, _>>()?;
     let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
-    let law = scenario.law()?;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))
         .build()
         .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
-    let warnings = Preflight::of(&scenario)?.warnings;
-    for warning in &warnings {
+    let preflight = Preflight::of(&scenario)?;
+    for warning in &preflight.warnings {
         console.warn(&warning.to_string());
     }
-    let warnings: Vec<_> = warnings
-        .into_iter()
-        .map(|warning| page::Warning { code: warning.code.name().to_owned(), message: warning.message })
+    let warnings: Vec<_> = preflight
+        .warnings
+        .iter()
+        .map(|warning| page::Warning { code: warning.code.name().to_owned(), message: warning.message.clone() })
         .collect();
     let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
@@ -120,7 +118,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
     let mut course = Course::new();
-    let report = threads.install(|| fly(&scenario, law, &folder, console, &interrupted, &mut course))?;
+    let report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut course))?;
     let pictures = Pictures {
         scenario: &scenario,
         course: (!arguments.no_figures).then_some(&course),
@@ -150,7 +148,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
 fn fly(
     scenario: &Scenario,
-    mut law: Box<dyn Law>,
+    preflight: &Preflight,
     folder: &OutFolder,
     console: Console,
     interrupted: &AtomicBool,
@@ -168,21 +166,29 @@ fn fly(
         }
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut plant = plant::for_scenario(scenario);
+    let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(scenario));
     let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, course)));
     let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
     progress.finish_and_clear();
     let closed = recording.finish();
     let flight = flown?;
     closed?;
-    Ok(report(scenario, &header, &flight, &metrics, state_hash.finish()))
+    Ok(report(scenario, preflight, &header, &flight, &metrics, state_hash.finish()))
 }
 
-fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: &Metrics<'_>, state_hash: String) -> Report {
+fn report(
+    scenario: &Scenario,
+    preflight: &Preflight,
+    header: &Header,
+    flight: &Flight,
+    metrics: &Metrics<'_>,
+    state_hash: String,
+) -> Report {
     let reason = match &flight.ending {
         Ending::Completed => None,
         Ending::Interrupted => Some("interrupted".to_owned()),
         Ending::LawUndefined(why) => Some(format!("the law is undefined: {why}")),
+        Ending::BrokeDown(why) => Some(format!("{why}; shorten time.dt_s, or look for speeds and gains that grow")),
     };
     let wall_s = flight.performance.wall.as_secs_f64();
     Report::new(&Findings {
@@ -190,8 +196,8 @@ fn report(scenario: &Scenario, header: &Header, flight: &Flight, metrics: &Metri
         scenario_sha256: &header.scenario_sha256,
         delta_m: scenario.delta_m,
         judge: scenario.judge,
-        start_dimension: affine_dimension(&scenario.start.positions_m, FLATNESS),
-        formation_dimension: scenario.formation.affine_dimension(FLATNESS),
+        trap_dimension: preflight.trap_dimension(),
+        formation_dimension: preflight.formation_dimension,
         certificate: &flight.certificate,
         audit: &flight.audit,
         engine_contact_pairs: (scenario.plant != PlantSpec::Ideal).then_some(flight.engine_contacts.len() as u64),

@@ -200,11 +200,14 @@ impl Preflight {
         })
     }
 
+    /// Dimension of the flat that the start never leaves, where the formation does not fit into it.
+    #[must_use]
+    pub fn trap_dimension(&self) -> Option<usize> {
+        (self.controls_distances && self.start_dimension < self.formation_dimension).then_some(self.start_dimension)
+    }
+
     fn start_too_flat(&self) -> Option<Warning> {
-        if !self.controls_distances || self.start_dimension >= self.formation_dimension {
-            return None;
-        }
-        let (code, flat) = match self.start_dimension {
+        let (code, flat) = match self.trap_dimension()? {
             0 | 1 => (Code::StartOnLine, "line"),
             _ => (Code::StartInPlane, "plane"),
         };

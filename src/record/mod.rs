@@ -19,7 +19,7 @@ pub struct Sample<'a> {
     pub step: u64,
     /// Positions \[m\] and velocities \[m/s\].
     pub swarm: &'a Swarm,
-    /// Commanded accelerations u \[m/s^2\], N x 3, at this instant.
+    /// Commanded accelerations u \[m/s^2\], N x 3, at this instant; no rows where the law had no answer.
     pub control: &'a Rows,
     /// Closest approach over the steps since the sample before (at the first sample: of the start itself).
     pub separation: Option<ClosestApproach>,
@@ -36,7 +36,7 @@ pub struct OwnedSample {
     pub step: u64,
     /// Positions \[m\] and velocities \[m/s\].
     pub swarm: Swarm,
-    /// Commanded accelerations u \[m/s^2\], N x 3.
+    /// Commanded accelerations u \[m/s^2\], N x 3; no rows where the law had no answer.
     pub control: Rows,
     /// Closest approach over the steps since the sample before.
     pub separation: Option<ClosestApproach>,
@@ -69,7 +69,7 @@ pub enum Event {
         /// When \[s\].
         time_s: f64,
     },
-    /// A pair that was closer than delta is clear again.
+    /// A pair that was closer than delta is clear again. One that still is closer at the end of the run has no such event.
     ViolationEnded {
         /// The pair.
         pair: Pair,

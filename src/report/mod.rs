@@ -37,8 +37,9 @@ pub struct Findings<'a> {
     pub delta_m: f64,
     /// What counted as reached.
     pub judge: JudgeSpec,
-    /// Dimension of the smallest flat that holds the start: 0 point, 1 line, 2 plane, 3 space.
-    pub start_dimension: usize,
+    /// Dimension of the flat that the start never leaves, where the formation does not fit into it: 0 point, 1 line,
+    /// 2 plane.
+    pub trap_dimension: Option<usize>,
     /// Dimension of the smallest flat that holds the formation.
     pub formation_dimension: usize,
     /// What the law promised.

@@ -39,7 +39,7 @@ const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: None, max_edg
 struct Case {
     audit: AuditOutcome,
     summary: Summary,
-    start_dimension: usize,
+    trap_dimension: Option<usize>,
     ended_early: Option<EndedEarly<'static>>,
     certificate: Certificate,
 }
@@ -47,7 +47,7 @@ struct Case {
 impl Case {
     fn good() -> Self {
         let certificate = Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![] };
-        Self { audit: passing(2.4607), summary: REACHED, start_dimension: 2, ended_early: None, certificate }
+        Self { audit: passing(2.4607), summary: REACHED, trap_dimension: None, ended_early: None, certificate }
     }
 
     fn report(&self) -> Report {
@@ -56,7 +56,7 @@ impl Case {
             scenario_sha256: "00ff",
             delta_m: DELTA_M,
             judge: JUDGE,
-            start_dimension: self.start_dimension,
+            trap_dimension: self.trap_dimension,
             formation_dimension: 2,
             certificate: &self.certificate,
             audit: &self.audit,
@@ -260,11 +260,11 @@ fn a_formation_kept_too_short_or_still_moving_says_so() {
 
 #[test]
 fn a_start_flatter_than_the_formation_is_named_only_where_it_was_not_left() {
-    let case = Case { summary: NOT_REACHED, start_dimension: 1, ..Case::good() };
+    let case = Case { summary: NOT_REACHED, trap_dimension: Some(1), ..Case::good() };
     let reasons = case.report().verdict.reasons;
     assert_eq!(reasons.len(), 2);
     assert!(reasons[1].starts_with("The start lies on a line and the formation needs a plane"), "{}", reasons[1]);
-    assert!(Case { start_dimension: 1, ..Case::good() }.report().verdict.pass);
+    assert!(Case { trap_dimension: Some(1), ..Case::good() }.report().verdict.pass);
 }
 
 #[test]

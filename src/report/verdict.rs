@@ -111,10 +111,10 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
 
 /// A start flatter than the formation: forces along the lines between vehicles never leave it.
 fn too_flat(findings: &Findings<'_>) -> Option<String> {
-    if findings.summary.reached_at_s.is_some() || findings.start_dimension >= findings.formation_dimension {
+    if findings.summary.reached_at_s.is_some() {
         return None;
     }
-    let (start, trap) = match findings.start_dimension {
+    let (start, trap) = match findings.trap_dimension? {
         0 => ("at one point", "point"),
         1 => ("on a line", "line"),
         _ => ("in a plane", "plane"),

@@ -12,7 +12,8 @@ pub(super) fn bound(error: f64) -> String {
         return "not a number".to_owned();
     }
     let exponent = DECADES * ((3.0 * error.abs()).log10() / DECADES).ceil();
-    format!("below 1e{:.0}", exponent.max(SMALLEST))
+    // Adding zero takes the sign from a negative zero.
+    format!("below 1e{:.0}", exponent.max(SMALLEST) + 0.0)
 }
 
 #[cfg(test)]
