@@ -37,12 +37,15 @@ for mutant in ${*:-$(ls tests/mutants)}; do
         echo "$mutant: the line to break is not in $(field "$mutant" file) exactly once"
         exit 2
     }
+    # Both trees share what is built; touching the file makes cargo build it anew for the tree at hand.
+    touch "$(field "$mutant" file)"
     # Without the break the test must run and pass, and with it the program must still be a program.
     # shellcheck disable=SC2086
     cargo test $test > "$scratch/log" 2>&1 && grep -q '^test .* ok$' "$scratch/log" || {
         echo "$mutant: the test does not pass on the unbroken program: $test"
         exit 2
     }
+    touch "$scratch/tree/$(field "$mutant" file)"
     # shellcheck disable=SC2086
     (cd "$scratch/tree" && cargo test --no-run $test) > "$scratch/log" 2>&1 || {
         echo "$mutant: the broken program does not compile"
