@@ -12,12 +12,18 @@
 //! row, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
+mod archive;
 mod clock;
+mod crazyflie;
 mod csv;
+mod curves;
 mod error;
 mod names;
+mod npy;
+mod npz;
 mod order;
 mod recognise;
+mod skybrush;
 mod source;
 mod table;
 
@@ -28,7 +34,7 @@ use std::path::Path;
 
 use crate::track::Tracks;
 use clock::KnownUnit;
-use order::Ordered;
+use order::{About, Ordered};
 use source::Source;
 
 /// A recording being read.
@@ -162,9 +168,10 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// What is known of the unit of time: what the user says goes before what the file says.
-    fn unit(&self, said: Option<TimeUnit>) -> KnownUnit {
-        self.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given)
+    /// What is known of a recording: what the user says of the unit of time goes before what the file says.
+    fn about(&self, said: Option<TimeUnit>, notes: Vec<String>, none: Fault) -> About {
+        let unit = self.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given);
+        About { unit, epoch_ns: 0, scale: self.scale, notes, none }
     }
 }
 
@@ -182,12 +189,15 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     let source = Source { path: path.to_owned(), gzip: recognised.gzip };
     match recognised.format {
         format @ (Format::Csv | Format::Text) => table(source, format, options),
+        Format::Crazyflie => crazyflie::open(path, options),
+        Format::Npz => npz::open(&source, options),
+        Format::Skybrush => skybrush::open(&source, options),
         _ => Err(source.error(Fault::UnknownFormat)),
     }
 }
 
 fn table(source: Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
     let table = csv::Table::open(source, format, &options.columns)?;
-    let (unit, notes) = (options.unit(table.layout.unit), table.layout.notes());
-    Ok(Box::new(Ordered::open(table, unit, options.scale, notes, Fault::HeaderOnly)?))
+    let about = options.about(table.layout.unit, table.layout.notes(), Fault::HeaderOnly);
+    Ok(Box::new(Ordered::open(table, about)?))
 }

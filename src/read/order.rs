@@ -58,6 +58,18 @@ pub(super) trait Rows {
     }
 }
 
+/// What is known of a recording beside its rows.
+pub(super) struct About {
+    pub(super) unit: KnownUnit,
+    /// What the times are counted from, as the file says it \[ns\].
+    pub(super) epoch_ns: i64,
+    /// Metres per unit of length.
+    pub(super) scale: f64,
+    pub(super) notes: Vec<String>,
+    /// The fault of a recording without rows.
+    pub(super) none: Fault,
+}
+
 /// Samples in order of time.
 ///
 /// A recording with a row for each time is streamed, and must not run backwards. One with a row for each vehicle and
@@ -80,13 +92,8 @@ pub(super) struct Ordered<R> {
 
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
-    pub(super) fn open(
-        mut rows: R,
-        known: KnownUnit,
-        scale: f64,
-        mut notes: Vec<String>,
-        none: Fault,
-    ) -> Result<Self, ReadError> {
+    pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
+        let About { unit, epoch_ns, scale, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -101,7 +108,8 @@ impl<R: Rows> Ordered<R> {
             rows.survey()?
         };
         let Some(probe) = probe else { return Err(rows.error(none)) };
-        let (timing, note) = Timing::settle(&probe, known);
+        let (mut timing, note) = Timing::settle(&probe, unit);
+        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
         notes.extend(note);
         if !rows.is_wide() {
             rows.settle_names();

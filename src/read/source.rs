@@ -17,7 +17,7 @@ pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
 const BLOCK_BYTES: usize = 256 * 1024;
 
 /// Up to here compressed data may grow without being looked at \[bytes\].
-const FREE_GROWTH_BYTES: u64 = 256 * 1024 * 1024;
+const FREE_GROWTH_BYTES: u64 = 64 * 1024 * 1024;
 
 /// Beyond [`FREE_GROWTH_BYTES`] data may grow by this factor. Deflate reaches 1032, recordings of real motion 20.
 const GROWTH_LIMIT: u64 = 200;
