@@ -18,6 +18,7 @@ mod crazyflie;
 mod csv;
 mod curves;
 mod error;
+pub(crate) mod mcap;
 mod names;
 mod npy;
 mod npz;
@@ -151,6 +152,8 @@ pub struct ReadOptions {
     pub axis_order: Option<AxisOrder>,
     /// The frame whose poses are read, where messages have several.
     pub frame: Option<String>,
+    /// Whether to accept an MCAP file that was not closed, for what it holds.
+    pub allow_unfinished: bool,
 }
 
 impl Default for ReadOptions {
@@ -163,6 +166,7 @@ impl Default for ReadOptions {
             columns: ColumnNames::default(),
             axis_order: None,
             frame: None,
+            allow_unfinished: false,
         }
     }
 }
@@ -190,6 +194,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     match recognised.format {
         format @ (Format::Csv | Format::Text) => table(source, format, options),
         Format::Crazyflie => crazyflie::open(path, options),
+        Format::Mcap => mcap::open(&source, options),
         Format::Npz => npz::open(&source, options),
         Format::Skybrush => skybrush::open(&source, options),
         _ => Err(source.error(Fault::UnknownFormat)),
