@@ -23,6 +23,7 @@ mod names;
 mod npy;
 mod npz;
 mod order;
+pub(crate) mod parquet;
 mod recognise;
 mod skybrush;
 mod source;
@@ -196,8 +197,8 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Format::Crazyflie => crazyflie::open(path, options),
         Format::Mcap => mcap::open(&source, options),
         Format::Npz => npz::open(&source, options),
+        Format::Parquet => parquet::open(&source, options),
         Format::Skybrush => skybrush::open(&source, options),
-        _ => Err(source.error(Fault::UnknownFormat)),
     }
 }
 
