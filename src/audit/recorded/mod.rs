@@ -323,7 +323,7 @@ impl Question {
             max_gap_s: self.max_gap_s.unwrap_or_else(usual),
         };
         let asked_for = self.only.as_ref().is_none_or(|only| only.contains(name));
-        Vehicle::new(name.to_owned(), asked_for, course, terms.radius_m)
+        Vehicle::new(name.to_owned(), asked_for, course, terms.radius_m.or(self.radius_m))
     }
 
     fn check(&self) -> Result<(), RecordedError> {
@@ -335,6 +335,7 @@ impl Question {
             _ => Ok(()),
         };
         check("delta", self.delta_m, LEAST, positive)?;
+        check("the radius", self.radius_m, 0.0, "0 m or more, and finite")?;
         check("the largest acceleration", self.max_accel_m_s2, 0.0, "0 or more, and finite")?;
         for axis in self.ellipsoid_m.iter().flatten() {
             check("each axis of the ellipsoid", Some(*axis), LEAST, positive)?;

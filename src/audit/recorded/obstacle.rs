@@ -69,7 +69,11 @@ pub struct ObstacleError {
 }
 
 impl Obstacle {
-    pub(super) fn check(&self) -> Result<(), ObstacleError> {
+    /// Whether it can be judged.
+    ///
+    /// # Errors
+    /// [`ObstacleError`] where a length, a place or a time is none.
+    pub fn check(&self) -> Result<(), ObstacleError> {
         let wrong = |reason: String| Err(ObstacleError { name: self.name.clone(), reason });
         let length = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
         let place = |v: &Vector3<f64>| v.iter().all(|x| x.abs() <= MAX_LENGTH_M);

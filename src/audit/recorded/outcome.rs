@@ -18,6 +18,26 @@ pub enum Who {
     },
 }
 
+impl Who {
+    /// The two vehicles, if it is two.
+    #[must_use]
+    pub fn pair(self) -> Option<Pair> {
+        match self {
+            Self::Pair(pair) => Some(pair),
+            Self::Obstacle { .. } => None,
+        }
+    }
+}
+
+impl Approach {
+    /// One number for the smallest distance \[m\]: what is reached where the motion is known, and what it is at least where
+    /// it is not.
+    #[must_use]
+    pub fn certain_m(&self) -> f64 {
+        if self.upper_m - self.lower_m <= 2.0 * super::WIDTH_M { self.upper_m } else { self.lower_m }
+    }
+}
+
 /// The closest that two came.
 ///
 /// Lengths are distances of two centres, or of a centre from an obstacle's surface, in metres; with an ellipsoid they are

@@ -46,6 +46,8 @@ pub struct Question {
     pub motion: Option<Motion>,
     /// Largest acceleration \[m/s^2\] of every vehicle, for [`Motion::Bounded`].
     pub max_accel_m_s2: Option<f64>,
+    /// Radius \[m\] of every vehicle of which nothing else is said; it goes before those of the recording.
+    pub radius_m: Option<f64>,
     /// Half axes \[m\] of the ellipsoid around each vehicle, such as a downwash that reaches far down.
     pub ellipsoid_m: Option<Vector3<f64>>,
     /// Judge from here on \[s\].
