@@ -44,6 +44,7 @@ pub mod law;
 pub mod metrics;
 pub mod plant;
 pub mod preflight;
+pub mod read;
 pub mod record;
 pub mod report;
 pub mod scenario;

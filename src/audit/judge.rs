@@ -8,7 +8,7 @@ use crate::swarm::{ClosestApproach, Pair};
 
 /// Coarsest resolution, as a fraction of delta, at which a pair that seems clear by less than the resolution is still
 /// called clear. Anything coarser is [`super::AuditOutcome::unresolved`].
-const NEGLIGIBLE_RESOLUTION: f64 = 1e-8;
+pub(super) const NEGLIGIBLE_RESOLUTION: f64 = 1e-8;
 
 /// The times of a step.
 #[derive(Clone, Copy, Debug)]

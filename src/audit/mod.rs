@@ -33,6 +33,7 @@ mod judge;
 mod ledger;
 mod outcome;
 mod parry;
+pub mod recorded;
 mod sweep;
 
 pub use outcome::{AuditError, AuditOutcome, Disagreement, ParryEvidence, Status, StepFinding, Violation};

@@ -38,6 +38,15 @@ impl Console {
         Self { data_on_stdout: true, ..self }.say(text);
     }
 
+    /// A count of what was read, on a terminal, for work whose end is not known.
+    pub(super) fn counter(self, message: String) -> ProgressBar {
+        let bar = self.progress(u64::MAX, message);
+        if let Ok(style) = ProgressStyle::with_template("{msg} {spinner} {human_pos} samples, {elapsed}") {
+            bar.set_style(style);
+        }
+        bar
+    }
+
     /// A progress bar on a terminal, nothing in a pipe.
     pub(super) fn progress(self, total: u64, message: String) -> ProgressBar {
         if self.quiet || !io::stderr().is_terminal() {

@@ -3,13 +3,17 @@
 //! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
+mod audit;
 mod check;
 mod completions;
 mod console;
 mod diagnostic;
+mod events;
 mod folder;
 mod list;
+mod obstacles;
 mod pictures;
+mod reading;
 mod run;
 mod schema;
 mod validate;
@@ -56,6 +60,8 @@ struct Arguments {
 enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),
+    /// Judge a recording of any origin: proved clear, a violation, or undecided at its sampling.
+    Audit(audit::AuditArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),
     /// Reproduce the paper and judge every claim, ours and the paper's.
@@ -82,6 +88,7 @@ pub fn main() -> ExitCode {
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Audit(arguments) => audit::audit(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::List(arguments) => list::list(&arguments),

@@ -9,6 +9,8 @@
 //! | [`energy`] | the law's energy and its start E(0), its bound on a complete graph |
 //! | [`shape_error`] | largest error of a desired distance |
 //! | [`disagreement`] | largest speed relative to the swarm's mean |
+//! | [`encounters`] | distances of pairs of a recording, with bands where they are not known exactly |
+//! | [`closest_approach`] | two paths of a recording from above, where they are closest |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
 //! | [`convergence`] | an integrator's error over its step |
 //!
@@ -26,6 +28,7 @@ mod course;
 mod distances;
 mod histories;
 mod paths;
+mod recorded;
 mod tension;
 mod thin;
 
@@ -34,6 +37,7 @@ pub use course::Course;
 pub use distances::distances;
 pub use histories::{control, disagreement, energy, shape_error};
 pub use paths::{paths, paths_in_space};
+pub use recorded::{Encounter, closest_approach, encounters};
 pub use tension::tension_curve;
 
 use maud::{PreEscaped, html};

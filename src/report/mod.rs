@@ -8,6 +8,7 @@
 mod artefact;
 mod html;
 pub mod page;
+pub mod recorded;
 mod verdict;
 mod words;
 

@@ -36,7 +36,7 @@
 //! [`FLUSH_PERIOD_S`] or more after the last chunk, or when [`FLUSH_BYTES`] are waiting. A process that is killed leaves
 //! every chunk up to then readable, and [`McapRecording`] reads such a file.
 
-mod framing;
+pub(crate) mod framing;
 mod message;
 mod reader;
 mod writer;

@@ -1,0 +1,281 @@
+//! What is in the way beside other vehicles.
+
+use nalgebra::Vector3;
+
+use super::segment::Segment;
+use crate::audit::sweep::RelativeMotion;
+
+/// Before and after its points an obstacle stands still; no recording lasts longer \[s\].
+const ALWAYS_S: f64 = 1e300;
+/// Largest length of an obstacle \[m\]: squares of lengths stay finite.
+const MAX_LENGTH_M: f64 = 1e70;
+
+/// A thing that a vehicle must stay clear of.
+///
+/// A vehicle must stay [`clearance_m`](Self::clearance_m) away from its surface; without one, the vehicle's own radius or
+/// delta / 2, whichever is larger, so that a keep-out ball that may touch another may touch an obstacle too.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Obstacle {
+    /// Its name.
+    pub name: String,
+    /// Its form.
+    pub shape: Shape,
+    /// Distance that a vehicle's centre must keep from the surface \[m\].
+    pub clearance_m: Option<f64>,
+    /// Where it is \[m\], and when \[s\]: one point for a thing that stands, else points at increasing times that it passes
+    /// on straight lines. Before the first and after the last it stands.
+    pub path: Vec<(f64, Vector3<f64>)>,
+}
+
+/// The form of an obstacle around its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A ball.
+    Ball {
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// A box, upright.
+    Box {
+        /// Half of its lengths \[m\].
+        half_m: Vector3<f64>,
+        /// How far it is turned about the vertical \[rad\], counter-clockwise from above.
+        yaw_rad: f64,
+    },
+    /// Everything within a radius of a straight line.
+    Capsule {
+        /// One end of the line, from the place of the obstacle \[m\].
+        from_m: Vector3<f64>,
+        /// The other end \[m\].
+        to_m: Vector3<f64>,
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// Everything behind a plane through the place of the obstacle.
+    HalfSpace {
+        /// Points out of it; of any length but zero.
+        normal: Vector3<f64>,
+    },
+}
+
+/// What is wrong with an obstacle.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("obstacle `{name}`: {reason}")]
+pub struct ObstacleError {
+    /// The obstacle.
+    pub name: String,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl Obstacle {
+    /// Whether it can be judged.
+    ///
+    /// # Errors
+    /// [`ObstacleError`] where a length, a place or a time is none.
+    pub fn check(&self) -> Result<(), ObstacleError> {
+        let wrong = |reason: String| Err(ObstacleError { name: self.name.clone(), reason });
+        let length = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
+        let place = |v: &Vector3<f64>| v.iter().all(|x| x.abs() <= MAX_LENGTH_M);
+        match &self.shape {
+            Shape::Ball { radius_m } | Shape::Capsule { radius_m, .. } if !length(*radius_m) => {
+                return wrong(format!("the radius must be above 0 m, not {radius_m}"));
+            }
+            Shape::Box { half_m, .. } if !half_m.iter().all(|x| length(*x)) => {
+                return wrong("every length of the box must be above 0 m".to_owned());
+            }
+            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => return wrong(format!("the yaw is {yaw_rad}")),
+            Shape::Capsule { from_m, to_m, .. } if !(place(from_m) && place(to_m)) => {
+                return wrong("the ends of the capsule must be finite numbers".to_owned());
+            }
+            Shape::HalfSpace { normal } if !length(normal.norm()) => {
+                return wrong("the normal must have a direction".to_owned());
+            }
+            _ => {}
+        }
+        if let Some(clearance_m) = self.clearance_m
+            && !length(clearance_m)
+        {
+            return wrong(format!("the clearance must be above 0 m, not {clearance_m}"));
+        }
+        let Some((_, first)) = self.path.first() else { return wrong("it has no place".to_owned()) };
+        if self.path.len() == 1 && place(first) {
+            return Ok(());
+        }
+        for (time_s, at) in &self.path {
+            if !(time_s.is_finite() && place(at)) {
+                return wrong(format!("the point at {time_s} s is not a finite place and time"));
+            }
+        }
+        match self.path.windows(2).find(|points| points[1].0 <= points[0].0) {
+            Some(points) => wrong(format!("the point at {} s comes after the one at {} s", points[1].0, points[0].0)),
+            None => Ok(()),
+        }
+    }
+
+    /// Its way, without an end.
+    pub(super) fn segments(&self) -> Vec<Segment> {
+        let (Some(&(_, first)), Some(&(last_s, last))) = (self.path.first(), self.path.last()) else {
+            return Vec::new();
+        };
+        let [(first_s, _), _, ..] = self.path[..] else {
+            return vec![Segment::straight(-ALWAYS_S, ALWAYS_S, first, first)];
+        };
+        let mut way = vec![Segment::straight(-ALWAYS_S, first_s, first, first)];
+        way.extend(self.path.windows(2).map(|ends| Segment::straight(ends[0].0, ends[1].0, ends[0].1, ends[1].1)));
+        way.push(Segment::straight(last_s, ALWAYS_S, last, last));
+        way
+    }
+}
+
+impl Shape {
+    /// Distance from the surface of a point \[m\], given from the obstacle's place: below zero within a ball, capsule or
+    /// half-space, zero within a box.
+    pub(super) fn distance(&self, point: Vector3<f64>) -> f64 {
+        match self {
+            Self::HalfSpace { normal } => point.dot(&normal.normalize()),
+            _ => self.from_core(self.turned(point)).norm() - self.radius(),
+        }
+    }
+
+    /// The smallest distance while a point moves straight, and the fraction of the way at which it is reached first.
+    ///
+    /// The vector from the nearest point of the core (a point, a line, a box) to the moving one is a straight function of
+    /// the fraction between the places where the nearest feature changes, so each part has a closed form.
+    pub(super) fn closest(&self, from: Vector3<f64>, to: Vector3<f64>) -> (f64, f64) {
+        if let Self::HalfSpace { .. } = self {
+            let (start, end) = (self.distance(from), self.distance(to));
+            return if end < start { (end, 1.0) } else { (start, 0.0) };
+        }
+        let (from, to) = (self.turned(from), self.turned(to));
+        let at = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
+        let mut best = (f64::INFINITY, 0.0);
+        let mut start = (0.0, self.from_core(from));
+        for u in self.changes(from, to).into_iter().chain([1.0]) {
+            let end = (u, self.from_core(at(u)));
+            let part = RelativeMotion::new(start.1, end.1).closest();
+            if part.squared < best.0 {
+                best = (part.squared, start.0 + (end.0 - start.0) * part.at);
+            }
+            start = end;
+        }
+        (best.0.sqrt() - self.radius(), best.1)
+    }
+
+    pub(super) fn radius(&self) -> f64 {
+        match self {
+            Self::Ball { radius_m } | Self::Capsule { radius_m, .. } => *radius_m,
+            Self::Box { .. } | Self::HalfSpace { .. } => 0.0,
+        }
+    }
+
+    /// A point in the frame in which the shape is upright and unturned.
+    pub(super) fn turned(&self, point: Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Box { yaw_rad, .. } if *yaw_rad != 0.0 => {
+                let (sin, cos) = (libm::sin(*yaw_rad), libm::cos(*yaw_rad));
+                Vector3::new(cos * point.x + sin * point.y, cos * point.y - sin * point.x, point.z)
+            }
+            _ => point,
+        }
+    }
+
+    /// The vector from the nearest point of the core.
+    fn from_core(&self, point: Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Ball { .. } | Self::HalfSpace { .. } => point,
+            Self::Box { half_m, .. } => point.zip_map(half_m, |x, half| x - x.clamp(-half, half)),
+            Self::Capsule { from_m, to_m, .. } => {
+                let (along, aside) = (to_m - from_m, point - from_m);
+                let squared = along.norm_squared();
+                let share = if squared > 0.0 { (aside.dot(&along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+                aside - along * share
+            }
+        }
+    }
+
+    /// The fractions of a straight way at which the nearest feature changes, in order.
+    fn changes(&self, from: Vector3<f64>, to: Vector3<f64>) -> Vec<f64> {
+        let by = to - from;
+        let mut found = Vec::new();
+        let mut cross = |start: f64, rate: f64| {
+            let u = -start / rate;
+            if u > 0.0 && u < 1.0 {
+                found.push(u);
+            }
+        };
+        match self {
+            Self::Ball { .. } | Self::HalfSpace { .. } => {}
+            Self::Box { half_m, .. } => {
+                for axis in 0..3 {
+                    cross(from[axis] - half_m[axis], by[axis]);
+                    cross(from[axis] + half_m[axis], by[axis]);
+                }
+            }
+            Self::Capsule { from_m, to_m, .. } => {
+                let along = to_m - from_m;
+                let (start, rate) = ((from - from_m).dot(&along), by.dot(&along));
+                cross(start, rate);
+                cross(start - along.norm_squared(), rate);
+            }
+        }
+        found.sort_unstable_by(f64::total_cmp);
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shapes() -> [Shape; 4] {
+        [
+            Shape::Ball { radius_m: 0.7 },
+            Shape::Box { half_m: Vector3::new(1.0, 0.5, 2.0), yaw_rad: 0.6 },
+            Shape::Capsule { from_m: Vector3::new(-1.0, 0.0, 0.0), to_m: Vector3::new(1.0, 1.0, 0.5), radius_m: 0.3 },
+            Shape::HalfSpace { normal: Vector3::new(0.0, 3.0, 4.0) },
+        ]
+    }
+
+    #[test]
+    fn the_smallest_distance_of_a_straight_way_is_that_of_a_fine_walk() {
+        const STEPS: u32 = 20_000;
+        // A step moves less than 1e-3 m, and the distance is at most so much steeper than its minimum.
+        const TOLERANCE_M: f64 = 1e-3;
+        for shape in shapes() {
+            for k in 0..40_u32 {
+                let turn = f64::from(k) * 2.4;
+                let from = Vector3::new(3.0 * turn.cos(), 3.0 * turn.sin(), 0.1 * f64::from(k) - 2.0);
+                let to = Vector3::new(-3.0 * (turn + 0.4).cos(), -2.0 * turn.sin(), 1.5 - 0.07 * f64::from(k));
+                let (found, u) = shape.closest(from, to);
+                let walked =
+                    (0..=STEPS).map(|s| shape.distance(from + (to - from) * (f64::from(s) / f64::from(STEPS))));
+                let walked = walked.fold(f64::INFINITY, f64::min);
+                assert!(found <= walked + 1e-12 && walked - found < TOLERANCE_M, "{shape:?}: {found} {walked}");
+                assert!((shape.distance(from + (to - from) * u) - found).abs() < 1e-12, "{shape:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_obstacle_without_size_place_or_order_is_refused() {
+        let good = Obstacle {
+            name: "tower".to_owned(),
+            shape: Shape::Ball { radius_m: 1.0 },
+            clearance_m: None,
+            path: vec![(0.0, Vector3::zeros()), (1.0, Vector3::x())],
+        };
+        assert_eq!(good.check(), Ok(()));
+        for wrong in [
+            Obstacle { shape: Shape::Ball { radius_m: 0.0 }, ..good.clone() },
+            Obstacle { shape: Shape::Box { half_m: Vector3::new(1.0, -1.0, 1.0), yaw_rad: 0.0 }, ..good.clone() },
+            Obstacle { shape: Shape::HalfSpace { normal: Vector3::zeros() }, ..good.clone() },
+            Obstacle { clearance_m: Some(f64::NAN), ..good.clone() },
+            Obstacle { path: vec![], ..good.clone() },
+            Obstacle { path: vec![(1.0, Vector3::zeros()), (1.0, Vector3::x())], ..good.clone() },
+            Obstacle { path: vec![(0.0, Vector3::repeat(f64::NAN))], ..good.clone() },
+        ] {
+            assert!(wrong.check().is_err(), "{wrong:?}");
+        }
+    }
+}

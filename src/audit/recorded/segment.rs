@@ -1,0 +1,265 @@
+//! A vehicle over one stretch of time, as the judge holds it.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+/// What is known of a vehicle from one instant to a later one: a straight line between two points, or a [`Curve`].
+///
+/// A jump is a stretch of no length whose ends differ, and a vehicle seen once is one whose ends do not.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
+    pub(super) from: Vector3<f64>,
+    pub(super) to: Vector3<f64>,
+    /// The vehicle counts as on the ground.
+    pub(super) grounded: bool,
+    /// Where the stretch is not a straight line known for certain.
+    pub(super) curve: Option<Arc<Curve>>,
+}
+
+/// The sum of `coefficients[k] (t - from_s)^k`, and how far the vehicle can be from it.
+#[derive(Clone, Debug)]
+pub(super) struct Curve {
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
+    pub(super) coefficients: Vec<Vector3<f64>>,
+    pub(super) slack: Slack,
+}
+
+/// How far a vehicle of bounded acceleration can be from the curve drawn through two samples h apart, x being the
+/// fraction of h that has passed.
+///
+/// Both bounds follow from Peano's form of the error, e(x) = h^2 * integral of K(x, s) p''(s) over s from 0 to 1, so that
+/// |e(x)| <= A h^2 * integral of |K(x, s)|.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Slack {
+    /// The vehicle is on the curve.
+    None,
+    /// Samples of position alone, joined by the chord: K(x, s) is -s (1 - x) for s <= x and -x (1 - s) beyond, which
+    /// integrates to x (1 - x) / 2. At most A h^2 / 8, in the middle.
+    Chord {
+        /// A h^2 / 8.
+        peak: f64,
+    },
+    /// Samples of position and velocity, joined by the cubic of Hermite. For s > x
+    ///
+    /// ```text
+    /// K(x, s) = -x^2 [(3 - 2 x) (1 - s) - (1 - x)]
+    /// ```
+    ///
+    /// which changes its sign once, at 1 - s = (1 - x) / (3 - 2 x), and K(x, s) = K(1 - x, 1 - s) for s < x. With
+    /// y = 2 x - 1 the two integrals of |K| add up to (1 - y^2)^2 / (4 (4 - y^2)), which falls as |y| grows: at most
+    /// A h^2 / 16, in the middle. Half of what the chord allows.
+    Hermite {
+        /// A h^2 / 16.
+        peak: f64,
+    },
+}
+
+impl Slack {
+    /// The largest deviation over the whole stretch.
+    pub(super) fn peak(self) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Chord { peak } | Self::Hermite { peak } => peak,
+        }
+    }
+
+    /// The largest deviation when a fraction `x` has passed.
+    fn at(self, x: f64) -> f64 {
+        let y = 2.0 * x.clamp(0.0, 1.0) - 1.0;
+        let rest = (1.0 - y) * (1.0 + y);
+        match self {
+            Self::None => 0.0,
+            Self::Chord { peak } => peak * rest,
+            Self::Hermite { peak } => peak * rest * rest * 4.0 / (4.0 - y * y),
+        }
+    }
+}
+
+impl Curve {
+    /// Where the curve is at a time.
+    pub(super) fn position(&self, time_s: f64) -> Vector3<f64> {
+        let t = time_s - self.from_s;
+        self.coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c)
+    }
+
+    /// How far from there the vehicle can be.
+    pub(super) fn slack_at(&self, time_s: f64) -> f64 {
+        self.slack.at((time_s - self.from_s) / (self.to_s - self.from_s))
+    }
+
+    /// The curve over a stretch as a polynomial of the fraction u of the stretch, by Horner's shift of the origin.
+    pub(super) fn local(&self, from_s: f64, to_s: f64) -> Vec<Vector3<f64>> {
+        let mut local = self.coefficients.clone();
+        let (shift, length) = (from_s - self.from_s, to_s - from_s);
+        let degree = local.len().saturating_sub(1);
+        if shift != 0.0 {
+            for lowest in 0..degree {
+                for k in (lowest..degree).rev() {
+                    let higher = local[k + 1];
+                    local[k] += higher * shift;
+                }
+            }
+        }
+        let mut power = 1.0;
+        for c in &mut local {
+            *c *= power;
+            power *= length;
+        }
+        local
+    }
+
+    /// Bound on the rounding of [`Curve::local`] and [`Curve::position`]: a few units in the last place of what is summed.
+    pub(super) fn rounding(&self) -> f64 {
+        let length = self.to_s - self.from_s;
+        let magnitude = self.coefficients.iter().rev().fold(0.0, |sum, c| sum * length + c.norm());
+        4.0 * self.coefficients.len() as f64 * f64::EPSILON * magnitude
+    }
+}
+
+impl Segment {
+    /// A straight line.
+    pub(super) fn straight(from_s: f64, to_s: f64, from: Vector3<f64>, to: Vector3<f64>) -> Self {
+        Self { from_s, to_s, from, to, grounded: false, curve: None }
+    }
+
+    /// A place at an instant.
+    pub(super) fn point(time_s: f64, at: Vector3<f64>) -> Self {
+        Self::straight(time_s, time_s, at, at)
+    }
+
+    /// A whole curve.
+    pub(super) fn curved(curve: Curve) -> Self {
+        let (from_s, to_s) = (curve.from_s, curve.to_s);
+        let (from, to) = (curve.position(from_s), curve.position(to_s));
+        Self { from_s, to_s, from, to, grounded: false, curve: Some(Arc::new(curve)) }
+    }
+
+    /// How far the vehicle can be from the curve, anywhere on the stretch.
+    pub(super) fn slack(&self) -> f64 {
+        self.curve.as_ref().map_or(0.0, |curve| curve.slack.peak())
+    }
+
+    /// How far the vehicle can be from the curve at a time.
+    pub(super) fn slack_at(&self, time_s: f64) -> f64 {
+        self.curve.as_ref().map_or(0.0, |curve| curve.slack_at(time_s))
+    }
+
+    /// The fraction of a straight stretch that has passed at a time within it.
+    #[inline]
+    pub(super) fn fraction(&self, time_s: f64) -> f64 {
+        if time_s <= self.from_s {
+            0.0
+        } else if time_s >= self.to_s {
+            1.0
+        } else {
+            (time_s - self.from_s) / (self.to_s - self.from_s)
+        }
+    }
+
+    /// Where the curve is at a time within the stretch.
+    #[inline]
+    pub(super) fn position(&self, time_s: f64) -> Vector3<f64> {
+        if time_s <= self.from_s {
+            self.from
+        } else if time_s >= self.to_s {
+            self.to
+        } else if let Some(curve) = &self.curve {
+            curve.position(time_s)
+        } else {
+            self.from + (self.to - self.from) * self.fraction(time_s)
+        }
+    }
+
+    /// The part of the stretch between two times; `None` if there is none.
+    pub(super) fn clipped(&self, from_s: f64, to_s: f64) -> Option<Self> {
+        let (start_s, end_s) = (self.from_s.max(from_s), self.to_s.min(to_s));
+        if start_s > end_s {
+            return None;
+        }
+        if start_s == self.from_s && end_s == self.to_s {
+            return Some(self.clone());
+        }
+        let (from, to) = (self.position(start_s), self.position(end_s));
+        Some(Self { from_s: start_s, to_s: end_s, from, to, ..self.clone() })
+    }
+
+    /// The stretch as a polynomial of the fraction u of the part between two times within it.
+    pub(super) fn local(&self, from_s: f64, to_s: f64) -> Vec<Vector3<f64>> {
+        match &self.curve {
+            Some(curve) => curve.local(from_s, to_s),
+            None if self.to_s <= self.from_s => vec![self.from, self.to - self.from],
+            None => {
+                let rate = (to_s - from_s) / (self.to_s - self.from_s);
+                vec![self.position(from_s), (self.to - self.from) * rate]
+            }
+        }
+    }
+
+    /// Bound on the rounding of positions.
+    pub(super) fn rounding(&self) -> f64 {
+        self.curve
+            .as_ref()
+            .map_or_else(|| 4.0 * f64::EPSILON * (self.from.amax() + self.to.amax()), |curve| curve.rounding())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOLERANCE: f64 = 1e-12;
+
+    fn curve(slack: Slack) -> Curve {
+        let coefficients = (0..8).map(|k| Vector3::new(1.0, -2.0, 0.5) / f64::from(1 + k * k)).collect();
+        Curve { from_s: 10.0, to_s: 12.0, coefficients, slack }
+    }
+
+    #[test]
+    fn a_part_of_a_curve_as_a_polynomial_of_its_fraction_is_the_same_curve() {
+        let curve = curve(Slack::None);
+        let local = curve.local(10.5, 11.75);
+        for u in [0.0, 0.2, 0.7, 1.0] {
+            let there = local.iter().rev().fold(Vector3::zeros(), |sum, c| sum * u + c);
+            assert!((there - curve.position(10.5 + 1.25 * u)).norm() < TOLERANCE);
+        }
+    }
+
+    /// The motion of acceleration at most 1 that strays farthest at `x`: full thrust by the sign of Peano's kernel, found
+    /// here by brute force over the time s at which each half changes its direction.
+    #[test]
+    fn the_deviation_from_chord_and_cubic_is_reached_by_some_motion_and_never_exceeded() {
+        const CELLS: u32 = 4000;
+        let cell = 1.0 / f64::from(CELLS);
+        for x in [0.1, 0.25, 0.5, 0.8] {
+            // p = (x - s)+ is the answer to an impulse of acceleration at s; what interpolation misses of it is K(x, s).
+            let missed = |s: f64, with_velocity: bool| {
+                let answer = (x - s).max(0.0);
+                let drawn =
+                    if with_velocity { (3.0 - 2.0 * x) * x * x * (1.0 - s) + x * x * (x - 1.0) } else { x * (1.0 - s) };
+                answer - drawn
+            };
+            let reached = |with_velocity| {
+                (0..CELLS).map(|k| missed((f64::from(k) + 0.5) * cell, with_velocity).abs() * cell).sum::<f64>()
+            };
+            let (chord, cubic) = (Slack::Chord { peak: 1.0 / 8.0 }, Slack::Hermite { peak: 1.0 / 16.0 });
+            assert!((reached(false) - chord.at(x)).abs() < 1e-6, "{} {}", reached(false), chord.at(x));
+            assert!((reached(true) - cubic.at(x)).abs() < 1e-6, "{} {}", reached(true), cubic.at(x));
+            assert!(cubic.at(x) <= cubic.peak() && chord.at(x) <= chord.peak());
+        }
+    }
+
+    #[test]
+    fn a_clipped_stretch_is_where_the_whole_one_is() {
+        let line = Segment::straight(1.0, 3.0, Vector3::zeros(), Vector3::new(4.0, 0.0, 2.0));
+        let part = line.clipped(2.0, 9.0).unwrap();
+        assert_eq!((part.from_s, part.to_s, part.from, part.to), (2.0, 3.0, Vector3::new(2.0, 0.0, 1.0), line.to));
+        assert!(line.clipped(3.5, 9.0).is_none());
+        let whole = Segment::curved(curve(Slack::None));
+        let part = whole.clipped(10.5, 11.0).unwrap();
+        assert_eq!(part.position(10.75), whole.position(10.75));
+    }
+}

@@ -1,0 +1,370 @@
+//! One vehicle of a recording, from items to stretches.
+
+use nalgebra::Vector3;
+
+use super::enclosure::range;
+use super::outcome::{Contradiction, Gap, Presence, RecordedError};
+use super::question::Motion;
+use super::segment::{Curve, Segment, Slack};
+use crate::track::{Piece, Sample};
+
+/// Largest coordinate that is judged \[m\]: fourth powers of lengths stay finite.
+const MAX_COORDINATE_M: f64 = 1e70;
+/// Pieces of a curve that follow each other within this \[s\] leave no gap: times are written with so many digits. What the
+/// position jumps by is swept.
+const SAME_INSTANT_S: f64 = 1e-6;
+/// Shortest part of a curve, as a fraction of it, that is looked at for when the ground is left.
+const SHORTEST_PART: f64 = 1e-12;
+/// Relative excess over the assumed acceleration that rounding explains.
+const ROUNDING: f64 = 1e-9;
+
+/// How one vehicle is judged.
+#[derive(Clone, Debug)]
+pub(super) struct Course {
+    pub(super) offset_s: f64,
+    pub(super) motion: Option<Motion>,
+    pub(super) max_accel_m_s2: f64,
+    /// 1 over the axes of the ellipsoid.
+    pub(super) scale: Option<Vector3<f64>>,
+    pub(super) window_s: (f64, f64),
+    pub(super) above_m: Option<f64>,
+    pub(super) max_gap_s: f64,
+}
+
+/// A vehicle as far as it has been read.
+#[derive(Clone, Debug)]
+pub(super) struct Vehicle {
+    pub(super) name: String,
+    /// Whether it is judged.
+    pub(super) asked_for: bool,
+    pub(super) course: Course,
+    /// Radius \[m\]; none where neither the recording nor the question has one.
+    pub(super) radius_m: Option<f64>,
+    /// Whether the radius was taken from the recording and must not change.
+    pub(super) radius_recorded: bool,
+    /// Stretches not yet done with, in order of time.
+    pub(super) segments: Vec<Segment>,
+    /// Up to when the vehicle is known \[s\].
+    pub(super) known_s: f64,
+    pub(super) presence: Option<Presence>,
+    last: Option<Seen>,
+    /// Speed over the last interval \[m/s\] and its length \[s\].
+    last_interval: Option<(Vector3<f64>, f64)>,
+    pub(super) contradiction: Option<Contradiction>,
+}
+
+/// The end of what is known.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    time_s: f64,
+    position_m: Vector3<f64>,
+    velocity_m_s: Option<Vector3<f64>>,
+}
+
+impl Vehicle {
+    pub(super) fn new(name: String, asked_for: bool, course: Course, radius_m: Option<f64>) -> Self {
+        Self {
+            name,
+            asked_for,
+            course,
+            radius_m,
+            radius_recorded: radius_m.is_none(),
+            segments: Vec::new(),
+            known_s: f64::NEG_INFINITY,
+            presence: None,
+            last: None,
+            last_interval: None,
+            contradiction: None,
+        }
+    }
+
+    /// Takes a sample; returns the gap before it, if there is one.
+    pub(super) fn sample(&mut self, index: usize, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
+        let motion = self.course.motion.unwrap_or(Motion::Linear);
+        if motion == Motion::Polynomial {
+            return Err(RecordedError::NotACurve { vehicle: self.name.clone() });
+        }
+        let time_s = sample.time_s + self.course.offset_s;
+        self.check_sample(sample)?;
+        if let Some(last) = &self.last
+            && time_s <= last.time_s
+        {
+            return Err(self.not_increasing(time_s));
+        }
+        if self.radius_recorded && sample.radius_m != self.radius_m {
+            if self.last.is_some() {
+                let radius_m = sample.radius_m.unwrap_or(0.0);
+                return Err(RecordedError::RadiusChanges { vehicle: self.name.clone(), time_s, radius_m });
+            }
+            self.radius_m = sample.radius_m;
+        }
+        let seen = Seen { time_s, position_m: sample.position_m, velocity_m_s: sample.velocity_m_s };
+        let last = self.last.replace(seen);
+        self.known_s = time_s;
+        let mut gap = None;
+        match last {
+            Some(last) if time_s - last.time_s <= self.course.max_gap_s => self.interval(index, motion, &last, &seen),
+            _ => {
+                gap = last.map(|last| Gap { vehicle: index, from_s: last.time_s, to_s: time_s });
+                self.last_interval = None;
+                let at = self.scaled(seen.position_m);
+                self.keep(Segment::point(time_s, at));
+            }
+        }
+        Ok(gap)
+    }
+
+    /// Takes a piece of a curve; returns the gap before it, if there is one.
+    pub(super) fn piece(&mut self, index: usize, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
+        if !matches!(self.course.motion, None | Some(Motion::Polynomial)) {
+            return Err(RecordedError::NotSamples { vehicle: self.name.clone() });
+        }
+        let (from_s, to_s) = (piece.from_s + self.course.offset_s, piece.to_s + self.course.offset_s);
+        let coefficients: Vec<_> = piece.coefficients.iter().map(|c| self.scaled(*c)).collect();
+        let segment = self.curve(Curve { from_s, to_s, coefficients, slack: Slack::None })?;
+        let (start, end) = (segment.from, segment.to);
+        let seen = Seen { time_s: to_s, position_m: end, velocity_m_s: None };
+        let mut gap = None;
+        match self.last.replace(seen) {
+            Some(last) if from_s < last.time_s - SAME_INSTANT_S => {
+                return Err(RecordedError::TimeNotIncreasing {
+                    vehicle: self.name.clone(),
+                    previous_s: last.time_s,
+                    time_s: from_s,
+                });
+            }
+            Some(last) if from_s - last.time_s <= self.course.max_gap_s.max(SAME_INSTANT_S) => {
+                let rests = last.position_m == start && last.time_s == from_s;
+                if !rests {
+                    self.keep(Segment::straight(last.time_s.min(from_s), from_s, last.position_m, start));
+                }
+            }
+            last => gap = last.map(|last| Gap { vehicle: index, from_s: last.time_s, to_s: from_s }),
+        }
+        self.known_s = to_s;
+        self.keep(segment);
+        Ok(gap)
+    }
+
+    fn curve(&self, curve: Curve) -> Result<Segment, RecordedError> {
+        let wrong = |what| Err(RecordedError::Piece { vehicle: self.name.clone(), time_s: curve.from_s, what });
+        if curve.coefficients.is_empty() {
+            return wrong("the piece has no coefficients");
+        }
+        if !(curve.from_s.is_finite() && curve.to_s.is_finite() && curve.to_s > curve.from_s) {
+            return wrong("the piece does not end after it begins");
+        }
+        let length = curve.to_s - curve.from_s;
+        let reach = curve.coefficients.iter().rev().fold(0.0, |sum, c| sum * length + c.abs().sum());
+        if !(reach <= MAX_COORDINATE_M) {
+            return wrong("a coefficient is not a finite number, or leads beyond 1e70 m");
+        }
+        Ok(Segment::curved(curve))
+    }
+
+    /// The interval between two samples.
+    fn interval(&mut self, index: usize, motion: Motion, last: &Seen, seen: &Seen) {
+        let (from_s, to_s) = (last.time_s, seen.time_s);
+        let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
+        match motion {
+            Motion::Hold => {
+                self.keep(Segment::straight(from_s, to_s, from, from));
+                self.keep(Segment::straight(to_s, to_s, from, to));
+            }
+            Motion::Bounded => {
+                self.compare_with_bound(index, last, seen);
+                let segment = self.bounded(last, seen);
+                self.keep(segment);
+            }
+            Motion::Linear | Motion::Polynomial => self.keep(Segment::straight(from_s, to_s, from, to)),
+        }
+    }
+
+    fn bounded(&self, last: &Seen, seen: &Seen) -> Segment {
+        let h = seen.time_s - last.time_s;
+        let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
+        // Lengths are divided by the axes of the ellipsoid, so deviations by its shortest.
+        let accel = self.course.max_accel_m_s2 * self.course.scale.map_or(1.0, |scale| scale.max());
+        let (coefficients, slack) = match last.velocity_m_s.zip(seen.velocity_m_s) {
+            Some((start, end)) => {
+                let (by, start, end) = (to - from, self.scaled(start), self.scaled(end));
+                let second = (by * 3.0 / h - start * 2.0 - end) / h;
+                let third = (start + end - by * 2.0 / h) / (h * h);
+                (vec![from, start, second, third], Slack::Hermite { peak: accel * h * h / 16.0 })
+            }
+            None => (vec![from, (to - from) / h], Slack::Chord { peak: accel * h * h / 8.0 }),
+        };
+        let curve = Curve { from_s: last.time_s, to_s: seen.time_s, coefficients, slack };
+        Segment { from, to, ..Segment::curved(curve) }
+    }
+
+    /// Notes where two samples, or three without velocities, cannot be joined within the bound.
+    fn compare_with_bound(&mut self, index: usize, last: &Seen, seen: &Seen) {
+        let h = seen.time_s - last.time_s;
+        let mean = (seen.position_m - last.position_m) / h;
+        let rounding = 4.0 * f64::EPSILON * (seen.position_m.norm() + last.position_m.norm()) / (h * h);
+        let mut needs = 0.0_f64;
+        if let Some((before, before_s)) = self.last_interval {
+            let apart_s = 0.5 * (before_s + h);
+            needs = (mean - before).norm() / apart_s - rounding * (h + h * h / before_s) / apart_s;
+        }
+        if let Some(start) = last.velocity_m_s {
+            needs = needs.max(2.0 * (mean - start).norm() / h - 2.0 * rounding);
+        }
+        if let Some(end) = seen.velocity_m_s {
+            needs = needs.max(2.0 * (end - mean).norm() / h - 2.0 * rounding);
+        }
+        if let Some((start, end)) = last.velocity_m_s.zip(seen.velocity_m_s) {
+            needs = needs.max((end - start).norm() / h);
+        }
+        self.last_interval = Some((mean, h));
+        let assumed_m_s2 = self.course.max_accel_m_s2;
+        let excess = needs > assumed_m_s2 * (1.0 + ROUNDING);
+        let judged = self.course.window_s.0 <= seen.time_s && last.time_s <= self.course.window_s.1;
+        if excess && judged && self.contradiction.is_none_or(|largest| needs > largest.needs_m_s2) {
+            self.contradiction =
+                Some(Contradiction { vehicle: index, time_s: last.time_s, needs_m_s2: needs, assumed_m_s2 });
+        }
+    }
+
+    /// Keeps what is asked for of a stretch.
+    fn keep(&mut self, segment: Segment) {
+        let (from_s, to_s) = self.course.window_s;
+        if segment.from_s < from_s || segment.to_s > to_s {
+            if let Some(part) = segment.clipped(from_s, to_s) {
+                self.keep_part(part);
+            }
+        } else {
+            self.keep_part(segment);
+        }
+    }
+
+    fn keep_part(&mut self, segment: Segment) {
+        let presence = self.presence.get_or_insert(Presence { from_s: segment.from_s, to_s: segment.to_s });
+        presence.to_s = presence.to_s.max(segment.to_s);
+        match self.course.above_m {
+            None => self.segments.push(segment),
+            Some(above_m) => {
+                let height = above_m * self.course.scale.map_or(1.0, |scale| scale.z) - segment.slack();
+                split_at_height(segment, height, &mut self.segments);
+            }
+        }
+    }
+
+    #[inline]
+    fn scaled(&self, v: Vector3<f64>) -> Vector3<f64> {
+        match &self.course.scale {
+            None => v,
+            Some(scale) => v.component_mul(scale),
+        }
+    }
+
+    fn check_sample(&self, sample: &Sample) -> Result<(), RecordedError> {
+        let near = |v: &Vector3<f64>| {
+            v.x.abs() <= MAX_COORDINATE_M && v.y.abs() <= MAX_COORDINATE_M && v.z.abs() <= MAX_COORDINATE_M
+        };
+        let what = if !sample.time_s.is_finite() {
+            "the time"
+        } else if !near(&sample.position_m) {
+            "the position"
+        } else if sample.velocity_m_s.is_some_and(|v| !near(&v)) {
+            "the velocity"
+        } else if sample.radius_m.is_some_and(|r| !(0.0..=MAX_COORDINATE_M).contains(&r)) {
+            "the radius, which must not be below 0 m,"
+        } else {
+            return Ok(());
+        };
+        Err(RecordedError::NotFinite { vehicle: self.name.clone(), time_s: sample.time_s, what })
+    }
+
+    fn not_increasing(&self, time_s: f64) -> RecordedError {
+        let previous_s = self.last.map_or(f64::NAN, |last| last.time_s);
+        RecordedError::TimeNotIncreasing { vehicle: self.name.clone(), previous_s, time_s }
+    }
+
+    /// Forgets what ended by a time, and says how many stretches that were.
+    pub(super) fn forget(&mut self, until_s: f64) -> usize {
+        let done = self.segments.partition_point(|segment| segment.to_s <= until_s);
+        self.segments.drain(..done);
+        done
+    }
+}
+
+/// Splits a stretch where it passes a height and says which parts are on the ground. A jump is on the ground if both ends
+/// are; what cannot be told on a curve is above.
+fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
+    let (low, high) = (segment.from.z.min(segment.to.z), segment.from.z.max(segment.to.z));
+    if segment.curve.is_some() {
+        split_curve_at_height(&segment, height, into);
+    } else if segment.to_s <= segment.from_s || high <= height || low > height {
+        into.push(Segment { grounded: high <= height, ..segment });
+    } else {
+        let share = (height - segment.from.z) / (segment.to.z - segment.from.z);
+        let at_s = segment.from_s + (segment.to_s - segment.from_s) * share.clamp(0.0, 1.0);
+        let starts_low = segment.from.z <= height;
+        for (from_s, to_s, grounded) in [(segment.from_s, at_s, starts_low), (at_s, segment.to_s, !starts_low)] {
+            if to_s > from_s {
+                into.extend(segment.clipped(from_s, to_s).map(|part| Segment { grounded, ..part }));
+            }
+        }
+    }
+}
+
+fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>) {
+    let length_s = segment.to_s - segment.from_s;
+    let mut stack = vec![(0.0, 1.0)];
+    let mut runs: Vec<(f64, f64, bool)> = Vec::new();
+    while let Some((start, length)) = stack.pop() {
+        let at = |u: f64| segment.from_s + length_s * u;
+        let local = segment.local(at(start), at(start + length));
+        let mut above: Vec<f64> = local.iter().map(|c| c.z).collect();
+        above[0] -= height;
+        let (low, high) = range(&above);
+        if high > 0.0 && low <= 0.0 && length > SHORTEST_PART {
+            let half = 0.5 * length;
+            stack.extend([(start + half, half), (start, half)]);
+            continue;
+        }
+        let grounded = high <= 0.0;
+        match runs.last_mut() {
+            Some(run) if run.2 == grounded => run.1 = start + length,
+            _ => runs.push((start, start + length, grounded)),
+        }
+    }
+    for (start, end, grounded) in runs {
+        let from_s = if start <= 0.0 { segment.from_s } else { segment.from_s + length_s * start };
+        let to_s = if end >= 1.0 { segment.to_s } else { segment.from_s + length_s * end };
+        into.extend(segment.clipped(from_s, to_s).map(|part| Segment { grounded, ..part }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parts(segment: Segment, height: f64) -> Vec<(f64, f64, bool)> {
+        let mut into = Vec::new();
+        split_at_height(segment, height, &mut into);
+        into.iter().map(|part| (part.from_s, part.to_s, part.grounded)).collect()
+    }
+
+    #[test]
+    fn a_climb_leaves_the_ground_where_it_passes_the_height() {
+        let climb = Segment::straight(0.0, 4.0, Vector3::zeros(), Vector3::new(0.0, 0.0, 2.0));
+        assert_eq!(parts(climb.clone(), 0.5), [(0.0, 1.0, true), (1.0, 4.0, false)]);
+        assert_eq!(parts(climb.clone(), 2.0), [(0.0, 4.0, true)]);
+        assert_eq!(parts(climb.clone(), -1.0), [(0.0, 4.0, false)]);
+        let fall = Segment::straight(0.0, 4.0, climb.to, climb.from);
+        assert_eq!(parts(fall, 0.5), [(0.0, 3.0, false), (3.0, 4.0, true)]);
+    }
+
+    #[test]
+    fn a_hop_on_a_curve_is_above_between_its_two_crossings() {
+        // z = 4 u (1 - u): above 0.75 between 1/4 and 3/4.
+        let coefficients = vec![Vector3::zeros(), Vector3::new(0.0, 0.0, 4.0), Vector3::new(0.0, 0.0, -4.0)];
+        let hop = Segment::curved(Curve { from_s: 0.0, to_s: 1.0, coefficients, slack: Slack::None });
+        let found = parts(hop, 0.75);
+        assert_eq!(found.iter().map(|part| part.2).collect::<Vec<_>>(), [true, false, true]);
+        assert!((found[0].1 - 0.25).abs() < 1e-9 && (found[1].1 - 0.75).abs() < 1e-9, "{found:?}");
+    }
+}

@@ -1,0 +1,351 @@
+//! `tautline audit`: judge a recording, whoever made it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use nalgebra::Vector3;
+
+use super::console::{self, Console};
+use super::events;
+use super::obstacles;
+use super::reading::{FormatArgument, ReadArguments};
+use super::{Exit, Failure};
+use crate::audit::recorded::{History, Judge, Motion, Outcome, Question, RecordedError, Terms, Who};
+use crate::figures::{self, Encounter, Figure};
+use crate::read::{self, ReadOptions};
+use crate::report::recorded::{Clock, RecordedReport, Source};
+use crate::report::{Status, write_atomically};
+use crate::track::Item;
+
+/// Items that are read before the first is judged: usual intervals are learnt from them.
+const OPENING: usize = 65_536;
+/// Pairs that the page draws.
+const DRAWN_PAIRS: usize = 3;
+
+/// Arguments of `tautline audit`.
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
+#[command(after_help = "\
+Exits with 0 where it is proved that nothing came too close, with 1 where something did or where it cannot be told \
+(unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
+below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
+pub(super) struct AuditArguments {
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Format of the recording [default: recognised by its content].
+    #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
+    format: Option<FormatArgument>,
+
+    /// Safety distance between two centres [m]; with --ellipsoid a scaled distance, by default 2.
+    #[arg(long, value_name = "METRES", help_heading = "Question")]
+    delta: Option<f64>,
+    /// What happens between samples [default: linear for samples, polynomial for curves].
+    #[arg(long, value_name = "MOTION", help_heading = "Question")]
+    motion: Option<MotionArgument>,
+    /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
+    #[arg(long, value_name = "[NAME=]A", value_parser = named, help_heading = "Question")]
+    max_accel: Vec<Named>,
+    /// Radius [m] of every vehicle, or of one; may be given several times.
+    #[arg(long, value_name = "[NAME=]R", value_parser = named, help_heading = "Question")]
+    radius: Vec<Named>,
+    /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash; two touch at a scaled distance of 2.
+    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, conflicts_with_all = ["radius", "obstacles"], help_heading = "Question")]
+    ellipsoid: Option<Vector3<f64>>,
+    /// TOML file of obstacles: balls, boxes, capsules, half-spaces; at rest or moving.
+    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    obstacles: Option<PathBuf>,
+    /// Judge from here on [s].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    from: Option<f64>,
+    /// Judge up to here [s].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    to: Option<f64>,
+    /// Leave out pairs while both are at or below this height [m].
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Question")]
+    above: Option<f64>,
+    /// Judge these vehicles alone.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Question")]
+    ids: Vec<String>,
+    /// Add this to the times of a vehicle whose clock was off [s]; may be given several times.
+    #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
+    offset: Vec<(String, f64)>,
+    /// Longest time between two samples that is no gap [s] [default: 1.5 of the vehicle's usual interval].
+    #[arg(long, value_name = "SECONDS", help_heading = "Question")]
+    max_gap: Option<f64>,
+
+    /// Print the report as JSON on standard output, and nothing else there.
+    #[arg(long, help_heading = "Answer")]
+    json: bool,
+    /// Print no summary and no progress: the exit code says it.
+    #[arg(long, help_heading = "Answer")]
+    quiet: bool,
+    /// Write the verdict as a JUnit file.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    junit: Option<PathBuf>,
+    /// Write violations, undecided times and gaps as CSV.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    events: Option<PathBuf>,
+    /// Write a report for people, with figures.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    html: Option<PathBuf>,
+    /// Exit with 0 where it cannot be told, too.
+    #[arg(long, help_heading = "Answer")]
+    allow_undecided: bool,
+}
+
+/// What happens between samples.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MotionArgument {
+    /// Straight lines.
+    Linear,
+    /// Nothing, with a jump at each sample.
+    Hold,
+    /// The recording's own curves.
+    Polynomial,
+    /// Anything within the largest acceleration.
+    Bounded,
+}
+
+/// A number, perhaps of one vehicle alone.
+type Named = (Option<String>, f64);
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(format!("`{text}` is not a number")),
+    }
+}
+
+fn named(text: &str) -> Result<Named, String> {
+    match text.rsplit_once('=') {
+        Some((name, value)) => Ok((Some(name.to_owned()), number(value)?)),
+        None => Ok((None, number(text)?)),
+    }
+}
+
+fn offset(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.rsplit_once('=').ok_or("write NAME=SECONDS, such as cf3=-0.12")?;
+    Ok((name.to_owned(), number(value)?))
+}
+
+fn axes(text: &str) -> Result<Vector3<f64>, String> {
+    let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    let [x, y, z] = numbers[..] else { return Err("write three half axes, such as 0.125,0.125,0.375".to_owned()) };
+    Ok(Vector3::new(x, y, z))
+}
+
+impl AuditArguments {
+    fn question(&self) -> Result<Question, Failure> {
+        let mut vehicles: BTreeMap<String, Terms> = BTreeMap::new();
+        let (mut radius_m, mut max_accel_m_s2) = (None, None);
+        for (name, value) in &self.radius {
+            match name {
+                Some(name) => vehicles.entry(name.clone()).or_default().radius_m = Some(*value),
+                None => radius_m = Some(*value),
+            }
+        }
+        for (name, value) in &self.max_accel {
+            match name {
+                Some(name) => vehicles.entry(name.clone()).or_default().max_accel_m_s2 = Some(*value),
+                None => max_accel_m_s2 = Some(*value),
+            }
+        }
+        for (name, value) in &self.offset {
+            vehicles.entry(name.clone()).or_default().offset_s = *value;
+        }
+        let motion = self.motion.map(|motion| match motion {
+            MotionArgument::Linear => Motion::Linear,
+            MotionArgument::Hold => Motion::Hold,
+            MotionArgument::Polynomial => Motion::Polynomial,
+            MotionArgument::Bounded => Motion::Bounded,
+        });
+        if !self.max_accel.is_empty() && motion != Some(Motion::Bounded) {
+            let help = "add --motion bounded, or leave --max-accel out";
+            return Err(Failure::input("--max-accel says nothing of a motion that is known exactly", help));
+        }
+        let only: BTreeSet<String> = self.ids.iter().cloned().collect();
+        Ok(Question {
+            delta_m: self.delta,
+            motion,
+            max_accel_m_s2,
+            radius_m,
+            ellipsoid_m: self.ellipsoid,
+            from_s: self.from,
+            to_s: self.to,
+            above_m: self.above,
+            max_gap_s: self.max_gap,
+            vehicles,
+            only: (!only.is_empty()).then_some(only),
+            obstacles: self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)?,
+        })
+    }
+
+    fn motion_in_words(&self, curves: bool) -> String {
+        let most = |accel: &[Named]| {
+            let listed = accel.iter().map(|(name, a)| match name {
+                Some(name) => format!("{a} m/s^2 for {name}"),
+                None => format!("{a} m/s^2"),
+            });
+            listed.collect::<Vec<_>>().join(", ")
+        };
+        match self.motion {
+            Some(MotionArgument::Hold) => "held between samples, jumps swept".to_owned(),
+            Some(MotionArgument::Bounded) => format!("accelerations of at most {}", most(&self.max_accel)),
+            _ if curves => "on the recording's curves".to_owned(),
+            _ => "straight between samples".to_owned(),
+        }
+    }
+}
+
+pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
+    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let question = arguments.question()?;
+    let options = arguments.reading.options(arguments.format)?;
+    let path = &arguments.reading.recording;
+    let judge = Judge::new(question.clone())?;
+    let Judged { outcome, clock, notes, curves } = judged(judge, arguments, &options, console)?;
+    for note in &notes {
+        console.warn(&format!("note: {note}"));
+    }
+    let source = Source { recording: path.display().to_string(), clock, notes };
+    let report = RecordedReport::new(&outcome, &question, source, &arguments.motion_in_words(curves));
+
+    if let Some(html) = &arguments.html {
+        let figures = figures(arguments, &options, &question, &outcome)?;
+        write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
+    }
+    if let Some(file) = &arguments.events {
+        write_atomically(file, &events::csv(&report)?)?;
+    }
+    if let Some(file) = &arguments.junit {
+        write_atomically(file, events::junit(&report, arguments.allow_undecided)?.as_bytes())?;
+    }
+    console.say(&format!("{}\n{}", report.headline(), report.text()));
+    if arguments.json {
+        let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
+        console::data(&json)?;
+    }
+    Ok(match report.status {
+        Status::Clear => Exit::Good,
+        Status::Undecided if arguments.allow_undecided => Exit::Good,
+        Status::Violation | Status::Undecided => Exit::Bad,
+    })
+}
+
+/// A recording after it was judged.
+struct Judged {
+    outcome: Outcome,
+    clock: Clock,
+    notes: Vec<String>,
+    /// Whether it has curves and no samples.
+    curves: bool,
+}
+
+fn judged(
+    mut judge: Judge,
+    arguments: &AuditArguments,
+    options: &ReadOptions,
+    console: Console,
+) -> Result<Judged, Failure> {
+    let path = &arguments.reading.recording;
+    let mut recording = read::open(path, options)?;
+    let progress = console.counter(path.display().to_string());
+    let mut items = Vec::new();
+    let (mut more, mut first, mut read, mut curves) = (true, true, 0, true);
+    while more {
+        items.clear();
+        while more && (items.is_empty() || (first && items.len() < OPENING)) {
+            more = recording.read(&mut items)?;
+        }
+        first = false;
+        curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
+        judge.push(recording.vehicles(), &items)?;
+        read += items.len() as u64;
+        progress.set_position(read);
+    }
+    progress.finish_and_clear();
+    let clock = recording.clock();
+    let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
+    Ok(Judged { outcome: judge.finish()?, clock, notes: recording.notes().to_vec(), curves })
+}
+
+/// Reads the recording again for the pairs that came closest.
+fn figures(
+    arguments: &AuditArguments,
+    options: &ReadOptions,
+    question: &Question,
+    outcome: &Outcome,
+) -> Result<Vec<Figure>, Failure> {
+    let closest: Vec<_> = outcome.closest.iter().take(DRAWN_PAIRS).collect();
+    let mut histories = Vec::new();
+    for approach in &closest {
+        if let Who::Pair(pair) = approach.who {
+            histories.push(History::new(question, &outcome.vehicles, [pair.first(), pair.second()])?);
+        }
+    }
+    let mut recording = read::open(&arguments.reading.recording, options)?;
+    let (mut items, mut more) = (Vec::new(), !histories.is_empty());
+    while more {
+        items.clear();
+        more = recording.read(&mut items)?;
+        for history in &mut histories {
+            history.push(&items)?;
+        }
+    }
+    let encounters: Vec<_> = histories
+        .into_iter()
+        .zip(&closest)
+        .filter_map(|(history, approach)| {
+            let pair = approach.who.pair()?;
+            let moments = history.finish();
+            let path =
+                |which: usize| moments.iter().map(|m| (m.positions_m[which].x, m.positions_m[which].y)).collect();
+            Some(Encounter {
+                names: [pair.first(), pair.second()].map(|k| outcome.vehicles.get(k).cloned().unwrap_or_default()),
+                distances: moments.iter().map(|m| (m.time_s, m.distance_m, m.slack_m)).collect(),
+                paths_m: [path(0), path(1)],
+                limit_m: approach.limit_m,
+                closest: (approach.time_s, approach.certain_m()),
+            })
+        })
+        .collect();
+    let Some(nearest) = encounters.first() else { return Ok(Vec::new()) };
+    let drawn = [
+        figures::encounters(&encounters, "Distances of the closest pairs"),
+        figures::closest_approach(nearest, "Closest approach from above"),
+    ];
+    drawn.into_iter().map(|figure| figure.map_err(|error| Failure::machine(error.to_string()))).collect()
+}
+
+/// The command as it was given, for a shell.
+fn command() -> String {
+    let words: Vec<String> = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+    let words = || std::iter::once("tautline").chain(words.iter().map(String::as_str));
+    // Only a zero byte cannot be quoted, and no argument has one.
+    shlex::try_join(words()).unwrap_or_else(|_| words().collect::<Vec<_>>().join(" "))
+}
+
+impl From<RecordedError> for Failure {
+    fn from(error: RecordedError) -> Self {
+        let help = match &error {
+            RecordedError::OutOfRange { .. } | RecordedError::EmptyWindow { .. } => "give another number",
+            RecordedError::NoBound { .. } => "give the largest acceleration with --max-accel A or --max-accel NAME=A",
+            RecordedError::NoLimit { .. } => "give --delta, or --radius NAME=R",
+            RecordedError::UnknownVehicle { .. } => "name vehicles as the recording does",
+            RecordedError::NotACurve { .. } => "give --motion linear, hold or bounded",
+            RecordedError::NotSamples { .. } => "leave --motion out, or give --motion polynomial",
+            RecordedError::RadiusChanges { .. } => "give one radius of the vehicle with --radius NAME=R",
+            RecordedError::ObstaclesAndEllipsoid => {
+                "judge obstacles by --delta or --radius, and ellipsoids without them"
+            }
+            RecordedError::Obstacle(_) => "mend the file of obstacles",
+            RecordedError::Unnamed { .. }
+            | RecordedError::NotFinite { .. }
+            | RecordedError::TimeNotIncreasing { .. }
+            | RecordedError::OutOfOrder { .. }
+            | RecordedError::Piece { .. } => "mend the recording there, or leave the vehicle out with --ids",
+        };
+        Self::input(error.to_string(), help)
+    }
+}

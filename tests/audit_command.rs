@@ -1,0 +1,1 @@
+//! The command `audit`, run as a user runs it.
