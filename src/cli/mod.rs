@@ -7,8 +7,10 @@ mod check;
 mod completions;
 mod console;
 mod diagnostic;
+mod export;
 mod list;
 mod pictures;
+mod reading;
 mod run;
 mod schema;
 
@@ -56,6 +58,8 @@ enum Command {
     Run(run::RunArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),
+    /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
+    Export(export::ExportArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -79,6 +83,7 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::check(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),
