@@ -95,6 +95,14 @@ fn a_chain_through_all_formats_loses_nothing() {
 }
 
 #[test]
+fn as_many_times_as_vehicles_come_back_in_their_places() {
+    let (folder, source) = folder_with("source.csv", "t_s,id,x,y,z\n0,1,1,2,3\n0,2,4,5,6\n1,1,7,8,9\n1,2,10,11,12\n");
+    let target = folder.path().join("target.npz");
+    export(&source, &target, Format::Npz, &ExportOptions::default()).expect("exported");
+    assert_eq!(bits(&whole(&target)), bits(&whole(&source)));
+}
+
+#[test]
 fn a_changed_bit_is_seen() {
     let (_folder, source) = folder_with("source.csv", &awkward("0", "1"));
     let mut changed = whole(&source);

@@ -1,4 +1,4 @@
-//! An archive of `NumPy` arrays: `t`, `positions` (T x N x 3), and where they are known `velocities`, `radii` (T x N),
+//! An archive of `NumPy` arrays: `t`, `positions` (T x N x 3), `axes`, and where they are known `velocities`, `radii` (T x N),
 //! `names`, `seen` (T x N) and `epoch_ns`.
 //!
 //! The recording is read once for each array, so that none of them is in memory.
@@ -26,6 +26,8 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     archive.array("positions", "<f8", &[times, vehicles, 3], |_, slots, out| {
         slots.iter().try_for_each(|slot| vector(slot.map(|sample| sample.position_m), out))
     })?;
+    // Where there are as many times as vehicles, the shape would not tell which axis is which.
+    archive.texts("axes", &["time", "vehicle", "xyz"].map(str::to_owned))?;
     if about.velocities {
         archive.array("velocities", "<f8", &[times, vehicles, 3], |_, slots, out| {
             slots.iter().try_for_each(|slot| vector(slot.and_then(|sample| sample.velocity_m_s), out))
@@ -44,17 +46,7 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     }
     let numbered = about.names.iter().enumerate().all(|(index, name)| *name == (index + 1).to_string());
     if !numbered {
-        let width = about.names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(1);
-        if let Some(name) = about.names.iter().find(|name| name.ends_with('\0')) {
-            return Err(ExportError::Name(name.clone()));
-        }
-        let out = archive.begin("names", &format!("<U{width}"), &[vehicles])?;
-        for name in &about.names {
-            let chars = name.chars().map(u32::from).chain(std::iter::repeat(0)).take(width);
-            for c in chars {
-                out.write_all(&c.to_le_bytes())?;
-            }
-        }
+        archive.texts("names", &about.names)?;
     }
     if about.clock.epoch_ns != 0 {
         archive.begin("epoch_ns", "<i8", &[])?.write_all(&about.clock.epoch_ns.to_le_bytes())?;
@@ -99,6 +91,22 @@ impl<'a> Archive<'a> {
         self.zip.write_all(&length.to_le_bytes())?;
         self.zip.write_all(header.as_bytes())?;
         Ok(&mut self.zip)
+    }
+
+    /// Writes an array of text.
+    fn texts(&mut self, name: &str, texts: &[String]) -> Result<(), ExportError> {
+        if let Some(text) = texts.iter().find(|text| text.ends_with('\0')) {
+            return Err(ExportError::Name(text.clone()));
+        }
+        let width = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+        let mut out = BufWriter::new(self.begin(name, &format!("<U{width}"), &[texts.len()])?);
+        for text in texts {
+            for c in text.chars().map(u32::from).chain(std::iter::repeat(0)).take(width) {
+                out.write_all(&c.to_le_bytes())?;
+            }
+        }
+        out.flush()?;
+        Ok(())
     }
 
     /// Writes an array, instant by instant.

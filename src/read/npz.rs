@@ -8,6 +8,7 @@
 //! | `radii` | N, or T x N | radii, if there are any; NaN where unknown |
 //! | `names` | N | names, if there are any |
 //! | `seen` | T x N | whether a vehicle was seen; where it was not, its position means nothing |
+//! | `axes` | 1 to 3 | names of the axes: `time` first or `vehicle` first, if it is said |
 //! | `epoch_ns` | 1 or no axis | what `t` counts from |
 //!
 //! Arrays whose first axis is time are streamed; others are in memory.
@@ -47,12 +48,17 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         });
         times.push(stamp.map_err(|fault| source.error(fault).at(Place::Part(format!("{time}[{k}]"))))?);
     }
-    let table = arrays.table(&positions, times.len(), options.axis_order)?;
-    let velocities =
-        arrays.optional("velocities", |arrays| arrays.table("velocities", times.len(), options.axis_order))?;
+    let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?;
+    let order = options.axis_order.or_else(|| match axes?.first()?.as_str() {
+        "time" => Some(AxisOrder::TimeFirst),
+        "vehicle" => Some(AxisOrder::VehicleFirst),
+        _ => None,
+    });
+    let table = arrays.table(&positions, times.len(), order)?;
+    let velocities = arrays.optional("velocities", |arrays| arrays.table("velocities", times.len(), order))?;
     let seen = arrays.optional("seen", |arrays| arrays.array("seen"))?;
     let radii = arrays.optional("radii", |arrays| arrays.radii(times.len(), table.vehicles))?;
-    let names = arrays.optional("names", Arrays::texts)?;
+    let names = arrays.optional("names", |arrays| arrays.texts("names"))?;
     let epoch_ns = arrays
         .optional("epoch_ns", |arrays| arrays.array("epoch_ns")?.next_stamp().map_err(|fault| source.error(fault)))?;
 
@@ -145,11 +151,11 @@ impl Arrays {
         radii.map(Radii::Same).map_err(self.at("radii"))
     }
 
-    fn texts(&mut self) -> Result<Vec<String>, ReadError> {
-        let mut array = self.array("names")?;
+    fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
+        let mut array = self.array(name)?;
         let mut texts = Vec::new();
         for _ in 0..array.count() {
-            texts.push(array.next_text().map_err(self.at("names"))?);
+            texts.push(array.next_text().map_err(self.at(name))?);
         }
         Ok(texts)
     }
