@@ -37,6 +37,7 @@
 pub mod audit;
 #[cfg(feature = "program")]
 pub mod cli;
+pub mod export;
 pub mod figures;
 pub mod formation;
 pub mod graph;

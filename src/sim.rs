@@ -19,6 +19,10 @@ use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, first_row_not_finite, row
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
 const SIDE_BY_SIDE_FROM: usize = 512;
 
+/// A path may bend away from the straight line that is swept by this much \[m\]; two vehicles by twice as much. A step
+/// that bends more is flown in halves.
+const MAX_BEND_M: f64 = 1e-5;
+
 /// What a flight left behind besides its recording.
 #[derive(Clone, Debug)]
 pub struct Flight {
@@ -93,6 +97,16 @@ pub enum Breakdown {
         /// The step, from 1.
         step: u64,
     },
+    /// A path bends too far from the straight line that is swept, however often the step is halved.
+    #[error(
+        "step {step}: a path bends by {bend_m:.1e} m from the straight line that is audited, and {MAX_BEND_M:e} m are allowed"
+    )]
+    Bent {
+        /// The step, from 1.
+        step: u64,
+        /// By how much at most \[m\].
+        bend_m: f64,
+    },
     /// The judge refused what it was shown.
     #[error("step {step}: {why}")]
     Audit {
@@ -146,7 +160,8 @@ impl From<RecordError> for Stop {
 /// [`ControlFlow::Break`].
 ///
 /// A step that takes more than half of the clearance above the law's barrier from some pair is refused, undone and flown
-/// in halves (at most [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between.
+/// in halves (at most [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between. So is one
+/// on which a path bends by more than 1e-5 m from the straight line that the audit sweeps, as the ideal plant's may.
 ///
 /// The scenario must be one that [`Scenario::validate`] accepts, and law and plant of its number of vehicles.
 ///
@@ -265,11 +280,15 @@ impl<'a> Cockpit<'a> {
         let (mut flown, mut part) = (0, whole);
         while flown < whole {
             self.move_vehicles(step, seconds(part))?;
-            if part > 1 && self.is_refused() {
+            let bend_m = self.plant.bend_m();
+            if part > 1 && (bend_m > MAX_BEND_M || self.is_refused()) {
                 self.plant.restore(&self.state);
                 part /= 2;
                 *shortest = part.min(*shortest);
                 continue;
+            }
+            if bend_m > MAX_BEND_M {
+                return Err(Breakdown::Bent { step, bend_m }.into());
             }
             flown += part;
             if flown == whole {

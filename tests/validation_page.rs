@@ -66,6 +66,7 @@ fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
     let ids = result["groups"].to_string();
     for finding in 1..=7 {
         assert!(ids.contains(&format!("\"finding\":\"F{finding}\"")), "F{finding} is measured");
+        assert!(html.contains(&format!("F{finding}; ")), "F{finding} is named on the page");
     }
 }
 

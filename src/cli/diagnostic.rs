@@ -6,6 +6,7 @@ use std::io::Write as _;
 use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
 
 use super::Exit;
+use crate::export::ExportError;
 use crate::law::ParameterError;
 use crate::read::ReadError;
 use crate::record::RecordError;
@@ -136,6 +137,13 @@ impl From<ArtefactError> for Failure {
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
+        let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
+        Self::plain(exit, harmless(&error.to_string())).with_help(error.help())
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
         let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
         Self::plain(exit, harmless(&error.to_string())).with_help(error.help())
     }

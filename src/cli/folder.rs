@@ -55,10 +55,19 @@ impl OutFolder {
                 "wait for it, or give another folder with --out",
             ));
         }
+        // Known before the work begins, and before anything old is taken away.
+        try_to_write_in(&self.path).map_err(|error| machine(&self.path, &error))?;
         // From here on the old report would describe something else.
         match fs::remove_file(&report) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
             _ => Ok(lock),
         }
     }
+}
+
+/// Makes a file in the folder and takes it away again.
+fn try_to_write_in(folder: &Path) -> io::Result<()> {
+    let probe = folder.join(format!(".tautline-{}", std::process::id()));
+    File::create(&probe)?;
+    fs::remove_file(&probe)
 }

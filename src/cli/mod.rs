@@ -9,6 +9,7 @@ mod completions;
 mod console;
 mod diagnostic;
 mod events;
+mod export;
 mod folder;
 mod list;
 mod obstacles;
@@ -66,6 +67,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Reproduce the paper and judge every claim, ours and the paper's.
     Validate(validate::ValidateArguments),
+    /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
+    Export(export::ExportArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -91,6 +94,7 @@ pub fn main() -> ExitCode {
         Command::Audit(arguments) => audit::audit(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),

@@ -130,7 +130,7 @@ pub fn solve(
 /// A swarm that moves as equation (1) says, at the scenario's start.
 #[must_use]
 pub fn plant(scenario: &Scenario) -> Box<dyn Plant> {
-    Box::new(Ideal { swarm: scenario.start.clone(), a22_per_s: scenario.a22_per_s, step_s: FIRST_STEP_S })
+    Box::new(Ideal { swarm: scenario.start.clone(), a22_per_s: scenario.a22_per_s, step_s: FIRST_STEP_S, bend_m: 0.0 })
 }
 
 struct Ideal {
@@ -138,6 +138,8 @@ struct Ideal {
     a22_per_s: f64,
     /// Solver step that the error control came to last.
     step_s: f64,
+    /// See [`Plant::bend_m`].
+    bend_m: f64,
 }
 
 impl Plant for Ideal {
@@ -145,7 +147,12 @@ impl Plant for Ideal {
         let flow = Flow::new(law, &self.swarm, self.a22_per_s);
         let first_step_s = self.step_s.min(dt_s);
         let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), first_step_s)?;
-        solver.advance(dt_s, &mut |_| Ok(()))?;
+        let mut turned_m_s = vec![0.0; self.swarm.count()];
+        solver.advance(dt_s, &mut |solver| {
+            solver.add_turns(&mut turned_m_s);
+            Ok(())
+        })?;
+        self.bend_m = 0.25 * dt_s * turned_m_s.into_iter().fold(0.0, f64::max);
         self.step_s = solver.method.h();
         self.swarm = solver.swarm();
         Ok(())
@@ -157,6 +164,12 @@ impl Plant for Ideal {
 
     fn restore(&mut self, swarm: &Swarm) {
         self.swarm.clone_from(swarm);
+    }
+
+    /// From the Green's function of a second derivative, which is at most T/4: a path of duration T stays within T/4
+    /// times the integral of |p''| of its chord. The integral is taken from the change of velocity in each solver step.
+    fn bend_m(&self) -> f64 {
+        self.bend_m
     }
 }
 
@@ -283,6 +296,15 @@ impl<'a, 'law> Solver<'a, 'law> {
             } else {
                 high_s = middle_s;
             }
+        }
+    }
+
+    /// Adds to each vehicle's entry by how much its velocity changed in the last step \[m/s\].
+    fn add_turns(&self, turned_m_s: &mut [f64]) {
+        let (before, after, count) = (self.method.y_prev(), self.method.y(), turned_m_s.len());
+        for (i, turned) in turned_m_s.iter_mut().enumerate() {
+            let change = |axis: usize| after[(3 + axis) * count + i] - before[(3 + axis) * count + i];
+            *turned += Vector3::from([0, 1, 2].map(change)).norm();
         }
     }
 

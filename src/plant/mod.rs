@@ -28,6 +28,12 @@ pub trait Plant: Send {
     /// Puts the vehicles back into a state that [`Plant::observe`] gave: a step that was refused is undone.
     fn restore(&mut self, swarm: &Swarm);
 
+    /// How far at most a vehicle's path over the last step bends away from the straight line between its ends \[m\],
+    /// which is what the audit sweeps. Zero for a plant that moves on straight lines within a step.
+    fn bend_m(&self) -> f64 {
+        0.0
+    }
+
     /// Appends the pairs whose keep-out balls overlapped when the plant's own collision detection last looked, in index
     /// order. A plant without one appends nothing.
     fn keep_out_contacts(&self, _pairs: &mut Vec<Pair>) {}

@@ -46,8 +46,9 @@ pub struct Preflight {
     /// Second smallest eigenvalue lambda2 of the graph's Laplacian; null for a graph of more than [`MOST_CONNECTED`]
     /// vehicles that is not complete.
     pub algebraic_connectivity: Option<f64>,
-    /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: relative velocities
-    /// are damped at least at this rate where it is positive, and grow where it is negative.
+    /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: for g >= 0 relative
+    /// velocities are damped at least at this rate where it is positive, and grow where it is negative. For g < 0 the
+    /// largest possible eigenvalue N takes the place of lambda2.
     pub velocity_margin_per_s: Option<f64>,
     /// Rate a22 at which the swarm's mean velocity grows \[1/s\]; negative where it decays.
     pub common_mode_rate_per_s: f64,
@@ -167,7 +168,7 @@ impl Preflight {
             found.relative_velocity_unstable(scenario),
             found.start_too_flat(),
             found.no_certificate(),
-            found.not_rigid(),
+            found.not_rigid(scenario),
             found.flat_formation_in_space(),
             found.common_mode_unstable(scenario),
             found.dt_too_large(scenario),
@@ -225,18 +226,20 @@ impl Preflight {
         })
     }
 
-    fn not_rigid(&self) -> Option<Warning> {
+    fn not_rigid(&self, scenario: &Scenario) -> Option<Warning> {
         // Out of its own flat a flat formation is never rigid in space, which has a warning of its own.
         let rigidity = if self.is_flat_in_space() {
             self.rigidity.within(self.formation_dimension, self.vehicles)
         } else {
             self.rigidity
         };
+        let remedy =
+            if scenario.graph.is_complete() { "Bend the formation a little." } else { "Add edges to the graph." };
         (self.controls_distances && rigidity.rigid == Some(false)).then(|| Warning {
             code: Code::NotRigid,
             message: format!(
                 "The formation is not rigid on its graph: {} of {} independent constraints hold it, so other shapes have \
-                 the same edges or are approached only slowly. Add edges to the graph.",
+                 the same edges or are approached only slowly. {remedy}",
                 rigidity.rank.map_or("too few".to_owned(), |rank| rank.to_string()),
                 rigidity.needed
             ),
@@ -316,7 +319,11 @@ fn velocity_gain(scenario: &Scenario) -> f64 {
 }
 
 fn velocity_margin(scenario: &Scenario, lambda2: f64) -> f64 {
-    velocity_gain(scenario) * (lambda2 / scenario.count().max(1) as f64) - scenario.a22_per_s
+    let count = scenario.count().max(1) as f64;
+    let gain = velocity_gain(scenario);
+    // No eigenvalue exceeds N: where the gain is negative that is the worst mode.
+    let worst = if gain < 0.0 { count } else { lambda2 };
+    gain * (worst / count) - scenario.a22_per_s
 }
 
 fn smallest_degree(graph: &Graph) -> usize {

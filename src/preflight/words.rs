@@ -6,7 +6,8 @@ use super::{Code, Preflight, Warning};
 
 /// A rate \[1/s\] to six decimals, with its sign.
 pub(super) fn rate(rate_per_s: f64) -> String {
-    format!("{rate_per_s:.6}")
+    // Adding zero takes the sign from what rounds to zero.
+    format!("{:.6}", (rate_per_s * 1e6).round() / 1e6 + 0.0)
 }
 
 /// A positive number to three significant digits.

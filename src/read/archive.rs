@@ -79,7 +79,7 @@ fn zip_fault(error: ZipError) -> Fault {
             format!("the archive needs what is not supported: {what}"),
             "make it with deflate or unpacked",
         ),
-        ZipError::InvalidArchive(what) if what.contains("end") => {
+        ZipError::InvalidArchive(what) if what.contains("EOCD") || what.contains("end") => {
             Fault::Truncated { what: "the end of the archive is missing".to_owned() }
         }
         other => Fault::damaged(other),

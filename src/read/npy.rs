@@ -39,6 +39,8 @@ pub(super) struct Array {
     pub(super) fortran_order: bool,
     pub(super) shape: Vec<usize>,
     element: Vec<u8>,
+    /// Elements that have not been read.
+    left: usize,
 }
 
 impl Array {
@@ -74,7 +76,8 @@ impl Array {
         if shape.iter().try_fold(width, |product, &length| product.checked_mul(length)).is_none() {
             return Err(broken("shape that fits into memory"));
         }
-        Ok(Self { bytes, kind, width, big_endian, fortran_order, shape, element: vec![0; width] })
+        let left = shape.iter().product();
+        Ok(Self { bytes, kind, width, big_endian, fortran_order, shape, element: vec![0; width], left })
     }
 
     /// How many elements there are.
@@ -89,6 +92,11 @@ impl Array {
 
     fn next_element(&mut self) -> Result<(), Fault> {
         read_exactly(&mut self.bytes, &mut self.element)?;
+        self.left = self.left.saturating_sub(1);
+        // Behind the last element the checksum is compared.
+        if self.left == 0 && self.bytes.read(&mut [0]).map_err(fault_of)? > 0 {
+            return Err(Fault::damaged("the array is longer than it says"));
+        }
         if self.big_endian {
             self.element.reverse();
         }

@@ -5,9 +5,10 @@
 //! | `t` | T | times, as numbers or `datetime64` |
 //! | `positions` | T x N x 3, or N x T x 3 | positions; two columns instead of three are a plane |
 //! | `velocities` | as `positions` | velocities, if there are any |
-//! | `radii` | N | radii, if there are any |
+//! | `radii` | N, or T x N | radii, if there are any; NaN where unknown |
 //! | `names` | N | names, if there are any |
 //! | `seen` | T x N | whether a vehicle was seen; where it was not, its position means nothing |
+//! | `axes` | 1 to 3 | names of the axes: `time` first or `vehicle` first, if it is said |
 //! | `epoch_ns` | 1 or no axis | what `t` counts from |
 //!
 //! Arrays whose first axis is time are streamed; others are in memory.
@@ -47,12 +48,17 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         });
         times.push(stamp.map_err(|fault| source.error(fault).at(Place::Part(format!("{time}[{k}]"))))?);
     }
-    let table = arrays.table(&positions, times.len(), options.axis_order)?;
-    let velocities =
-        arrays.optional("velocities", |arrays| arrays.table("velocities", times.len(), options.axis_order))?;
+    let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?;
+    let order = options.axis_order.or_else(|| match axes?.first()?.as_str() {
+        "time" => Some(AxisOrder::TimeFirst),
+        "vehicle" => Some(AxisOrder::VehicleFirst),
+        _ => None,
+    });
+    let table = arrays.table(&positions, times.len(), order)?;
+    let velocities = arrays.optional("velocities", |arrays| arrays.table("velocities", times.len(), order))?;
     let seen = arrays.optional("seen", |arrays| arrays.array("seen"))?;
-    let radii = arrays.optional("radii", Arrays::numbers)?;
-    let names = arrays.optional("names", Arrays::texts)?;
+    let radii = arrays.optional("radii", |arrays| arrays.radii(times.len(), table.vehicles))?;
+    let names = arrays.optional("names", |arrays| arrays.texts("names"))?;
     let epoch_ns = arrays
         .optional("epoch_ns", |arrays| arrays.array("epoch_ns")?.next_stamp().map_err(|fault| source.error(fault)))?;
 
@@ -63,12 +69,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         if found == expected { Ok(()) } else { Err(source.error(fault)) }
     };
     fits("seen", seen.as_ref().map_or(times.len() * vehicles, Array::count), times.len() * vehicles)?;
-    fits("radii", radii.as_ref().map_or(vehicles, Vec::len), vehicles)?;
     fits("names", names.as_ref().map_or(vehicles, Vec::len), vehicles)?;
     if let Some(table) = &velocities {
         fits("velocities", table.vehicles * table.axes, vehicles * axes)?;
     }
-    let names = names.map_or_else(|| Names::numbered(vehicles), Names::from_list);
+    let names = names.map_or_else(Names::default, Names::from_list);
     let mut notes = Vec::new();
     if axes == 2 {
         notes.push("positions have two columns: z is taken as 0".to_owned());
@@ -132,24 +137,25 @@ impl Arrays {
         if self.holds(name) { read(self).map(Some) } else { Ok(None) }
     }
 
-    fn numbers(&mut self) -> Result<Vec<f64>, ReadError> {
+    fn radii(&mut self, times: usize, vehicles: usize) -> Result<Radii, ReadError> {
         let mut array = self.array("radii")?;
-        let mut numbers = Vec::new();
-        for _ in 0..array.count() {
-            let number = array.next_number().and_then(|number| {
-                let fault = || Fault::content(format!("it holds {number}"), "radii are 0 or more");
-                if number >= 0.0 && number.is_finite() || number.is_nan() { Ok(number) } else { Err(fault()) }
-            });
-            numbers.push(number.map_err(self.at("radii"))?);
+        if array.shape == [times, vehicles] && !array.fortran_order {
+            return Ok(Radii::Each(array));
         }
-        Ok(numbers)
+        if array.shape != [vehicles] {
+            let problem = format!("it is of shape {:?}", array.shape);
+            let fault = Fault::content(problem, "save a radius for each vehicle, or for each time and vehicle");
+            return Err(self.at("radii")(fault));
+        }
+        let radii = (0..vehicles).map(|_| array.next_number()).collect::<Result<_, _>>();
+        radii.map(Radii::Same).map_err(self.at("radii"))
     }
 
-    fn texts(&mut self) -> Result<Vec<String>, ReadError> {
-        let mut array = self.array("names")?;
+    fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
+        let mut array = self.array(name)?;
         let mut texts = Vec::new();
         for _ in 0..array.count() {
-            texts.push(array.next_text().map_err(self.at("names"))?);
+            texts.push(array.next_text().map_err(self.at(name))?);
         }
         Ok(texts)
     }
@@ -162,6 +168,10 @@ impl Arrays {
             let problem = format!("it is of shape {:?}", array.shape);
             return Err(at(Fault::content(problem, "save positions as T x N x 3 or N x T x 3")));
         };
+        if array.count() == 0 {
+            let problem = format!("it is of shape {:?}, which holds nothing", array.shape);
+            return Err(at(Fault::content(problem, "save at least one instant of one vehicle")));
+        }
         let order = match (order, first == times, second == times) {
             (Some(AxisOrder::TimeFirst), true, _) | (None, true, false) => AxisOrder::TimeFirst,
             (Some(AxisOrder::VehicleFirst), _, true) | (None, false, true) => AxisOrder::VehicleFirst,
@@ -221,6 +231,27 @@ impl Table {
     }
 }
 
+/// Radii of the vehicles, NaN where unknown.
+enum Radii {
+    /// The same at all times.
+    Same(Vec<f64>),
+    /// Of each time and vehicle.
+    Each(Array),
+}
+
+impl Radii {
+    fn next(&mut self, vehicle: usize) -> Result<Option<f64>, Fault> {
+        let radius = match self {
+            Self::Same(radii) => radii[vehicle],
+            Self::Each(array) => array.next_number()?,
+        };
+        if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
+            return Ok(Some(radius).filter(|radius| !radius.is_nan()));
+        }
+        Err(Fault::content(format!("the radius is {radius}"), "radii are finite and 0 or more, or NaN where unknown"))
+    }
+}
+
 /// The rows of an archive.
 struct Instants {
     source: Source,
@@ -232,7 +263,7 @@ struct Instants {
     table: Table,
     velocities: Option<Table>,
     seen: Option<Array>,
-    radii: Option<Vec<f64>>,
+    radii: Option<Radii>,
     names: Names,
 }
 
@@ -240,6 +271,7 @@ impl Instants {
     fn row(&mut self, stamp: Stamp, vehicle: usize) -> Result<Option<Row>, Fault> {
         let position = self.table.next_vector()?;
         let velocity = self.velocities.as_mut().map(Table::next_vector).transpose()?;
+        let radius = self.radii.as_mut().map(|radii| radii.next(vehicle)).transpose()?.flatten();
         let seen = self.seen.as_mut().map(Array::next_number).transpose()?.is_none_or(|seen| seen != 0.0);
         if !seen {
             return Ok(None);
@@ -256,7 +288,6 @@ impl Instants {
                 "velocities are finite, or all NaN where unknown",
             ));
         }
-        let radius = self.radii.as_ref().map(|radii| radii[vehicle]).filter(|radius| !radius.is_nan());
         let place = (self.at * self.table.vehicles + vehicle) as u64;
         Ok(Some(Row { stamp, place, vehicle, position, velocity, radius }))
     }
@@ -273,6 +304,10 @@ impl Rows for Instants {
                     self.source.error(fault).at(place)
                 })?;
                 rows.extend(row);
+            }
+            if self.names.all().is_empty() {
+                // So many have really been read: the shape is no longer a claim.
+                self.names = Names::numbered(self.table.vehicles);
             }
             self.at += 1;
         }

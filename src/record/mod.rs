@@ -85,7 +85,8 @@ pub enum Event {
         /// When \[s\].
         time_s: f64,
     },
-    /// A step was refused and flown in shorter ones, because it took more than half of a clearance.
+    /// A step was refused and flown in shorter ones, because it took more than half of a clearance or bent too far from
+    /// the straight line that is audited.
     StepRefined {
         /// When the step began \[s\].
         time_s: f64,

@@ -12,7 +12,7 @@ pub mod recorded;
 mod verdict;
 mod words;
 
-pub use artefact::{ArtefactError, write_atomically};
+pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
 pub use html::RunPage;
 
 use std::path::Path;

@@ -64,12 +64,14 @@ fn ended_early(findings: &Findings<'_>) -> Option<String> {
     Some(format!("The run ended early, at {}: {}.", seconds(ended.time_s), ended.reason.trim_end_matches('.')))
 }
 
-/// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier.
+/// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier, or
+/// numbers that ran out of digits.
 fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
     let (certified_m, closest) = (findings.certificate.certified_m?, findings.audit.closest?);
     (closest.separation_m < certified_m).then(|| {
         format!(
-            "The law certifies {} m in continuous time, and vehicles {} came to {} m: the time step is too long.",
+            "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
+             the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits.",
             metres(certified_m),
             closest.pair,
             metres_below(closest.separation_m, certified_m),

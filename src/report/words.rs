@@ -43,7 +43,11 @@ impl Report {
             Status::Clear => {
                 let closest = self.separation.min_m.map(metres_at_least);
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
-                format!("CLEAR: {closest} (delta {delta} m), {}", self.formation_in_words())
+                let broken = match (self.separation.min_m, self.separation.certified_m) {
+                    (Some(min_m), Some(certified_m)) if min_m < certified_m => ", which breaks the certificate",
+                    _ => "",
+                };
+                format!("CLEAR: {closest} (delta {delta} m){broken}, {}", self.formation_in_words())
             }
             Status::Violation => {
                 let deepest = self.deepest_in_words();

@@ -126,7 +126,7 @@ impl Experiment {
             measured: format!(
                 "closest {min_m:.6} m at {at_s:.3} s; largest edge error below {REACHED_M} m from \
                  {reached_at_s:.1} s on, {} m after {DURATION_S} s",
-                bound(error_m)
+                bound(error_m, CONVERGED_M)
             ),
             values: [
                 ("min_m", min_m),
@@ -228,7 +228,7 @@ fn baseline() -> Result<Vec<Claim>, ValidateError> {
             "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s, largest \
              edge error {} m after {DURATION_S} s",
             flight.reached_at_s(),
-            bound(error_m)
+            bound(error_m, CONVERGED_M)
         ),
         values: [("min_m", min_m), ("min_at_s", min_at_s), ("final_edge_error_m", error_m)].into(),
         tolerance: "half a unit of the last digit".to_owned(),
@@ -254,7 +254,7 @@ fn straight_line() -> Result<Vec<Claim>, ValidateError> {
         measured: format!(
             "largest distance from the line {}; closest {min_m:.6} m; largest edge error {error_m:.2} m after \
              {DURATION_S} s",
-            bound(off_line_m)
+            if off_line_m == 0.0 { "exactly 0".to_owned() } else { format!("{off_line_m:.1e} m") }
         ),
         values: [("off_line_m", off_line_m), ("min_m", min_m), ("final_edge_error_m", error_m)].into(),
         tolerance: "0 from the line, half a unit of the last digit for the rest".to_owned(),
@@ -298,7 +298,7 @@ fn up_to_rigid_motion() -> Result<Vec<Claim>, ValidateError> {
         measured: format!(
             "best rigid fit {} m (rms) either way; turned by {turn_rad:.6} rad and {}; a vehicle is {farthest_m:.2} m \
              from its slot",
-            bound(fit_m),
+            bound(fit_m, CONVERGED_M),
             if mirrored { "mirrored" } else { "not mirrored" }
         ),
         values: [("fit_rms_m", fit_m), ("turn_rad", turn_rad), ("farthest_from_slot_m", farthest_m)].into(),
@@ -335,7 +335,7 @@ fn relative_motion() -> Result<Vec<Claim>, ValidateError> {
         expected: "the same pentagon flight".to_owned(),
         measured: format!(
             "relative positions after {COMPARED_S} s differ by {} m between a22 of {A22_PER_S:?} 1/s",
-            bound(difference_m)
+            bound(difference_m, CONVERGED_M)
         ),
         values: [("largest_difference_m", difference_m)].into(),
         tolerance: format!("{CONVERGED_M:e} m"),

@@ -5,11 +5,12 @@ use std::ops::ControlFlow;
 use super::ValidateError;
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
+use crate::law::Law;
+use crate::plant;
 use crate::plant::ideal::{self, Solution, Tolerances};
-use crate::plant::{self};
 use crate::record::{Event, RecordError, Recorder, Sample};
 use crate::scenario::{PlantSpec, Precision, Scenario, Source};
-use crate::sim::{self, Flight};
+use crate::sim::{self, Ending, Flight};
 use crate::swarm::Swarm;
 
 /// The embedded scenario of this name.
@@ -35,11 +36,25 @@ pub(super) fn continuous(scenario: &Scenario, times_s: &[f64]) -> Result<Solutio
     Ok(ideal::solve(law.as_mut(), start, a22_per_s, times_s, Tolerances::default())?)
 }
 
-/// The scenario in the physics engine, step by step; `observe` sees every recorded sample.
+/// The scenario in the physics engine, step by step, to its duration; `observe` sees every recorded sample.
 pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> Result<Flight, ValidateError> {
-    let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(scenario));
+    let mut law = scenario.law()?;
+    let flight = engine_to_any_end(scenario, law.as_mut(), observe)?;
+    match flight.ending {
+        Ending::Completed => Ok(flight),
+        ending => Err(ValidateError::EndedEarly { scenario: scenario.name.clone(), time_s: flight.duration_s, ending }),
+    }
+}
+
+/// The scenario in the physics engine under this law, to whatever end it comes.
+pub(super) fn engine_to_any_end(
+    scenario: &Scenario,
+    law: &mut dyn Law,
+    observe: impl FnMut(&Sample<'_>),
+) -> Result<Flight, ValidateError> {
+    let mut plant = plant::for_scenario(scenario);
     let go_on = &mut |_| ControlFlow::Continue(());
-    Ok(sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut Watch(observe), go_on)?)
+    Ok(sim::fly(scenario, law, plant.as_mut(), &mut Watch(observe), go_on)?)
 }
 
 /// The same scenario at another precision and step \[s\], with every step recorded and taken as it is.
@@ -76,5 +91,22 @@ impl<F: FnMut(&Sample<'_>)> Recorder for Watch<F> {
 
     fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flight_that_ends_early_is_an_error_and_not_a_short_flight() {
+        let mut scenario = builtin("pentagon").expect("a scenario");
+        scenario.time.duration_s = 0.1;
+        assert!(engine(&scenario, |_| ()).is_ok());
+        // Closer than delta within the first step, which is not refused.
+        scenario.time.max_halvings = 0;
+        scenario.start.velocities_m_s[(0, 0)] = 600.0;
+        let error = engine(&scenario, |_| ()).expect_err("the law is undefined below delta");
+        assert!(matches!(error, ValidateError::EndedEarly { ending: Ending::LawUndefined(_), .. }), "{error}");
     }
 }

@@ -3,6 +3,14 @@
 use super::{Claim, Group, Kind, Rung, Validation};
 use crate::report::page::{Badge, Block, Cell, Column, Page, Section, Table, Tone};
 
+/// What the claims rest on.
+const ASSUMED: [&str; 3] = [
+    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, which knows nothing \
+     of the physics engine.",
+    "Within a step the engine moves every vehicle on a straight line, and the audit sweeps that line.",
+    "Random starts come from fixed seeds: the same program finds the same numbers.",
+];
+
 impl Validation {
     /// The result as a self-contained page: claims, figures and the ladder. Two validations by one program give the same
     /// bytes.
@@ -18,6 +26,10 @@ impl Validation {
             blocks: vec![Block::Table(ladder(&self.ladder)), Block::Figures(of_ladder)],
         });
         sections.push(Section { heading: "The paper's figures".to_owned(), blocks: vec![Block::Figures(of_paper)] });
+        sections.push(Section {
+            heading: "What was assumed".to_owned(),
+            blocks: vec![Block::List(ASSUMED.map(str::to_owned).to_vec())],
+        });
         sections.push(Section {
             heading: "Repeat it".to_owned(),
             blocks: vec![Block::Command("tautline validate".to_owned())],
@@ -61,7 +73,15 @@ fn row(claim: &Claim) -> Vec<Cell> {
         (true, _) => Tone::Good,
     };
     vec![
-        Cell::Noted(claim.statement.to_owned(), format!("{}; {}", claim.id, claim.source)),
+        Cell::Noted(
+            claim.statement.to_owned(),
+            format!(
+                "{}{}; {}",
+                claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default(),
+                claim.id,
+                claim.source
+            ),
+        ),
         Cell::Noted(
             claim.measured.clone(),
             format!("Expected: {}. Tolerance: {} ({}).", claim.expected, claim.tolerance, claim.reason),

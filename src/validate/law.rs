@@ -113,7 +113,11 @@ fn matrix_form(states: &[State]) -> Result<Claim, ValidateError> {
         kind: Kind::PaperHolds,
         statement: "The sum over neighbours (8) and the weighted Laplacian (9) are the same law.",
         expected: "equal to rounding".to_owned(),
-        measured: format!("largest difference {} of the largest component, {} states", bound(error), states.len()),
+        measured: format!(
+            "largest difference {} of the largest component, {} states",
+            bound(error, ROUNDING),
+            states.len()
+        ),
         values: [("largest_relative_difference", error)].into(),
         tolerance: format!("{ROUNDING:e}"),
         reason: "rounding of sums of up to 8 terms, relative to the largest",
@@ -133,7 +137,7 @@ fn zero_sum(states: &[State]) -> Result<Claim, ValidateError> {
         kind: Kind::Ours,
         statement: "The controls sum to zero: the law cannot move the centre of mass.",
         expected: "a zero mean".to_owned(),
-        measured: format!("largest mean {} of the largest component, {} states", bound(error), states.len()),
+        measured: format!("largest mean {} of the largest component, {} states", bound(error, ROUNDING), states.len()),
         values: [("largest_relative_mean", error)].into(),
         tolerance: format!("{ROUNDING:e}"),
         reason: "rounding of sums of up to 8 terms, relative to the largest",
@@ -156,7 +160,10 @@ fn energy_rate(states: &[State]) -> Result<Claim, ValidateError> {
         kind: Kind::Ours,
         statement: "On the complete graph dE/dt = -sum |v_i - mean v|^2, whatever a22 is.",
         expected: "equal at every state".to_owned(),
-        measured: format!("largest relative error {} over {STATES} states with a22 of {A22_PER_S:?} 1/s", bound(error)),
+        measured: format!(
+            "largest relative error {} over {STATES} states with a22 of {A22_PER_S:?} 1/s",
+            bound(error, ROUNDING)
+        ),
         values: [("largest_relative_error", error)].into(),
         tolerance: format!("{ROUNDING:e}"),
         reason: "rounding, relative to the terms that are summed",
@@ -178,7 +185,7 @@ fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, ValidateError> {
         kind: Kind::Ours,
         statement: "On any graph dE/dt <= -[(1 + a22) lambda2/N - a22] sum |v_i - mean v|^2.",
         expected: "never more".to_owned(),
-        measured: format!("largest relative excess {} over {} states", bound(excess), states.len()),
+        measured: format!("largest relative excess {} over {} states", bound(excess, ROUNDING), states.len()),
         values: [("largest_relative_excess", excess)].into(),
         tolerance: format!("{ROUNDING:e}"),
         reason: "rounding, relative to the terms that are summed",
@@ -212,7 +219,7 @@ fn literal_baseline() -> Result<Claim, ValidateError> {
         expected: "rest at (1 + a22) h_p instead: read h as goal positions h_p and goal velocities 0".to_owned(),
         measured: format!(
             "at rest at h_p the law still commands {at_goal:.4} m/s^2, at {f2_per_s} h_p {}",
-            bound(at_scaled)
+            bound(at_scaled, ROUNDING)
         ),
         values: [("control_at_goal_m_s2", at_goal), ("control_at_scaled_goal_m_s2", at_scaled)].into(),
         tolerance: format!("{ROUNDING:e} m/s^2"),

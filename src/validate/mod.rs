@@ -36,7 +36,7 @@ use crate::law::{LawError, ParameterError, TensionError};
 use crate::plant::PlantError;
 use crate::plant::ideal::IdealError;
 use crate::scenario::ScenarioError;
-use crate::sim::SimError;
+use crate::sim::{Ending, SimError};
 
 /// Version of the keys of `validate.json`: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -115,6 +115,16 @@ pub(crate) enum ValidateError {
     /// A flight failed.
     #[error(transparent)]
     Sim(#[from] SimError),
+    /// A flight ended before its time.
+    #[error("the flight of {scenario} ended early, at {time_s} s: {ending:?}")]
+    EndedEarly {
+        /// Name of the scenario.
+        scenario: String,
+        /// When \[s\].
+        time_s: f64,
+        /// How.
+        ending: Ending,
+    },
 }
 
 /// Counts finished work, from any thread.

@@ -25,7 +25,8 @@ impl Validation {
         let width = |of: fn(&Claim) -> usize| self.claims().map(of).max().unwrap_or(0);
         let (outcomes, names) = (width(|claim| claim.outcome().len()), width(|claim| claim.id.len()));
         self.claims().fold(String::new(), |text, claim| {
-            text + &format!("{:outcomes$}  {:names$}  {}\n", claim.outcome(), claim.id, claim.measured)
+            let finding = claim.finding.map(|finding| format!("[{finding}] ")).unwrap_or_default();
+            text + &format!("{:outcomes$}  {:names$}  {finding}{}\n", claim.outcome(), claim.id, claim.measured)
         })
     }
 
@@ -133,7 +134,7 @@ mod tests {
             judged.headline(),
             "valid: all 3 claims are as expected: 1 of ours hold, 1 of the paper's hold, 1 of the paper's are refuted"
         );
-        assert_eq!(judged.text().lines().last(), Some("paper: refuted  c  none"));
+        assert_eq!(judged.text().lines().last(), Some("paper: refuted  c  [F9] none"));
         let page = judged.markdown();
         assert!(page.contains("| F9 | Nothing moves. | none | `c` |"), "{page}");
         assert!(page.contains("### Paper: refuted: `c`"), "{page}");

@@ -56,9 +56,9 @@ fn minimum() -> Result<Claim, ValidateError> {
         expected: "V(d) = V'(d) = 0, and V' changes sign at d".to_owned(),
         measured: format!(
             "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) evaluated literally {}; V' {}",
-            bound(value),
-            bound(slope),
-            bound(literal),
+            bound(value, ROUNDING),
+            bound(slope, ROUNDING),
+            bound(literal, ROUNDING),
             if bracketed { "changes sign" } else { "does not change sign" }
         ),
         values: [("value_m2_s2", value), ("slope_m_s2", slope), ("literal_m2_s2", literal)].into(),

@@ -1,4 +1,5 @@
 //! Recordings read whole.
+#![allow(dead_code, reason = "each test uses its part")]
 
 use std::path::Path;
 

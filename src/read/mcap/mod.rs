@@ -58,7 +58,7 @@ fn first_known_schema(source: &Source) -> Result<Option<Known>, ReadError> {
             _ => {}
         }
     }
-    Ok(None)
+    if records.is_complete() { Ok(None) } else { Err(source.error(unfinished())) }
 }
 
 fn records(source: &Source) -> Result<RecordReader, ReadError> {

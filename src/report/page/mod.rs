@@ -251,10 +251,11 @@ impl Block {
 
 impl Table {
     fn render(&self) -> Markup {
+        let prose = self.columns.iter().skip(1).any(|column| !column.numeric);
         let class = |k: usize| self.columns.get(k).is_some_and(|column| column.numeric).then_some("number");
         html! {
             div.scroll role="region" tabindex="0" aria-label=(self.caption) {
-                table {
+                table.prose[prose] {
                     caption { (self.caption) }
                     thead { tr { @for (k, column) in self.columns.iter().enumerate() {
                         th scope="col" class=[class(k)] { (column.heading) }
