@@ -26,7 +26,7 @@ pub(super) struct ExportArguments {
     #[arg(long, value_name = "FORMAT")]
     format: Option<TargetArgument>,
     /// How often curves are sampled [Hz]; what is between the samples is lost.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     sample_hz: Option<f64>,
     /// Overwrite the file if it exists.
     #[arg(long)]
