@@ -5,7 +5,7 @@ use std::io::{Cursor, Write as _};
 use std::path::PathBuf;
 
 use tautline::export::{self, ExportOptions};
-use tautline::read::{self, Fault, Format, Place, ReadError, ReadOptions};
+use tautline::read::{self, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -288,6 +288,9 @@ fn a_format_that_is_forced_on_other_content_is_refused() {
     for format in [Format::Parquet, Format::Npz, Format::Mcap, Format::Crazyflie, Format::Skybrush] {
         refused_with("flight.csv", LONG.as_bytes(), &forced(format));
     }
+    let unit = ReadOptions { time_unit: Some(TimeUnit::Milliseconds), ..ReadOptions::default() };
+    let error = refused_with("cf1.csv", b"duration,x^0,y^0,z^0\n1,0,0,0\n", &unit);
+    assert!(error.help().contains("leave --time-unit away"), "{error}");
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let options = ReadOptions { scale, ..ReadOptions::default() };
         assert!(refused_with("flight.csv", LONG.as_bytes(), &options).help().contains("positive"));

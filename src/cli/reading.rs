@@ -111,7 +111,7 @@ pub(super) enum FormatArgument {
     Text,
     /// A table in Parquet.
     Parquet,
-    /// `NumPy` arrays t and positions.
+    /// Arrays t and positions, as numpy.savez saves them.
     Npz,
     /// MCAP: our own, Foxglove or ROS 2 messages.
     Mcap,

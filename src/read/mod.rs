@@ -86,6 +86,11 @@ impl Format {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
+    /// Whether the format itself says in what unit its times are.
+    fn has_its_own_clock(self) -> bool {
+        matches!(self, Self::Mcap | Self::Crazyflie | Self::Skybrush)
+    }
+
     /// What a sentence calls it.
     #[must_use]
     pub fn title(self) -> &'static str {
@@ -192,6 +197,10 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     }
     let recognised = recognise::recognise(path, options.format)?;
     let source = Source { path: path.to_owned(), gzip: recognised.gzip };
+    if recognised.format.has_its_own_clock() && options.time_unit.is_some() {
+        let problem = format!("{} has a unit of time of its own", recognised.format.title());
+        return Err(source.error(Fault::content(problem, "leave --time-unit away")));
+    }
     match recognised.format {
         format @ (Format::Csv | Format::Text) => table(source, format, options),
         Format::Crazyflie => crazyflie::open(path, options),
