@@ -100,3 +100,19 @@ fn a_folder_that_cannot_be_written_is_the_machine() {
     let failed = ran(folder.path(), &["export", "flight.csv", "-o", "missing/out.npz"]);
     assert_eq!(failed.exit, Some(3), "{}", said(&failed));
 }
+
+#[test]
+fn a_table_whose_pages_contradict_each_other_is_said_once_and_without_a_panic() {
+    let folder = folder();
+    let path = folder.path().join("flight.parquet");
+    assert_eq!(ran(folder.path(), &["export", "flight.csv", "-o", "flight.parquet"]).exit, Some(0));
+    let mut bytes = fs::read(&path).expect("read");
+    // The first page is a dictionary: called an index, it is passed over, and the pages that need it are not.
+    assert_eq!(bytes[4..6], [0x15, 0x04]);
+    bytes[5] = 0x02;
+    fs::write(&path, bytes).expect("written");
+    let refused = ran(folder.path(), &["export", "flight.parquet", "-o", "out.csv"]);
+    assert_eq!(refused.exit, Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("flight.parquet") && said(&refused).contains("damaged"), "{}", said(&refused));
+    assert!(!said(&refused).contains("panicked"), "{}", said(&refused));
+}

@@ -29,6 +29,7 @@ mod skybrush;
 mod source;
 mod table;
 
+pub use self::parquet::is_guarded;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
 
