@@ -27,7 +27,7 @@ fn position(k: u64, vehicle: u64) -> [f64; 3] {
 fn table(path: &Path, shape: &str, bytes: u64) {
     let mut out = BufWriter::new(File::create(path).expect("a file"));
     let header = match shape {
-        "wide" => (1..=VEHICLES).map(|n| format!(",x{n},y{n},z{n}")).collect(),
+        "wide" => (1..=VEHICLES).fold(String::new(), |header, n| header + &format!(",x{n},y{n},z{n}")),
         _ => ",id,x,y,z".to_owned(),
     };
     writeln!(out, "t{header}").expect("written");

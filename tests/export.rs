@@ -46,12 +46,14 @@ fn bits(whole: &Whole) -> Vec<(u64, String, Vec<u64>)> {
 
 /// Numbers that use all their bits, a vehicle that comes late, one without a velocity, and odd names.
 fn awkward(first_time: &str, more_time: &str) -> String {
-    let mut rows = "t_s,id,x,y,z,vx,vy,vz,radius\n".to_owned();
-    rows += &format!("{first_time},\"lead, er\",0.1,-0.0,1e-310,0.30000000000000004,1e300,-5e-324,0.15\n");
-    rows += &format!("{first_time},10,1,2,3,,,,\n");
-    rows += &format!("{more_time},10,3.141592653589793,2.718281828459045,-1.4142135623730951,1,2,3,\n");
-    rows += &format!("{more_time},9,1e16,123456789.12345679,-7,,,,0.2\n");
-    rows
+    [
+        "t_s,id,x,y,z,vx,vy,vz,radius\n",
+        &format!("{first_time},\"lead, er\",0.1,-0.0,1e-310,0.30000000000000004,1e300,-5e-324,0.15\n"),
+        &format!("{first_time},10,1,2,3,,,,\n"),
+        &format!("{more_time},10,3.141592653589793,2.718281828459045,-1.4142135623730951,1,2,3,\n"),
+        &format!("{more_time},9,1e16,123456789.12345679,-7,,,,0.2\n"),
+    ]
+    .concat()
 }
 
 #[test]
@@ -77,13 +79,13 @@ fn every_format_gives_back_the_same_bits() {
 
 #[test]
 fn a_chain_through_all_formats_loses_nothing() {
-    let rows: String = (0..3000)
+    let rows: Vec<_> = (0..3000)
         .map(|k| {
-            let (time, phase) = ((k / 3) as f64 / 60.0, k as f64);
+            let (time, phase) = (f64::from(k / 3) / 60.0, f64::from(k));
             format!("{time},{},{},{},{}\n", k % 3 + 1, phase.sin(), phase.cos() * 1e3, phase.sqrt())
         })
         .collect();
-    let (folder, source) = folder_with("source.csv", &format!("t_s,id,x,y,z\n{rows}"));
+    let (folder, source) = folder_with("source.csv", &format!("t_s,id,x,y,z\n{}", rows.concat()));
     let truth = bits(&whole(&source));
     let mut from = source;
     for format in [Format::Npz, Format::Mcap, Format::Parquet, Format::Csv, Format::Mcap, Format::Npz] {

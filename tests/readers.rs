@@ -138,8 +138,8 @@ fn a_unit_in_the_name_of_the_column_is_known_and_any_other_is_said() {
 #[test]
 fn more_rows_than_a_batch_come_in_order_and_complete() {
     const ROWS: usize = 25_001;
-    let rows: String = (0..ROWS).map(|k| format!("{},{},{k},0,0\n", (k / 3) as f64 * 0.25, k % 3 + 1)).collect();
-    let whole = read("many.csv", format!("t,id,x,y,z\n{rows}"));
+    let rows: Vec<_> = (0..ROWS).map(|k| format!("{},{},{k},0,0\n", (k / 3) as f64 * 0.25, k % 3 + 1)).collect();
+    let whole = read("many.csv", ["t,id,x,y,z\n", &rows.concat()].concat());
     let expected: Vec<_> = (0..ROWS).map(|k| ((k / 3) as f64 * 0.25, k % 3)).collect();
     let found: Vec<_> = whole.items.iter().map(|item| (item.time_s(), item.vehicle())).collect();
     assert!(found == expected);

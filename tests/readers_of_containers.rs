@@ -302,7 +302,7 @@ fn shows_are_read_alone_and_out_of_an_archive_with_parts() {
         )
     };
     let alone = whole("show.json", show(TRAJECTORY).as_bytes());
-    let reference = show(r##"{"$ref": "./drones/Drone 1/trajectory.json#"}"##);
+    let reference = show(r#"{"$ref": "./drones/Drone 1/trajectory.json#"}"#);
     let parts = [("show.json", reference.into_bytes()), ("drones/Drone 1/trajectory.json", TRAJECTORY.into())];
     let parted = whole("show.skyc", &archive(&parts, true));
     for found in [&alone, &parted] {

@@ -2,6 +2,7 @@
 //!
 //! The cases are few by default; `TAUTLINE_FUZZ_CASES` sets how many there are of each kind.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{Cursor, Write as _};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -32,9 +33,9 @@ const CSV: &str =
 const WIDE: &str = "t,x1,y1,z1,x2,y2,z2\n0,1,2,3,-1.5,.25,1e-3\n.5,1.5,2,3,,,\n";
 const TEXT: &str = "# text\n0 1 2 3 -1.5 .25 1e-3\n.5   1.5\t2 3 -1 .25 2e-3\n";
 const POLYNOMIAL: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1,\n1,0,1,0,0,1,0,\n0.5,1,1,0,0,1,0,\n";
-const SHOW: &str = r##"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
+const SHOW: &str = r#"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
     "takeoffTime": 2, "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], [[0, 0, 0]]]]}}},
-    {"settings": {"trajectory": {"$ref": "./a.json#"}}}]}}"##;
+    {"settings": {"trajectory": {"$ref": "./a.json#"}}}]}}"#;
 
 /// Valid files of every format.
 fn seeds() -> Vec<(&'static str, Vec<u8>)> {
@@ -87,7 +88,7 @@ fn foreign(compression: Option<&str>) -> Vec<u8> {
         ("/protobuf", "foxglove.PosesInFrame", "protobuf", protobuf),
     ] {
         let schema = out.add_schema(schema, encoding, b"").expect("a schema");
-        let channel_id = out.add_channel(schema, topic, encoding, &Default::default()).expect("a channel");
+        let channel_id = out.add_channel(schema, topic, encoding, &BTreeMap::new()).expect("a channel");
         let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
         out.write_to_known_channel(&header, &content).expect("a message");
     }

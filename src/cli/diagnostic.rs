@@ -131,7 +131,7 @@ impl From<RecordError> for Failure {
 
 impl From<ArtefactError> for Failure {
     fn from(error: ArtefactError) -> Self {
-        Self::machine(error.to_string()).with_help("free some space or give another folder with --out")
+        Self::machine(error.to_string()).with_help("free some space or write to another folder")
     }
 }
 

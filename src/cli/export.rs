@@ -14,11 +14,6 @@ use crate::report::write_atomically_with;
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArguments {
-    #[command(flatten)]
-    reading: ReadArguments,
-    /// Format of the recording [default: recognised by its content].
-    #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
-    input_format: Option<FormatArgument>,
     /// The file to write.
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
@@ -26,7 +21,7 @@ pub(super) struct ExportArguments {
     #[arg(long, value_name = "FORMAT")]
     format: Option<TargetArgument>,
     /// How often curves are sampled [Hz]; what is between the samples is lost.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     sample_hz: Option<f64>,
     /// Overwrite the file if it exists.
     #[arg(long)]
@@ -34,6 +29,12 @@ pub(super) struct ExportArguments {
     /// Say nothing.
     #[arg(long, short)]
     quiet: bool,
+    // Last, because its heading holds for all that follows.
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Format of the recording [default: recognised by its content].
+    #[arg(long, value_name = "FORMAT")]
+    input_format: Option<FormatArgument>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

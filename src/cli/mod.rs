@@ -23,6 +23,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::read;
 use diagnostic::Failure;
 
 /// How the program ends.
@@ -77,9 +78,20 @@ enum Command {
     Completions(completions::CompletionsArguments),
 }
 
+/// Keeps the panic hook from speaking of what becomes an error anyway.
+fn quiet_guarded_panics() {
+    let speak = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !read::is_guarded() {
+            speak(panic);
+        }
+    }));
+}
+
 /// Runs the program with the arguments of the process.
 #[must_use]
 pub fn main() -> ExitCode {
+    quiet_guarded_panics();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(usage) => {

@@ -18,7 +18,7 @@ pub(super) struct ReadArguments {
     #[arg(long, value_name = "UNIT")]
     time_unit: Option<UnitArgument>,
     /// Metres per unit of length of the recording.
-    #[arg(long, value_name = "METRES", default_value_t = 1.0)]
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
     /// Name of a column: t, id, x, y, z, vx, vy, vz or radius. In NPZ, t and x name the arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
@@ -111,7 +111,7 @@ pub(super) enum FormatArgument {
     Text,
     /// A table in Parquet.
     Parquet,
-    /// `NumPy` arrays t and positions.
+    /// Arrays t and positions, as numpy.savez saves them.
     Npz,
     /// MCAP: our own, Foxglove or ROS 2 messages.
     Mcap,

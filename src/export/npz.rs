@@ -35,8 +35,8 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     }
     if about.radii {
         archive.array("radii", "<f8", &[times, vehicles], |_, slots, out| {
-            let radius = |slot: &Option<&Sample>| slot.and_then(|sample| sample.radius_m).unwrap_or(f64::NAN);
-            slots.iter().try_for_each(|slot| out.write_all(&radius(slot).to_le_bytes()))
+            let radius = |slot: Option<&Sample>| slot.and_then(|sample| sample.radius_m).unwrap_or(f64::NAN);
+            slots.iter().try_for_each(|&slot| out.write_all(&radius(slot).to_le_bytes()))
         })?;
     }
     if about.samples != (times * vehicles) as u64 {
@@ -80,8 +80,9 @@ impl<'a> Archive<'a> {
         // Times of files are the same always, so that the same recording gives the same bytes.
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);
         self.zip.start_file(format!("{name}.npy"), options).map_err(std::io::Error::other)?;
-        let shape: String = shape.iter().map(|length| format!("{length}, ")).collect();
-        let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}), }}", shape.trim_end());
+        let shape: Vec<_> = shape.iter().map(|length| format!("{length},")).collect();
+        let shape = shape.join(" ");
+        let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({shape}), }}");
         let head = 10;
         let filled = (head + header.len() + 1).next_multiple_of(ALIGNMENT);
         header.push_str(&" ".repeat(filled - head - header.len() - 1));

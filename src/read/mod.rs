@@ -29,6 +29,7 @@ mod skybrush;
 mod source;
 mod table;
 
+pub use self::parquet::is_guarded;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
 
@@ -84,6 +85,11 @@ impl Format {
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.name() == name)
+    }
+
+    /// Whether the format itself says in what unit its times are.
+    fn has_its_own_clock(self) -> bool {
+        matches!(self, Self::Mcap | Self::Crazyflie | Self::Skybrush)
     }
 
     /// What a sentence calls it.
@@ -192,6 +198,10 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     }
     let recognised = recognise::recognise(path, options.format)?;
     let source = Source { path: path.to_owned(), gzip: recognised.gzip };
+    if recognised.format.has_its_own_clock() && options.time_unit.is_some() {
+        let problem = format!("{} has a unit of time of its own", recognised.format.title());
+        return Err(source.error(Fault::content(problem, "leave --time-unit away")));
+    }
     match recognised.format {
         format @ (Format::Csv | Format::Text) => table(source, format, options),
         Format::Crazyflie => crazyflie::open(path, options),

@@ -100,7 +100,9 @@ impl<R: Rows> Ordered<R> {
             ended = !rows.next(&mut first)?;
             first.first().map(|row| {
                 let mut probe = Probe::new(row.stamp);
-                first.iter().for_each(|row| probe.see(row.stamp));
+                for row in &first {
+                    probe.see(row.stamp);
+                }
                 probe.in_order = true;
                 probe
             })

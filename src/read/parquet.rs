@@ -3,6 +3,7 @@
 //! Columns are flat: numbers, text or whole numbers for the vehicle, and for time numbers or time stamps, whose unit is
 //! then known. What time counts from may stand under `epoch_ns` in the metadata of the file.
 
+use std::cell::Cell;
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -69,9 +70,22 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     Ok(Box::new(Ordered::open(table, about)?))
 }
 
+thread_local! {
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether this thread is in a call whose panic becomes an error: a panic hook has nothing to say about it.
+#[must_use]
+pub fn is_guarded() -> bool {
+    GUARDED.get()
+}
+
 /// Calls into the library, which panics on some damaged files.
 fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault> {
-    match catch_unwind(AssertUnwindSafe(call)) {
+    GUARDED.set(true);
+    let outcome = catch_unwind(AssertUnwindSafe(call));
+    GUARDED.set(false);
+    match outcome {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated { what }),
         Ok(Err(error)) if error.to_string().contains("Invalid Parquet file") => Err(Fault::Truncated {

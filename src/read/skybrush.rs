@@ -217,7 +217,7 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
 
 /// The Bezier curve of these points over a duration as coefficients of the powers of time.
 ///
-/// c_k = C(n, k) sum_i (-1)^(k - i) C(k, i) P_i / T^k, which is the k-th forward difference of the points.
+/// `c_k = C(n, k) D_k / T^k` with the k-th forward difference `D_k = sum_i (-1)^(k - i) C(k, i) P_i` of the points.
 fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
     let degree = points.len() - 1;
     let mut differences = points.to_vec();

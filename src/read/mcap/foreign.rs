@@ -96,13 +96,11 @@ impl Poses {
             },
             _ => Some(()),
         };
-        match known {
-            Some(()) => Ok(true),
-            None => {
-                let fault = Fault::damaged("a record is shorter than its fields");
-                Err(self.source.error(fault).at(Place::Byte(offset)))
-            }
-        }
+        let damaged = || {
+            let fault = Fault::damaged("a record is shorter than its fields");
+            self.source.error(fault).at(Place::Byte(offset))
+        };
+        known.map(|()| true).ok_or_else(damaged)
     }
 
     /// Appends the rows of a message.

@@ -77,8 +77,8 @@ pub(super) enum Who {
 /// Reads a message; the error says what is wrong with it.
 pub(super) fn decode(kind: Kind, encoding: Encoding, bytes: &[u8]) -> Result<Vec<Seen>, String> {
     match kind {
-        Kind::PoseInFrame => foxglove::<PoseInFrame>(encoding, bytes).map(|message| message.seen()),
-        Kind::PosesInFrame => foxglove::<PosesInFrame>(encoding, bytes).map(|message| message.seen()),
+        Kind::PoseInFrame => foxglove::<PoseInFrame>(encoding, bytes).map(PoseInFrame::seen),
+        Kind::PosesInFrame => foxglove::<PosesInFrame>(encoding, bytes).map(PosesInFrame::seen),
         Kind::FrameTransform => foxglove::<FrameTransform>(encoding, bytes).map(|message| vec![message.seen()]),
         Kind::FrameTransforms => foxglove::<FrameTransforms>(encoding, bytes)
             .map(|message| message.transforms.into_iter().map(FrameTransform::seen).collect()),

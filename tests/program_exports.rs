@@ -1,0 +1,118 @@
+//! `tautline export`, run as a user runs it.
+
+use std::fs;
+use std::path::Path;
+
+#[path = "support/program.rs"]
+mod program;
+
+use program::{Ran, TAUTLINE, ran_by};
+
+const LONG: &str = "t,id,x,y,z\n0,1,1,2,3\n0,2,4,5,6\n0.5,1,1,2,3.5\n0.5,2,4,5,6\n";
+const CURVE: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1\n1,0,1,0,0,1,0\n";
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("flight.csv"), LONG).expect("written");
+    fs::write(folder.path().join("cf1.csv"), CURVE).expect("written");
+    folder
+}
+
+/// Everything that the program said, without the line breaks that depend on the width of the terminal.
+fn said(ran: &Ran) -> String {
+    let words = |text: &str| text.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+    words(&ran.out) + " " + &words(&ran.err)
+}
+
+#[test]
+fn a_recording_goes_through_every_format_and_comes_back() {
+    let folder = folder();
+    for (from, to) in [
+        ("flight.csv", "1.npz"),
+        ("1.npz", "2.parquet"),
+        ("2.parquet", "3.mcap"),
+        ("3.mcap", "4.csv"),
+        ("4.csv", "5.csv"),
+    ] {
+        let done = ran(folder.path(), &["export", from, "-o", to]);
+        assert_eq!(done.exit, Some(0), "{from} to {to}: {}", said(&done));
+        assert!(said(&done).contains("4 samples of 2 vehicles"), "{}", said(&done));
+    }
+    let text = |name: &str| fs::read_to_string(folder.path().join(name)).expect("read");
+    assert_eq!(text("4.csv"), text("5.csv"));
+    assert_eq!(text("5.csv").lines().nth(3), Some("0.5,1,1.0,2.0,3.5"));
+}
+
+#[test]
+fn a_file_that_exists_is_overwritten_only_by_force() {
+    let folder = folder();
+    let again = |more: &[&str]| ran(folder.path(), &[&["export", "flight.csv", "-o", "cf1.csv"], more].concat());
+    let refused = again(&[]);
+    assert_eq!(refused.exit, Some(2));
+    assert!(said(&refused).contains("--force"), "{}", said(&refused));
+    assert_eq!(fs::read_to_string(folder.path().join("cf1.csv")).expect("read"), CURVE);
+    assert_eq!(again(&["--force", "--quiet"]).out, "");
+    assert!(fs::read_to_string(folder.path().join("cf1.csv")).expect("read").starts_with("t_s,id,x,y,z"));
+}
+
+#[test]
+fn curves_need_a_rate() {
+    let folder = folder();
+    let refused = ran(folder.path(), &["export", "cf1.csv", "-o", "out.csv"]);
+    assert_eq!(refused.exit, Some(2));
+    assert!(said(&refused).contains("--sample-hz"), "{}", said(&refused));
+    assert!(!folder.path().join("out.csv").exists());
+    let done = ran(folder.path(), &["export", "cf1.csv", "-o", "out.csv", "--sample-hz", "2"]);
+    assert_eq!(done.exit, Some(0), "{}", said(&done));
+    assert!(said(&done).contains("lost"), "{}", said(&done));
+}
+
+#[test]
+fn wrong_input_ends_with_2_and_leaves_no_file() {
+    let folder = folder();
+    fs::write(folder.path().join("wrong.csv"), LONG.replace("3.5", "three")).expect("written");
+    for (arguments, words) in [
+        (vec!["wrong.csv", "-o", "out.npz"], ["wrong.csv, line 4", "`three`"]),
+        (vec!["missing.csv", "-o", "out.npz"], ["missing.csv", "spelling"]),
+        (vec!["flight.csv", "-o", "out"], ["does not tell a format", "--format"]),
+        (vec!["flight.csv", "-o", "out.npz", "--scale", "-1"], ["--scale", "positive"]),
+        (vec!["flight.csv", "-o", "out.npz", "--column", "w=x"], ["`w` is no column", "radius"]),
+        (vec!["flight.csv", "-o", "out.npz", "--input-format", "mcap"], ["not an MCAP file", "--format"]),
+    ] {
+        let refused = ran(folder.path(), &[vec!["export"], arguments.clone()].concat());
+        assert_eq!(refused.exit, Some(2), "{arguments:?}: {}", said(&refused));
+        for word in words {
+            assert!(said(&refused).contains(word), "{arguments:?}: {}\ninstead of {word}", said(&refused));
+        }
+        let names: Vec<_> =
+            fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("one").file_name()).collect();
+        assert_eq!(names.len(), 3, "{names:?}");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_the_machine() {
+    let folder = folder();
+    let failed = ran(folder.path(), &["export", "flight.csv", "-o", "missing/out.npz"]);
+    assert_eq!(failed.exit, Some(3), "{}", said(&failed));
+}
+
+#[test]
+fn a_table_whose_pages_contradict_each_other_is_said_once_and_without_a_panic() {
+    let folder = folder();
+    let path = folder.path().join("flight.parquet");
+    assert_eq!(ran(folder.path(), &["export", "flight.csv", "-o", "flight.parquet"]).exit, Some(0));
+    let mut bytes = fs::read(&path).expect("read");
+    // The first page is a dictionary: called an index, it is passed over, and the pages that need it are not.
+    assert_eq!(bytes[4..6], [0x15, 0x04]);
+    bytes[5] = 0x02;
+    fs::write(&path, bytes).expect("written");
+    let refused = ran(folder.path(), &["export", "flight.parquet", "-o", "out.csv"]);
+    assert_eq!(refused.exit, Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("flight.parquet") && said(&refused).contains("damaged"), "{}", said(&refused));
+    assert!(!said(&refused).contains("panicked"), "{}", said(&refused));
+}
