@@ -27,8 +27,11 @@ const FEWEST_STRETCHES: usize = 4;
 const MOST_HALVINGS: u32 = 12;
 /// Neighbours in the order of the sort that are compared first, so that the closest pairs are known roughly.
 const FIRST_NEIGHBOURS: usize = 12;
-/// Rounding of a straight way, relative to the coordinates it joins.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Rounding of a straight way, relative to the coordinates it joins: three operations on them, and two differences.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// A pair among the closest is looked at again only where it could come closer by more than this, relative to its
+/// distance: vehicles that stand, or fly side by side, are as close all the time but for rounding.
+const TIE: f64 = 1e-12;
 
 /// What keeps two apart.
 #[derive(Clone, Copy, Debug)]
@@ -194,10 +197,12 @@ impl Windows {
         let (a, b) = (&self.hulls[a], &self.hulls[b]);
         let who = Who::Pair(Pair::new(a.vehicle, b.vehicle));
         let (limit, cutoff) = (self.limits.of_pair(a.radius, b.radius), findings.closest.cutoff(who));
-        if least(a, b) >= limit.max(cutoff) {
+        let least = least(a, b);
+        if least >= limit.max(cutoff * (1.0 - TIE)) {
             return;
         }
-        let meeting = Meeting { who, target: Target::Origin, keep_out: KeepOut::new(limit), cutoff };
+        let may_violate = least < limit;
+        let meeting = Meeting { who, target: Target::Origin, keep_out: KeepOut::new(limit), cutoff, may_violate };
         let first = &vehicles[a.vehicle].segments[a.first..a.end];
         let second = &vehicles[b.vehicle].segments[b.first..b.end];
         meeting.judge(first, second, window_s, findings);
@@ -218,8 +223,10 @@ impl Windows {
                 let cutoff = findings.obstacles.cutoff(who);
                 let shape: &Shape = &obstacle.shape;
                 let least = shape.closest(hull.from - place.from, hull.to - place.to).0 - hull.stray - place.stray;
-                if least < limit.max(cutoff) {
-                    let meeting = Meeting { who, target: Target::Shape(shape), keep_out: KeepOut::new(limit), cutoff };
+                if least < limit.max(cutoff * (1.0 - TIE)) {
+                    let target = Target::Shape(shape);
+                    let may_violate = least < limit;
+                    let meeting = Meeting { who, target, keep_out: KeepOut::new(limit), cutoff, may_violate };
                     let course = &vehicles[hull.vehicle].segments[hull.first..hull.end];
                     meeting.judge(way, course, window_s, findings);
                 }
