@@ -75,9 +75,9 @@ const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 const LEAST: f64 = 1e-70;
 const MOST: f64 = 1e70;
 /// Stretches of a vehicle in a window, about.
-const STRETCHES: usize = 32;
+const STRETCHES: usize = 12;
 /// Fewest items between two windows.
-const FEWEST_ITEMS: usize = 256;
+const FEWEST_ITEMS: usize = 48;
 /// Names that an error lists.
 const NAMES_LISTED: usize = 12;
 

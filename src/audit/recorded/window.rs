@@ -64,6 +64,7 @@ struct Hull {
     stray: f64,
     radius: f64,
     grounded: bool,
+    curved: bool,
     vehicle: usize,
     first: usize,
     end: usize,
@@ -104,7 +105,7 @@ impl Windows {
         for (vehicle, of) in vehicles.iter().enumerate() {
             if let Some(hull) = hull(vehicle, of, window_s) {
                 stretches += hull.end - hull.first;
-                curved |= of.segments[hull.first..hull.end].iter().any(|part| part.curve.is_some());
+                curved |= hull.curved;
                 self.hulls.push(hull);
             }
         }
@@ -247,13 +248,14 @@ struct Straight {
     from: Vector3<f64>,
     to: Vector3<f64>,
     stray: f64,
+    curved: bool,
 }
 
 impl Straight {
     /// Of stretches that meet the window, at least one. Where there is none the last place is kept; that only widens.
     fn over(parts: &[Segment], (from_s, to_s): (f64, f64)) -> Self {
         let (Some(first), Some(last)) = (parts.first(), parts.last()) else {
-            return Self { from: Vector3::zeros(), to: Vector3::zeros(), stray: f64::INFINITY };
+            return Self { from: Vector3::zeros(), to: Vector3::zeros(), stray: f64::INFINITY, curved: false };
         };
         let (from, to) = (first.position(from_s.max(first.from_s)), last.position(to_s));
         let by = to - from;
@@ -261,6 +263,7 @@ impl Straight {
         let off = |time_s: f64, at: &Vector3<f64>| (at - (from + by * ((time_s - from_s) * per_s))).norm_squared();
         let mut squared = 0.0_f64;
         let mut beyond = 0.0_f64;
+        let mut curved = false;
         for part in parts {
             if part.from_s >= from_s {
                 squared = squared.max(off(part.from_s, &part.from));
@@ -270,11 +273,12 @@ impl Straight {
             }
             if part.curve.is_some() {
                 let local = part.local(part.from_s.max(from_s), part.to_s.min(to_s));
+                curved = true;
                 beyond = beyond.max(stray(&local) + part.slack() + part.rounding());
             }
         }
         let rounding = ROUNDING * (from.amax() + to.amax());
-        Self { from, to, stray: squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding }
+        Self { from, to, stray: squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding, curved }
     }
 }
 
@@ -286,7 +290,7 @@ fn hull(vehicle: usize, of: &Vehicle, window_s: (f64, f64)) -> Option<Hull> {
     if parts.is_empty() {
         return None;
     }
-    let Straight { from, to, stray } = Straight::over(parts, window_s);
+    let Straight { from, to, stray, curved } = Straight::over(parts, window_s);
     let aside = Vector3::repeat(stray);
     Some(Hull {
         low: from.inf(&to) - aside,
@@ -296,6 +300,7 @@ fn hull(vehicle: usize, of: &Vehicle, window_s: (f64, f64)) -> Option<Hull> {
         stray,
         radius: of.radius_m.unwrap_or(0.0),
         grounded: parts.iter().all(|part| part.grounded),
+        curved,
         vehicle,
         first,
         end,
