@@ -1,1 +1,151 @@
-//! The command `audit`, run as a user runs it.
+//! `tautline audit`, run as a user runs it.
+
+use std::fs;
+use std::path::Path;
+
+use tempfile::TempDir;
+
+#[path = "support/program.rs"]
+mod program;
+
+use program::{Ran, TAUTLINE, ran_by};
+
+/// Two vehicles pass each other within a second, 1 m apart in the middle and far apart in every sample.
+const PASS: &str = "t,id,x,y,z\n0,alpha,-5,0,0\n0,bravo,5,1,0\n1,alpha,5,0,0\n1,bravo,-5,1,0\n";
+
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).expect("a file");
+    }
+    folder
+}
+
+fn audit(folder: &Path, arguments: &[&str]) -> Ran {
+    let mut all = vec!["audit"];
+    all.extend(arguments);
+    ran_by(TAUTLINE, folder, &all)
+}
+
+#[test]
+fn the_first_line_says_it_and_so_does_the_exit_code() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    let clear = audit(folder.path(), &["pass.csv", "--delta", "0.5"]);
+    assert_eq!(clear.exit, Some(0), "{clear:?}");
+    assert!(
+        clear.out.starts_with("PROVED CLEAR: never closer than 1.000000 m, alpha and bravo at 0.50 s"),
+        "{clear:?}"
+    );
+    let violation = audit(folder.path(), &["pass.csv", "--delta", "2"]);
+    assert_eq!(violation.exit, Some(1), "{violation:?}");
+    assert!(violation.out.starts_with("VIOLATION: alpha and bravo came to 1.000 m (limit 2.000 m)"), "{violation:?}");
+    let bounded = ["pass.csv", "--delta", "0.9", "--motion", "bounded", "--max-accel", "1"];
+    let undecided = audit(folder.path(), &bounded);
+    assert_eq!(undecided.exit, Some(1), "{undecided:?}");
+    assert!(undecided.out.starts_with("UNDECIDED: alpha and bravo"), "{undecided:?}");
+    assert!(undecided.out.contains("Hz would decide"), "{undecided:?}");
+    assert_eq!(audit(folder.path(), &[&bounded[..], &["--allow-undecided"]].concat()).exit, Some(0));
+    let quiet = audit(folder.path(), &["pass.csv", "--delta", "2", "--quiet"]);
+    assert_eq!((quiet.exit, quiet.out.as_str()), (Some(1), ""), "{quiet:?}");
+}
+
+#[test]
+fn json_is_alone_on_standard_output_and_has_the_keys_of_a_report() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON alone");
+    assert_eq!(json["status"], "violation");
+    assert_eq!(json["separation"]["min_m"], 1.0);
+    assert_eq!(json["separation"]["min_pair"], serde_json::json!([1, 2]));
+    assert_eq!(json["audit"]["violations"][0]["pair"], serde_json::json!([1, 2]));
+    assert_eq!(json["audit"]["parry"]["disagreements"], 0);
+    assert_eq!(json["clock"]["unit"], "s");
+    assert_eq!(json["closest"][0]["who"], serde_json::json!(["alpha", "bravo"]));
+    for key in ["gaps", "undecided"] {
+        assert_eq!(json[key], serde_json::json!([]), "{key}");
+    }
+    assert!(ran.err.contains("VIOLATION"), "talk goes beside it: {ran:?}");
+}
+
+#[test]
+fn junit_events_and_page_are_written() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    let files = ["--junit", "a.xml", "--events", "a.csv", "--html", "a.html"];
+    let ran = audit(folder.path(), &[&["pass.csv", "--delta", "2"][..], &files].concat());
+    assert_eq!(ran.exit, Some(1), "{ran:?}");
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect(name);
+    assert!(read("a.xml").contains("failures=\"2\""), "{}", read("a.xml"));
+    let events = read("a.csv");
+    assert!(events.starts_with("kind,first,second,from_s,to_s,"), "{events}");
+    assert!(events.contains("\nviolation,alpha,bravo,0.41"), "{events}");
+    let page = read("a.html");
+    assert!(page.contains("VIOLATION") && page.contains("closest 1.000000 m") && page.contains("Closest approach"));
+    let clear = audit(folder.path(), &[&["pass.csv", "--delta", "0.5"][..], &files].concat());
+    assert_eq!(clear.exit, Some(0), "{clear:?}");
+    assert!(read("a.xml").contains("failures=\"0\"") && !read("a.csv").contains("violation"));
+}
+
+#[test]
+fn every_question_can_be_asked() {
+    let tower = "[[obstacle]]\nname = \"tower\"\nball = { radius_m = 1.0 }\nat_m = [0.0, -2.0, 0.0]\n";
+    let folder = folder(&[("pass.csv", PASS), ("tower.toml", tower)]);
+    for (arguments, exit) in [
+        (&["--radius", "0.4"][..], 0),
+        (&["--radius", "alpha=0.4", "--radius", "bravo=0.7"], 1),
+        (&["--ellipsoid", "0.4,0.4,2"], 0),
+        (&["--ellipsoid", "0.6,0.6,2"], 1),
+        (&["--delta", "2", "--to", "0.4"], 0),
+        (&["--delta", "2", "--from", "0.6"], 0),
+        (&["--delta", "2", "--from", "0.3", "--to", "0.45"], 1),
+        (&["--delta", "2", "--above", "0.5"], 0),
+        (&["--delta", "2", "--above", "-0.5"], 1),
+        (&["--delta", "2", "--ids", "alpha"], 0),
+        (&["--delta", "2", "--offset", "bravo=9"], 0),
+        (&["--delta", "2", "--max-gap", "0.5"], 1),
+        (&["--delta", "0.5", "--max-gap", "2"], 0),
+        (&["--delta", "1", "--obstacles", "tower.toml"], 0),
+        (&["--delta", "1", "--radius", "0.4", "--obstacles", "tower.toml"], 0),
+        (&["--delta", "1", "--radius", "alpha=1.1", "--radius", "bravo=0", "--obstacles", "tower.toml"], 1),
+    ] {
+        let ran = audit(folder.path(), &[&["pass.csv"][..], arguments].concat());
+        // A gap of the whole recording leaves two single samples, far apart.
+        assert_eq!(ran.exit, Some(exit), "{arguments:?}: {ran:?}");
+    }
+}
+
+#[test]
+fn wrong_input_is_named_with_its_remedy_and_exits_with_2() {
+    let bad = "[[obstacle]]\nname = \"tower\"\nbal = { radius_m = 1.0 }\n";
+    let files = [("pass.csv", PASS), ("bad.toml", bad), ("text.csv", "t,id,x,y,z\n0,a,here,0,0\n")];
+    let folder = folder(&files);
+    for (arguments, said) in [
+        (&["pass.csv"][..], "--radius NAME=R"),
+        (&["pass.csv", "--delta", "0"], "delta must be above 0"),
+        (&["pass.csv", "--delta", "nan"], "delta"),
+        (&["pass.csv", "--delta", "1", "--ids", "zulu"], "no vehicle zulu"),
+        (&["pass.csv", "--delta", "1", "--radius", "zulu=1"], "no vehicle zulu"),
+        (&["pass.csv", "--delta", "1", "--motion", "bounded"], "--max-accel"),
+        (&["pass.csv", "--delta", "1", "--max-accel", "1"], "--motion bounded"),
+        (&["pass.csv", "--delta", "1", "--motion", "polynomial"], "--motion linear"),
+        (&["pass.csv", "--delta", "1", "--from", "2", "--to", "1"], "holds no time"),
+        (&["pass.csv", "--delta", "1", "--obstacles", "bad.toml"], "line 3"),
+        (&["pass.csv", "--delta", "1", "--obstacles", "none.toml"], "none.toml"),
+        (&["pass.csv", "--ellipsoid", "1,2"], "three half axes"),
+        (&["pass.csv", "--delta", "1", "--offset", "alpha"], "NAME=SECONDS"),
+        (&["none.csv", "--delta", "1"], "none.csv"),
+        (&["text.csv", "--delta", "1"], "line 2"),
+    ] {
+        let ran = audit(folder.path(), arguments);
+        assert_eq!(ran.exit, Some(2), "{arguments:?}: {ran:?}");
+        let words = ran.err.split_whitespace().filter(|word| !word.starts_with('│')).collect::<Vec<_>>().join(" ");
+        assert!(words.contains(said), "{arguments:?}: {words}");
+        assert_eq!(ran.out, "", "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_the_machines_failure() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--html", "none/a.html"]);
+    assert_eq!(ran.exit, Some(3), "{ran:?}");
+}

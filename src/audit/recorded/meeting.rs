@@ -20,6 +20,8 @@ pub(super) struct Meeting<'a> {
     pub(super) keep_out: KeepOut,
     /// What the distance must come below to be among the closest.
     pub(super) cutoff: f64,
+    /// Whether bounds on the motion leave it open that the distance falls below its limit: then it is judged twice.
+    pub(super) may_violate: bool,
 }
 
 /// The time that two stretches share.
@@ -106,6 +108,9 @@ impl Meeting<'_> {
         if approach.squared < nearest.squared {
             *nearest = Nearest { squared: approach.squared, from_s: shared.from_s, to_s: shared.to_s, at: approach.at };
         }
+        if !self.may_violate {
+            return;
+        }
         let cast = self.keep_out.cast(&motion);
         if cast.is_some() || self.keep_out.is_near(&motion, approach) {
             self.near(shared, &motion, cast, findings);
@@ -180,7 +185,7 @@ impl Meeting<'_> {
         } else if lower < limit || (exact && slack == 0.0 && is_coarse(&motion, lower, limit)) {
             self.unknown(shared, lower, upper, shared.rate_hz(slack, (drawn.upper - limit).abs()), findings);
         }
-        if drawn.lower < limit.max(self.cutoff) {
+        if self.may_violate {
             let opinion = self.second_opinion(&r, exact, &motion, &drawn, rounding, &search);
             self.hear(shared, opinion, drawn.upper, findings);
         }

@@ -9,10 +9,11 @@
 //! - Under bounded acceleration A a vehicle is within A h^2 / 8 of the straight line between two samples h apart, or within
 //!   A h^2 / 16 of the cubic where the samples have velocities. Two vehicles are at least as far apart as drawn, less both
 //!   deviations; they are too close for certain only where even the deviations cannot keep them apart, such as at a sample.
-//! - Parry judges every stretch that is swept a second time; where it contradicts, nothing is clear.
+//! - What bounds on the motion do not prove clear is judged a second time, by parry; where it contradicts, nothing is
+//!   clear.
 //!
 //! Not every pair is swept: a window of time at a time, pairs are left out that bounds on their motion prove to be neither
-//! too close nor among the ten closest. Memory is that of a window, and of what was found.
+//! too close nor among the ten closest, to 1e-12 of a distance. Memory is that of a window, and of what was found.
 //!
 //! Every instant counts, the first and the last too, and a vehicle that was seen once is judged where it was seen. A
 //! vehicle that is late or leaves early is judged while it is there. While a vehicle is not seen for longer than
@@ -74,9 +75,9 @@ const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 const LEAST: f64 = 1e-70;
 const MOST: f64 = 1e70;
 /// Stretches of a vehicle in a window, about.
-const STRETCHES: usize = 32;
+const STRETCHES: usize = 12;
 /// Fewest items between two windows.
-const FEWEST_ITEMS: usize = 256;
+const FEWEST_ITEMS: usize = 48;
 /// Names that an error lists.
 const NAMES_LISTED: usize = 12;
 

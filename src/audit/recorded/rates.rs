@@ -2,6 +2,8 @@
 
 use crate::track::Item;
 
+/// Items that are looked at.
+const OPENING: usize = 65_536;
 /// Intervals of one vehicle that are looked at.
 const MOST_INTERVALS: usize = 64;
 /// Fewest intervals of a vehicle that make a rate of its own; with fewer, all vehicles' intervals do.
@@ -20,6 +22,7 @@ pub(super) struct Rates {
 impl Rates {
     /// Learns from the opening of a recording.
     pub(super) fn learn(items: &[Item]) -> Self {
+        let items = &items[..items.len().min(OPENING)];
         let count = items.iter().map(|item| item.vehicle() + 1).max().unwrap_or(0);
         let mut last_s: Vec<Option<f64>> = vec![None; count];
         let mut intervals_s: Vec<Vec<f64>> = vec![Vec::new(); count];

@@ -79,6 +79,7 @@ impl Vehicle {
     }
 
     /// Takes a sample; returns the gap before it, if there is one.
+    #[inline]
     pub(super) fn sample(&mut self, index: usize, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
         let motion = self.course.motion.unwrap_or(Motion::Linear);
         if motion == Motion::Polynomial {
@@ -163,6 +164,7 @@ impl Vehicle {
     }
 
     /// The interval between two samples.
+    #[inline]
     fn interval(&mut self, index: usize, motion: Motion, last: &Seen, seen: &Seen) {
         let (from_s, to_s) = (last.time_s, seen.time_s);
         let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
@@ -228,6 +230,7 @@ impl Vehicle {
     }
 
     /// Keeps what is asked for of a stretch.
+    #[inline]
     fn keep(&mut self, segment: Segment) {
         let (from_s, to_s) = self.course.window_s;
         if segment.from_s < from_s || segment.to_s > to_s {
@@ -239,6 +242,7 @@ impl Vehicle {
         }
     }
 
+    #[inline]
     fn keep_part(&mut self, segment: Segment) {
         let presence = self.presence.get_or_insert(Presence { from_s: segment.from_s, to_s: segment.to_s });
         presence.to_s = presence.to_s.max(segment.to_s);

@@ -27,8 +27,11 @@ const FEWEST_STRETCHES: usize = 4;
 const MOST_HALVINGS: u32 = 12;
 /// Neighbours in the order of the sort that are compared first, so that the closest pairs are known roughly.
 const FIRST_NEIGHBOURS: usize = 12;
-/// Rounding of a straight way, relative to the coordinates it joins.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Rounding of a straight way, relative to the coordinates it joins: three operations on them, and two differences.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// A pair among the closest is looked at again only where it could come closer by more than this, relative to its
+/// distance: vehicles that stand, or fly side by side, are as close all the time but for rounding.
+const TIE: f64 = 1e-12;
 
 /// What keeps two apart.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +64,7 @@ struct Hull {
     stray: f64,
     radius: f64,
     grounded: bool,
+    curved: bool,
     vehicle: usize,
     first: usize,
     end: usize,
@@ -101,7 +105,7 @@ impl Windows {
         for (vehicle, of) in vehicles.iter().enumerate() {
             if let Some(hull) = hull(vehicle, of, window_s) {
                 stretches += hull.end - hull.first;
-                curved |= of.segments[hull.first..hull.end].iter().any(|part| part.curve.is_some());
+                curved |= hull.curved;
                 self.hulls.push(hull);
             }
         }
@@ -194,10 +198,12 @@ impl Windows {
         let (a, b) = (&self.hulls[a], &self.hulls[b]);
         let who = Who::Pair(Pair::new(a.vehicle, b.vehicle));
         let (limit, cutoff) = (self.limits.of_pair(a.radius, b.radius), findings.closest.cutoff(who));
-        if least(a, b) >= limit.max(cutoff) {
+        let least = least(a, b);
+        if least >= limit.max(cutoff * (1.0 - TIE)) {
             return;
         }
-        let meeting = Meeting { who, target: Target::Origin, keep_out: KeepOut::new(limit), cutoff };
+        let may_violate = least < limit;
+        let meeting = Meeting { who, target: Target::Origin, keep_out: KeepOut::new(limit), cutoff, may_violate };
         let first = &vehicles[a.vehicle].segments[a.first..a.end];
         let second = &vehicles[b.vehicle].segments[b.first..b.end];
         meeting.judge(first, second, window_s, findings);
@@ -218,8 +224,10 @@ impl Windows {
                 let cutoff = findings.obstacles.cutoff(who);
                 let shape: &Shape = &obstacle.shape;
                 let least = shape.closest(hull.from - place.from, hull.to - place.to).0 - hull.stray - place.stray;
-                if least < limit.max(cutoff) {
-                    let meeting = Meeting { who, target: Target::Shape(shape), keep_out: KeepOut::new(limit), cutoff };
+                if least < limit.max(cutoff * (1.0 - TIE)) {
+                    let target = Target::Shape(shape);
+                    let may_violate = least < limit;
+                    let meeting = Meeting { who, target, keep_out: KeepOut::new(limit), cutoff, may_violate };
                     let course = &vehicles[hull.vehicle].segments[hull.first..hull.end];
                     meeting.judge(way, course, window_s, findings);
                 }
@@ -240,13 +248,14 @@ struct Straight {
     from: Vector3<f64>,
     to: Vector3<f64>,
     stray: f64,
+    curved: bool,
 }
 
 impl Straight {
     /// Of stretches that meet the window, at least one. Where there is none the last place is kept; that only widens.
     fn over(parts: &[Segment], (from_s, to_s): (f64, f64)) -> Self {
         let (Some(first), Some(last)) = (parts.first(), parts.last()) else {
-            return Self { from: Vector3::zeros(), to: Vector3::zeros(), stray: f64::INFINITY };
+            return Self { from: Vector3::zeros(), to: Vector3::zeros(), stray: f64::INFINITY, curved: false };
         };
         let (from, to) = (first.position(from_s.max(first.from_s)), last.position(to_s));
         let by = to - from;
@@ -254,6 +263,7 @@ impl Straight {
         let off = |time_s: f64, at: &Vector3<f64>| (at - (from + by * ((time_s - from_s) * per_s))).norm_squared();
         let mut squared = 0.0_f64;
         let mut beyond = 0.0_f64;
+        let mut curved = false;
         for part in parts {
             if part.from_s >= from_s {
                 squared = squared.max(off(part.from_s, &part.from));
@@ -263,11 +273,12 @@ impl Straight {
             }
             if part.curve.is_some() {
                 let local = part.local(part.from_s.max(from_s), part.to_s.min(to_s));
+                curved = true;
                 beyond = beyond.max(stray(&local) + part.slack() + part.rounding());
             }
         }
         let rounding = ROUNDING * (from.amax() + to.amax());
-        Self { from, to, stray: squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding }
+        Self { from, to, stray: squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding, curved }
     }
 }
 
@@ -279,7 +290,7 @@ fn hull(vehicle: usize, of: &Vehicle, window_s: (f64, f64)) -> Option<Hull> {
     if parts.is_empty() {
         return None;
     }
-    let Straight { from, to, stray } = Straight::over(parts, window_s);
+    let Straight { from, to, stray, curved } = Straight::over(parts, window_s);
     let aside = Vector3::repeat(stray);
     Some(Hull {
         low: from.inf(&to) - aside,
@@ -289,6 +300,7 @@ fn hull(vehicle: usize, of: &Vehicle, window_s: (f64, f64)) -> Option<Hull> {
         stray,
         radius: of.radius_m.unwrap_or(0.0),
         grounded: parts.iter().all(|part| part.grounded),
+        curved,
         vehicle,
         first,
         end,

@@ -1,0 +1,535 @@
+//! What the judge of recordings claims, each with the case in which it must say the opposite.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use tautline::audit::Status;
+use tautline::audit::recorded::{
+    Judge, Motion, Obstacle, Outcome, Question, RecordedError, Shape, Terms, WIDTH_M, Who, judge,
+};
+use tautline::track::{Item, Piece, Sample};
+
+/// Rounding of a handful of operations on numbers around ten.
+const ROUNDING: f64 = 1e-13;
+
+fn seen(vehicle: usize, time_s: f64, at: [f64; 3]) -> Item {
+    Item::Sample(Sample { vehicle, time_s, position_m: at.into(), velocity_m_s: None, radius_m: None })
+}
+
+fn names(count: usize) -> Vec<String> {
+    ["alpha", "bravo", "charlie", "delta"].iter().take(count).map(ToString::to_string).collect()
+}
+
+fn asked(items: &[Item], question: Question) -> Outcome {
+    let count = items.iter().map(|item| item.vehicle() + 1).max().unwrap_or(0);
+    judge(&names(count), items, question).expect("it can be judged")
+}
+
+fn status(items: &[Item], question: Question) -> Status {
+    asked(items, question).status
+}
+
+/// Two vehicles pass each other within a second, `miss_m` apart in the middle and far apart in every sample.
+fn pass(miss_m: f64) -> Vec<Item> {
+    vec![
+        seen(0, 0.0, [-5.0, 0.0, 0.0]),
+        seen(1, 0.0, [5.0, miss_m, 0.0]),
+        seen(0, 1.0, [5.0, 0.0, 0.0]),
+        seen(1, 1.0, [-5.0, miss_m, 0.0]),
+    ]
+}
+
+fn of(terms: &[(&str, Terms)]) -> BTreeMap<String, Terms> {
+    terms.iter().map(|(name, terms)| ((*name).to_owned(), *terms)).collect()
+}
+
+#[test]
+fn what_happens_between_samples_is_judged_and_equality_is_no_violation() {
+    assert_eq!(status(&pass(1.0), Question::delta(2.0)), Status::Violation);
+    assert_eq!(status(&pass(3.0), Question::delta(2.0)), Status::Clear);
+    assert_eq!(status(&pass(2.0), Question::delta(2.0)), Status::Clear);
+    assert_eq!(status(&pass(2.0_f64.next_down()), Question::delta(2.0)), Status::Violation);
+    let found = asked(&pass(1.0), Question::delta(2.0)).violations[0];
+    let half_s = 3_f64.sqrt() / 20.0;
+    assert!((found.from_s - (0.5 - half_s)).abs() < ROUNDING && (found.to_s - (0.5 + half_s)).abs() < ROUNDING);
+    assert_eq!((found.min_m, found.min_at_s), (1.0, 0.5));
+}
+
+#[test]
+fn the_first_instant_and_a_single_sample_are_judged() {
+    let once = |apart_m: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [apart_m, 0.0, 0.0])];
+    assert_eq!(status(&once(1.0), Question::delta(2.0)), Status::Violation);
+    assert_eq!(status(&once(3.0), Question::delta(2.0)), Status::Clear);
+    // Seen once, in the way of one that flies.
+    let in_the_way = |time_s| {
+        let mut items = pass(9.0);
+        items.push(seen(2, time_s, [0.0; 3]));
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        items
+    };
+    assert_eq!(status(&in_the_way(0.5), Question::delta(2.0)), Status::Violation);
+    assert_eq!(status(&in_the_way(0.1), Question::delta(2.0)), Status::Clear);
+    // Apart from then on, too close at the start alone.
+    let mut parting = once(1.0);
+    parting.extend([seen(0, 1.0, [-5.0, 0.0, 0.0]), seen(1, 1.0, [5.0, 0.0, 0.0])]);
+    assert_eq!(asked(&parting, Question::delta(2.0)).violations[0].from_s, 0.0);
+}
+
+#[test]
+fn nothing_to_judge_is_undecided() {
+    assert_eq!(judge(&[], &[], Question::delta(1.0)).unwrap().status, Status::Undecided);
+    assert_eq!(status(&[seen(0, 0.0, [0.0; 3])], Question::delta(1.0)), Status::Clear);
+    let elsewhere = Question { from_s: Some(5.0), ..Question::delta(1.0) };
+    assert_eq!(status(&pass(3.0), elsewhere), Status::Undecided);
+}
+
+#[test]
+fn a_held_vehicle_is_where_it_was_and_its_jump_is_swept() {
+    // Bravo stands beside the way of alpha's jump, and alpha is far from it in every sample.
+    let items = |aside_m: f64| {
+        let mut items = vec![seen(0, 0.0, [-5.0, 0.0, 0.0]), seen(0, 1.0, [5.0, 0.0, 0.0])];
+        items.extend([seen(1, 0.0, [0.0, aside_m, 0.0]), seen(1, 1.0, [0.0, aside_m, 0.0])]);
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        items
+    };
+    let held = Question { motion: Some(Motion::Hold), ..Question::delta(2.0) };
+    let found = asked(&items(1.0), held.clone());
+    assert_eq!((found.status, found.violations[0].from_s, found.violations[0].to_s), (Status::Violation, 1.0, 1.0));
+    assert_eq!(status(&items(3.0), held.clone()), Status::Clear);
+    // Charlie crosses where alpha still stands, though not where a straight flight would be.
+    let mut crossing = vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [6.0, 6.0, 0.0])];
+    crossing.extend([seen(1, 0.5, [6.0, 0.0, 0.0]), seen(1, 0.9, [1.0, 0.0, 0.0]), seen(0, 1.0, [0.0, 60.0, 0.0])]);
+    let patient = |motion| Question { motion: Some(motion), max_gap_s: Some(9.0), ..Question::delta(2.0) };
+    assert_eq!(status(&crossing, patient(Motion::Hold)), Status::Violation);
+    assert_eq!(status(&crossing, patient(Motion::Linear)), Status::Clear);
+}
+
+/// A product of two polynomials.
+fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut product = vec![0.0; a.len() + b.len() - 1];
+    for (i, x) in a.iter().enumerate() {
+        for (j, y) in b.iter().enumerate() {
+            product[i + j] += x * y;
+        }
+    }
+    product
+}
+
+/// A polynomial in t as one in t - shift.
+fn about(c: &[f64], shift: f64) -> Vec<f64> {
+    let powers = |n: usize| (0..n).fold(vec![1.0], |power, _| times(&power, &[shift, 1.0]));
+    let mut moved = vec![0.0; c.len()];
+    for (k, c) in c.iter().enumerate() {
+        for (j, p) in powers(k).iter().enumerate() {
+            moved[j] += c * p;
+        }
+    }
+    moved
+}
+
+/// Two vehicles on curves of degree 7 over 4 s, whose distance is smallest, `miss_m`, at 1.7 s, and that known without a
+/// search: bravo flies like alpha, plus (t - 1.7) (1 + t^2 / 4)^3 along x and the miss along y. Each is cut into pieces at
+/// times of its own.
+fn curves(miss_m: f64) -> Vec<Item> {
+    let own = [
+        [0.3, -0.8, 0.5, 0.1, -0.06, 0.01, 0.002, -0.0004],
+        [1.0, 0.4, -0.3, 0.08, 0.02, -0.008, 0.0007, 0.0001],
+        [1.5, 0.1, 0.2, -0.05, 0.0, 0.003, -0.0006, 0.00003],
+    ];
+    let grows = [1.0, 0.0, 0.25];
+    let apart = times(&[-1.7, 1.0], &times(&grows, &times(&grows, &grows)));
+    let mut other = own;
+    for (c, extra) in other[0].iter_mut().zip(&apart) {
+        *c += extra;
+    }
+    other[1][0] += miss_m;
+    let pieces = |vehicle: usize, axes: [[f64; 8]; 3], cuts: &[f64]| {
+        cuts.windows(2)
+            .map(|ends| {
+                let [x, y, z] = axes.map(|axis| about(&axis, ends[0]));
+                let coefficients = (0..8).map(|k| Vector3::new(x[k], y[k], z[k])).collect();
+                Item::Piece(Piece { vehicle, from_s: ends[0], to_s: ends[1], coefficients })
+            })
+            .collect::<Vec<_>>()
+    };
+    let mut items = pieces(0, own, &[0.0, 1.0, 2.5, 4.0]);
+    items.extend(pieces(1, other, &[0.0, 1.625, 3.0, 4.0]));
+    items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    items
+}
+
+/// The same flight as samples, so many a second.
+fn sampled(curves: &[Item], rate_hz: u32, with_velocity: bool) -> Vec<Item> {
+    let mut items = Vec::new();
+    for k in 0..=4 * rate_hz {
+        let time_s = f64::from(k) / f64::from(rate_hz);
+        for vehicle in 0..2 {
+            let piece = curves.iter().rev().find_map(|item| match item {
+                Item::Piece(piece) if piece.vehicle == vehicle && piece.from_s <= time_s => Some(piece),
+                _ => None,
+            });
+            let piece = piece.expect("there from the start");
+            let t = time_s - piece.from_s;
+            let position_m = piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c);
+            let slope = piece.coefficients.iter().enumerate().skip(1).rev();
+            let velocity = slope.fold(Vector3::zeros(), |sum, (k, c)| sum * t + c * k as f64);
+            let velocity_m_s = with_velocity.then_some(velocity);
+            items.push(Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s, radius_m: None }));
+        }
+    }
+    items
+}
+
+#[test]
+fn the_minimum_on_curves_is_enclosed_and_not_sampled() {
+    for miss_m in [0.0, 0.25, 0.610_765, 3.0] {
+        let outcome = asked(&curves(miss_m), Question::delta(0.5));
+        let closest = outcome.closest[0];
+        // The pieces are expanded about other times than the curve was made at, which rounds.
+        assert!(closest.lower_m <= miss_m + ROUNDING && miss_m <= closest.upper_m + ROUNDING, "{closest:?}");
+        assert!(closest.upper_m - closest.lower_m < 2.0 * WIDTH_M, "{closest:?}");
+        assert!((closest.time_s - 1.7).abs() < 1e-4, "{closest:?}");
+        assert_eq!(outcome.status, if miss_m < 0.5 { Status::Violation } else { Status::Clear });
+        assert_eq!(outcome.disagreements, 0);
+    }
+    // A curve is not its samples, which look better.
+    let samples =
+        asked(&sampled(&curves(0.25), 10, false), Question { motion: Some(Motion::Hold), ..Question::delta(0.2) });
+    assert_eq!(samples.status, Status::Clear);
+    let near = asked(&curves(0.25), Question::delta(0.25 - 2.0 * WIDTH_M)).status;
+    let beyond = asked(&curves(0.25), Question::delta(0.25 + 2.0 * WIDTH_M)).status;
+    assert_eq!((near, beyond), (Status::Clear, Status::Violation));
+}
+
+#[test]
+fn the_time_below_delta_on_curves_ends_where_delta_is_reached() {
+    let outcome = asked(&curves(0.25), Question::delta(0.5));
+    let [found] = outcome.violations[..] else { panic!("{outcome:?}") };
+    for time_s in [found.from_s, found.to_s] {
+        let x = (time_s - 1.7) * (1.0 + time_s * time_s / 4.0).powi(3);
+        assert!((x.hypot(0.25) - 0.5).abs() < 1e-7, "{found:?}");
+    }
+    assert!(found.from_s < 1.7 && found.to_s > 1.7);
+}
+
+fn bounded(delta_m: f64, max_accel_m_s2: f64) -> Question {
+    Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(max_accel_m_s2), ..Question::delta(delta_m) }
+}
+
+#[test]
+fn bounded_motion_is_at_least_the_sweep_less_what_acceleration_allows() {
+    let (accel, h) = (0.8, 1.0);
+    let slack_m = 2.0 * accel * h * h / 8.0;
+    let outcome = asked(&pass(3.0), bounded(2.0, accel));
+    assert!((outcome.closest[0].lower_m - (3.0 - slack_m)).abs() < ROUNDING);
+    assert!((outcome.closest[0].upper_m - (3.0 + slack_m)).abs() < ROUNDING);
+    assert_eq!(status(&pass(3.0), bounded(3.0 - slack_m - 1e-9, accel)), Status::Clear);
+    let outcome = asked(&pass(3.0), bounded(3.0 - slack_m + 1e-9, accel));
+    assert_eq!(outcome.status, Status::Undecided);
+    // Where the drawn motion is below by more than any deviation, it is a violation; at a sample, always.
+    assert_eq!(status(&pass(3.0), bounded(3.0 + slack_m - 1e-9, accel)), Status::Undecided);
+    assert_eq!(status(&pass(3.0), bounded(3.0 + slack_m + 1e-9, accel)), Status::Violation);
+    let sampled = [seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [1.0, 0.0, 0.0])];
+    assert_eq!(status(&sampled, bounded(1.5, 1e6)), Status::Violation);
+}
+
+#[test]
+fn the_rate_that_is_said_to_decide_does() {
+    let straight = |rate_hz: f64| {
+        let mut items = Vec::new();
+        let steps = rate_hz.ceil();
+        for k in 0..=(steps as u32) {
+            let u = f64::from(k) / steps;
+            items.extend([seen(0, u, [10.0 * u - 5.0, 0.0, 0.0]), seen(1, u, [5.0 - 10.0 * u, 3.0, 0.0])]);
+        }
+        items
+    };
+    let question = bounded(2.9, 4.0);
+    let outcome = asked(&straight(1.0), question.clone());
+    let rate_hz = outcome.undecided[0].rate_hz.expect("a rate decides");
+    assert!((rate_hz - (8.0_f64 / 8.0 / 0.1).sqrt()).abs() < 1e-9, "{rate_hz}");
+    assert_eq!(outcome.status, Status::Undecided);
+    assert_eq!(status(&straight(rate_hz), question.clone()), Status::Clear);
+    assert_eq!(status(&straight(0.7 * rate_hz), question), Status::Undecided);
+}
+
+#[test]
+fn velocities_sharpen_the_bound() {
+    let curve = curves(0.6);
+    let accel = 700.0;
+    let rough = asked(&sampled(&curve, 50, false), bounded(0.1, accel)).closest[0];
+    let sharp = asked(&sampled(&curve, 50, true), bounded(0.1, accel)).closest[0];
+    for found in [rough, sharp] {
+        assert!(found.lower_m <= 0.6 && 0.6 <= found.upper_m, "{found:?}");
+    }
+    // Half of the deviation: A h^2 / 16 and not A h^2 / 8, for two vehicles.
+    let h = 0.02;
+    assert!((0.6 - rough.lower_m - accel * h * h / 4.0).abs() < 0.01, "{rough:?}");
+    assert!((0.6 - sharp.lower_m - accel * h * h / 8.0).abs() < 0.01, "{sharp:?}");
+}
+
+#[test]
+fn a_bound_that_the_recording_contradicts_proves_nothing() {
+    // Alpha turns back at 1 s: 2 m/s of difference within 1 s.
+    let mut items = vec![seen(0, 0.0, [0.0; 3]), seen(0, 1.0, [1.0, 0.0, 0.0]), seen(0, 2.0, [0.0; 3])];
+    items.extend([seen(1, 0.0, [50.0, 0.0, 0.0]), seen(1, 1.0, [50.0, 0.0, 0.0]), seen(1, 2.0, [50.0, 0.0, 0.0])]);
+    items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    let outcome = asked(&items, bounded(2.0, 1.5));
+    let contradiction = outcome.contradiction.expect("seen");
+    assert_eq!(outcome.status, Status::Undecided);
+    assert_eq!((contradiction.vehicle, contradiction.assumed_m_s2), (0, 1.5));
+    assert!((contradiction.needs_m_s2 - 2.0).abs() < ROUNDING);
+    assert_eq!(status(&items, bounded(2.0, 2.0)), Status::Clear);
+}
+
+#[test]
+fn pairs_on_the_ground_are_left_out_until_one_of_them_leaves_it() {
+    let items = |climbs_m: f64| {
+        let mut items = vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [1.0, 0.0, 0.0])];
+        items.extend([seen(0, 2.0, [0.0, 0.0, climbs_m]), seen(1, 2.0, [1.0, 0.0, 0.0])]);
+        items
+    };
+    let above = Question { above_m: Some(0.25), ..Question::delta(1.5) };
+    assert_eq!(status(&items(1.0), Question::delta(1.5)), Status::Violation);
+    assert_eq!(status(&items(0.2), above.clone()), Status::Clear);
+    let outcome = asked(&items(1.0), above.clone());
+    assert_eq!(outcome.violations[0].from_s, 0.5, "{outcome:?}");
+    assert!((outcome.closest[0].lower_m - 1.0_f64.hypot(0.25)).abs() < ROUNDING);
+    // On curves, and under a bound, which may leave the ground sooner.
+    let bounded = Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(0.01), ..above };
+    assert!(asked(&items(1.0), bounded).violations[0].from_s < 0.5);
+}
+
+#[test]
+fn a_window_clips_exactly() {
+    let inside = |from_s, to_s| Question { from_s, to_s, ..Question::delta(2.0) };
+    // Below delta from 0.5 - sqrt(3) / 20 = 0.4134 s on.
+    assert_eq!(status(&pass(1.0), inside(None, Some(0.41))), Status::Clear);
+    assert_eq!(status(&pass(1.0), inside(Some(0.59), None)), Status::Clear);
+    let outcome = asked(&pass(1.0), inside(Some(0.25), Some(0.45)));
+    let found = outcome.violations[0];
+    assert_eq!((outcome.span_s, found.to_s), (Some((0.25, 0.45)), 0.45));
+    assert!((found.min_m - 1.0_f64.hypot(1.0)).abs() < ROUNDING, "10 m/s of each, 0.05 s before they meet");
+}
+
+#[test]
+fn a_gap_is_undecided_unless_it_is_bridged() {
+    let flown = |missing: u32| {
+        let mut items = Vec::new();
+        for k in 0..20 {
+            let time_s = 0.1 * f64::from(k);
+            items.push(seen(0, time_s, [0.0, 0.0, time_s]));
+            if k != missing {
+                items.push(seen(1, time_s, [9.0, 0.0, time_s]));
+            }
+        }
+        items
+    };
+    assert_eq!(status(&flown(99), Question::delta(2.0)), Status::Clear);
+    let outcome = asked(&flown(7), Question::delta(2.0));
+    assert_eq!((outcome.status, outcome.gaps.len(), outcome.gaps[0].vehicle), (Status::Undecided, 1, 1));
+    assert!((outcome.gaps[0].from_s - 0.6).abs() < ROUNDING && (outcome.gaps[0].to_s - 0.8).abs() < ROUNDING);
+    assert_eq!(status(&flown(7), Question { max_gap_s: Some(0.25), ..Question::delta(2.0) }), Status::Clear);
+    // Late and early are no gaps.
+    assert!(asked(&flown(0), Question::delta(2.0)).gaps.is_empty());
+    assert!(asked(&flown(19), Question::delta(2.0)).gaps.is_empty());
+    // Nor is one that ends before the window.
+    assert_eq!(status(&flown(7), Question { from_s: Some(1.0), ..Question::delta(2.0) }), Status::Clear);
+    // A gap between curves.
+    let mut curves = curves(5.0);
+    curves.retain(|item| !(item.vehicle() == 0 && item.time_s() == 1.0));
+    assert_eq!(asked(&curves, Question::delta(0.1)).gaps.len(), 1);
+}
+
+#[test]
+fn a_clock_that_was_off_is_set_right() {
+    // Through the same place one second apart, by clocks that differ by one second.
+    let through = |vehicle: usize, late_s: f64, turned: bool| {
+        (0..=20).map(move |k| {
+            let t = 0.2 * f64::from(k);
+            let way = 5.0 * t - 10.0;
+            seen(vehicle, t + late_s, if turned { [0.0, way, 0.0] } else { [way, 0.0, 0.0] })
+        })
+    };
+    let mut items: Vec<_> = through(0, 0.0, false).chain(through(1, 1.0, true)).collect();
+    items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    let set = |offset_s| Question {
+        vehicles: of(&[("bravo", Terms { offset_s, ..Terms::default() })]),
+        ..Question::delta(2.0)
+    };
+    assert_eq!(status(&items, Question::delta(2.0)), Status::Clear);
+    let outcome = asked(&items, set(-1.0));
+    assert_eq!(outcome.status, Status::Violation);
+    assert!(outcome.closest[0].lower_m < 1e-12 && (outcome.closest[0].time_s - 2.0).abs() < 1e-12);
+    assert_eq!(status(&items, set(1.0)), Status::Clear);
+}
+
+#[test]
+fn ellipsoids_are_judged_by_scaled_distance() {
+    let stacked = |dz: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [0.0, 0.0, dz])];
+    let beside = |dx: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [dx, 0.0, 0.0])];
+    let downwash = Question { ellipsoid_m: Some(Vector3::new(0.125, 0.125, 0.375)), ..Question::default() };
+    assert_eq!(status(&stacked(0.7), downwash.clone()), Status::Violation);
+    assert_eq!(status(&stacked(0.75), downwash.clone()), Status::Clear);
+    assert_eq!(status(&beside(0.3), downwash.clone()), Status::Clear);
+    let outcome = asked(&beside(0.2), downwash.clone());
+    assert_eq!(outcome.status, Status::Violation);
+    assert!((outcome.closest[0].lower_m - 1.6).abs() < ROUNDING);
+    assert_eq!(status(&beside(0.2), Question { delta_m: Some(1.5), ..downwash }), Status::Clear);
+}
+
+#[test]
+fn radii_and_delta_are_both_kept() {
+    let apart = |distance_m: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [distance_m, 0.0, 0.0])];
+    let radius = |radius_m| Terms { radius_m: Some(radius_m), ..Terms::default() };
+    let radii = Question { vehicles: of(&[("alpha", radius(0.5)), ("bravo", radius(1.0))]), ..Question::default() };
+    assert_eq!(status(&apart(1.4), radii.clone()), Status::Violation);
+    assert_eq!(status(&apart(1.5), radii.clone()), Status::Clear);
+    let both = Question { delta_m: Some(2.0), ..radii };
+    assert_eq!(status(&apart(1.6), both), Status::Violation);
+    // The recording's own radii, and none at all.
+    let mut own = apart(1.4);
+    for item in &mut own {
+        if let Item::Sample(sample) = item {
+            sample.radius_m = Some(0.75);
+        }
+    }
+    assert_eq!(status(&own, Question::default()), Status::Violation);
+    let none = judge(&names(2), &apart(1.4), Question::default()).unwrap_err();
+    assert_eq!(none, RecordedError::NoLimit { vehicle: "alpha".to_owned() });
+}
+
+fn thing(shape: Shape, at: [f64; 3]) -> Obstacle {
+    Obstacle { name: "thing".to_owned(), shape, clearance_m: None, path: vec![(0.0, at.into())] }
+}
+
+#[test]
+fn obstacles_are_kept_clear_of() {
+    let flight = [seen(0, 0.0, [-5.0, 0.0, 2.0]), seen(0, 1.0, [5.0, 0.0, 2.0])];
+    // A keep-out ball of delta / 2 = 0.5 m must not enter.
+    let with = |obstacle: Obstacle| Question { obstacles: vec![obstacle], ..Question::delta(1.0) };
+    let ball = Shape::Ball { radius_m: 1.0 };
+    let cuboid = Shape::Box { half_m: Vector3::new(1.0, 1.0, 1.0), yaw_rad: 0.3 };
+    let capsule =
+        Shape::Capsule { from_m: Vector3::new(0.0, -3.0, 0.0), to_m: Vector3::new(0.0, 3.0, 0.0), radius_m: 1.0 };
+    for shape in [ball, cuboid, capsule] {
+        for (z, expected) in [(0.4, Status::Clear), (0.5, Status::Clear), (0.6, Status::Violation)] {
+            let outcome = asked(&flight, with(thing(shape, [0.0, 0.0, z])));
+            assert_eq!((outcome.status, outcome.disagreements), (expected, 0), "{shape:?} {z} {outcome:?}");
+            assert!((outcome.obstacles[0].lower_m - (1.0 - z)).abs() < 1e-9, "{outcome:?}");
+        }
+    }
+    let ground = |z| thing(Shape::HalfSpace { normal: Vector3::z() }, [0.0, 0.0, z]);
+    assert_eq!(status(&flight, with(ground(1.5))), Status::Clear);
+    assert_eq!(status(&flight, with(ground(1.6))), Status::Violation);
+    let wider = Obstacle { clearance_m: Some(0.7), ..ground(1.4) };
+    assert_eq!(status(&flight, with(wider)), Status::Violation);
+    // One that moves: there when the vehicle passes, or long gone.
+    let moving = |late_s: f64| Obstacle {
+        path: vec![(late_s, Vector3::new(0.0, -10.0, 2.0)), (late_s + 1.0, Vector3::new(0.0, 10.0, 2.0))],
+        ..thing(ball, [0.0; 3])
+    };
+    let hit = asked(&flight, with(moving(0.0)));
+    assert_eq!(hit.status, Status::Violation);
+    assert!(matches!(hit.violations[0].who, Who::Obstacle { vehicle: 0, obstacle: 0 }));
+    assert_eq!(status(&flight, with(moving(3.0))), Status::Clear);
+    // On a curve.
+    let outcome = asked(&curves(5.0), Question { obstacles: vec![ground(-20.0)], ..Question::delta(0.1) });
+    assert_eq!((outcome.disagreements, outcome.status), (0, Status::Clear));
+}
+
+#[test]
+fn only_those_who_are_asked_for_are_judged() {
+    let mut items = pass(1.0);
+    items.extend([seen(2, 0.0, [0.0, 50.0, 0.0]), seen(2, 1.0, [0.0, 50.0, 0.0])]);
+    items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    let only = |names: &[&str]| Question {
+        only: Some(names.iter().map(ToString::to_string).collect::<BTreeSet<_>>()),
+        ..Question::delta(2.0)
+    };
+    assert_eq!(status(&items, only(&["alpha", "charlie"])), Status::Clear);
+    assert_eq!(status(&items, only(&["alpha", "bravo"])), Status::Violation);
+    let unknown = judge(&names(3), &items, only(&["zulu"])).unwrap_err();
+    assert_eq!(unknown.to_string(), "the recording has no vehicle zulu; it has alpha, bravo, charlie");
+}
+
+#[test]
+fn wrong_recordings_and_questions_are_refused_by_name() {
+    let refused = |items: &[Item], question: Question| judge(&names(2), items, question).unwrap_err().to_string();
+    let twice = [seen(0, 1.0, [0.0; 3]), seen(0, 1.0, [1.0, 0.0, 0.0])];
+    assert!(refused(&twice, Question::delta(1.0)).contains("alpha: the time 1 s is not later than 1 s"));
+    assert!(
+        refused(&[seen(1, 1.0, [f64::NAN, 0.0, 0.0])], Question::delta(1.0)).contains("bravo at 1 s: the position")
+    );
+    let back = [seen(0, 1.0, [0.0; 3]), seen(1, 0.5, [0.0; 3])];
+    assert!(refused(&back, Question::delta(1.0)).contains("comes after one at 1 s"));
+    assert!(refused(&[seen(7, 1.0, [0.0; 3])], Question::delta(1.0)).contains("no name for vehicle 8"));
+    let with = |motion| Question { motion: Some(motion), ..Question::delta(1.0) };
+    assert!(refused(&pass(1.0), with(Motion::Polynomial)).contains("has samples and no curve"));
+    assert!(refused(&curves(1.0), with(Motion::Linear)).contains("has a curve"));
+    assert!(refused(&pass(1.0), with(Motion::Bounded)).contains("needs its largest acceleration"));
+    for question in [
+        Question::delta(0.0),
+        Question::delta(f64::NAN),
+        Question { max_gap_s: Some(-1.0), ..Question::delta(1.0) },
+        Question { from_s: Some(2.0), to_s: Some(1.0), ..Question::delta(1.0) },
+        Question { ellipsoid_m: Some(Vector3::new(1.0, 0.0, 1.0)), ..Question::default() },
+    ] {
+        assert!(Judge::new(question.clone()).is_err(), "{question:?}");
+    }
+}
+
+#[test]
+fn a_recording_in_parts_is_judged_like_the_whole() {
+    let mut items = Vec::new();
+    for k in 0..3000_u32 {
+        let t = 0.1 * f64::from(k);
+        for vehicle in 0..4_u32 {
+            if (k + vehicle) % (vehicle + 1) == 0 {
+                let phase = f64::from(vehicle) * 1.7 + 0.05 * t * f64::from(vehicle + 1);
+                items.push(seen(vehicle as usize, t, [6.0 * phase.cos(), 6.0 * phase.sin(), 0.3 * f64::from(vehicle)]));
+            }
+        }
+    }
+    let question = Question { max_gap_s: Some(1.0), ..Question::delta(2.0) };
+    let whole = judge(&names(4), &items, question.clone()).unwrap();
+    let mut in_parts = Judge::new(question).unwrap();
+    for part in items.chunks(7) {
+        in_parts.push(&names(4), part).unwrap();
+    }
+    assert_eq!(whole, in_parts.finish().unwrap());
+    assert_eq!(whole.status, Status::Violation);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_input_makes_the_judge_panic(
+        raw in prop::collection::vec((0_usize..4, any::<bool>(), prop::array::uniform5(prop_oneof![
+            any::<f64>(), -10.0..10.0_f64, Just(0.0), Just(1e300), Just(f64::NAN)
+        ])), 0..40),
+        motion in 0..5_u8,
+        above in prop::option::of(-5.0..5.0_f64),
+        sorted in any::<bool>(),
+    ) {
+        let mut items: Vec<_> = raw.into_iter().map(|(vehicle, piece, [t, x, y, z, w])| {
+            let position_m = Vector3::new(x, y, z);
+            if piece {
+                Item::Piece(Piece { vehicle, from_s: t, to_s: t + w.abs(), coefficients: vec![position_m, position_m * w] })
+            } else {
+                Item::Sample(Sample { vehicle, time_s: t, position_m, velocity_m_s: None, radius_m: None })
+            }
+        }).collect();
+        if sorted {
+            items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        }
+        let motion = [None, Some(Motion::Linear), Some(Motion::Hold), Some(Motion::Polynomial), Some(Motion::Bounded)]
+            [usize::from(motion)];
+        let obstacles = vec![thing(Shape::Ball { radius_m: 1.0 }, [0.0; 3])];
+        let question =
+            Question { motion, above_m: above, max_accel_m_s2: Some(1.0), obstacles, ..Question::delta(1.0) };
+        let _ = judge(&names(4), &items, question);
+    }
+}
