@@ -45,6 +45,8 @@ pub mod metrics;
 pub mod plant;
 pub mod preflight;
 pub mod record;
+#[cfg(feature = "viewer")]
+pub mod render;
 pub mod report;
 pub mod scenario;
 pub mod sim;

@@ -7,10 +7,15 @@ mod check;
 mod completions;
 mod console;
 mod diagnostic;
+#[cfg(feature = "viewer")]
+mod drawing;
 mod list;
 mod pictures;
+#[cfg(feature = "viewer")]
+mod render;
 mod run;
 mod schema;
+mod snapshots;
 
 use std::process::ExitCode;
 
@@ -56,6 +61,9 @@ enum Command {
     Run(run::RunArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),
+    /// Draw a recording: pictures, films and contact sheets, without a screen.
+    #[cfg(feature = "viewer")]
+    Render(render::RenderArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -79,6 +87,8 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::check(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::Render(arguments) => render::render(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),
