@@ -1,10 +1,10 @@
 // Straight lines of a width in pixels.
 
 struct Line {
-    @location(0) from: vec3<f32>,
-    @location(1) to: vec3<f32>,
-    @location(2) from_colour: vec4<f32>,
-    @location(3) to_colour: vec4<f32>,
+    @location(0) first: vec3<f32>,
+    @location(1) second: vec3<f32>,
+    @location(2) first_colour: vec4<f32>,
+    @location(3) second_colour: vec4<f32>,
     @location(4) width: f32,
 }
 
@@ -24,9 +24,9 @@ fn ahead(point: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
 
 @vertex
 fn corner(@builtin(vertex_index) index: u32, line: Line) -> Corner {
-    let from = seen(line.from);
-    let to = seen(line.to);
-    let ends = array(clipped(ahead(from, to)), clipped(ahead(to, from)));
+    let first = seen(line.first);
+    let second = seen(line.second);
+    let ends = array(clipped(ahead(first, second)), clipped(ahead(second, first)));
     let half_size = frame.range.zw / 2.0;
     let run = (ends[1].xy / ends[1].w - ends[0].xy / ends[0].w) * half_size;
     var across = vec2(0.0, 1.0);
@@ -36,10 +36,10 @@ fn corner(@builtin(vertex_index) index: u32, line: Line) -> Corner {
     let at_end = (index & 1u) == 1u;
     let side = select(-0.5, 0.5, (index >> 1u) == 1u);
     var position = ends[0];
-    var colour = line.from_colour;
+    var colour = line.first_colour;
     if at_end {
         position = ends[1];
-        colour = line.to_colour;
+        colour = line.second_colour;
     }
     position += vec4(across * side * line.width / half_size * position.w, 0.0, 0.0);
     return Corner(position, light_of(colour));

@@ -30,6 +30,10 @@ impl FromStr for AdapterChoice {
     }
 }
 
+/// Ways to speak to adapters, the better ones first. OpenGL is asked last: on machines without a screen it complains on
+/// standard error.
+const BACKENDS: [wgpu::Backends; 2] = [wgpu::Backends::PRIMARY, wgpu::Backends::GL];
+
 /// Why nothing can be drawn.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GpuError {
@@ -94,8 +98,15 @@ pub(crate) struct Gpu {
 
 impl Gpu {
     pub(super) fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        Self::start(pick(&instance, choice, None)?)
+        let mut found = Vec::new();
+        for backends in BACKENDS {
+            let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+            descriptor.backends = backends;
+            if let Some(adapter) = pick(&wgpu::Instance::new(descriptor), choice, None, &mut found) {
+                return Self::start(adapter);
+            }
+        }
+        Err(not_found(choice, &found))
     }
 
     /// An adapter that can show what it draws on a surface.
@@ -104,7 +115,9 @@ impl Gpu {
         surface: &wgpu::Surface<'_>,
         choice: &AdapterChoice,
     ) -> Result<(Self, wgpu::SurfaceCapabilities), GpuError> {
-        let adapter = pick(instance, choice, Some(surface))?;
+        let mut found = Vec::new();
+        let adapter =
+            pick(instance, choice, Some(surface), &mut found).ok_or_else(|| not_found(choice, &found))?;
         let capabilities = surface.get_capabilities(&adapter);
         Ok((Self::start(adapter)?, capabilities))
     }
@@ -156,23 +169,18 @@ fn name(adapter: &wgpu::Adapter) -> String {
     format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend)
 }
 
-/// The first adapter of a choice, the best first.
+/// The first adapter of a choice, the best first; the names of all others are added to `found`.
 fn pick(
     instance: &wgpu::Instance,
     choice: &AdapterChoice,
     surface: Option<&wgpu::Surface<'_>>,
-) -> Result<wgpu::Adapter, GpuError> {
+    found: &mut Vec<String>,
+) -> Option<wgpu::Adapter> {
     let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
     adapters.retain(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)));
-    adapters.sort_by_key(|adapter| {
-        let info = adapter.get_info();
-        (rank(info.device_type), info.backend == wgpu::Backend::Gl)
-    });
-    let found = adapters.iter().map(name).collect::<Vec<_>>().join(", ");
-    if adapters.is_empty() {
-        return Err(GpuError::NoAdapter);
-    }
-    let is_wanted = |adapter: &wgpu::Adapter| {
+    adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
+    found.extend(adapters.iter().map(name));
+    adapters.into_iter().find(|adapter| {
         let is_software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         match choice {
             AdapterChoice::Best => true,
@@ -180,14 +188,20 @@ fn pick(
             AdapterChoice::Software => is_software,
             AdapterChoice::Named(wanted) => name(adapter).to_lowercase().contains(&wanted.to_lowercase()),
         }
-    };
+    })
+}
+
+fn not_found(choice: &AdapterChoice, found: &[String]) -> GpuError {
+    if found.is_empty() {
+        return GpuError::NoAdapter;
+    }
     let wanted = match choice {
         AdapterChoice::Best => "usable".to_owned(),
         AdapterChoice::Hardware => "hardware".to_owned(),
         AdapterChoice::Software => "software".to_owned(),
         AdapterChoice::Named(name) => format!("`{name}`"),
     };
-    adapters.into_iter().find(is_wanted).ok_or(GpuError::NoSuchAdapter { wanted, found })
+    GpuError::NoSuchAdapter { wanted, found: found.join(", ") }
 }
 
 fn rank(device_type: wgpu::DeviceType) -> u8 {

@@ -39,11 +39,11 @@ impl Overlay {
             time: Some(0.0),
             ..egui::RawInput::default()
         };
-        let output = self.context.run_pass(input, |context| {
+        let mut output = self.context.run_pass(input, |context| {
             let layer = egui::LayerId::background();
             paint(&context.layer_painter(layer).with_clip_rect(screen), marks, Vec2::ZERO, 1.0);
         });
-        let primitives: Vec<ClippedPrimitive> = self.context.tessellate(output.shapes, 1.0);
+        let primitives: Vec<ClippedPrimitive> = self.context.tessellate(std::mem::take(&mut output.shapes), 1.0);
         let screen = ScreenDescriptor { size_in_pixels: target.size_px, pixels_per_point: 1.0 };
         for renderer in &mut self.renderers {
             for (id, deltas) in &output.textures_delta.set {
@@ -73,6 +73,7 @@ impl Overlay {
                 renderer.free_texture(id);
             }
         }
+        output.textures_delta.clear();
     }
 }
 
