@@ -16,6 +16,8 @@ mod render;
 mod run;
 mod schema;
 mod snapshots;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::process::ExitCode;
 
@@ -64,6 +66,9 @@ enum Command {
     /// Draw a recording: pictures, films and contact sheets, without a screen.
     #[cfg(feature = "viewer")]
     Render(render::RenderArguments),
+    /// Open a window on a recording, or on a scenario that is flown while it is watched.
+    #[cfg(feature = "viewer")]
+    View(view::ViewArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -89,6 +94,8 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::check(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::View(arguments) => view::view(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),

@@ -224,6 +224,15 @@ impl Footage {
         &self.spans
     }
 
+    /// When a pair came closest while it was closer than delta \[s\], as far as the samples tell.
+    #[must_use]
+    pub fn worst_s(&self, span: &Span) -> f64 {
+        let within = self.instants.iter().filter_map(|instant| instant.here);
+        let within = within.filter(|here| here.pair == span.pair && (span.from_s..=span.to_s).contains(&here.time_s));
+        let worst = within.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m));
+        worst.map_or(span.from_s, |worst| worst.time_s)
+    }
+
     /// Times and positions in memory, in order.
     pub(super) fn positions(&self) -> impl ExactSizeIterator<Item = (f64, &Rows)> {
         self.instants.iter().map(|instant| (instant.time_s, &instant.positions_m))
@@ -232,6 +241,11 @@ impl Footage {
     /// Time \[s\] and positions \[m\] of an instant in memory.
     pub(super) fn instant(&self, k: usize) -> (f64, &Rows) {
         (self.instants[k].time_s, &self.instants[k].positions_m)
+    }
+
+    /// Times in memory \[s\], in order.
+    pub fn times(&self) -> impl Iterator<Item = f64> + '_ {
+        self.instants.iter().map(|instant| instant.time_s)
     }
 
     /// Times \[s\] and the separation \[m\] that was smallest since the time before.

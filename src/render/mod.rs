@@ -21,6 +21,7 @@ pub mod gpu;
 mod picture;
 pub mod scene;
 mod snapshots;
+mod window;
 
 pub use film::{Film, FilmError, FilmFormat};
 pub use footage::{BUDGET_BYTES, Footage, FootageError, Moment, Plan, Span};
@@ -28,3 +29,4 @@ pub use gpu::{AdapterChoice, GpuError, Renderer, ShootError};
 pub use picture::{Picture, PictureError, contact_sheet, data_uri};
 pub use scene::{CameraError, CameraSpec, Layers, Scene, Theme, View};
 pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
+pub use window::{Fed, WindowError, show};

@@ -36,8 +36,7 @@ fn occasions(footage: &Footage) -> Vec<(String, String, f64, CameraSpec)> {
         let until_s = span.to_s.min(end_s);
         let description =
             format!("Vehicles {} were closer than delta from {:.2} s to {until_s:.2} s.", span.pair, span.from_s);
-        let middle_s = f64::midpoint(span.from_s, until_s);
-        occasions.push((format!("violation-{}", k + 1), description, middle_s, CameraSpec::Closest));
+        occasions.push((format!("violation-{}", k + 1), description, footage.worst_s(span), CameraSpec::Closest));
     }
     occasions
 }

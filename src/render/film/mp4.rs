@@ -2,7 +2,7 @@
 
 use muxide::api::{Muxer, MuxerBuilder, VideoCodec};
 use openh264::OpenH264API;
-use openh264::encoder::{BitRate, Encoder, EncoderConfig, FrameRate, FrameType, IntraFramePeriod, QpRange, VuiConfig};
+use openh264::encoder::{Encoder, EncoderConfig, FrameRate, FrameType, IntraFramePeriod, RateControlMode, VuiConfig};
 use openh264::formats::{RgbaSliceU8, YUVBuffer};
 
 use super::FilmError;
@@ -11,10 +11,6 @@ use crate::render::picture::Picture;
 pub(super) const NAME: &str = "MP4";
 /// Largest pictures that the encoder takes.
 const LARGEST: [u32; 2] = [3840, 2160];
-/// Bits that a pixel of a picture may take, on average.
-const BITS_PER_PIXEL: f64 = 0.15;
-/// Coarsest steps of brightness: text stays sharp.
-const QUANTISER: QpRange = QpRange::new(10, 30);
 /// Pictures from one that stands by itself to the next, in seconds of film.
 const KEY_EVERY_S: u32 = 4;
 
@@ -61,14 +57,12 @@ impl Mp4 {
         if width.min(height) < 16 || width.max(height) > LARGEST[0] || width.min(height) > LARGEST[1] {
             return size("from 16 x 16 to 3840 x 2160");
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-        let bits = (f64::from(width) * f64::from(height) * f64::from(fps) * BITS_PER_PIXEL) as u32;
         let config = EncoderConfig::new()
-            .bitrate(BitRate::from_bps(bits))
             .max_frame_rate(FrameRate::from_hz(fps as f32))
             .intra_frame_period(IntraFramePeriod::from_num_frames(KEY_EVERY_S * fps))
+            // The same quality for every picture: steps of brightness of 26, at which text stays sharp.
+            .rate_control_mode(RateControlMode::Off)
             .skip_frames(false)
-            .qp(QUANTISER)
             // What the library makes of red, green and blue.
             .vui(VuiConfig::bt601());
         let encoder = Encoder::with_api_config(OpenH264API::from_source(), config).map_err(|error| failed(&error))?;

@@ -15,7 +15,6 @@ pub use adapter::{AdapterChoice, GpuError};
 
 pub(crate) use adapter::Gpu;
 pub(crate) use overlay::paint;
-pub(crate) use target::WORDS_FORMAT;
 
 use super::picture::Picture;
 use super::scene::{CameraError, Scene, Stage, View};

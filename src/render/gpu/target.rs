@@ -8,7 +8,7 @@ pub(super) const SAMPLES: u32 = 4;
 /// Format of a picture while light is added up.
 pub(super) const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 /// Format of the same picture while words are laid over it.
-pub(crate) const WORDS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+pub(super) const WORDS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Textures for pictures of one size.

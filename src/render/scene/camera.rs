@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 /// Half of the vertical angle of view, as a tangent: 35 degrees in all.
 const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
 /// Parts of the picture's half width and height that framing leaves to captions: left, right, bottom, top.
-const MARGINS: [f64; 4] = [0.06, 0.06, 0.18, 0.24];
+const MARGINS: [f64; 4] = [0.02, 0.02, 0.15, 0.21];
 /// Nearest that a camera is put to what it looks at \[m\].
 const MIN_DISTANCE_M: f64 = 1e-3;
 /// Where `iso` looks from: azimuth and elevation \[degrees\].

@@ -13,6 +13,8 @@ const SHADES: i16 = 16;
 const NO_LEGEND_PX: [u32; 2] = [420, 260];
 /// Longest name that is written in full.
 const LONGEST_NAME: usize = 40;
+/// Opacity of what is behind words.
+const BACKING: f32 = 0.72;
 const WHITE: Colour = Colour::hex(0xFF_FF_FF);
 
 impl Painting<'_> {
@@ -43,17 +45,24 @@ impl Painting<'_> {
         let (theme, size_px, margin) = (self.view.theme, self.view.text_px(1.0), self.margin());
         let width_px = self.view.size_px[0] as f32;
         let mut y = self.banner(placing);
+        let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
+        let (bottom, taken) = placing.placed();
         let name = shortened(&self.footage.name);
         placing.write([margin, y], [0.0, 0.0], 1.35 * size_px, theme.ink(), &name);
+        placing.back(taken, bottom, ground, room_px);
+        let (_, taken) = placing.placed();
         let time = format!("t = {:.2} s", self.moment.time_s);
         placing.write([width_px - margin, y], [1.0, 0.0], 1.35 * size_px, theme.ink(), &time);
         y += 1.8 * size_px;
         let (verdict, colour) = self.verdict();
         let box_px = placing.write([width_px - margin, y], [1.0, 0.0], size_px, colour, &verdict);
+        placing.back(taken, bottom, ground, room_px);
+        let (_, taken) = placing.placed();
         let free_px = box_px[0][0] - margin;
         for text in self.closest_so_far() {
             if width(size_px, &text) <= free_px {
                 placing.write([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), &text);
+                placing.back(taken, bottom, ground, room_px);
                 break;
             }
         }
@@ -125,6 +134,7 @@ impl Painting<'_> {
         let (layers, plan) = (self.view.layers, self.footage.plan.as_ref());
         let y = height_px as f32 - margin;
         let mut x = margin;
+        let (bottom, taken) = placing.placed();
         let ink = theme.soft_ink();
         let room_px = width_px as f32 - margin;
         let fits = |x: f32, text: &str| x + width(size_px, text) <= room_px;
@@ -167,6 +177,7 @@ impl Painting<'_> {
             placing.draw(Mark::Ring { at_px, radius_px: 1.4 * arm, colour, width_px: 1.6 * stroke });
             placing.write([x + 1.2 * size_px, y], [0.0, 1.0], size_px, ink, shell);
         }
+        placing.back(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
     }
 
     /// Keeps words off the vehicles that have names.

@@ -218,6 +218,20 @@ impl Scene {
         Ok(Self::seen_by(camera, footage, stage, moment, view))
     }
 
+    /// A picture of nothing.
+    #[must_use]
+    pub fn blank(size_px: [u32; 2]) -> Self {
+        Self {
+            camera: Camera::framing(&CameraSpec::Iso, &[], size_px),
+            depth_m: [0.1, 1.0],
+            background: Theme::Dark.background(),
+            balls: Vec::new(),
+            shells: Vec::new(),
+            lines: Vec::new(),
+            marks: Vec::new(),
+        }
+    }
+
     /// The draw list of a flight at a moment, seen by a camera whose size of picture is that of the view.
     #[must_use]
     pub fn seen_by(camera: Camera, footage: &Footage, stage: &Stage, moment: &Moment, view: &View) -> Self {

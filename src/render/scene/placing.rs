@@ -63,6 +63,22 @@ impl<'a> Placing<'a> {
         room
     }
 
+    /// How many marks there are, and how many places are taken.
+    pub(super) fn placed(&self) -> (usize, usize) {
+        (self.marks.len(), self.taken.len())
+    }
+
+    /// Puts a box behind every mark from `mark` on that surrounds all places taken from `taken` on.
+    pub(super) fn back(&mut self, taken: usize, mark: usize, colour: Colour, room_px: f32) {
+        let Some((first, rest)) = self.taken[taken..].split_first() else { return };
+        let around = rest.iter().fold(*first, |a, b| {
+            [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
+        });
+        let [left, top, right, bottom] = around;
+        let corners_px = [[left - room_px, top - room_px], [right + room_px, bottom + room_px]];
+        self.marks.insert(mark, Mark::Box { corners_px, colour, round_px: room_px });
+    }
+
     fn has_room(&self, [left, top, right, bottom]: [f32; 4]) -> bool {
         let inside = left >= 0.0 && top >= 0.0 && right <= self.size_px[0] && bottom <= self.size_px[1];
         let clear = |taken: &[f32; 4]| right <= taken[0] || taken[2] <= left || bottom <= taken[1] || taken[3] <= top;

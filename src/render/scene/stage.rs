@@ -1,5 +1,7 @@
 //! What does not change from one moment of a flight to the next.
 
+use std::sync::{Mutex, PoisonError};
+
 use nalgebra::Vector3;
 
 use super::{Camera, CameraError, CameraSpec, Lens, Orbit, View};
@@ -18,12 +20,17 @@ const FOLLOWED_RADII: f64 = 20.0;
 /// How far around the closest pair one sees, in units of its distance.
 const CLOSEST_DISTANCES: f64 = 1.1;
 
+/// Room around the ground for its scale, in distances of its lines.
+const SCALE_ROOM: f64 = 0.6;
+
 /// Extent of a flight, the frame it is drawn in, and its ground.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Stage {
     origin_m: Vector3<f64>,
-    /// Places of vehicles over the flight with the radius that must be seen around them.
+    /// Places of vehicles over the flight with the radius that must be seen around them, and corners of the ground.
     places: Vec<(Vector3<f64>, f64)>,
+    /// The framing asked for last: it is the same for all pictures of a film.
+    framed: Mutex<Option<(CameraSpec, Camera)>>,
     /// Corners of the ground, in the scene's frame \[m\].
     pub(super) ground_m: [Vector3<f64>; 2],
     /// Distance of its lines \[m\].
@@ -82,9 +89,14 @@ impl Stage {
                 z,
             ),
         ];
+        for x in [ground_m[0].x - SCALE_ROOM * grid_m, ground_m[1].x + SCALE_ROOM * grid_m] {
+            for y in [ground_m[0].y - SCALE_ROOM * grid_m, ground_m[1].y + SCALE_ROOM * grid_m] {
+                places.push((Vector3::new(x, y, z), 0.0));
+            }
+        }
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
-        Self { origin_m, places, ground_m, grid_m, reach }
+        Self { origin_m, places, framed: Mutex::new(None), ground_m, grid_m, reach }
     }
 
     /// Where the origin of the scene's frame is in the recording's \[m\].
@@ -104,7 +116,7 @@ impl Stage {
     /// # Errors
     /// [`CameraError`] when it follows a vehicle that the flight does not have.
     pub fn camera(&self, footage: &Footage, moment: &Moment, view: &View) -> Result<Camera, CameraError> {
-        let framing = |spec: &CameraSpec| Camera::framing(spec, &self.places, view.size_px);
+        let framing = |spec| self.framing(spec, view.size_px);
         Ok(match &view.camera {
             CameraSpec::Orbit(orbit) => Camera::orbiting(*orbit, Vector3::zeros(), view.size_px),
             CameraSpec::Follow(name) => {
@@ -136,6 +148,18 @@ impl Stage {
         })
     }
 
+    fn framing(&self, spec: &CameraSpec, size_px: [u32; 2]) -> Camera {
+        let mut framed = self.framed.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*framed {
+            Some((known, camera)) if known == spec && camera.size_px == size_px => *camera,
+            _ => {
+                let camera = Camera::framing(spec, &self.places, size_px);
+                *framed = Some((spec.clone(), camera));
+                camera
+            }
+        }
+    }
+
     fn find(&self, footage: &Footage, name: &str) -> Result<usize, CameraError> {
         footage.vehicles.iter().position(|vehicle| vehicle == name).ok_or_else(|| {
             let mut vehicles = footage.vehicles.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
@@ -149,7 +173,7 @@ impl Stage {
     /// The orbit and the target \[m\] of a camera that frames the flight: where a person begins to look around.
     #[must_use]
     pub fn orbit(&self, spec: &CameraSpec, size_px: [u32; 2]) -> (Orbit, Vector3<f64>) {
-        let camera = Camera::framing(spec, &self.places, size_px);
+        let camera = self.framing(spec, size_px);
         let back = camera.back;
         let distance_m = match camera.lens {
             Lens::Perspective(_) => back.dot(&camera.eye_m).max(self.grid_m),
