@@ -188,7 +188,14 @@ fn crossing() -> Footage {
         }
         let separation = Some(ClosestApproach { pair: Pair::new(0, 2), separation_m: 3.0 - 0.4 * time_s, time_s });
         let control = Rows::zeros(5);
-        footage.take(&Sample { time_s, step: u64::from(k), swarm: &swarm, control: &control, separation, energy: None });
+        footage.take(&Sample {
+            time_s,
+            step: u64::from(k),
+            swarm: &swarm,
+            control: &control,
+            separation,
+            energy: None,
+        });
     }
     footage.note(&Event::ViolationBegan { pair: Pair::new(0, 2), time_s: 2.0 });
     footage.note(&Event::ViolationEnded { pair: Pair::new(0, 2), time_s: 3.0, min_m: 1.8 });

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use super::Failure;
-use crate::render::{AdapterChoice, CameraError, FilmError, Footage, FootageError, GpuError, PictureError, ShootError, Theme};
+use crate::render::{
+    AdapterChoice, CameraError, FilmError, Footage, FootageError, GpuError, PictureError, ShootError, Theme,
+};
 
 /// The names of the themes.
 pub(super) fn theme(name: &str) -> Result<Theme, String> {
@@ -42,9 +44,10 @@ impl From<FootageError> for Failure {
     fn from(error: FootageError) -> Self {
         match error {
             FootageError::Record(error) => error.into(),
-            FootageError::Empty { .. } => {
-                Self::input(error.to_string(), "give a recording that holds at least one sample, such as a run's run.mcap")
-            }
+            FootageError::Empty { .. } => Self::input(
+                error.to_string(),
+                "give a recording that holds at least one sample, such as a run's run.mcap",
+            ),
         }
     }
 }
@@ -54,9 +57,10 @@ impl From<GpuError> for Failure {
         let message = error.to_string();
         match error {
             GpuError::NoAdapter => Self::machine(message).with_help(GpuError::HELP),
-            GpuError::NoSuchAdapter { .. } => {
-                Self::input(message, "give hardware, software or a part of the name of an adapter that there is with --adapter")
-            }
+            GpuError::NoSuchAdapter { .. } => Self::input(
+                message,
+                "give hardware, software or a part of the name of an adapter that there is with --adapter",
+            ),
             GpuError::Size { .. } => Self::input(message, "give another size with --size"),
             GpuError::Unusable { .. } | GpuError::Driver { .. } | GpuError::Lost => {
                 Self::machine(message).with_help("try a smaller picture, or another driver with --adapter software")
@@ -89,7 +93,9 @@ impl From<FilmError> for Failure {
     fn from(error: FilmError) -> Self {
         let message = error.to_string();
         match error {
-            FilmError::UnknownFormat(_) => Self::input(message, "name the film something.mp4, something.gif or something.png"),
+            FilmError::UnknownFormat(_) => {
+                Self::input(message, "name the film something.mp4, something.gif or something.png")
+            }
             FilmError::Rate { .. } => Self::input(message, "give another rate with --fps"),
             FilmError::Size { .. } => Self::input(message, "give another size with --size, or another format"),
             FilmError::Mixed | FilmError::Picture(_) | FilmError::Encoder { .. } => Self::machine(message),

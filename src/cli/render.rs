@@ -95,8 +95,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let stills = stills(arguments, &footage, &folder)?;
     let frames = film.map(|_| film_times(arguments, &footage)).transpose()?.unwrap_or_default();
     let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &footage)).transpose()?;
-    let view =
-        View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
+    let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
     let mut reel = film.map(|(_, format)| Film::new(format, view.size_px, arguments.fps)).transpose()?;
     // Targets are tried before the work.
     if !stills.is_empty() || sheet.is_some() {
@@ -239,10 +238,12 @@ fn stills(arguments: &RenderArguments, footage: &Footage, folder: &Path) -> Resu
     }
     if let Some(every_s) = arguments.every {
         let times = even_times(footage, every_s, "--every")?;
-        stills.extend(times.into_iter().enumerate().map(|(k, time_s)| Still {
-            time_s,
-            path: folder.join(format!("frame-{:05}.png", k + 1)),
-        }));
+        stills.extend(
+            times
+                .into_iter()
+                .enumerate()
+                .map(|(k, time_s)| Still { time_s, path: folder.join(format!("frame-{:05}.png", k + 1)) }),
+        );
     }
     Ok(stills)
 }

@@ -65,9 +65,7 @@ mod viewer {
 
     use super::super::{Failure, console::Console, drawing};
     use super::{Picture, Watched};
-    use crate::render::{
-        Footage, Renderer, ShootError, Snapshot, Theme, View, snapshot_names, snapshots_of_run,
-    };
+    use crate::render::{Footage, Renderer, ShootError, Snapshot, Theme, View, snapshot_names, snapshots_of_run};
     use crate::report::write_atomically;
     use crate::scenario::Scenario;
 

@@ -114,9 +114,8 @@ impl From<WindowError> for Failure {
     fn from(error: WindowError) -> Self {
         let message = error.to_string();
         match error {
-            WindowError::NoDisplay(_) => Self::machine(message).with_help(
-                "run it on a machine with a screen, or draw without one: tautline render RECORDING",
-            ),
+            WindowError::NoDisplay(_) => Self::machine(message)
+                .with_help("run it on a machine with a screen, or draw without one: tautline render RECORDING"),
             WindowError::Refused(_) => Self::machine(message),
             WindowError::Gpu(error) => error.into(),
         }

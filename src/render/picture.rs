@@ -109,12 +109,10 @@ mod tests {
         let colours = [[1, 0, 0, 255], [2, 0, 0, 255], [3, 0, 0, 255]];
         let sheet = contact_sheet(&colours.map(|colour| plain([4, 2], colour)), 2).expect("a sheet");
         assert_eq!(sheet.size_px, [8, 4]);
-        assert_eq!([[0, 0], [4, 1], [3, 2], [7, 3]].map(|[x, y]| sheet.pixel(x, y).map(|pixel| pixel[0])), [
-            Some(1),
-            Some(2),
-            Some(3),
-            Some(1)
-        ]);
+        assert_eq!(
+            [[0, 0], [4, 1], [3, 2], [7, 3]].map(|[x, y]| sheet.pixel(x, y).map(|pixel| pixel[0])),
+            [Some(1), Some(2), Some(3), Some(1)]
+        );
         assert_eq!(sheet.pixel(8, 0), None);
         assert!(contact_sheet(&[], 2).is_err());
         assert!(contact_sheet(&[plain([1, 1], [0; 4]), plain([2, 1], [0; 4])], 2).is_err());

@@ -22,8 +22,7 @@ pub struct Snapshot {
 /// What is worth a picture: name, description, time \[s\] and camera.
 fn occasions(footage: &Footage) -> Vec<(String, String, f64, CameraSpec)> {
     let [start_s, end_s] = footage.range_s();
-    let mut occasions =
-        vec![("start".to_owned(), format!("The start, at {start_s:.2} s."), start_s, CameraSpec::Iso)];
+    let mut occasions = vec![("start".to_owned(), format!("The start, at {start_s:.2} s."), start_s, CameraSpec::Iso)];
     if let Some(closest) = footage.closest() {
         let description = format!(
             "The closest approach of the flight: vehicles {} at {:.2} s, {:.3} m apart.",
@@ -53,11 +52,7 @@ pub fn snapshot_names() -> Vec<String> {
 ///
 /// # Errors
 /// [`ShootError`] when the adapter fails.
-pub fn snapshots_of_run(
-    renderer: &mut Renderer,
-    footage: &Footage,
-    view: &View,
-) -> Result<Vec<Snapshot>, ShootError> {
+pub fn snapshots_of_run(renderer: &mut Renderer, footage: &Footage, view: &View) -> Result<Vec<Snapshot>, ShootError> {
     let stage = Stage::of(footage);
     let mut snapshots = Vec::new();
     for (name, description, time_s, camera) in occasions(footage) {

@@ -45,8 +45,9 @@ impl Footage {
             courses[item.vehicle()].take(item);
         }
         let mut footage = Self { delta_m, ..Self::new(name, courses.len()) };
-        footage.vehicles =
-            (0..courses.len()).map(|k| tracks.vehicles().get(k).cloned().unwrap_or_else(|| format!("{}", k + 1))).collect();
+        footage.vehicles = (0..courses.len())
+            .map(|k| tracks.vehicles().get(k).cloned().unwrap_or_else(|| format!("{}", k + 1)))
+            .collect();
         footage.radius_m = courses.iter().map(|course| course.radius_m.unwrap_or(UNKNOWN_RADIUS_M)).collect();
         let mut places = vec![0; courses.len()];
         for time_s in common_times(&courses) {
@@ -60,8 +61,8 @@ impl Footage {
     }
 
     fn see(&mut self, time_s: f64, positions_m: Rows) {
-        let here = nearest_present(&positions_m)
-            .map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s });
+        let here =
+            nearest_present(&positions_m).map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s });
         let inside = here.filter(|here| self.delta_m.is_some_and(|delta_m| here.separation_m < delta_m));
         match (self.spans.last_mut().filter(|span| span.to_s.is_infinite()), inside) {
             (Some(span), Some(here)) if span.pair == here.pair => {}

@@ -57,7 +57,9 @@ pub enum GpuError {
         reason: String,
     },
     /// A picture of this size cannot be drawn.
-    #[error("a picture of {width} x {height} pixels cannot be drawn: {adapter} draws from 1 to {largest} pixels a side")]
+    #[error(
+        "a picture of {width} x {height} pixels cannot be drawn: {adapter} draws from 1 to {largest} pixels a side"
+    )]
     Size {
         /// Width asked for.
         width: u32,
@@ -81,7 +83,8 @@ pub enum GpuError {
 
 impl GpuError {
     /// What helps where there is no adapter.
-    pub const HELP: &'static str = "install a driver; one in software is in Debian's packages: apt-get install mesa-vulkan-drivers libvulkan1";
+    pub const HELP: &'static str =
+        "install a driver; one in software is in Debian's packages: apt-get install mesa-vulkan-drivers libvulkan1";
 }
 
 /// An adapter at work.
@@ -116,8 +119,7 @@ impl Gpu {
         choice: &AdapterChoice,
     ) -> Result<(Self, wgpu::SurfaceCapabilities), GpuError> {
         let mut found = Vec::new();
-        let adapter =
-            pick(instance, choice, Some(surface), &mut found).ok_or_else(|| not_found(choice, &found))?;
+        let adapter = pick(instance, choice, Some(surface), &mut found).ok_or_else(|| not_found(choice, &found))?;
         let capabilities = surface.get_capabilities(&adapter);
         Ok((Self::start(adapter)?, capabilities))
     }

@@ -18,18 +18,17 @@ pub(super) struct Overlay {
 impl Overlay {
     pub(super) fn new(device: &wgpu::Device) -> Self {
         let context = egui::Context::default();
-        let renderer =
-            |format| egui_wgpu::Renderer::new(device, format, egui_wgpu::RendererOptions { dithering: false, ..egui_wgpu::RendererOptions::PREDICTABLE });
+        let renderer = |format| {
+            egui_wgpu::Renderer::new(
+                device,
+                format,
+                egui_wgpu::RendererOptions { dithering: false, ..egui_wgpu::RendererOptions::PREDICTABLE },
+            )
+        };
         Self { context, renderers: [WORDS_FORMAT, LIGHT_FORMAT].map(renderer) }
     }
 
-    pub(super) fn draw(
-        &mut self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
-        marks: &[Mark],
-    ) {
+    pub(super) fn draw(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, target: &Target, marks: &[Mark]) {
         let [width, height] = target.size_px;
         let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(width as f32, height as f32));
         let input = egui::RawInput {
@@ -90,10 +89,8 @@ pub(crate) fn paint(painter: &egui::Painter, marks: &[Mark], origin: Vec2, pixel
                 let galley = painter.layout_no_wrap(text.clone(), font, colour32(*colour));
                 let place = at(*at_px) - Vec2::new(anchor[0], anchor[1]) * galley.size();
                 // Whole pixels keep letters sharp.
-                let place = pos2(
-                    (place.x * pixels_per_point).round() * scale,
-                    (place.y * pixels_per_point).round() * scale,
-                );
+                let place =
+                    pos2((place.x * pixels_per_point).round() * scale, (place.y * pixels_per_point).round() * scale);
                 painter.galley(place, galley, colour32(*colour));
             }
             Mark::Box { corners_px, colour, round_px } => {

@@ -151,10 +151,14 @@ impl Pipelines {
                 source: wgpu::ShaderSource::Wgsl(source.into()),
             })
         };
-        let ball_shader =
-            shader("ball", concat!(include_str!("../../../shaders/frame.wgsl"), include_str!("../../../shaders/ball.wgsl")));
-        let line_shader =
-            shader("line", concat!(include_str!("../../../shaders/frame.wgsl"), include_str!("../../../shaders/line.wgsl")));
+        let ball_shader = shader(
+            "ball",
+            concat!(include_str!("../../../shaders/frame.wgsl"), include_str!("../../../shaders/ball.wgsl")),
+        );
+        let line_shader = shader(
+            "line",
+            concat!(include_str!("../../../shaders/frame.wgsl"), include_str!("../../../shaders/line.wgsl")),
+        );
         let ball_attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Unorm8x4];
         let line_attributes =
             wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Unorm8x4, 4 => Float32];

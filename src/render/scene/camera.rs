@@ -102,11 +102,7 @@ impl FromStr for CameraSpec {
         if !(MIN_DISTANCE_M..=1e9).contains(distance_m) {
             return range("a distance that is not between 0.001 and 1e9 m");
         }
-        Ok(Self::Orbit(Orbit {
-            azimuth_deg: *azimuth_deg,
-            elevation_deg: *elevation_deg,
-            distance_m: *distance_m,
-        }))
+        Ok(Self::Orbit(Orbit { azimuth_deg: *azimuth_deg, elevation_deg: *elevation_deg, distance_m: *distance_m }))
     }
 }
 
@@ -169,8 +165,7 @@ impl Camera {
             let (x, y, ahead) = (right.dot(centre), up.dot(centre), -back.dot(centre));
             for (side, offset) in [-x, x, -y, y].into_iter().enumerate() {
                 let slope = slopes[side];
-                let reach =
-                    if parallel { offset + radius } else { offset + radius * slope.hypot(1.0) - ahead * slope };
+                let reach = if parallel { offset + radius } else { offset + radius * slope.hypot(1.0) - ahead * slope };
                 reaches[side] = reaches[side].max(reach);
             }
         }
@@ -180,8 +175,7 @@ impl Camera {
         let need = |low: usize, high: usize| (reaches[low] + reaches[high]) / (slopes[low] + slopes[high]);
         let distance_m = need(0, 1).max(need(2, 3)).max(MIN_DISTANCE_M);
         let middle = |low: usize, high: usize| {
-            let (least, most) =
-                (reaches[high] - slopes[high] * distance_m, slopes[low] * distance_m - reaches[low]);
+            let (least, most) = (reaches[high] - slopes[high] * distance_m, slopes[low] * distance_m - reaches[low]);
             f64::midpoint(least, most)
         };
         let behind = if parallel { far_behind(back, balls) } else { distance_m };
@@ -258,8 +252,7 @@ impl Camera {
 
 /// Right, up and back of a camera in this direction from its target.
 fn axes(azimuth_deg: f64, elevation_deg: f64) -> [Vector3<f64>; 3] {
-    let ((sin_a, cos_a), (sin_e, cos_e)) =
-        (azimuth_deg.to_radians().sin_cos(), elevation_deg.to_radians().sin_cos());
+    let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth_deg.to_radians().sin_cos(), elevation_deg.to_radians().sin_cos());
     let back = Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e);
     let right = Vector3::new(-sin_a, cos_a, 0.0);
     [right, back.cross(&right), back]

@@ -101,8 +101,7 @@ impl Painting<'_> {
         if self.footage.delta_m.is_none() {
             return ("not judged: no delta".to_owned(), theme.soft_ink());
         }
-        let began: Vec<_> =
-            self.footage.violations().iter().filter(|span| span.from_s <= self.moment.time_s).collect();
+        let began: Vec<_> = self.footage.violations().iter().filter(|span| span.from_s <= self.moment.time_s).collect();
         match began.first() {
             None => ("clear so far".to_owned(), theme.good()),
             Some(span) => {
@@ -188,7 +187,8 @@ impl Painting<'_> {
         for k in 0..self.footage.count() {
             if let Some(at) = self.vehicle(k).and_then(|place| self.camera.project(place)) {
                 #[expect(clippy::cast_possible_truncation, reason = "pixels")]
-                let [x, y, radius] = [at.at_px[0], at.at_px[1], self.footage.radius_m[k] * at.px_per_m].map(|v| v as f32);
+                let [x, y, radius] =
+                    [at.at_px[0], at.at_px[1], self.footage.radius_m[k] * at.px_per_m].map(|v| v as f32);
                 placing.take([[x - radius, y - radius], [x + radius, y + radius]]);
             }
         }

@@ -57,7 +57,9 @@ impl Painting<'_> {
         for axis in 0..2 {
             let other = 1 - axis;
             // Edge-on there is no edge to write along.
-            if self.camera.back[axis].abs() > 0.97 || self.camera.back.z.abs() < 0.05 && axis == 1 && self.camera.back.y.abs() > 0.5 {
+            if self.camera.back[axis].abs() > 0.97
+                || self.camera.back.z.abs() < 0.05 && axis == 1 && self.camera.back.y.abs() > 0.5
+            {
                 continue;
             }
             let edge = [low[other], high[other]].into_iter().max_by(|&a, &b| {
@@ -106,9 +108,10 @@ mod tests {
 
     #[test]
     fn the_scale_shows_round_numbers() {
-        assert_eq!([(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| plain(at, step)), [
-            "0", "4", "0.30", "-15"
-        ]);
+        assert_eq!(
+            [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| plain(at, step)),
+            ["0", "4", "0.30", "-15"]
+        );
         assert_eq!(lines(f64::INFINITY, 1.0), MOST_LINES);
     }
 }

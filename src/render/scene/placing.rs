@@ -71,9 +71,7 @@ impl<'a> Placing<'a> {
     /// Puts a box behind every mark from `mark` on that surrounds all places taken from `taken` on.
     pub(super) fn back(&mut self, taken: usize, mark: usize, colour: Colour, room_px: f32) {
         let Some((first, rest)) = self.taken[taken..].split_first() else { return };
-        let around = rest.iter().fold(*first, |a, b| {
-            [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
-        });
+        let around = rest.iter().fold(*first, |a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]);
         let [left, top, right, bottom] = around;
         let corners_px = [[left - room_px, top - room_px], [right + room_px, bottom + room_px]];
         self.marks.insert(mark, Mark::Box { corners_px, colour, round_px: room_px });

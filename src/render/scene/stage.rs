@@ -131,8 +131,7 @@ impl Stage {
             }
             CameraSpec::Closest => {
                 let pair = moment.nearest.map(|(pair, distance_m)| {
-                    let [first, second] =
-                        [pair.first(), pair.second()].map(|k| self.place(&moment.positions_m, k));
+                    let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&moment.positions_m, k));
                     (first, second, distance_m)
                 });
                 match pair {

@@ -17,7 +17,14 @@ fn footage() -> Footage {
         swarm.positions_m.column_mut(0).add_scalar_mut(time_s);
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 3.0 - 0.1 * time_s, time_s });
         let control = Rows::zeros(4);
-        footage.take(&Sample { time_s, step: u64::from(k), swarm: &swarm, control: &control, separation, energy: None });
+        footage.take(&Sample {
+            time_s,
+            step: u64::from(k),
+            swarm: &swarm,
+            control: &control,
+            separation,
+            energy: None,
+        });
     }
     footage.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 4.0 });
     footage.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: 6.0, min_m: 1.5 });
@@ -31,7 +38,12 @@ fn scene(footage: &Footage, time_s: f64, view: &View) -> Scene {
 
 fn words(scene: &Scene) -> Vec<&str> {
     let text = |mark: &'_ Mark| matches!(mark, Mark::Words { .. });
-    scene.marks.iter().filter(|mark| text(mark)).map(|mark| if let Mark::Words { text, .. } = mark { text } else { "" }).collect()
+    scene
+        .marks
+        .iter()
+        .filter(|mark| text(mark))
+        .map(|mark| if let Mark::Words { text, .. } = mark { text } else { "" })
+        .collect()
 }
 
 fn camera(text: &str) -> View {
@@ -154,10 +166,24 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
     }
     let mut alone = Footage::new("alone", 1);
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[f64::NAN, 0.0, 0.0]));
-    alone.take(&Sample { time_s: 0.0, step: 0, swarm: &swarm, control: &Rows::zeros(1), separation: None, energy: None });
+    alone.take(&Sample {
+        time_s: 0.0,
+        step: 0,
+        swarm: &swarm,
+        control: &Rows::zeros(1),
+        separation: None,
+        energy: None,
+    });
     assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
     let far = Swarm::at_rest(Rows::from_row_slice(&[5e6, 4e6, 100.0]));
     let mut far_away = Footage::new("far", 1);
-    far_away.take(&Sample { time_s: 0.0, step: 0, swarm: &far, control: &Rows::zeros(1), separation: None, energy: None });
+    far_away.take(&Sample {
+        time_s: 0.0,
+        step: 0,
+        swarm: &far,
+        control: &Rows::zeros(1),
+        separation: None,
+        energy: None,
+    });
     assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
 }

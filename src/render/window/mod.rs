@@ -181,12 +181,8 @@ impl Shell {
         if self.desk.framed {
             self.desk.frame(&open.stage, open.picture_px);
         }
-        let view = View {
-            theme: self.desk.theme,
-            size_px: open.picture_px,
-            layers: self.desk.layers,
-            ..View::default()
-        };
+        let view =
+            View { theme: self.desk.theme, size_px: open.picture_px, layers: self.desk.layers, ..View::default() };
         let moment = self.player.footage.at(self.player.time_s);
         let scene = moment.as_ref().map(|moment| {
             let camera = Camera::orbiting(self.desk.orbit, self.desk.target_m, view.size_px);
@@ -240,7 +236,8 @@ impl Open {
         player: &Player,
     ) -> Result<Self, WindowError> {
         let size = window.inner_size();
-        let unusable = || GpuError::Unusable { adapter: gpu.name.clone(), reason: "it cannot draw on windows".to_owned() };
+        let unusable =
+            || GpuError::Unusable { adapter: gpu.name.clone(), reason: "it cannot draw on windows".to_owned() };
         let mut configuration = surface_configuration(capabilities).ok_or_else(unusable)?;
         [configuration.width, configuration.height] =
             [size.width, size.height].map(|side| side.clamp(1, gpu.largest_px));
