@@ -19,7 +19,7 @@ const LISTED: usize = 8;
 const PLOT_POINTS: usize = 600;
 
 /// Keys and what they do, for the help.
-const HELP: [(&str, &str); 13] = [
+const HELP: [(&str, &str); 14] = [
     ("Space", "play, pause"),
     ("Left, Right", "a sample back, on"),
     ("Home, End", "to the start, to the end"),
@@ -28,9 +28,10 @@ const HELP: [(&str, &str); 13] = [
     ("drag, W A S D", "turn the camera"),
     ("right drag", "move the camera"),
     ("wheel, Page Up, Page Down", "nearer, farther"),
-    ("click, Tab", "pick a vehicle, the next one"),
+    ("click, V", "pick a vehicle, the next one"),
     ("F, T", "frame everything, change colours"),
     ("1 to 8", "shells, edges, trails, marks, ground, names, closest pair, caption"),
+    ("Tab", "to the next button"),
     ("P", "write a picture beside you"),
     ("H, Q", "this help, quit"),
 ];
@@ -114,10 +115,14 @@ impl Desk {
     }
 
     pub(super) fn keys(&mut self, context: &egui::Context, player: &mut Player) -> Wishes {
-        // A field being typed into has its keys to itself.
-        if context.egui_wants_keyboard_input() {
+        // A field being typed into has its keys to itself; any other field in focus has those that work it.
+        let focus = context.memory(egui::Memory::focused);
+        if focus.is_some_and(|id| egui::text_edit::TextEditState::load(context, id).is_some()) {
             return Wishes::default();
         }
+        let works_it = |key: Key| {
+            matches!(key, Key::Space | Key::Enter | Key::ArrowLeft | Key::ArrowRight | Key::Escape) && focus.is_some()
+        };
         let pressed: Vec<Key> = context.input(|input| {
             let pressed = |event: &egui::Event| match event {
                 egui::Event::Key { key, pressed: true, modifiers, .. } if !modifiers.command => Some(*key),
@@ -126,7 +131,7 @@ impl Desk {
             input.events.iter().filter_map(pressed).collect()
         });
         let mut wishes = Wishes::default();
-        for key in pressed {
+        for key in pressed.into_iter().filter(|&key| !works_it(key)) {
             match key {
                 Key::Space => player.toggle(),
                 Key::ArrowLeft => player.step(-1),
@@ -147,7 +152,7 @@ impl Desk {
                 Key::S => self.turn(0.0, -KEY_TURN_DEG),
                 Key::PageUp => self.approach(0.9),
                 Key::PageDown => self.approach(1.0 / 0.9),
-                Key::Tab => {
+                Key::V => {
                     let next = self.picked.map_or(0, |picked| picked + 1);
                     self.picked = (next < player.footage.count()).then_some(next);
                 }
