@@ -31,7 +31,14 @@ fn footage(count: usize) -> Footage {
             set_row(&mut swarm.positions_m, vehicle, place + Vector3::new(0.2 * wave, 0.0, 1.0 + wave));
         }
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 2.8, time_s });
-        footage.take(&Sample { time_s, step: u64::from(k), swarm: &swarm, control: &control, separation, energy: None });
+        footage.take(&Sample {
+            time_s,
+            step: u64::from(k),
+            swarm: &swarm,
+            control: &control,
+            separation,
+            energy: None,
+        });
     }
     footage
 }

@@ -37,6 +37,7 @@
 pub mod audit;
 #[cfg(feature = "program")]
 pub mod cli;
+pub mod export;
 pub mod figures;
 pub mod formation;
 pub mod graph;
@@ -44,6 +45,7 @@ pub mod law;
 pub mod metrics;
 pub mod plant;
 pub mod preflight;
+pub mod read;
 pub mod record;
 #[cfg(feature = "viewer")]
 pub mod render;

@@ -6,7 +6,9 @@ use std::io::Write as _;
 use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
 
 use super::Exit;
+use crate::export::ExportError;
 use crate::law::ParameterError;
+use crate::read::ReadError;
 use crate::record::RecordError;
 use crate::report::ArtefactError;
 use crate::scenario::ScenarioError;
@@ -136,6 +138,20 @@ impl From<RecordError> for Failure {
 impl From<ArtefactError> for Failure {
     fn from(error: ArtefactError) -> Self {
         Self::machine(error.to_string()).with_help("free some space or give another folder with --out")
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
+        Self::plain(exit, harmless(&error.to_string())).with_help(error.help())
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
+        Self::plain(exit, harmless(&error.to_string())).with_help(error.help())
     }
 }
 

@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use super::Failure;
+use crate::read::{self, ReadOptions};
+use crate::record::mcap::McapRecording;
 use crate::render::{
     AdapterChoice, CameraError, FilmError, Footage, FootageError, GpuError, PictureError, ShootError, Theme,
 };
@@ -35,9 +37,32 @@ pub(super) fn adapter(text: &str) -> AdapterChoice {
     text.parse().unwrap_or_default()
 }
 
-/// Opens a recording to draw it.
-pub(super) fn footage(recording: &Path) -> Result<Footage, Failure> {
-    Ok(Footage::read_mcap(recording)?)
+/// Reads a recording to draw it, and what a person should know about how it was read. `delta_m` is for recordings that
+/// do not say what they are judged by.
+pub(super) fn footage(
+    recording: &Path,
+    reading: &ReadOptions,
+    delta_m: Option<f64>,
+) -> Result<(Footage, Vec<String>), Failure> {
+    if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && delta_m.is_finite())) {
+        return Err(Failure::input(format!("--delta is {delta_m}"), "give a positive distance in metres"));
+    }
+    // Our own recordings know formation, graph and law too.
+    let (mut footage, notes) = if McapRecording::open(recording).is_ok() {
+        (Footage::read_mcap(recording)?, Vec::new())
+    } else {
+        let mut tracks = read::open(recording, reading)?;
+        let name = recording.file_stem().unwrap_or_default().to_string_lossy();
+        let footage = Footage::from_tracks(&name, tracks.as_mut(), delta_m)?;
+        (footage, tracks.notes().to_vec())
+    };
+    if footage.instants() == 0 {
+        return Err(FootageError::Empty { name: recording.display().to_string() }.into());
+    }
+    if let Some(delta_m) = delta_m {
+        footage.delta_m = Some(delta_m);
+    }
+    Ok((footage, notes))
 }
 
 impl From<FootageError> for Failure {

@@ -9,8 +9,10 @@ mod console;
 mod diagnostic;
 #[cfg(feature = "viewer")]
 mod drawing;
+mod export;
 mod list;
 mod pictures;
+mod reading;
 #[cfg(feature = "viewer")]
 mod render;
 mod run;
@@ -63,6 +65,8 @@ enum Command {
     Run(run::RunArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),
+    /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
+    Export(export::ExportArguments),
     /// Draw a recording: pictures, films and contact sheets, without a screen.
     #[cfg(feature = "viewer")]
     Render(render::RenderArguments),
@@ -92,6 +96,7 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::check(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),
         #[cfg(feature = "viewer")]

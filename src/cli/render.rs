@@ -9,6 +9,7 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use super::console::Console;
 use super::drawing;
+use super::reading::{FormatArgument, ReadArguments};
 use super::{Exit, Failure};
 use crate::render::scene::Stage;
 use crate::render::{
@@ -26,8 +27,14 @@ const WAITING_BYTES: usize = 256 << 20;
 /// Arguments of `tautline render`.
 #[derive(Debug, Args)]
 pub(super) struct RenderArguments {
-    /// A recording, such as the run.mcap of a run.
-    recording: PathBuf,
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Format of the recording [default: recognised by its content].
+    #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
+    input_format: Option<FormatArgument>,
+    /// Safety distance for a recording that has none: shells of half of it, and violations at the times drawn [m].
+    #[arg(long, value_name = "M")]
+    delta: Option<f64>,
     /// Times to picture: start, closest, end, or seconds; several with commas. By default start,closest,end, unless
     /// something else is asked for.
     #[arg(long, value_name = "TIMES", value_delimiter = ',')]
@@ -87,11 +94,16 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: false, quiet: arguments.quiet };
     let camera: CameraSpec = arguments.camera.parse()?;
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
-    let footage = drawing::footage(&arguments.recording)?;
+    let reading = arguments.reading.options(arguments.input_format)?;
+    let recording = &arguments.reading.recording;
+    let (footage, notes) = drawing::footage(recording, &reading, arguments.delta)?;
+    for note in notes {
+        console.warn(&format!("note: {note}"));
+    }
     if footage.every() > 1 {
         console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", footage.every()));
     }
-    let folder = arguments.out.clone().unwrap_or_else(|| beside(&arguments.recording));
+    let folder = arguments.out.clone().unwrap_or_else(|| beside(recording));
     let stills = stills(arguments, &footage, &folder)?;
     let frames = film.map(|_| film_times(arguments, &footage)).transpose()?.unwrap_or_default();
     let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &footage)).transpose()?;

@@ -173,6 +173,10 @@ fn fly(
 ) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.recording(), &header)?;
+    #[cfg(feature = "viewer")]
+    {
+        recording = recording.with(Box::new(crate::render::FoxgloveScene::of(scenario)))?;
+    }
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
     let mut state_hash = StateHash::new();
 

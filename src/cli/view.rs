@@ -9,6 +9,7 @@ use clap::Args;
 use super::drawing;
 use super::{Exit, Failure};
 use crate::plant;
+use crate::read::ReadOptions;
 use crate::record::{Event, OwnedSample, RecordError, Recorder, Sample};
 use crate::render::{Fed, Footage, Theme, WindowError, show};
 use crate::scenario::{Override, Scenario, Source};
@@ -26,6 +27,9 @@ pub(super) struct ViewArguments {
     /// Set any key of the scenario; may be given several times.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
+    /// Safety distance for a recording that has none [m].
+    #[arg(long, value_name = "M")]
+    delta: Option<f64>,
     /// Colours: dark, light, or paper.
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
@@ -36,9 +40,9 @@ pub(super) struct ViewArguments {
 
 pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let path = Path::new(&arguments.what);
-    let is_recording = path.extension().is_some_and(|extension| extension != "toml") && path.is_file();
+    let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
     let (footage, feed) = if is_recording {
-        (drawing::footage(path)?, None)
+        (drawing::footage(path, &ReadOptions::default(), arguments.delta)?.0, None)
     } else {
         let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
         let scenario = Scenario::read(&Source::resolve(&arguments.what)?, &overrides)?;

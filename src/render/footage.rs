@@ -111,6 +111,17 @@ pub enum FootageError {
 }
 
 impl Plan {
+    /// Formation, graph and law of a scenario.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self {
+            formation: scenario.formation.clone(),
+            graph: scenario.graph.clone(),
+            law: scenario.law.clone(),
+            delta_m: scenario.delta_m,
+        }
+    }
+
     /// How hard the edge between two vehicles pulls (above 0) or pushes (below 0) at a distance \[m\], from -1 to 1.
     ///
     /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
@@ -153,12 +164,7 @@ impl Footage {
         Self {
             radius_m: scenario.hull_radius_m.clone(),
             delta_m: Some(scenario.delta_m),
-            plan: Some(Plan {
-                formation: scenario.formation.clone(),
-                graph: scenario.graph.clone(),
-                law: scenario.law.clone(),
-                delta_m: scenario.delta_m,
-            }),
+            plan: Some(Plan::of(scenario)),
             ..Self::new(&scenario.name, scenario.count())
         }
     }

@@ -17,6 +17,7 @@
 
 mod film;
 mod footage;
+mod foxglove_scene;
 pub mod gpu;
 mod picture;
 pub mod scene;
@@ -25,6 +26,7 @@ mod window;
 
 pub use film::{Film, FilmError, FilmFormat};
 pub use footage::{BUDGET_BYTES, Footage, FootageError, Moment, Plan, Span};
+pub use foxglove_scene::{FoxgloveScene, SCENE_HZ};
 pub use gpu::{AdapterChoice, GpuError, Renderer, ShootError};
 pub use picture::{Picture, PictureError, contact_sheet, data_uri};
 pub use scene::{CameraError, CameraSpec, Layers, Scene, Theme, View};

@@ -27,21 +27,31 @@ impl ArtefactError {
 /// # Errors
 /// [`ArtefactError`] when the system refuses.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
-    replace(path, bytes).map_err(|source| ArtefactError::new(path, source))
+    write_atomically_with(path, |file| file.write_all(bytes).map_err(|source| ArtefactError::new(path, source)))
 }
 
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "it names no file"))?;
+/// Like [`write_atomically`] for what is written piece by piece.
+///
+/// # Errors
+/// The error of `write`, or [`ArtefactError`] when the system refuses.
+pub fn write_atomically_with<T, E: From<ArtefactError>>(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> Result<T, E>,
+) -> Result<T, E> {
+    let error = |source| E::from(ArtefactError::new(path, source));
+    let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "it names no file"));
     let mut temporary = OsString::from(".");
-    temporary.push(name);
+    temporary.push(path.file_name().ok_or_else(no_name)?);
     // Two processes may write the same file; the later one wins, whole.
     temporary.push(format!(".{}.partial", std::process::id()));
     let temporary = path.with_file_name(temporary);
-    let written = File::create(&temporary).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()
+    let written = File::create(&temporary).map_err(error).and_then(|mut file| {
+        let written = write(&mut file)?;
+        file.sync_all().map_err(error)?;
+        Ok(written)
     });
-    written.and_then(|()| fs::rename(&temporary, path)).inspect_err(|_| {
+    let renamed = written.and_then(|written| fs::rename(&temporary, path).map(|()| written).map_err(error));
+    renamed.inspect_err(|_| {
         // The first error is the one to report.
         let _ = fs::remove_file(&temporary);
     })

@@ -11,7 +11,7 @@ pub mod page;
 mod verdict;
 mod words;
 
-pub use artefact::{ArtefactError, write_atomically};
+pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
 pub use html::RunPage;
 
 use std::path::Path;

@@ -85,7 +85,7 @@ pub trait Tracks {
     /// numbers). It may grow as the recording is read; an index keeps its meaning.
     fn vehicles(&self) -> &[String];
 
-    /// Appends the next items to `items`, some ten thousand at a time; `false` when there are none left.
+    /// Appends the next items to `items`, some ten thousand at a time; `false` when there was none to append.
     ///
     /// # Errors
     /// When the recording cannot be read further; what was appended before stays true.

@@ -23,7 +23,7 @@ const HEAD_BYTES: usize = 9;
 const FOOTER_BYTES: u64 = 20;
 
 /// The system's error or the file's fault.
-pub(super) enum Trouble {
+pub(crate) enum Trouble {
     System(io::Error),
     Fault(ReadFault),
 }
@@ -41,15 +41,15 @@ impl From<ReadFault> for Trouble {
 }
 
 /// One record: what it is and what it holds.
-pub(super) struct Record<'a> {
+pub(crate) struct Record<'a> {
     /// Where in the file it, or the chunk around it, begins \[bytes\].
-    pub(super) offset: u64,
-    pub(super) opcode: u8,
-    pub(super) body: &'a [u8],
+    pub(crate) offset: u64,
+    pub(crate) opcode: u8,
+    pub(crate) body: &'a [u8],
 }
 
 /// Reads the data section of an MCAP file record by record and goes into its chunks.
-pub(super) struct RecordReader {
+pub(crate) struct RecordReader {
     file: BufReader<File>,
     /// Whether the file ends as a closed recording does.
     complete: bool,
@@ -64,7 +64,7 @@ pub(super) struct RecordReader {
 }
 
 impl RecordReader {
-    pub(super) fn open(path: &Path) -> Result<Self, Trouble> {
+    pub(crate) fn open(path: &Path) -> Result<Self, Trouble> {
         let mut file = File::open(path)?;
         let mut magic = Vec::new();
         (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic)?;
@@ -87,13 +87,13 @@ impl RecordReader {
         })
     }
 
-    pub(super) fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.complete
     }
 
     /// The next record, chunks taken apart; `None` at the end of the data section or where a file that was not closed
     /// breaks off.
-    pub(super) fn next(&mut self) -> Result<Option<Record<'_>>, Trouble> {
+    pub(crate) fn next(&mut self) -> Result<Option<Record<'_>>, Trouble> {
         while self.chunk.is_empty() {
             let Some(opcode) = self.read_record()? else { return Ok(None) };
             match opcode {
@@ -102,7 +102,14 @@ impl RecordReader {
                     return Ok(None);
                 }
                 op::CHUNK => {
-                    self.chunk = chunk_records(&self.body).map_err(|reason| damaged(self.body_offset, reason))?;
+                    let records = chunk_records(&self.body).map_err(|reason| damaged(self.body_offset, reason))?;
+                    self.chunk = match records {
+                        Records::Plain(range) => range,
+                        Records::Unpacked(bytes) => {
+                            self.body = bytes;
+                            0..self.body.len()
+                        }
+                    };
                 }
                 _ => return Ok(Some(Record { offset: self.body_offset, opcode, body: &self.body })),
             }
@@ -177,32 +184,60 @@ fn ends_with_footer(file: &mut File) -> io::Result<bool> {
     Ok(bytes.starts_with(&expected) && bytes.ends_with(MAGIC))
 }
 
-/// Where in a chunk's content its records are, once its checksum is found right.
-fn chunk_records(body: &[u8]) -> Result<std::ops::Range<usize>, &'static str> {
+/// The records of a chunk.
+enum Records {
+    /// They stand here in its content.
+    Plain(std::ops::Range<usize>),
+    /// They were packed.
+    Unpacked(Vec<u8>),
+}
+
+/// The records in a chunk's content, once its checksum is found right.
+fn chunk_records(body: &[u8]) -> Result<Records, &'static str> {
     let mut fields = Fields(body);
     let header = (|| {
         let _message_times = (fields.u64()?, fields.u64()?);
         Some((fields.u64()?, fields.u32()?, fields.str()?, fields.u64()?))
     })();
-    let (uncompressed_bytes, crc, compression, bytes) = header.ok_or("the chunk has no header")?;
-    if !compression.is_empty() {
-        return Err("the chunk is compressed, which this program does not read (`mcap decompress` helps)");
+    let (unpacked_bytes, crc, compression, bytes) = header.ok_or("the chunk has no header")?;
+    let packed = usize::try_from(bytes).ok().and_then(|bytes| fields.0.get(..bytes));
+    let packed = packed.ok_or("the chunk is shorter than it says")?;
+    let checked = |records: &[u8]| {
+        if records.len() as u64 != unpacked_bytes {
+            return Err("the chunk is shorter than it says");
+        }
+        if crc != 0 && crc32fast::hash(records) != crc { Err("the checksum of the chunk is wrong") } else { Ok(()) }
+    };
+    if compression.is_empty() {
+        checked(packed)?;
+        let start = body.len() - fields.0.len();
+        return Ok(Records::Plain(start..start + packed.len()));
     }
-    let records = usize::try_from(bytes).ok().and_then(|bytes| fields.0.get(..bytes));
-    let records = records.filter(|_| bytes == uncompressed_bytes).ok_or("the chunk is shorter than it says")?;
-    if crc != 0 && crc32fast::hash(records) != crc {
-        return Err("the checksum of the chunk is wrong");
-    }
-    let start = body.len() - fields.0.len();
-    Ok(start..start + records.len())
+    let records = unpack(compression, packed, unpacked_bytes)?;
+    checked(&records)?;
+    Ok(Records::Unpacked(records))
 }
 
-pub(super) fn damaged(offset: u64, reason: &str) -> ReadFault {
+/// Unpacks a chunk, to no more than it says.
+fn unpack(compression: &str, packed: &[u8], unpacked_bytes: u64) -> Result<Vec<u8>, &'static str> {
+    if unpacked_bytes > RECORD_LIMIT_BYTES {
+        return Err("the chunk claims to unpack to more than any recording needs");
+    }
+    let mut records = Vec::new();
+    let read = match compression {
+        "lz4" => lz4_flex::frame::FrameDecoder::new(packed).take(unpacked_bytes).read_to_end(&mut records),
+        "zstd" => zstd::Decoder::new(packed).and_then(|zstd| zstd.take(unpacked_bytes).read_to_end(&mut records)),
+        _ => return Err("the chunk is packed by something else than lz4 and zstd (`mcap compress` changes that)"),
+    };
+    read.map(|_| records).map_err(|_| "the packed content of the chunk is wrong")
+}
+
+pub(crate) fn damaged(offset: u64, reason: &str) -> ReadFault {
     ReadFault::Damaged { offset, reason: reason.to_owned() }
 }
 
 /// Takes the fields of a record off its front; `None` where it is too short.
-pub(super) struct Fields<'a>(pub(super) &'a [u8]);
+pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Fields<'a> {
     fn head(mut self) -> Option<(u8, u64)> {
@@ -216,19 +251,19 @@ impl<'a> Fields<'a> {
         Some(*array)
     }
 
-    pub(super) fn u16(&mut self) -> Option<u16> {
+    pub(crate) fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
-    pub(super) fn u32(&mut self) -> Option<u32> {
+    pub(crate) fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
-    pub(super) fn u64(&mut self) -> Option<u64> {
+    pub(crate) fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_le_bytes)
     }
 
-    pub(super) fn str(&mut self) -> Option<&'a str> {
+    pub(crate) fn str(&mut self) -> Option<&'a str> {
         let bytes = usize::try_from(self.u32()?).ok()?;
         let (text, rest) = self.0.split_at_checked(bytes)?;
         self.0 = rest;

@@ -1,0 +1,85 @@
+//! A long table in text: `t_s,id,x,y,z`, and where they are known `vx,vy,vz` and `radius`.
+//!
+//! Numbers are written with as few digits as give the same bits again.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+
+use super::{About, ExportError, Source};
+
+/// From here on a reader counts times from an epoch again \[s\].
+const EPOCH_FROM_S: i64 = 1_000_000;
+
+pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<Option<String>, ExportError> {
+    let names = about.names.iter().map(|name| quoted(name)).collect::<Result<Vec<_>, _>>()?;
+    let (epoch_s, rest_ns) = (about.clock.epoch_ns / 1_000_000_000, about.clock.epoch_ns % 1_000_000_000);
+    let absolute = epoch_s >= EPOCH_FROM_S && rest_ns == 0;
+    let epoch_s = if absolute { epoch_s } else { 0 };
+    let mut out = BufWriter::new(file);
+    out.write_all(b"t_s,id,x,y,z")?;
+    if about.velocities {
+        out.write_all(b",vx,vy,vz")?;
+    }
+    if about.radii {
+        out.write_all(b",radius")?;
+    }
+    out.write_all(b"\n")?;
+    source.each_instant(|instant| {
+        let time = instant.first().map_or_else(String::new, |first| time_text(epoch_s, first.time_s));
+        for sample in instant {
+            let [x, y, z] = sample.position_m.into();
+            write!(out, "{time},{},{x:?},{y:?},{z:?}", names[sample.vehicle])?;
+            match sample.velocity_m_s.map(<[f64; 3]>::from) {
+                Some([x, y, z]) => write!(out, ",{x:?},{y:?},{z:?}")?,
+                None if about.velocities => out.write_all(b",,,")?,
+                None => {}
+            }
+            match sample.radius_m {
+                Some(radius) => write!(out, ",{radius:?}")?,
+                None if about.radii => out.write_all(b",")?,
+                None => {}
+            }
+            out.write_all(b"\n")?;
+        }
+        Ok(())
+    })?;
+    out.flush()?;
+    let lost = about.clock.epoch_ns != 0 && !absolute;
+    Ok(lost.then(|| format!("times count from {} ns, which the table does not say", about.clock.epoch_ns)))
+}
+
+/// A time after an epoch in decimal digits: whole seconds are added exactly.
+fn time_text(epoch_s: i64, time_s: f64) -> String {
+    if epoch_s == 0 || time_s < 0.0 {
+        return format!("{:?}", time_s + epoch_s as f64);
+    }
+    let digits = time_s.to_string();
+    let (whole, fraction) = digits.split_once('.').unwrap_or((&digits, "0"));
+    match whole.parse::<i64>().ok().and_then(|whole| whole.checked_add(epoch_s)) {
+        Some(whole) => format!("{whole}.{fraction}"),
+        None => format!("{:?}", time_s + epoch_s as f64),
+    }
+}
+
+/// A name as a field of a line.
+fn quoted(name: &str) -> Result<String, ExportError> {
+    if name.is_empty() || name.trim() != name || name.contains(['\n', '\r']) {
+        return Err(ExportError::Name(name.to_owned()));
+    }
+    if name.contains([',', '"', ';', '\t']) {
+        return Ok(format!("\"{}\"", name.replace('"', "\"\"")));
+    }
+    Ok(name.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::time_text;
+
+    #[test]
+    fn times_after_an_epoch_keep_their_digits() {
+        assert_eq!(time_text(1_700_000_000, 12.345_678_901), "1700000012.345678901");
+        assert_eq!(time_text(1_700_000_000, 1e-7), "1700000000.0000001");
+        assert_eq!(time_text(0, 0.1), "0.1");
+    }
+}

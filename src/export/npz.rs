@@ -1,0 +1,134 @@
+//! An archive of `NumPy` arrays: `t`, `positions` (T x N x 3), `axes`, and where they are known `velocities`, `radii` (T x N),
+//! `names`, `seen` (T x N) and `epoch_ns`.
+//!
+//! The recording is read once for each array, so that none of them is in memory.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+
+use nalgebra::Vector3;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use super::{About, ExportError, Source};
+use crate::track::Sample;
+
+/// Headers of arrays end at a multiple of this \[bytes\].
+const ALIGNMENT: usize = 64;
+
+pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
+    let (times, vehicles) = (about.instants, about.names.len());
+    let mut archive = Archive { zip: ZipWriter::new(BufWriter::new(file)), source, vehicles };
+    archive.array("t", "<f8", &[times], |instant, _, out| {
+        let time_s = instant.first().map_or(f64::NAN, |sample| sample.time_s);
+        out.write_all(&time_s.to_le_bytes())
+    })?;
+    archive.array("positions", "<f8", &[times, vehicles, 3], |_, slots, out| {
+        slots.iter().try_for_each(|slot| vector(slot.map(|sample| sample.position_m), out))
+    })?;
+    // Where there are as many times as vehicles, the shape would not tell which axis is which.
+    archive.texts("axes", &["time", "vehicle", "xyz"].map(str::to_owned))?;
+    if about.velocities {
+        archive.array("velocities", "<f8", &[times, vehicles, 3], |_, slots, out| {
+            slots.iter().try_for_each(|slot| vector(slot.and_then(|sample| sample.velocity_m_s), out))
+        })?;
+    }
+    if about.radii {
+        archive.array("radii", "<f8", &[times, vehicles], |_, slots, out| {
+            let radius = |slot: &Option<&Sample>| slot.and_then(|sample| sample.radius_m).unwrap_or(f64::NAN);
+            slots.iter().try_for_each(|slot| out.write_all(&radius(slot).to_le_bytes()))
+        })?;
+    }
+    if about.samples != (times * vehicles) as u64 {
+        archive.array("seen", "|b1", &[times, vehicles], |_, slots, out| {
+            slots.iter().try_for_each(|slot| out.write_all(&[u8::from(slot.is_some())]))
+        })?;
+    }
+    let numbered = about.names.iter().enumerate().all(|(index, name)| *name == (index + 1).to_string());
+    if !numbered {
+        archive.texts("names", &about.names)?;
+    }
+    if about.clock.epoch_ns != 0 {
+        archive.begin("epoch_ns", "<i8", &[])?.write_all(&about.clock.epoch_ns.to_le_bytes())?;
+    }
+    archive.zip.finish().map_err(std::io::Error::other)?.flush()?;
+    Ok(())
+}
+
+fn vector(vector: Option<Vector3<f64>>, out: &mut dyn Write) -> std::io::Result<()> {
+    let vector = vector.unwrap_or_else(|| Vector3::repeat(f64::NAN));
+    vector.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))
+}
+
+struct Archive<'a> {
+    zip: ZipWriter<BufWriter<&'a mut File>>,
+    source: &'a Source<'a>,
+    vehicles: usize,
+}
+
+/// The samples of an instant, in the place of each vehicle.
+type Slots<'a> = [Option<&'a Sample>];
+
+impl<'a> Archive<'a> {
+    /// Begins an array.
+    fn begin(
+        &mut self,
+        name: &str,
+        descr: &str,
+        shape: &[usize],
+    ) -> Result<&mut ZipWriter<BufWriter<&'a mut File>>, ExportError> {
+        // Times of files are the same always, so that the same recording gives the same bytes.
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);
+        self.zip.start_file(format!("{name}.npy"), options).map_err(std::io::Error::other)?;
+        let shape: String = shape.iter().map(|length| format!("{length}, ")).collect();
+        let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}), }}", shape.trim_end());
+        let head = 10;
+        let filled = (head + header.len() + 1).next_multiple_of(ALIGNMENT);
+        header.push_str(&" ".repeat(filled - head - header.len() - 1));
+        header.push('\n');
+        let length = u16::try_from(header.len()).map_err(std::io::Error::other)?;
+        self.zip.write_all(b"\x93NUMPY\x01\x00")?;
+        self.zip.write_all(&length.to_le_bytes())?;
+        self.zip.write_all(header.as_bytes())?;
+        Ok(&mut self.zip)
+    }
+
+    /// Writes an array of text.
+    fn texts(&mut self, name: &str, texts: &[String]) -> Result<(), ExportError> {
+        if let Some(text) = texts.iter().find(|text| text.ends_with('\0')) {
+            return Err(ExportError::Name(text.clone()));
+        }
+        let width = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+        let mut out = BufWriter::new(self.begin(name, &format!("<U{width}"), &[texts.len()])?);
+        for text in texts {
+            for c in text.chars().map(u32::from).chain(std::iter::repeat(0)).take(width) {
+                out.write_all(&c.to_le_bytes())?;
+            }
+        }
+        out.flush()?;
+        Ok(())
+    }
+
+    /// Writes an array, instant by instant.
+    fn array(
+        &mut self,
+        name: &str,
+        descr: &str,
+        shape: &[usize],
+        write: impl Fn(&[Sample], &Slots<'_>, &mut dyn Write) -> std::io::Result<()>,
+    ) -> Result<(), ExportError> {
+        let (source, vehicles) = (self.source, self.vehicles);
+        let zip = self.begin(name, descr, shape)?;
+        // Many small writes become few: the archive computes a checksum of each.
+        let mut out = BufWriter::new(zip);
+        source.each_instant(|instant| {
+            let mut slots = vec![None; vehicles];
+            for sample in instant {
+                slots[sample.vehicle] = Some(sample);
+            }
+            Ok(write(instant, &slots, &mut out)?)
+        })?;
+        out.flush()?;
+        Ok(())
+    }
+}

@@ -1,0 +1,110 @@
+//! A long table in Parquet, with the columns of the table in text.
+
+use std::fs::File;
+use std::sync::Arc;
+
+use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::{Type, TypePtr};
+
+use super::{About, ExportError, Source};
+use crate::read::parquet::EPOCH_KEY;
+use crate::track::Sample;
+
+/// Rows of a group, which is built in memory.
+const GROUP_ROWS: usize = 200_000;
+
+pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
+    let schema = schema(about).map_err(write_error)?;
+    let mut properties = WriterProperties::builder()
+        .set_compression(Compression::SNAPPY)
+        .set_created_by(concat!("tautline ", env!("CARGO_PKG_VERSION")).to_owned());
+    if about.clock.epoch_ns != 0 {
+        let epoch = KeyValue::new(EPOCH_KEY.to_owned(), about.clock.epoch_ns.to_string());
+        properties = properties.set_key_value_metadata(Some(vec![epoch]));
+    }
+    let file = file.try_clone()?;
+    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties.build())).map_err(write_error)?;
+    let names: Vec<ByteArray> = about.names.iter().map(|name| ByteArray::from(name.as_str())).collect();
+    let mut rows = Vec::new();
+    source.each_instant(|instant| {
+        rows.extend_from_slice(instant);
+        if rows.len() >= GROUP_ROWS {
+            write_group(&mut writer, &rows, &names, about).map_err(write_error)?;
+            rows.clear();
+        }
+        Ok(())
+    })?;
+    if !rows.is_empty() {
+        write_group(&mut writer, &rows, &names, about).map_err(write_error)?;
+    }
+    writer.close().map_err(write_error)?;
+    Ok(())
+}
+
+fn schema(about: &About) -> Result<TypePtr, ParquetError> {
+    let column = |name: &str, physical, repetition, logical| {
+        let column = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+        column.with_logical_type(logical).build().map(Arc::new)
+    };
+    let double = |name, repetition| column(name, Physical::DOUBLE, repetition, None);
+    let mut columns = vec![
+        double("t_s", Repetition::REQUIRED)?,
+        column("id", Physical::BYTE_ARRAY, Repetition::REQUIRED, Some(LogicalType::String))?,
+    ];
+    for name in ["x", "y", "z"] {
+        columns.push(double(name, Repetition::REQUIRED)?);
+    }
+    let velocities: &[_] = if about.velocities { &["vx", "vy", "vz"] } else { &[] };
+    let radii: &[_] = if about.radii { &["radius"] } else { &[] };
+    for name in velocities.iter().chain(radii) {
+        columns.push(double(name, Repetition::OPTIONAL)?);
+    }
+    Type::group_type_builder("samples").with_fields(columns).build().map(Arc::new)
+}
+
+fn write_group(
+    writer: &mut SerializedFileWriter<File>,
+    rows: &[Sample],
+    names: &[ByteArray],
+    about: &About,
+) -> Result<(), ParquetError> {
+    let mut group = writer.next_row_group()?;
+    write_column::<DoubleType>(&mut group, rows, |sample| Some(sample.time_s))?;
+    write_column::<ByteArrayType>(&mut group, rows, |sample| Some(names[sample.vehicle].clone()))?;
+    for axis in 0..3 {
+        write_column::<DoubleType>(&mut group, rows, |sample| Some(sample.position_m[axis]))?;
+    }
+    if about.velocities {
+        for axis in 0..3 {
+            write_column::<DoubleType>(&mut group, rows, |sample| sample.velocity_m_s.map(|v| v[axis]))?;
+        }
+    }
+    if about.radii {
+        write_column::<DoubleType>(&mut group, rows, |sample| sample.radius_m)?;
+    }
+    group.close().map(drop)
+}
+
+fn write_column<D: DataType>(
+    group: &mut SerializedRowGroupWriter<'_, File>,
+    rows: &[Sample],
+    cell: impl Fn(&Sample) -> Option<D::T>,
+) -> Result<(), ParquetError> {
+    let Some(mut column) = group.next_column()? else {
+        return Err(ParquetError::General("the schema has too few columns".to_owned()));
+    };
+    let cells: Vec<_> = rows.iter().map(cell).collect();
+    let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
+    let values: Vec<_> = cells.into_iter().flatten().collect();
+    column.typed::<D>().write_batch(&values, Some(&levels), None)?;
+    column.close()
+}
+
+fn write_error(error: ParquetError) -> ExportError {
+    ExportError::Write(std::io::Error::other(error))
+}

@@ -1,0 +1,300 @@
+//! Times as a recording writes them, and the clock that turns them into seconds.
+
+use std::cmp::Ordering;
+use std::fmt::Write as _;
+
+use crate::track::Clock;
+
+/// From this distance to zero on, a clock is counted from an epoch \[s\]: there doubles are coarser than 0.1 ns.
+const EPOCH_FROM_S: f64 = 1e6;
+
+/// Decimals that a [`Stamp::Fixed`] keeps.
+const DECIMALS: usize = 18;
+
+/// A unit of time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimeUnit {
+    /// s.
+    Seconds,
+    /// ms.
+    Milliseconds,
+    /// us.
+    Microseconds,
+    /// ns.
+    Nanoseconds,
+}
+
+impl TimeUnit {
+    /// All units, the longest first.
+    pub const ALL: [Self; 4] = [Self::Seconds, Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
+
+    /// `s`, `ms`, `us` or `ns`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Seconds => "s",
+            Self::Milliseconds => "ms",
+            Self::Microseconds => "us",
+            Self::Nanoseconds => "ns",
+        }
+    }
+
+    /// The unit of this name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "s" | "sec" | "secs" | "second" | "seconds" => Some(Self::Seconds),
+            "ms" | "msec" | "millis" | "milliseconds" => Some(Self::Milliseconds),
+            "us" | "µs" | "usec" | "micros" | "microseconds" => Some(Self::Microseconds),
+            "ns" | "nsec" | "nanos" | "nanoseconds" => Some(Self::Nanoseconds),
+            _ => None,
+        }
+    }
+
+    /// How many make a second.
+    pub(super) fn per_second(self) -> i64 {
+        match self {
+            Self::Seconds => 1,
+            Self::Milliseconds => 1_000,
+            Self::Microseconds => 1_000_000,
+            Self::Nanoseconds => 1_000_000_000,
+        }
+    }
+}
+
+/// A time as it is written, in the unit of the recording and exact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stamp {
+    /// A whole number of units.
+    Whole(i64),
+    /// A number whose double is exact enough.
+    Real(f64),
+    /// A positive decimal number too long for a double: whole units and units of 10^-18.
+    Fixed { whole: i64, decimals: u64 },
+}
+
+impl Stamp {
+    /// Reads a time; none where it is not a number. The result may be infinite or NaN.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+        if let Some((whole, fraction)) = text.split_once('.') {
+            // From seven digits on the text tells more than a double of it.
+            if whole.len() >= 7 && digits(whole) && digits(fraction) && fraction.len() <= DECIMALS {
+                let decimals = fraction.bytes().chain(std::iter::repeat(b'0')).take(DECIMALS);
+                let decimals = decimals.fold(0, |sum: u64, digit| 10 * sum + u64::from(digit - b'0'));
+                if let Ok(whole) = whole.parse() {
+                    return Some(Self::Fixed { whole, decimals });
+                }
+            }
+        } else if let Ok(whole) = text.parse() {
+            return Some(Self::Whole(whole));
+        }
+        text.parse().ok().map(Self::Real)
+    }
+
+    /// The nearest double \[units\].
+    pub(super) fn approximately(self) -> f64 {
+        match self {
+            Self::Whole(whole) => whole as f64,
+            Self::Real(real) => real,
+            Self::Fixed { whole, decimals } => whole as f64 + decimals as f64 * 1e-18,
+        }
+    }
+
+    pub(super) fn compare(self, other: Self) -> Ordering {
+        match (self, other) {
+            (Self::Whole(a), Self::Whole(b)) => a.cmp(&b),
+            (Self::Fixed { whole: a, decimals: c }, Self::Fixed { whole: b, decimals: d }) => (a, c).cmp(&(b, d)),
+            _ => self.approximately().total_cmp(&other.approximately()),
+        }
+    }
+
+    /// The largest whole number that is not above it, if there is one.
+    fn floor(self) -> Option<i64> {
+        #[expect(clippy::cast_possible_truncation, reason = "the range is looked at first")]
+        let floor_of = |real: f64| (real.abs() < 9e18).then(|| real.floor() as i64);
+        match self {
+            Self::Whole(whole) | Self::Fixed { whole, .. } => Some(whole),
+            Self::Real(real) => floor_of(real),
+        }
+    }
+
+    /// The difference to a whole number, rounded once \[units\].
+    fn since(self, epoch: i64) -> f64 {
+        match self {
+            Self::Whole(whole) => (i128::from(whole) - i128::from(epoch)) as f64,
+            Self::Real(real) if epoch == 0 => real,
+            Self::Real(real) => real - epoch as f64,
+            Self::Fixed { whole, decimals } => match whole.checked_sub(epoch) {
+                Some(whole) if whole >= 0 => {
+                    // The decimal text of the difference, because only a parser rounds it correctly.
+                    let mut text = String::with_capacity(40);
+                    let _ = write!(text, "{whole}.{decimals:018}");
+                    text.parse().unwrap_or(f64::NAN)
+                }
+                _ => (i128::from(whole) - i128::from(epoch)) as f64 + decimals as f64 * 1e-18,
+            },
+        }
+    }
+}
+
+/// What the times of a recording look like.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Probe {
+    first: Stamp,
+    last: Stamp,
+    /// Smallest step between two different times \[units\].
+    step: f64,
+    /// Whether all times are whole numbers.
+    whole: bool,
+    /// Whether time never ran backwards.
+    pub(super) in_order: bool,
+}
+
+impl Probe {
+    pub(super) fn new(first: Stamp) -> Self {
+        let whole = matches!(first, Stamp::Whole(_));
+        Self { first, last: first, step: f64::INFINITY, whole, in_order: true }
+    }
+
+    pub(super) fn see(&mut self, stamp: Stamp) {
+        let order = self.last.compare(stamp);
+        if order == Ordering::Equal {
+            return;
+        }
+        self.in_order &= order == Ordering::Less;
+        self.whole &= matches!(stamp, Stamp::Whole(_));
+        self.step = self.step.min((stamp.since(0) - self.last.since(0)).abs());
+        if self.first.compare(stamp) == Ordering::Greater {
+            self.first = stamp;
+        }
+        self.last = stamp;
+    }
+
+    /// The unit that times of this size and step are most likely in.
+    ///
+    /// Times of day since 1970 tell by their size. Other whole numbers tell by their step: vehicles are recorded some
+    /// 1 to 1000 times a second. Everything else is in seconds.
+    fn likely_unit(&self) -> (TimeUnit, &'static str) {
+        let size = self.first.approximately();
+        let by_size = [(1e8, TimeUnit::Seconds), (1e11, TimeUnit::Milliseconds), (1e14, TimeUnit::Microseconds)];
+        if let Some(&(_, unit)) = by_size.iter().find(|(from, _)| (*from..100.0 * from).contains(&size)) {
+            return (unit, "because they are of the size of times since 1970");
+        }
+        if (1e17..9.3e18).contains(&size) {
+            return (TimeUnit::Nanoseconds, "because they are of the size of times since 1970");
+        }
+        let by_step = "because they are whole numbers with steps of that size";
+        match self.step {
+            step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "because nothing says otherwise"),
+            step if step >= 1e6 => (TimeUnit::Nanoseconds, by_step),
+            step if step >= 1e3 => (TimeUnit::Microseconds, by_step),
+            step if step >= 2.0 => (TimeUnit::Milliseconds, by_step),
+            _ => (TimeUnit::Seconds, "because nothing says otherwise"),
+        }
+    }
+}
+
+/// How the unit of a clock is known.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum KnownUnit {
+    /// The format, the name of the column or the user says it.
+    Given(TimeUnit),
+    /// Nobody says it.
+    Unsaid,
+}
+
+/// Turns stamps into seconds.
+#[derive(Clone, Debug)]
+pub(super) struct Timing {
+    pub(super) clock: Clock,
+    unit: TimeUnit,
+    /// Whole seconds in units.
+    epoch: i64,
+}
+
+impl Timing {
+    /// A clock that fits what was seen, and a sentence where something was inferred.
+    pub(super) fn settle(probe: &Probe, known: KnownUnit) -> (Self, Option<String>) {
+        let (unit, note) = match known {
+            KnownUnit::Given(unit) => (unit, None),
+            KnownUnit::Unsaid => {
+                let (unit, why) = probe.likely_unit();
+                let name = unit.name();
+                (unit, Some(format!("times carry no unit and are taken as {name}, {why} (--time-unit {name} says so)")))
+            }
+        };
+        let per_second = unit.per_second();
+        let seconds = probe.first.floor().map(|floor| floor.div_euclid(per_second));
+        let seconds = seconds.filter(|&seconds| (seconds as f64).abs() >= EPOCH_FROM_S);
+        let epoch = seconds.and_then(|s| Some((s.checked_mul(per_second)?, s.checked_mul(1_000_000_000)?)));
+        let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
+        let clock = Clock { unit: unit.name(), inferred: note.is_some(), epoch_ns };
+        (Self { clock, unit, epoch }, note)
+    }
+
+    /// Seconds since the epoch.
+    pub(super) fn seconds(&self, stamp: Stamp) -> f64 {
+        stamp.since(self.epoch) / self.unit.per_second() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn timing(texts: &[&str], known: KnownUnit) -> (Timing, Option<String>, Vec<f64>) {
+        let stamps: Vec<_> = texts.iter().map(|text| Stamp::parse(text).expect("a number")).collect();
+        let mut probe = Probe::new(stamps[0]);
+        stamps.iter().for_each(|&stamp| probe.see(stamp));
+        let (timing, note) = Timing::settle(&probe, known);
+        let seconds = stamps.iter().map(|&stamp| timing.seconds(stamp)).collect();
+        (timing, note, seconds)
+    }
+
+    #[test]
+    fn a_clock_in_nanoseconds_loses_no_digit() {
+        let (timing, note, seconds) = timing(&["1700000000123456789", "1700000000123456790"], KnownUnit::Unsaid);
+        assert_eq!(timing.clock, Clock { unit: "ns", inferred: true, epoch_ns: 1_700_000_000_000_000_000 });
+        assert_eq!(seconds, [0.123_456_789, 0.123_456_790]);
+        assert!(note.is_some_and(|note| note.contains("taken as ns")));
+    }
+
+    #[test]
+    fn decimal_seconds_since_1970_lose_no_digit() {
+        let (timing, _, seconds) = timing(&["1700000000.123456789", "1700000003.000000001"], KnownUnit::Unsaid);
+        assert_eq!((timing.clock.unit, timing.clock.epoch_ns), ("s", 1_700_000_000_000_000_000));
+        assert_eq!(seconds, [0.123_456_789, 3.000_000_001]);
+    }
+
+    #[test]
+    fn small_times_keep_the_bits_of_their_text() {
+        let (timing, note, seconds) = timing(&["0.1", "0.30000000000000004", "7"], KnownUnit::Given(TimeUnit::Seconds));
+        assert_eq!((timing.clock.epoch_ns, note), (0, None));
+        assert_eq!(seconds, [0.1, 0.300_000_000_000_000_04, 7.0]);
+    }
+
+    #[test]
+    fn units_are_told_by_steps_where_the_size_tells_nothing() {
+        for (texts, unit) in [
+            (["0", "10"], "ms"),
+            (["0", "10000"], "us"),
+            (["0", "10000000"], "ns"),
+            (["0", "1"], "s"),
+            (["0", "0.02"], "s"),
+            (["1700000000000", "1700000000010"], "ms"),
+            (["1700000000000000", "1700000000010000"], "us"),
+        ] {
+            assert_eq!(timing(&texts, KnownUnit::Unsaid).0.clock.unit, unit, "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn time_that_runs_backwards_is_seen() {
+        let mut probe = Probe::new(Stamp::Whole(2));
+        probe.see(Stamp::Whole(2));
+        assert!(probe.in_order);
+        probe.see(Stamp::Whole(1));
+        assert!(!probe.in_order);
+    }
+}

@@ -1,0 +1,97 @@
+//! Recordings that hold curves: all pieces are in memory.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+
+use super::order::BATCH;
+use super::{ReadError, Recording};
+use crate::track::{Clock, Item, Piece, Tracks};
+
+/// A curve that jumps further than this between two pieces is worth a word \[m\]: files round to micrometres.
+const JUMP_M: f64 = 1e-3;
+
+/// Pieces of curves in order of time.
+pub(super) struct Curves {
+    vehicles: Vec<String>,
+    items: std::vec::IntoIter<Item>,
+    clock: Clock,
+    notes: Vec<String>,
+}
+
+impl Curves {
+    /// The recording of these vehicles: each with its items, in order of time.
+    pub(super) fn recording(vehicles: Vec<(String, Vec<Item>)>, mut notes: Vec<String>) -> Recording {
+        notes.extend(largest_jump(&vehicles));
+        let (vehicles, items): (Vec<_>, Vec<_>) = vehicles.into_iter().unzip();
+        let mut items: Vec<_> = items.into_iter().flatten().collect();
+        // Stable: at the same time, in the order of the vehicles.
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        let clock = Clock { unit: "s", inferred: false, epoch_ns: 0 };
+        Box::new(Self { vehicles, items: items.into_iter(), clock, notes })
+    }
+}
+
+impl Tracks for Curves {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        &self.vehicles
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        let before = items.len();
+        items.extend(self.items.by_ref().take(BATCH));
+        Ok(items.len() > before)
+    }
+
+    fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+/// Names that tell all vehicles apart: those given, or numbers where two are the same.
+pub(super) fn distinct(names: Vec<String>) -> Vec<String> {
+    let different: BTreeSet<_> = names.iter().collect();
+    if different.len() == names.len() { names } else { (1..=names.len()).map(|number| number.to_string()).collect() }
+}
+
+/// A curve with these coefficients, scaled to metres; none where they leave the range of numbers.
+pub(super) fn piece(
+    vehicle: usize,
+    from_s: f64,
+    to_s: f64,
+    coefficients: impl IntoIterator<Item = Vector3<f64>>,
+    scale: f64,
+) -> Option<Piece> {
+    let coefficients: Vec<_> = coefficients.into_iter().map(|coefficient| coefficient * scale).collect();
+    let finite = coefficients.iter().all(|coefficient| coefficient.iter().all(|x| x.is_finite()));
+    (finite && from_s.is_finite() && to_s.is_finite() && from_s < to_s).then_some(Piece {
+        vehicle,
+        from_s,
+        to_s,
+        coefficients,
+    })
+}
+
+fn end_of(piece: &Piece) -> Vector3<f64> {
+    let duration = piece.to_s - piece.from_s;
+    piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * duration + coefficient)
+}
+
+fn largest_jump(vehicles: &[(String, Vec<Item>)]) -> Option<String> {
+    let jumps = vehicles.iter().flat_map(|(name, items)| {
+        items.windows(2).filter_map(move |pair| match pair {
+            [Item::Piece(before), Item::Piece(after)] => {
+                Some(((end_of(before) - after.coefficients.first()?).norm(), name, after.from_s))
+            }
+            _ => None,
+        })
+    });
+    let (jump_m, name, time_s) = jumps.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|jump| jump.0 > JUMP_M)?;
+    Some(format!("the curve of `{name}` jumps by {jump_m:.4} m at {time_s} s, which is the largest jump of all"))
+}

@@ -1,0 +1,285 @@
+//! Messages of others that hold positions: Foxglove in protobuf and JSON, ROS 2 in CDR.
+
+use byteorder::{BigEndian, LittleEndian};
+use nalgebra::{Vector3, vector};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+/// Message types that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    PoseInFrame,
+    PosesInFrame,
+    FrameTransform,
+    FrameTransforms,
+    PoseStamped,
+    PoseArray,
+    TransformStamped,
+    TfMessage,
+}
+
+impl Kind {
+    /// The type of this schema.
+    pub(super) fn of_schema(name: &str) -> Option<Self> {
+        Some(match name {
+            "foxglove.PoseInFrame" => Self::PoseInFrame,
+            "foxglove.PosesInFrame" => Self::PosesInFrame,
+            "foxglove.FrameTransform" => Self::FrameTransform,
+            "foxglove.FrameTransforms" => Self::FrameTransforms,
+            "geometry_msgs/msg/PoseStamped" => Self::PoseStamped,
+            "geometry_msgs/msg/PoseArray" => Self::PoseArray,
+            "geometry_msgs/msg/TransformStamped" => Self::TransformStamped,
+            "tf2_msgs/msg/TFMessage" => Self::TfMessage,
+            _ => return None,
+        })
+    }
+}
+
+/// How the messages of a channel are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Protobuf,
+    Json,
+    Cdr,
+}
+
+impl Encoding {
+    pub(super) fn of_name(name: &str) -> Option<Self> {
+        match name {
+            "protobuf" => Some(Self::Protobuf),
+            "json" => Some(Self::Json),
+            "cdr" => Some(Self::Cdr),
+            _ => None,
+        }
+    }
+}
+
+/// A position as a message says it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Seen {
+    /// Whose: a frame's name, or the place in a list of poses from 1; none where the topic itself is the vehicle.
+    pub(super) who: Who,
+    /// The frame that the position is given in.
+    pub(super) frame: String,
+    /// Since the clock's zero \[ns\]; 0 where the message does not say.
+    pub(super) stamp_ns: i64,
+    pub(super) position: Vector3<f64>,
+}
+
+/// Which vehicle a message speaks of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Who {
+    Topic,
+    Listed(usize),
+    Named(String),
+}
+
+/// Reads a message; the error says what is wrong with it.
+pub(super) fn decode(kind: Kind, encoding: Encoding, bytes: &[u8]) -> Result<Vec<Seen>, String> {
+    match kind {
+        Kind::PoseInFrame => foxglove::<PoseInFrame>(encoding, bytes).map(|message| message.seen()),
+        Kind::PosesInFrame => foxglove::<PosesInFrame>(encoding, bytes).map(|message| message.seen()),
+        Kind::FrameTransform => foxglove::<FrameTransform>(encoding, bytes).map(|message| vec![message.seen()]),
+        Kind::FrameTransforms => foxglove::<FrameTransforms>(encoding, bytes)
+            .map(|message| message.transforms.into_iter().map(FrameTransform::seen).collect()),
+        Kind::PoseStamped => ros::<PoseStamped>(encoding, bytes)
+            .map(|message| vec![message.header.seen(Who::Topic, &message.pose.position)]),
+        Kind::PoseArray => ros::<PoseArray>(encoding, bytes).map(|message| {
+            let seen = |(k, pose): (usize, &RosPose)| message.header.seen(Who::Listed(k + 1), &pose.position);
+            message.poses.iter().enumerate().map(seen).collect()
+        }),
+        Kind::TransformStamped => ros::<TransformStamped>(encoding, bytes).map(|message| vec![message.seen()]),
+        Kind::TfMessage => ros::<TfMessage>(encoding, bytes)
+            .map(|message| message.transforms.into_iter().map(TransformStamped::seen).collect()),
+    }
+}
+
+fn foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: Encoding, bytes: &[u8]) -> Result<T, String> {
+    match encoding {
+        Encoding::Protobuf => T::decode(bytes).map_err(|error| error.to_string()),
+        Encoding::Json => serde_json::from_slice(bytes).map_err(|error| error.to_string()),
+        Encoding::Cdr => Err("Foxglove messages are read in protobuf and JSON, not in CDR".to_owned()),
+    }
+}
+
+fn ros<T: DeserializeOwned>(encoding: Encoding, bytes: &[u8]) -> Result<T, String> {
+    if encoding != Encoding::Cdr {
+        return Err("ROS 2 messages are read in CDR alone".to_owned());
+    }
+    let message = match bytes {
+        [0, 1, _, _, body @ ..] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
+        [0, 0, _, _, body @ ..] => cdr_encoding::from_bytes::<T, BigEndian>(body),
+        _ => return Err("it does not begin as CDR does".to_owned()),
+    };
+    message.map(|(message, _)| message).map_err(|error| error.to_string())
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct Timestamp {
+    #[prost(int64, tag = "1")]
+    #[serde(alias = "sec")]
+    seconds: i64,
+    #[prost(int32, tag = "2")]
+    #[serde(alias = "nsec")]
+    nanos: i32,
+}
+
+impl Timestamp {
+    fn ns(stamp: Option<&Self>) -> i64 {
+        stamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()))
+    }
+}
+
+fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
+    seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds)
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct Vec3 {
+    #[prost(double, tag = "1")]
+    x: f64,
+    #[prost(double, tag = "2")]
+    y: f64,
+    #[prost(double, tag = "3")]
+    z: f64,
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct Pose {
+    #[prost(message, optional, tag = "1")]
+    position: Option<Vec3>,
+}
+
+fn point(point: Option<&Vec3>) -> Vector3<f64> {
+    point.map_or_else(Vector3::zeros, |point| vector![point.x, point.y, point.z])
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct PoseInFrame {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(string, tag = "2")]
+    frame_id: String,
+    #[prost(message, optional, tag = "3")]
+    pose: Option<Pose>,
+}
+
+impl PoseInFrame {
+    fn seen(self) -> Vec<Seen> {
+        let position = point(self.pose.as_ref().and_then(|pose| pose.position.as_ref()));
+        let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
+        vec![Seen { who: Who::Topic, frame: self.frame_id, stamp_ns, position }]
+    }
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct PosesInFrame {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(string, tag = "2")]
+    frame_id: String,
+    #[prost(message, repeated, tag = "3")]
+    poses: Vec<Pose>,
+}
+
+impl PosesInFrame {
+    fn seen(self) -> Vec<Seen> {
+        let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
+        let seen = |(k, pose): (usize, &Pose)| Seen {
+            who: Who::Listed(k + 1),
+            frame: self.frame_id.clone(),
+            stamp_ns,
+            position: point(pose.position.as_ref()),
+        };
+        self.poses.iter().enumerate().map(seen).collect()
+    }
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct FrameTransform {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(string, tag = "2")]
+    parent_frame_id: String,
+    #[prost(string, tag = "3")]
+    child_frame_id: String,
+    #[prost(message, optional, tag = "4")]
+    translation: Option<Vec3>,
+}
+
+impl FrameTransform {
+    fn seen(self) -> Seen {
+        let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
+        let position = point(self.translation.as_ref());
+        Seen { who: Who::Named(self.child_frame_id), frame: self.parent_frame_id, stamp_ns, position }
+    }
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct FrameTransforms {
+    #[prost(message, repeated, tag = "1")]
+    transforms: Vec<FrameTransform>,
+}
+
+#[derive(Deserialize)]
+struct RosTime {
+    sec: i32,
+    nanosec: u32,
+}
+
+#[derive(Deserialize)]
+struct RosHeader {
+    stamp: RosTime,
+    frame_id: String,
+}
+
+impl RosHeader {
+    fn seen(&self, who: Who, position: &[f64; 3]) -> Seen {
+        let stamp_ns = nanoseconds(self.stamp.sec.into(), self.stamp.nanosec.into());
+        Seen { who, frame: self.frame_id.clone(), stamp_ns, position: (*position).into() }
+    }
+}
+
+/// `Pose` and `Transform` alike: a position and a quaternion.
+#[derive(Deserialize)]
+struct RosPose {
+    position: [f64; 3],
+    _orientation: [f64; 4],
+}
+
+#[derive(Deserialize)]
+struct PoseStamped {
+    header: RosHeader,
+    pose: RosPose,
+}
+
+#[derive(Deserialize)]
+struct PoseArray {
+    header: RosHeader,
+    poses: Vec<RosPose>,
+}
+
+#[derive(Deserialize)]
+struct TransformStamped {
+    header: RosHeader,
+    child_frame_id: String,
+    transform: RosPose,
+}
+
+impl TransformStamped {
+    fn seen(self) -> Seen {
+        self.header.seen(Who::Named(self.child_frame_id.clone()), &self.transform.position)
+    }
+}
+
+#[derive(Deserialize)]
+struct TfMessage {
+    transforms: Vec<TransformStamped>,
+}

@@ -1,0 +1,401 @@
+//! Tables in Parquet, with the same columns as in CSV.
+//!
+//! Columns are flat: numbers, text or whole numbers for the vehicle, and for time numbers or time stamps, whose unit is
+//! then known. What time counts from may stand under `epoch_ns` in the metadata of the file.
+
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use nalgebra::Vector3;
+use parquet::basic::{ConvertedType, LogicalType, TimeUnit as ParquetUnit};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{ByteArray, DataType};
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
+
+use super::clock::{Probe, Stamp};
+use super::error::{Fault, Place, ReadError};
+use super::names::Names;
+use super::order::{BATCH, Ordered, Row, Rows};
+use super::source::Source;
+use super::table::{Body, Layout, Shape};
+use super::{ReadOptions, Recording, TimeUnit};
+
+/// Key of the metadata that says what time counts from \[ns\].
+pub(crate) const EPOCH_KEY: &str = "epoch_ns";
+
+/// Opens a table.
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let file = File::open(&source.path).map_err(|error| source.error(Fault::System(error)))?;
+    let bytes = file.metadata().map_err(|error| source.error(Fault::System(error)))?.len();
+    if bytes < 12 {
+        return Err(source.error(Fault::Truncated { what: "the end of the file is missing".to_owned() }));
+    }
+    let at = |fault| source.error(fault);
+    let reader = guarded(|| SerializedFileReader::new(file)).map_err(at)?;
+    let metadata = reader.metadata().file_metadata();
+    let schema = metadata.schema_descr();
+    let header: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
+    let layout = Layout::of(&header, &options.columns).map_err(at)?;
+    let unit = unit_of(&schema.column(layout.time)).or(layout.unit);
+    for &column in &columns_of(&layout) {
+        let descriptor = schema.column(column);
+        if descriptor.max_rep_level() > 0 {
+            let problem = format!("column `{}` holds lists", header[column]);
+            return Err(at(Fault::content(problem, "save a number in each cell")));
+        }
+    }
+    let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
+    let epoch_ns = epoch_ns.and_then(|pair| pair.value.as_deref()).and_then(|value| value.parse().ok());
+    let mut about = options.about(unit, layout.notes(), Fault::HeaderOnly);
+    about.epoch_ns = epoch_ns.unwrap_or(0);
+    let names = match &layout.shape {
+        Shape::Long { .. } => Names::default(),
+        Shape::Wide { names, .. } => Names::from_list(names.clone()),
+    };
+    let table = Table {
+        source: source.clone(),
+        reader,
+        header,
+        layout,
+        names,
+        group: 0,
+        columns: Vec::new(),
+        rows_left: 0,
+        rows_read: 0,
+        vehicle: 0,
+    };
+    Ok(Box::new(Ordered::open(table, about)?))
+}
+
+/// Calls into the library, which panics on some damaged files.
+fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated { what }),
+        Ok(Err(error)) if error.to_string().contains("Invalid Parquet file") => Err(Fault::Truncated {
+            what: "the end of the file, where its columns are described, is missing".to_owned(),
+        }),
+        Ok(Err(error)) => Err(Fault::damaged(error)),
+        Err(_) => Err(Fault::damaged("its pages contradict each other")),
+    }
+}
+
+/// The unit of a column of time stamps.
+fn unit_of(column: &ColumnDescriptor) -> Option<TimeUnit> {
+    match (column.logical_type_ref(), column.converted_type()) {
+        (Some(LogicalType::Timestamp(stamp)), _) => Some(match stamp.unit {
+            ParquetUnit::MILLIS => TimeUnit::Milliseconds,
+            ParquetUnit::MICROS => TimeUnit::Microseconds,
+            ParquetUnit::NANOS => TimeUnit::Nanoseconds,
+        }),
+        (_, ConvertedType::TIMESTAMP_MILLIS) => Some(TimeUnit::Milliseconds),
+        (_, ConvertedType::TIMESTAMP_MICROS) => Some(TimeUnit::Microseconds),
+        _ => None,
+    }
+}
+
+/// The columns that are read, each once.
+fn columns_of(layout: &Layout) -> Vec<usize> {
+    let of = |body: &Body| {
+        let velocity = body.velocity.unwrap_or_default();
+        body.position.into_iter().chain(velocity).chain([body.radius]).flatten().collect::<Vec<_>>()
+    };
+    let mut columns = vec![layout.time];
+    match &layout.shape {
+        Shape::Long { id, body } => {
+            columns.push(*id);
+            columns.extend(of(body));
+        }
+        Shape::Wide { bodies, .. } => columns.extend(bodies.iter().flat_map(of)),
+    }
+    columns.sort_unstable();
+    columns.dedup();
+    columns
+}
+
+/// Some cells of a column; none where a cell is null.
+enum Cells {
+    Whole(Vec<Option<i64>>),
+    Real(Vec<Option<f64>>),
+    Text(Vec<Option<ByteArray>>),
+}
+
+impl Cells {
+    fn len(&self) -> usize {
+        match self {
+            Self::Whole(cells) => cells.len(),
+            Self::Real(cells) => cells.len(),
+            Self::Text(cells) => cells.len(),
+        }
+    }
+
+    /// The next cells of a column.
+    fn read(reader: &mut ColumnReader, present: i16, count: usize) -> Result<Self, Fault> {
+        match reader {
+            ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count).map(Self::Real),
+            ColumnReader::FloatColumnReader(reader) => {
+                cells(reader, present, count).map(|cells| Self::Real(each(cells, f64::from)))
+            }
+            ColumnReader::Int64ColumnReader(reader) => cells(reader, present, count).map(Self::Whole),
+            ColumnReader::Int32ColumnReader(reader) => {
+                cells(reader, present, count).map(|cells| Self::Whole(each(cells, i64::from)))
+            }
+            ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count).map(Self::Text),
+            _ => Err(Fault::content(
+                "a column is neither of numbers nor of text",
+                "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
+            )),
+        }
+    }
+
+    fn number(&self, row: usize) -> Result<Option<f64>, ()> {
+        match self {
+            Self::Real(cells) => Ok(cells[row]),
+            Self::Whole(cells) => Ok(cells[row].map(|whole| whole as f64)),
+            Self::Text(_) => Err(()),
+        }
+    }
+}
+
+fn each<A, B>(cells: Vec<Option<A>>, change: impl Fn(A) -> B) -> Vec<Option<B>> {
+    cells.into_iter().map(|cell| cell.map(&change)).collect()
+}
+
+fn cells<D: DataType>(
+    reader: &mut ColumnReaderImpl<D>,
+    present: i16,
+    count: usize,
+) -> Result<Vec<Option<D::T>>, Fault> {
+    let (mut values, mut levels) = (Vec::new(), Vec::new());
+    guarded(|| reader.read_records(count, Some(&mut levels), None, &mut values))?;
+    if present == 0 {
+        return Ok(values.into_iter().map(Some).collect());
+    }
+    let mut values = values.into_iter();
+    Ok(levels.into_iter().map(|level| if level == present { values.next() } else { None }).collect())
+}
+
+/// A column of the current group of rows.
+struct Column {
+    number: usize,
+    /// The definition level of a cell that is there.
+    present: i16,
+    reader: ColumnReader,
+    cells: Cells,
+}
+
+/// The rows of a table.
+struct Table {
+    source: Source,
+    reader: SerializedFileReader<File>,
+    header: Vec<String>,
+    layout: Layout,
+    names: Names,
+    /// Number of the next group of rows.
+    group: usize,
+    columns: Vec<Column>,
+    /// Rows of the current group that have not been read.
+    rows_left: usize,
+    rows_read: u64,
+    vehicle: usize,
+}
+
+impl Table {
+    /// Goes to the next group of rows; `false` behind the last.
+    fn open_group(&mut self, wanted: &[usize]) -> Result<bool, Fault> {
+        if self.group >= self.reader.num_row_groups() {
+            return Ok(false);
+        }
+        let schema = self.reader.metadata().file_metadata().schema_descr_ptr();
+        let (group, reader) = (self.group, &self.reader);
+        let mut columns = Vec::new();
+        for &number in wanted {
+            let column = guarded(|| reader.get_row_group(group)?.get_column_reader(number))?;
+            let present = schema.column(number).max_def_level();
+            columns.push(Column { number, present, reader: column, cells: Cells::Whole(Vec::new()) });
+        }
+        let rows = self.reader.metadata().row_group(self.group).num_rows();
+        self.rows_left = usize::try_from(rows).map_err(|_| Fault::damaged("a group has less than no rows"))?;
+        self.columns = columns;
+        self.group += 1;
+        Ok(true)
+    }
+
+    /// Reads some rows of these columns; 0 at the end.
+    fn fill(&mut self, wanted: &[usize]) -> Result<usize, Fault> {
+        while self.rows_left == 0 {
+            if !self.open_group(wanted)? {
+                return Ok(0);
+            }
+        }
+        let count = self.rows_left.min(BATCH);
+        for column in &mut self.columns {
+            column.cells = Cells::read(&mut column.reader, column.present, count)?;
+            if column.cells.len() != count {
+                let what = format!("column `{}` has fewer cells than its group has rows", self.header[column.number]);
+                return Err(Fault::Truncated { what });
+            }
+        }
+        self.rows_left -= count;
+        Ok(count)
+    }
+
+    fn cells(&self, number: usize) -> Option<&Cells> {
+        let at = self.columns.binary_search_by_key(&number, |column| column.number).ok()?;
+        Some(&self.columns[at].cells)
+    }
+
+    fn number(&self, column: usize, row: usize) -> Result<Option<f64>, Fault> {
+        let name = || self.header[column].clone();
+        match self.cells(column).map_or(Err(()), |cells| cells.number(row)) {
+            Ok(Some(number)) if !number.is_finite() => {
+                Err(Fault::NotFinite { column: name(), value: number.to_string() })
+            }
+            Ok(number) => Ok(number),
+            Err(()) => Err(Fault::NotANumber { column: name(), value: "text".to_owned() }),
+        }
+    }
+
+    fn stamp(&self, row: usize) -> Result<Stamp, Fault> {
+        let column = self.layout.time;
+        let stamp = match self.cells(column) {
+            Some(Cells::Whole(cells)) => cells[row].map(Stamp::Whole),
+            _ => self.number(column, row)?.map(Stamp::Real),
+        };
+        stamp.ok_or_else(|| Fault::EmptyCell { column: self.header[column].clone() })
+    }
+
+    fn vehicle(&mut self, id: usize, row: usize) -> Result<usize, Fault> {
+        let empty = || Fault::EmptyCell { column: self.header[id].clone() };
+        let owned;
+        let name = match self.cells(id) {
+            Some(Cells::Text(cells)) => {
+                let text = cells[row].as_ref().ok_or_else(empty)?;
+                owned = text.as_utf8().map_err(|_| Fault::NotUtf8)?.to_owned();
+                owned.as_str()
+            }
+            Some(Cells::Whole(cells)) => {
+                owned = cells[row].ok_or_else(empty)?.to_string();
+                owned.as_str()
+            }
+            _ => {
+                let problem = format!("column `{}` holds numbers with decimals", self.header[id]);
+                return Err(Fault::content(problem, "save vehicles as text or as whole numbers"));
+            }
+        };
+        self.vehicle = self.names.index(name, self.vehicle);
+        Ok(self.vehicle)
+    }
+
+    fn vector(&self, columns: &[Option<usize>; 3], row: usize) -> Result<Option<Vector3<f64>>, Fault> {
+        let mut vector = Vector3::zeros();
+        let (mut filled, mut empty) = (false, None);
+        for (axis, column) in columns.iter().enumerate() {
+            let Some(column) = *column else { continue };
+            match self.number(column, row)? {
+                Some(number) => (vector[axis], filled) = (number, true),
+                None => empty = empty.or(Some(column)),
+            }
+        }
+        match empty {
+            None => Ok(Some(vector)),
+            Some(_) if !filled => Ok(None),
+            Some(column) => Err(Fault::EmptyCell { column: self.header[column].clone() }),
+        }
+    }
+
+    fn row(&self, stamp: Stamp, vehicle: usize, body: &Body, row: usize) -> Result<Option<Row>, Fault> {
+        let Some(position) = self.vector(&body.position, row)? else { return Ok(None) };
+        let velocity = body.velocity.as_ref().map(|columns| self.vector(columns, row)).transpose()?.flatten();
+        let radius = body.radius.map(|column| self.number(column, row)).transpose()?.flatten();
+        if radius.is_some_and(|radius| radius < 0.0) {
+            return Err(Fault::content("a radius is negative", "write 0 or more"));
+        }
+        Ok(Some(Row { stamp, place: self.rows_read + row as u64 + 1, vehicle, position, velocity, radius }))
+    }
+
+    fn rows_of(&mut self, row: usize, shape: &Shape, rows: &mut Vec<Row>) -> Result<(), Fault> {
+        let stamp = self.stamp(row)?;
+        match shape {
+            Shape::Long { id, body } => {
+                let vehicle = self.vehicle(*id, row)?;
+                rows.extend(self.row(stamp, vehicle, body, row)?);
+            }
+            Shape::Wide { bodies, .. } => {
+                for (vehicle, body) in bodies.iter().enumerate() {
+                    rows.extend(self.row(stamp, vehicle, body, row)?);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn at_row(&self, row: usize, fault: Fault) -> ReadError {
+        self.source.error(fault).at(Place::Row(self.rows_read + row as u64 + 1))
+    }
+}
+
+impl Rows for Table {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+        let before = rows.len();
+        let (wanted, shape) = (columns_of(&self.layout), self.layout.shape.clone());
+        while rows.len() < before + BATCH {
+            let count = self.fill(&wanted).map_err(|fault| self.at_row(0, fault))?;
+            if count == 0 {
+                break;
+            }
+            for row in 0..count {
+                self.rows_of(row, &shape, rows).map_err(|fault| self.at_row(row, fault))?;
+            }
+            self.rows_read += count as u64;
+        }
+        Ok(rows.len() > before)
+    }
+
+    fn rewind(&mut self) -> Result<(), ReadError> {
+        (self.group, self.rows_left, self.rows_read) = (0, 0, 0);
+        Ok(())
+    }
+
+    fn vehicles(&self) -> &[String] {
+        self.names.all()
+    }
+
+    fn settle_names(&mut self) {
+        self.names.settle();
+    }
+
+    fn error(&self, fault: Fault) -> ReadError {
+        self.source.error(fault)
+    }
+
+    fn place(&self, number: u64) -> Place {
+        Place::Row(number)
+    }
+
+    fn is_wide(&self) -> bool {
+        matches!(self.layout.shape, Shape::Wide { .. })
+    }
+
+    /// Only times and names are looked at.
+    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+        let Shape::Long { id, .. } = self.layout.shape else { return Ok(None) };
+        let mut wanted = [self.layout.time, id];
+        wanted.sort_unstable();
+        let mut probe: Option<Probe> = None;
+        loop {
+            let count = self.fill(&wanted).map_err(|fault| self.at_row(0, fault))?;
+            if count == 0 {
+                return Ok(probe);
+            }
+            for row in 0..count {
+                let stamp = self.vehicle(id, row).and_then(|_| self.stamp(row));
+                let stamp = stamp.map_err(|fault| self.at_row(row, fault))?;
+                probe.get_or_insert_with(|| Probe::new(stamp)).see(stamp);
+            }
+            self.rows_read += count as u64;
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Which format a file is in, going by its content.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+use super::Format;
+use super::error::{Fault, ReadError};
+use super::source::{GZIP_MAGIC, Source, fault_of};
+
+/// Bytes that are looked at.
+const HEAD_BYTES: u64 = 64 * 1024;
+
+/// What a file is.
+pub(super) struct Recognised {
+    pub(super) format: Format,
+    /// Whether it is packed by gzip.
+    pub(super) gzip: bool,
+}
+
+/// Recognises a file or folder.
+pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognised, ReadError> {
+    let error = |fault| ReadError::new(path, fault);
+    let data = fs::metadata(path).map_err(|source| error(Fault::System(source)))?;
+    if data.is_dir() {
+        return Ok(Recognised { format: Format::Crazyflie, gzip: false });
+    }
+    let mut source = Source { path: path.to_owned(), gzip: false };
+    let mut head = Vec::new();
+    let file = File::open(path).map_err(|source| error(Fault::System(source)))?;
+    file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|source| error(Fault::System(source)))?;
+    if head.is_empty() {
+        return Err(error(Fault::Empty));
+    }
+    source.gzip = head.starts_with(&GZIP_MAGIC);
+    if source.gzip {
+        head.clear();
+        source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head).map_err(|source| error(fault_of(source)))?;
+        if head.is_empty() {
+            return Err(error(Fault::Empty));
+        }
+    }
+    let format = match forced {
+        Some(format) => format,
+        None => format_of(&head, path)?,
+    };
+    if source.gzip && !matches!(format, Format::Csv | Format::Text) {
+        let problem = format!("it is {} inside gzip", format.title());
+        return Err(error(Fault::content(problem, "unpack it first, with gunzip")));
+    }
+    Ok(Recognised { format, gzip: source.gzip })
+}
+
+fn format_of(head: &[u8], path: &Path) -> Result<Format, ReadError> {
+    let error = |fault| ReadError::new(path, fault);
+    if head.starts_with(b"PAR1") {
+        return Ok(Format::Parquet);
+    }
+    if head.starts_with(b"\x89MCAP0\r\n") {
+        return Ok(Format::Mcap);
+    }
+    if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") {
+        // Entries of NPZ archives end in .npy; a show holds show.json.
+        let arrays = memchr::memmem::find(head, b".npy").is_some();
+        return Ok(if arrays { Format::Npz } else { Format::Skybrush });
+    }
+    if head.starts_with(b"\x93NUMPY") {
+        let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
+        return Err(error(Fault::content("it is a single NumPy array, which tells no times", remedy)));
+    }
+    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
+        return Err(error(Fault::NotUtf8));
+    }
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    if memchr::memchr(0, text).is_some() {
+        return Err(error(Fault::UnknownFormat));
+    }
+    if text.starts_with(b"{") {
+        return Ok(Format::Skybrush);
+    }
+    let lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
+    let Some(line) = lines.into_iter().find(|line| !line.is_empty() && !line.starts_with(b"#")) else {
+        return Ok(Format::Csv);
+    };
+    if line.starts_with(b"duration,") {
+        return Ok(Format::Crazyflie);
+    }
+    let has = |byte| memchr::memchr(byte, line).is_some();
+    let begins_with_a_number = line.split(u8::is_ascii_whitespace).next().is_some_and(is_number);
+    let csv = has(b',') || has(b';') || (has(b'\t') && !begins_with_a_number);
+    Ok(if csv { Format::Csv } else { Format::Text })
+}
+
+fn is_number(bytes: &[u8]) -> bool {
+    std::str::from_utf8(bytes).is_ok_and(|text| text.parse::<f64>().is_ok())
+}

@@ -1,0 +1,260 @@
+//! Skybrush shows: `show.json`, alone or inside a `.skyc` archive.
+//!
+//! Each drone has a trajectory of keyed points `[t, [x, y, z], [control points]]`. Times count from the drone's take-off,
+//! before which it stands at its first point. The control points belong to the segment that ends at the point: with n of
+//! them the segment is a Bezier curve of degree n + 1, so without any it is a straight line.
+
+use std::fmt;
+use std::io::Read;
+
+use nalgebra::Vector3;
+use serde::de::{DeserializeOwned, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+
+use super::archive::Archive;
+use super::curves::{Curves, distinct, piece};
+use super::error::{Fault, Place, ReadError};
+use super::source::{Source, fault_of};
+use super::{ReadOptions, Recording};
+use crate::track::{Item, Sample};
+
+/// Highest degree of a Bezier segment that is read.
+const HIGHEST_DEGREE: usize = 15;
+
+/// The entry of an archive that holds the show.
+const SHOW: &str = "show.json";
+
+#[derive(Deserialize)]
+struct Show {
+    swarm: Option<Swarm>,
+}
+
+#[derive(Deserialize)]
+struct Swarm {
+    #[serde(default)]
+    drones: Vec<Drone>,
+}
+
+#[derive(Deserialize)]
+struct Drone {
+    settings: Option<Settings>,
+}
+
+#[derive(Default, Deserialize)]
+struct Settings {
+    #[serde(rename = "$ref")]
+    elsewhere: Option<String>,
+    name: Option<String>,
+    trajectory: Option<Trajectory>,
+}
+
+#[derive(Default, Deserialize)]
+struct Trajectory {
+    #[serde(rename = "$ref")]
+    elsewhere: Option<String>,
+    version: Option<f64>,
+    #[serde(default)]
+    points: Vec<Point>,
+    #[serde(default, rename = "takeoffTime")]
+    takeoff_s: f64,
+}
+
+/// `[t, [x, y, z], [control points]]`, the last of which may be left out.
+struct Point {
+    time_s: f64,
+    position: Vector3<f64>,
+    controls: Vec<Vector3<f64>>,
+}
+
+impl<'de> Deserialize<'de> for Point {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Parts;
+        impl<'de> Visitor<'de> for Parts {
+            type Value = Point;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a keyed point [t, [x, y, z], [control points]]")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut parts: A) -> Result<Point, A::Error> {
+                use serde::de::Error as _;
+                let time_s = parts.next_element()?.ok_or_else(|| A::Error::invalid_length(0, &self))?;
+                let position: [f64; 3] = parts.next_element()?.ok_or_else(|| A::Error::invalid_length(1, &self))?;
+                let controls: Vec<[f64; 3]> = parts.next_element()?.unwrap_or_default();
+                while parts.next_element::<serde::de::IgnoredAny>()?.is_some() {}
+                let controls = controls.into_iter().map(Vector3::from).collect();
+                Ok(Point { time_s, position: position.into(), controls })
+            }
+        }
+        deserializer.deserialize_seq(Parts)
+    }
+}
+
+/// Opens a show.
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let mut head = [0; 2];
+    let is_archive = source.bytes()?.read(&mut head).is_ok_and(|bytes| bytes == 2 && head == *b"PK");
+    let mut documents = Documents { source, archive: is_archive.then(|| Archive::open(source)).transpose()? };
+    let show: Show = documents.show()?;
+    let mut names = Vec::new();
+    let mut curves = Vec::new();
+    for (index, drone) in show.swarm.map_or_else(Vec::new, |swarm| swarm.drones).into_iter().enumerate() {
+        let mut settings = drone.settings.unwrap_or_default();
+        if let Some(elsewhere) = &settings.elsewhere {
+            settings = documents.referenced(elsewhere)?;
+        }
+        let mut trajectory = settings.trajectory.unwrap_or_default();
+        if let Some(elsewhere) = &trajectory.elsewhere {
+            trajectory = documents.referenced(elsewhere)?;
+        }
+        let name = settings.name.unwrap_or_else(|| (index + 1).to_string());
+        let items = items(&trajectory, index, options.scale).map_err(|(point, fault)| {
+            let place = point.map_or(format!("drone `{name}`"), |point| format!("drone `{name}`, point {}", point + 1));
+            source.error(fault).at(Place::Part(place))
+        })?;
+        names.push(name);
+        curves.push(items);
+    }
+    if curves.iter().all(Vec::is_empty) {
+        let remedy = "export the show with its trajectories";
+        return Err(source.error(Fault::content("the show has no drone with a trajectory", remedy)));
+    }
+    Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
+}
+
+/// The JSON documents of a show.
+struct Documents<'a> {
+    source: &'a Source,
+    archive: Option<Archive>,
+}
+
+impl Documents<'_> {
+    fn show<T: DeserializeOwned>(&mut self) -> Result<T, ReadError> {
+        let Some(archive) = &mut self.archive else {
+            let mut bytes = Vec::new();
+            self.source.bytes()?.read_to_end(&mut bytes).map_err(|error| self.source.error(fault_of(error)))?;
+            return self.parse(&bytes, None);
+        };
+        if !archive.holds(SHOW) {
+            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays");
+            return Err(self.source.error(Fault::content(problem, "give a .skyc or .npz file")));
+        }
+        let bytes = archive.whole(SHOW)?;
+        self.parse(&bytes, Some(SHOW))
+    }
+
+    /// The document behind `$ref`.
+    fn referenced<T: DeserializeOwned>(&mut self, reference: &str) -> Result<T, ReadError> {
+        let name = reference.split('#').next().unwrap_or_default();
+        let name = name.trim_start_matches("./");
+        let Some(archive) = self.archive.as_mut().filter(|archive| archive.holds(name)) else {
+            let problem = format!("it refers to `{reference}`, which is not there");
+            return Err(self
+                .source
+                .error(Fault::content(problem, "give the .skyc file that holds all parts of the show")));
+        };
+        let bytes = archive.whole(name)?;
+        self.parse(&bytes, Some(name))
+    }
+
+    fn parse<T: DeserializeOwned>(&self, bytes: &[u8], entry: Option<&str>) -> Result<T, ReadError> {
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        serde_json::from_slice(text).map_err(|error| {
+            let line = u64::try_from(error.line()).unwrap_or(0);
+            let place = entry.map_or(Place::Line(line), |entry| Place::Part(format!("entry `{entry}`, line {line}")));
+            let fault = if error.is_eof() {
+                Fault::Truncated { what: "the JSON ends before it is complete".to_owned() }
+            } else {
+                let remedy = "give a show as Skybrush exports it";
+                Fault::content(format!("it is not the JSON of a Skybrush show: {error}"), remedy)
+            };
+            self.source.error(fault).at(place)
+        })
+    }
+}
+
+/// The curve of a drone, or the number of the point that is wrong.
+fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item>, (Option<usize>, Fault)> {
+    if let Some(version) = trajectory.version.filter(|&version| version != 1.0) {
+        let problem = format!("the trajectory is of version {version}");
+        return Err((None, Fault::content(problem, "export the show with trajectories of version 1")));
+    }
+    let Some(first) = trajectory.points.first() else { return Ok(Vec::new()) };
+    let begin_s = trajectory.takeoff_s + first.time_s;
+    let range =
+        |at| (at, Fault::content("its numbers leave the range of numbers", "look at --scale and at the numbers"));
+    let mut items = Vec::new();
+    if begin_s > 0.0 {
+        let standing = piece(vehicle, 0.0, begin_s, [first.position], scale).ok_or_else(|| range(Some(0)))?;
+        items.push(Item::Piece(standing));
+    } else if trajectory.points.len() == 1 {
+        let position_m = first.position * scale;
+        items.push(Item::Sample(Sample { vehicle, time_s: begin_s, position_m, velocity_m_s: None, radius_m: None }));
+    }
+    for (index, pair) in trajectory.points.windows(2).enumerate() {
+        let [before, point] = pair else { continue };
+        let (from_s, to_s) = (trajectory.takeoff_s + before.time_s, trajectory.takeoff_s + point.time_s);
+        if to_s == from_s {
+            let problem = format!("two points are at the same time, {to_s} s");
+            return Err((Some(index + 1), Fault::content(problem, "a drone is in one place at a time: take one out")));
+        }
+        if to_s < from_s {
+            return Err((Some(index + 1), Fault::TimeBackwards { time_s: to_s, before_s: from_s }));
+        }
+        let degree = point.controls.len() + 1;
+        if degree > HIGHEST_DEGREE {
+            let problem = format!("the segment is of degree {degree}");
+            return Err((Some(index + 1), Fault::content(problem, format!("degrees up to {HIGHEST_DEGREE} are read"))));
+        }
+        let mut points = vec![before.position];
+        points.extend(&point.controls);
+        points.push(point.position);
+        let piece = piece(vehicle, from_s, to_s, powers(&points, to_s - from_s), scale);
+        items.push(Item::Piece(piece.ok_or_else(|| range(Some(index + 1)))?));
+    }
+    Ok(items)
+}
+
+/// The Bezier curve of these points over a duration as coefficients of the powers of time.
+///
+/// c_k = C(n, k) sum_i (-1)^(k - i) C(k, i) P_i / T^k, which is the k-th forward difference of the points.
+fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
+    let degree = points.len() - 1;
+    let mut differences = points.to_vec();
+    let mut factor = 1.0;
+    let mut coefficients = Vec::with_capacity(points.len());
+    for k in 0..=degree {
+        coefficients.push(differences[0] * factor);
+        for i in 0..degree - k {
+            differences[i] = differences[i + 1] - differences[i];
+        }
+        factor *= (degree - k) as f64 / ((k + 1) as f64 * duration_s);
+    }
+    coefficients
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+
+    /// Rounding of a handful of additions of numbers around 10.
+    const ROUNDING_M: f64 = 1e-13;
+
+    #[test]
+    fn powers_say_the_same_as_de_casteljau() {
+        let points = [vector![1.0, 2.0, 3.0], vector![-2.0, 0.5, 4.0], vector![0.0, 7.0, 1.0], vector![5.0, 5.0, 5.0]];
+        let coefficients = powers(&points, 2.5);
+        for step in 0..=10 {
+            let u = f64::from(step) / 10.0;
+            let mut level = points.to_vec();
+            while level.len() > 1 {
+                level = level.windows(2).map(|pair| pair[0] * (1.0 - u) + pair[1] * u).collect();
+            }
+            let t = 2.5 * u;
+            let power = coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c);
+            assert!((power - level[0]).norm() < ROUNDING_M, "{u}: {power} {}", level[0]);
+        }
+    }
+}
