@@ -26,12 +26,13 @@ impl Watched {
     /// A machine that cannot draw leaves none and says so.
     pub(super) fn snapshots(self, folder: &Path, console: Console) -> Result<Vec<Picture>, Failure> {
         #[cfg(feature = "viewer")]
-        return viewer::snapshots(self.camera, folder, console);
+        let taken = viewer::snapshots(self.camera, folder, console);
         #[cfg(not(feature = "viewer"))]
-        {
+        let taken = {
             let _ = (folder, console);
             Ok(Vec::new())
-        }
+        };
+        taken
     }
 }
 

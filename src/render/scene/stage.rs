@@ -10,6 +10,8 @@ use crate::swarm::{Rows, row};
 
 /// Most places of vehicles that framing looks at.
 const FRAMED_PLACES: usize = 200_000;
+/// The ground is at z = 0 for a flight that is not higher above it than this part of its extent.
+const NEAR_GROUND: f64 = 0.3;
 /// Lines of the ground along its longer side, about.
 const GROUND_LINES: f64 = 12.0;
 /// Vehicles that are named in a message at most.
@@ -71,7 +73,8 @@ impl Stage {
         for (place, _) in &mut places {
             *place -= origin_m;
         }
-        let ground_z = if low.z >= 0.0 && low.z <= (high - low).norm() + largest { 0.0 } else { low.z - largest };
+        let is_near = low.z >= 0.0 && low.z <= NEAR_GROUND * (high - low).norm() + largest;
+        let ground_z = if is_near { 0.0 } else { low.z - largest };
         let (low, high) = (low - origin_m, high - origin_m);
         let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
         let grid_m = round_step(span / GROUND_LINES);

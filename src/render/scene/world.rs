@@ -65,8 +65,8 @@ impl Painting<'_> {
         let unit_px = self.view.unit_px();
         if plan.graph.edge_count() <= MOST_EDGES {
             let many = plan.graph.edge_count() as f32;
-            let opacity = (60.0 / many).clamp(0.3, 0.9);
-            let width_px = (2.2 - many / 300.0).clamp(1.0, 2.2) * unit_px;
+            let opacity = (36.0 / many).clamp(0.08, 0.9);
+            let width_px = (2.2 - many / 200.0).clamp(1.0, 2.2) * unit_px;
             for (i, j) in plan.graph.edges() {
                 let (Some(from), Some(to)) = (self.vehicle(i), self.vehicle(j)) else { continue };
                 #[expect(clippy::cast_possible_truncation, reason = "a colour")]
