@@ -47,6 +47,8 @@ pub mod plant;
 pub mod preflight;
 pub mod read;
 pub mod record;
+#[cfg(feature = "viewer")]
+pub mod render;
 pub mod report;
 pub mod scenario;
 pub mod sim;

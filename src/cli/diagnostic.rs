@@ -52,6 +52,12 @@ impl Failure {
         Self { exit, message, help: None, place: None }
     }
 
+    /// What is wrong and what helps, on one line.
+    #[cfg(feature = "viewer")]
+    pub(super) fn in_words(&self) -> String {
+        self.help.as_ref().map_or_else(|| self.message.clone(), |help| format!("{} ({help})", self.message))
+    }
+
     /// Shows the error on standard error.
     pub(super) fn show(&self) -> Exit {
         let mut text = String::new();

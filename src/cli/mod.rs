@@ -9,15 +9,22 @@ mod completions;
 mod console;
 mod diagnostic;
 mod events;
+#[cfg(feature = "viewer")]
+mod drawing;
 mod export;
 mod folder;
 mod list;
 mod obstacles;
 mod pictures;
 mod reading;
+#[cfg(feature = "viewer")]
+mod render;
 mod run;
 mod schema;
+mod snapshots;
 mod validate;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::process::ExitCode;
 
@@ -70,6 +77,12 @@ enum Command {
     Validate(validate::ValidateArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
     Export(export::ExportArguments),
+    /// Draw a recording: pictures, films and contact sheets, without a screen.
+    #[cfg(feature = "viewer")]
+    Render(render::RenderArguments),
+    /// Open a window on a recording, or on a scenario that is flown while it is watched.
+    #[cfg(feature = "viewer")]
+    View(view::ViewArguments),
     /// List the built-in scenarios, or print one as TOML to start from.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
@@ -107,6 +120,10 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Export(arguments) => export::export(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::Render(arguments) => render::render(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::View(arguments) => view::view(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),

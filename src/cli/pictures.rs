@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::Failure;
 use crate::figures::{self, Course, Figure, Yardsticks};
-use crate::report::page::Warning;
+use crate::report::page::{Picture, Warning};
 use crate::report::{Report, RunPage, write_atomically};
 use crate::scenario::Scenario;
 
@@ -17,6 +17,8 @@ pub(super) struct Pictures<'a> {
     pub(super) course: Option<&'a Course>,
     pub(super) warnings: &'a [Warning],
     pub(super) command: &'a str,
+    /// The run as it looked, for the page.
+    pub(super) snapshots: &'a [Picture],
 }
 
 impl Pictures<'_> {
@@ -25,8 +27,13 @@ impl Pictures<'_> {
     pub(super) fn write(&self, folder: &Path, report: &Report) -> Result<PathBuf, Failure> {
         let figures = self.figures(report)?;
         write_figures(&folder.join("figures"), &figures)?;
-        let page =
-            RunPage { scenario: self.scenario, warnings: self.warnings, figures: &figures, command: self.command };
+        let page = RunPage {
+            scenario: self.scenario,
+            warnings: self.warnings,
+            figures: &figures,
+            pictures: self.snapshots,
+            command: self.command,
+        };
         let path = folder.join("report.html");
         write_atomically(&path, report.to_html(&page).as_bytes())?;
         Ok(path)

@@ -10,13 +10,14 @@ use clap::Args;
 use super::console::{self, Console};
 use super::folder::OutFolder;
 use super::pictures::Pictures;
+use super::snapshots::Watched;
 use super::{Exit, Failure};
 use crate::figures::Course;
 use crate::metrics::Metrics;
 use crate::plant;
 use crate::preflight::Preflight;
-use crate::record::StateHash;
 use crate::record::mcap::{Header, McapRecorder};
+use crate::record::{Recorder, StateHash};
 use crate::report::page;
 use crate::report::{EndedEarly, Findings, Performance, Report, Run};
 use crate::scenario::{Override, PlantSpec, Scenario, Source};
@@ -54,6 +55,14 @@ pub(super) struct RunArguments {
     /// Draw no figures.
     #[arg(long)]
     no_figures: bool,
+    /// Take no pictures.
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    no_snapshots: bool,
+    /// What draws pictures: best, hardware, software, or a part of an adapter's name.
+    #[cfg(feature = "viewer")]
+    #[arg(long, value_name = "NAME", default_value = "best")]
+    adapter: String,
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -74,6 +83,10 @@ impl Default for RunArguments {
             out: None,
             force: false,
             no_figures: false,
+            #[cfg(feature = "viewer")]
+            no_snapshots: false,
+            #[cfg(feature = "viewer")]
+            adapter: "best".to_owned(),
             json: false,
             quiet: false,
             threads: None,
@@ -118,12 +131,16 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
     let mut course = Course::new();
-    let report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut course))?;
+    let mut watched = Watched::new(arguments, &scenario);
+    let mut watchers = (&mut course, &mut watched);
+    let report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
+    let snapshots = watched.snapshots(folder.path(), console)?;
     let pictures = Pictures {
         scenario: &scenario,
         course: (!arguments.no_figures).then_some(&course),
         warnings: &warnings,
         command: &arguments.command(),
+        snapshots: &snapshots,
     };
     let page = pictures.write(folder.path(), &report)?;
     report.write(&folder.report())?;
@@ -152,10 +169,14 @@ fn fly(
     folder: &OutFolder,
     console: Console,
     interrupted: &AtomicBool,
-    course: &mut Course,
+    watchers: &mut dyn Recorder,
 ) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
+    #[cfg(feature = "viewer")]
+    {
+        recording = recording.with(Box::new(crate::render::FoxgloveScene::of(scenario)))?;
+    }
     let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
     let mut state_hash = StateHash::new();
 
@@ -167,7 +188,7 @@ fn fly(
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(scenario));
-    let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, course)));
+    let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, watchers)));
     let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
     progress.finish_and_clear();
     let closed = recording.finish();
@@ -219,6 +240,18 @@ fn report(
         },
         ended_early: reason.as_deref().map(|reason| EndedEarly { time_s: flight.duration_s, reason }),
     })
+}
+
+impl Watched {
+    /// Watches what these arguments want pictures of.
+    fn new(arguments: &RunArguments, scenario: &Scenario) -> Self {
+        #[cfg(feature = "viewer")]
+        if !arguments.no_snapshots {
+            return Self::of(scenario, &arguments.adapter);
+        }
+        let _ = (arguments, scenario);
+        Self::nothing()
+    }
 }
 
 /// Set by Ctrl-C (and by a request to terminate). The second one does not wait for the step to end.

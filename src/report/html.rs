@@ -1,6 +1,6 @@
 //! `report.html`: a run's report for people.
 
-use super::page::{Badge, Block, Cell, Column, Page, Section, Table, Warning};
+use super::page::{Badge, Block, Cell, Column, Page, Picture, Section, Table, Warning};
 use super::words::seconds;
 use super::{Performance, Report, Status};
 use crate::figures::Figure;
@@ -18,6 +18,8 @@ pub struct RunPage<'a> {
     pub warnings: &'a [Warning],
     /// The run as charts.
     pub figures: &'a [Figure],
+    /// The run as it looked.
+    pub pictures: &'a [Picture],
     /// The command that repeats the run.
     pub command: &'a str,
 }
@@ -35,6 +37,9 @@ impl Report {
         let mut sections = vec![section("Numbers", vec![Block::Tables(self.numbers())])];
         if !self.audit.violations.is_empty() {
             sections.push(section("Violations", self.violations()));
+        }
+        if !page.pictures.is_empty() {
+            sections.push(section("Pictures", vec![Block::Pictures(page.pictures.to_vec())]));
         }
         if !page.figures.is_empty() {
             sections.push(section("Figures", vec![Block::Figures(page.figures.to_vec())]));

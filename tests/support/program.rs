@@ -21,7 +21,10 @@ pub(crate) struct Ran {
 
 /// Runs a program in a folder, its input closed and its output in pipes.
 pub(crate) fn ran_by(program: &str, folder: &Path, arguments: &[&str]) -> Ran {
-    let done = Command::new(program).args(arguments).current_dir(folder).timeout(PATIENCE).output().expect(program);
+    let mut command = Command::new(program);
+    // Graphics drivers complain where there is no such folder.
+    command.args(arguments).current_dir(folder).env("XDG_RUNTIME_DIR", folder).timeout(PATIENCE);
+    let done = command.output().expect(program);
     let text = |bytes| String::from_utf8(bytes).expect("the program writes UTF-8");
     Ran { exit: done.status.code(), out: text(done.stdout), err: text(done.stderr) }
 }

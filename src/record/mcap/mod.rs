@@ -10,6 +10,8 @@
 //! | `/swarm` | `tautline_msgs/msg/Swarm` | each sample | positions, velocities, controls |
 //! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
 //!
+//! A [`Companion`] may add a channel of its own, such as the 3-D scene on `/scene`; readers pass over it.
+//!
 //! The fields, with their units, are in the schemas themselves:
 //!
 //! ```text
@@ -42,7 +44,7 @@ mod reader;
 mod writer;
 
 pub use reader::{Entry, McapRecording};
-pub use writer::{FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
+pub use writer::{Channel, Companion, FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
 
 use super::sha256_hex;
 

@@ -28,6 +28,40 @@ const MESSAGE_OVERHEAD_BYTES: usize = 31;
 /// Who wrote the file, for MCAP tools.
 const LIBRARY: &str = concat!("tautline ", env!("CARGO_PKG_VERSION"));
 
+/// Makes the messages of one more channel out of the samples.
+pub trait Companion: Send {
+    /// The channel.
+    fn channel(&self) -> Channel;
+
+    /// Replaces the content of `message` by the one that belongs to a sample; `false` where none is due.
+    ///
+    /// # Errors
+    /// When the message cannot be encoded.
+    fn message(&mut self, sample: &Sample<'_>, message: &mut Vec<u8>) -> io::Result<bool>;
+}
+
+/// What a [`Companion`]'s channel is called and how its messages are to be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// The topic; none of the recording's own.
+    pub topic: String,
+    /// How messages are encoded, such as `protobuf`.
+    pub message_encoding: String,
+    /// Name of their schema.
+    pub schema_name: String,
+    /// How the schema is encoded.
+    pub schema_encoding: String,
+    /// The schema.
+    pub schema: Vec<u8>,
+}
+
+/// A companion with the number of its channel and its messages so far.
+struct Joined {
+    companion: Box<dyn Companion>,
+    channel_id: u16,
+    sequence: u32,
+}
+
 /// Records a run into an MCAP file as it is made.
 ///
 /// Memory holds one chunk ([`FLUSH_BYTES`] and one sample at most) and an index entry of some 200 bytes per chunk
@@ -38,6 +72,7 @@ pub struct McapRecorder {
     out: Option<Writer<NoSeek<BufWriter<File>>>>,
     /// Channel number and messages so far, in the order of [`Topic::ALL`].
     channels: [(u16, u32); 4],
+    companion: Option<Joined>,
     /// The message being written.
     message: Vec<u8>,
     waiting_bytes: usize,
@@ -55,12 +90,48 @@ impl McapRecorder {
             path: path.to_owned(),
             out: Some(out),
             channels,
+            companion: None,
             message: Vec::new(),
             waiting_bytes: 0,
             flushed_at_s: f64::NEG_INFINITY,
         };
         recorder.write(Topic::Scenario, 0.0, &ScenarioMessage::from(header))?;
         Ok(recorder)
+    }
+
+    /// Records one more channel beside the recording's own, from the next sample on.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] when the system refuses.
+    pub fn with(mut self, companion: Box<dyn Companion>) -> Result<Self, RecordError> {
+        let Channel { topic, message_encoding, schema_name, schema_encoding, schema } = companion.channel();
+        let mut channel_id = 0;
+        self.with_out(|out, _| {
+            let schema_id = out.add_schema(&schema_name, &schema_encoding, &schema)?;
+            channel_id = out.add_channel(schema_id, &topic, &message_encoding, &BTreeMap::new())?;
+            Ok(())
+        })?;
+        self.companion = Some(Joined { companion, channel_id, sequence: 0 });
+        Ok(self)
+    }
+
+    fn write_companion(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        let Some(mut joined) = self.companion.take() else { return Ok(()) };
+        let mut bytes = std::mem::take(&mut self.message);
+        let due = joined.companion.message(sample, &mut bytes);
+        let result = self.with_out(|out, _| {
+            if due? {
+                let (channel_id, sequence, log_time) = (joined.channel_id, joined.sequence, nanoseconds(sample.time_s));
+                let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+                joined.sequence = sequence.wrapping_add(1);
+                out.write_to_known_channel(&header, &bytes)?;
+            }
+            Ok(())
+        });
+        self.waiting_bytes += bytes.len() + MESSAGE_OVERHEAD_BYTES;
+        self.message = bytes;
+        self.companion = Some(joined);
+        result
     }
 
     /// Writes what is waiting and the closing index, and closes the file.
@@ -116,6 +187,7 @@ impl Recorder for McapRecorder {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.write(Topic::Summary, sample.time_s, &SummaryMessage::from(sample))?;
         self.write(Topic::Swarm, sample.time_s, &SwarmMessage::from(sample))?;
+        self.write_companion(sample)?;
         self.flush_if_due(sample.time_s)
     }
 

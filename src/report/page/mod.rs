@@ -85,6 +85,8 @@ pub enum Block {
     Tables(Vec<Table>),
     /// Figures side by side, as many as fit.
     Figures(Vec<Figure>),
+    /// Pictures side by side, as many as fit.
+    Pictures(Vec<Picture>),
     /// A command to be typed.
     Command(String),
     /// Preformatted text that is folded away under a summary.
@@ -94,6 +96,15 @@ pub enum Block {
         /// What one sees after unfolding.
         text: String,
     },
+}
+
+/// A picture that is part of the page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// What it shows, in a sentence.
+    pub description: String,
+    /// The picture itself as a `data:` address.
+    pub data_uri: String,
 }
 
 /// A table whose first column names the rows.
@@ -234,6 +245,16 @@ impl Block {
                         figure {
                             (PreEscaped(&figure.svg))
                             figcaption { (figure.description) }
+                        }
+                    }
+                }
+            },
+            Self::Pictures(pictures) => html! {
+                div.figures {
+                    @for picture in pictures {
+                        figure {
+                            img src=(picture.data_uri) alt=(picture.description);
+                            figcaption { (picture.description) }
                         }
                     }
                 }

@@ -1,0 +1,77 @@
+//! Draw lists, frames with read-back, and PNG, over the number of vehicles.
+//!
+//! Frames are drawn by the best adapter of the machine; its name is printed first. Without one, lists alone are measured.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use nalgebra::Vector3;
+use tautline::formation::Formation;
+use tautline::record::Sample;
+use tautline::render::scene::Stage;
+use tautline::render::{AdapterChoice, Footage, Renderer, Scene, View};
+use tautline::scenario::Scenario;
+use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, row, set_row};
+
+const SAMPLES: u32 = 200;
+
+/// A grid of vehicles in a plane that wave for twenty seconds.
+fn footage(count: usize) -> Footage {
+    let formation = Formation::grid(count, 3.0);
+    let start = Swarm::at_rest(formation.slots_m.clone());
+    let scenario = Scenario::new("wave", start.clone(), formation, 2.0, 20.0);
+    let mut footage = Footage::of(&scenario);
+    let control = Rows::zeros(count);
+    for k in 0..SAMPLES {
+        let time_s = f64::from(k) * 0.1;
+        let mut swarm = start.clone();
+        for vehicle in 0..count {
+            let place = row(&start.positions_m, vehicle);
+            let wave = (0.1 * place.x + time_s).sin();
+            set_row(&mut swarm.positions_m, vehicle, place + Vector3::new(0.2 * wave, 0.0, 1.0 + wave));
+        }
+        let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 2.8, time_s });
+        footage.take(&Sample {
+            time_s,
+            step: u64::from(k),
+            swarm: &swarm,
+            control: &control,
+            separation,
+            energy: None,
+        });
+    }
+    footage
+}
+
+fn benchmarks(criterion: &mut Criterion) {
+    let mut renderer = Renderer::open(&AdapterChoice::Best).map_err(|error| println!("no frames: {error}")).ok();
+    if let Some(renderer) = &renderer {
+        println!("drawn by {}", renderer.adapter());
+    }
+    let view = View::default();
+    for count in [10, 200, 1_000, 10_000] {
+        let footage = footage(count);
+        let stage = Stage::of(&footage);
+        let moment = footage.at(15.0).expect("a moment");
+        let list = || Scene::compose(&footage, &stage, &moment, &view).expect("a scene");
+        criterion.bench_with_input(BenchmarkId::new("moment", count), &footage, |bencher, footage| {
+            bencher.iter(|| footage.at(black_box(15.03)));
+        });
+        criterion.bench_function(&format!("draw list/{count}"), |bencher| {
+            bencher.iter(|| black_box(list()));
+        });
+        let Some(renderer) = &mut renderer else { continue };
+        let scene = list();
+        let picture = renderer.paint(&scene).expect("a picture");
+        let mut group = criterion.benchmark_group("frame 1280x720");
+        group.sample_size(10);
+        group.bench_function(BenchmarkId::new("with read-back", count), |bencher| {
+            bencher.iter(|| renderer.paint(&scene).expect("a picture"));
+        });
+        group.bench_function(BenchmarkId::new("PNG", count), |bencher| bencher.iter(|| picture.to_png()));
+        group.finish();
+    }
+}
+
+criterion_group!(benches, benchmarks);
+criterion_main!(benches);

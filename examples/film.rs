@@ -1,0 +1,36 @@
+//! A film of the built-in circle, flown and filmed without a file in between: `cargo run --release --example film`
+
+use std::error::Error;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use tautline::render::scene::Stage;
+use tautline::render::{AdapterChoice, Film, FilmFormat, Footage, Renderer, Scene, View};
+use tautline::scenario::{Override, Scenario, Source};
+use tautline::{plant, sim};
+
+const FPS: u32 = 25;
+/// Seconds of the flight in a second of the film.
+const SPEED: f64 = 6.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let shorter = Override::parse("time.duration_s=60")?;
+    let scenario = Scenario::read(&Source::resolve("circle")?, &[shorter])?;
+    let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(&scenario));
+    let mut footage = Footage::of(&scenario);
+    sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut footage, &mut |_step| ControlFlow::Continue(()))?;
+
+    let path = Path::new("circle.mp4");
+    let view = View { size_px: [960, 540], ..View::default() };
+    let (stage, [start_s, end_s]) = (Stage::of(&footage), footage.range_s());
+    let mut renderer = Renderer::open(&AdapterChoice::Best)?;
+    let mut film = Film::new(FilmFormat::of(path)?, view.size_px, FPS)?;
+    for time_s in (0..).map(|k| start_s + f64::from(k) * SPEED / f64::from(FPS)).take_while(|&time_s| time_s <= end_s) {
+        let Some(moment) = footage.at(time_s) else { break };
+        let scene = Scene::compose(&footage, &stage, &moment, &view)?;
+        film.add(&[renderer.paint(&scene)?])?;
+    }
+    std::fs::write(path, film.finish()?)?;
+    println!("{}, drawn by {}", path.display(), renderer.adapter());
+    Ok(())
+}

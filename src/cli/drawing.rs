@@ -1,0 +1,135 @@
+//! What every command that draws has in common.
+
+use std::path::Path;
+
+use super::Failure;
+use crate::read::{self, ReadOptions};
+use crate::record::mcap::McapRecording;
+use crate::render::{
+    AdapterChoice, CameraError, FilmError, Footage, FootageError, GpuError, PictureError, ShootError, Theme,
+};
+
+/// The names of the themes.
+pub(super) fn theme(name: &str) -> Result<Theme, String> {
+    let known = Theme::ALL.iter().find(|(known, _)| *known == name);
+    known.map(|(_, theme)| *theme).ok_or_else(|| "give dark, light or paper".to_owned())
+}
+
+/// Width and height in pixels, as in 1280x720.
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    pair(text).ok_or_else(|| "give width and height in pixels, each at least 1, such as 1280x720".to_owned())
+}
+
+/// Columns and rows, as in 4x3.
+pub(super) fn sheet(text: &str) -> Result<[u32; 2], String> {
+    pair(text).ok_or_else(|| "give columns and rows, each at least 1, such as 4x3".to_owned())
+}
+
+fn pair(text: &str) -> Option<[u32; 2]> {
+    let (first, second) = text.split_once(['x', 'X'])?;
+    let side = |text: &str| text.trim().parse().ok().filter(|&side| side > 0);
+    Some([side(first)?, side(second)?])
+}
+
+/// Any words are an adapter's name.
+pub(super) fn adapter(text: &str) -> AdapterChoice {
+    // Parsing cannot fail.
+    text.parse().unwrap_or_default()
+}
+
+/// Reads a recording to draw it, and what a person should know about how it was read. `delta_m` is for recordings that
+/// do not say what they are judged by.
+pub(super) fn footage(
+    recording: &Path,
+    reading: &ReadOptions,
+    delta_m: Option<f64>,
+) -> Result<(Footage, Vec<String>), Failure> {
+    if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && delta_m.is_finite())) {
+        return Err(Failure::input(format!("--delta is {delta_m}"), "give a positive distance in metres"));
+    }
+    // Our own recordings know formation, graph and law too.
+    let (mut footage, notes) = if McapRecording::open(recording).is_ok() {
+        (Footage::read_mcap(recording)?, Vec::new())
+    } else {
+        let mut tracks = read::open(recording, reading)?;
+        let name = recording.file_stem().unwrap_or_default().to_string_lossy();
+        let footage = Footage::from_tracks(&name, tracks.as_mut(), delta_m)?;
+        (footage, tracks.notes().to_vec())
+    };
+    if footage.instants() == 0 {
+        return Err(FootageError::Empty { name: recording.display().to_string() }.into());
+    }
+    if let Some(delta_m) = delta_m {
+        footage.delta_m = Some(delta_m);
+    }
+    Ok((footage, notes))
+}
+
+impl From<FootageError> for Failure {
+    fn from(error: FootageError) -> Self {
+        match error {
+            FootageError::Record(error) => error.into(),
+            FootageError::Empty { .. } => Self::input(
+                error.to_string(),
+                "give a recording that holds at least one sample, such as a run's run.mcap",
+            ),
+        }
+    }
+}
+
+impl From<GpuError> for Failure {
+    fn from(error: GpuError) -> Self {
+        let message = error.to_string();
+        match error {
+            GpuError::NoAdapter => Self::machine(message).with_help(GpuError::HELP),
+            GpuError::NoSuchAdapter { .. } => Self::input(
+                message,
+                "give hardware, software or a part of the name of an adapter that there is with --adapter",
+            ),
+            GpuError::Size { .. } => Self::input(message, "give another size with --size"),
+            GpuError::Unusable { .. } | GpuError::Driver { .. } | GpuError::Lost => {
+                Self::machine(message).with_help("try a smaller picture, or another driver with --adapter software")
+            }
+        }
+    }
+}
+
+impl From<CameraError> for Failure {
+    fn from(error: CameraError) -> Self {
+        let help = match error {
+            CameraError::NoVehicle { .. } => "give the name of a vehicle of the recording",
+            CameraError::Unknown(_) | CameraError::Range { .. } => CameraError::HELP,
+        };
+        Self::input(error.to_string(), help)
+    }
+}
+
+impl From<ShootError> for Failure {
+    fn from(error: ShootError) -> Self {
+        match error {
+            ShootError::Camera(error) => error.into(),
+            ShootError::Gpu(error) => error.into(),
+            ShootError::Empty => Self::input(error.to_string(), "give a flight with at least one sample"),
+        }
+    }
+}
+
+impl From<FilmError> for Failure {
+    fn from(error: FilmError) -> Self {
+        let message = error.to_string();
+        match error {
+            FilmError::UnknownFormat(_) => {
+                Self::input(message, "name the film something.mp4, something.gif or something.png")
+            }
+            FilmError::Rate { .. } => Self::input(message, "give another rate with --fps"),
+            FilmError::Size { .. } => Self::input(message, "give another size with --size, or another format"),
+            FilmError::Mixed | FilmError::Picture(_) | FilmError::Encoder { .. } => Self::machine(message),
+        }
+    }
+}
+
+impl From<PictureError> for Failure {
+    fn from(error: PictureError) -> Self {
+        Self::machine(error.to_string())
+    }
+}

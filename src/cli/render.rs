@@ -1,0 +1,313 @@
+//! `tautline render`: pictures and films of a recording.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::ProgressBar;
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+
+use super::console::Console;
+use super::drawing;
+use super::reading::{FormatArgument, ReadArguments};
+use super::{Exit, Failure};
+use crate::render::scene::Stage;
+use crate::render::{
+    CameraSpec, Film, FilmFormat, Footage, Picture, Renderer, Scene, ShootError, Theme, View, contact_sheet,
+};
+use crate::report::write_atomically;
+
+/// Most pictures of one command.
+const MOST_PICTURES: f64 = 100_000.0;
+/// A film at the default speed is not longer than this \[s\].
+const LONGEST_FILM_S: f64 = 20.0;
+/// Bytes of pictures that wait for their encoder at a time.
+const WAITING_BYTES: usize = 256 << 20;
+
+/// Arguments of `tautline render`.
+#[derive(Debug, Args)]
+pub(super) struct RenderArguments {
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Format of the recording [default: recognised by its content].
+    #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
+    input_format: Option<FormatArgument>,
+    /// Safety distance for a recording that has none: shells of half of it, and violations at the times drawn [m].
+    #[arg(long, value_name = "M")]
+    delta: Option<f64>,
+    /// Times to picture: start, closest, end, or seconds; several with commas. By default start,closest,end, unless
+    /// something else is asked for.
+    #[arg(long, value_name = "TIMES", value_delimiter = ',')]
+    at: Vec<String>,
+    /// A picture every so many seconds of the flight.
+    #[arg(long, value_name = "S")]
+    every: Option<f64>,
+    /// A film: H.264 for .mp4, or .gif, or an animated .png.
+    #[arg(long, value_name = "FILE")]
+    film: Option<PathBuf>,
+    /// A contact sheet of so many columns and rows.
+    #[arg(long, value_name = "CxR", value_parser = drawing::sheet)]
+    sheet: Option<[u32; 2]>,
+    /// Folder for the pictures, by default `snapshots` beside the recording.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Width and height of a picture, or of the whole sheet, in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = drawing::size)]
+    size: [u32; 2],
+    /// Pictures a second of a film.
+    #[arg(long, value_name = "N", default_value_t = 30)]
+    fps: u32,
+    /// Seconds of the flight in a second of the film; by default 1, or more where the film would be longer than 20 s.
+    #[arg(long, value_name = "X")]
+    speed: Option<f64>,
+    /// Where to look from: iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and
+    /// metres.
+    #[arg(long, default_value = "iso", allow_hyphen_values = true)]
+    camera: String,
+    /// Colours: dark, light, or paper (white, for print).
+    #[arg(long, default_value = "dark", value_parser = drawing::theme)]
+    theme: Theme,
+    /// What draws: best, hardware, software, or a part of an adapter's name.
+    #[arg(long, value_name = "NAME", default_value = "best")]
+    adapter: String,
+    /// Print no summary and no progress.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// A picture to be taken.
+struct Still {
+    time_s: f64,
+    path: PathBuf,
+}
+
+/// Draws a flight as it is asked for.
+struct Studio<'a> {
+    footage: &'a Footage,
+    stage: Stage,
+    renderer: Renderer,
+    view: View,
+    progress: ProgressBar,
+}
+
+pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
+    let console = Console { data_on_stdout: false, quiet: arguments.quiet };
+    let camera: CameraSpec = arguments.camera.parse()?;
+    let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
+    let reading = arguments.reading.options(arguments.input_format)?;
+    let recording = &arguments.reading.recording;
+    let (footage, notes) = drawing::footage(recording, &reading, arguments.delta)?;
+    for note in notes {
+        console.warn(&format!("note: {note}"));
+    }
+    if footage.every() > 1 {
+        console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", footage.every()));
+    }
+    let folder = arguments.out.clone().unwrap_or_else(|| beside(recording));
+    let stills = stills(arguments, &footage, &folder)?;
+    let frames = film.map(|_| film_times(arguments, &footage)).transpose()?.unwrap_or_default();
+    let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &footage)).transpose()?;
+    let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
+    let mut reel = film.map(|(_, format)| Film::new(format, view.size_px, arguments.fps)).transpose()?;
+    // Targets are tried before the work.
+    if !stills.is_empty() || sheet.is_some() {
+        writable(&folder)?;
+    }
+    if let Some((path, _)) = film {
+        writable(path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")))?;
+    }
+    let renderer = Renderer::open(&drawing::adapter(&arguments.adapter))?;
+    let tiles = sheet.as_ref().map_or(0, |(times, _)| times.len());
+    let progress = console.progress((stills.len() + frames.len() + tiles) as u64, footage.name.clone());
+    let mut studio = Studio { stage: Stage::of(&footage), footage: &footage, renderer, view, progress };
+
+    let times: Vec<f64> = stills.iter().map(|still| still.time_s).collect();
+    studio.shoot(&times, |first, pictures| {
+        let jobs: Vec<_> = stills[first..].iter().zip(pictures).collect();
+        jobs.par_iter().map(|(still, picture)| write(&still.path, picture)).collect::<Result<(), Failure>>()
+    })?;
+    if let Some(reel) = &mut reel {
+        studio.shoot(&frames, |_, pictures| Ok(reel.add(pictures)?))?;
+    }
+    let mut written: Vec<PathBuf> = stills.into_iter().map(|still| still.path).collect();
+    if let (Some((path, _)), Some(reel)) = (film, reel) {
+        write_atomically(path, &reel.finish()?)?;
+        written.push(path.to_owned());
+    }
+    if let (Some((times, size_px)), Some([columns, _])) = (sheet, arguments.sheet) {
+        studio.view.size_px = size_px;
+        let mut tiles = Vec::new();
+        studio.shoot(&times, |_, pictures| {
+            tiles.extend_from_slice(pictures);
+            Ok(())
+        })?;
+        let path = folder.join("sheet.png");
+        write(&path, &contact_sheet(&tiles, columns)?)?;
+        written.push(path);
+    }
+    studio.progress.finish_and_clear();
+    let names = match written.as_slice() {
+        [first, .., last] if written.len() > 4 => {
+            format!("{} pictures from {} to {}", written.len(), first.display(), last.display())
+        }
+        _ => written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "),
+    };
+    console.say(&format!("wrote {names}\ndrawn by {}", studio.renderer.adapter()));
+    Ok(Exit::Good)
+}
+
+impl Studio<'_> {
+    /// Takes pictures at these times and hands them on in order, some at a time; while those are worked on, the next
+    /// ones are drawn.
+    fn shoot(
+        &mut self,
+        times_s: &[f64],
+        mut take: impl FnMut(usize, &[Picture]) -> Result<(), Failure> + Send,
+    ) -> Result<(), Failure> {
+        let picture_bytes = self.view.size_px[0] as usize * self.view.size_px[1] as usize * 4;
+        let at_a_time = (WAITING_BYTES / picture_bytes.max(1)).clamp(1, 2 * rayon::current_num_threads());
+        let (mut first, mut waiting): (usize, Vec<Picture>) = (0, Vec::new());
+        for times_s in times_s.chunks(at_a_time) {
+            let (drawn, taken) = rayon::join(
+                || times_s.iter().map(|&time_s| self.picture(time_s)).collect::<Result<Vec<_>, Failure>>(),
+                || take(first, &waiting),
+            );
+            taken?;
+            first += waiting.len();
+            waiting = drawn?;
+        }
+        take(first, &waiting)
+    }
+
+    fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
+        let moment = self.footage.at(time_s).ok_or(ShootError::Empty)?;
+        let scene = Scene::compose(self.footage, &self.stage, &moment, &self.view)?;
+        let picture = self.renderer.paint(&scene)?;
+        self.progress.inc(1);
+        Ok(picture)
+    }
+}
+
+fn write(path: &Path, picture: &Picture) -> Result<(), Failure> {
+    Ok(write_atomically(path, &picture.to_png()?)?)
+}
+
+fn beside(recording: &Path) -> PathBuf {
+    recording.parent().unwrap_or(Path::new("")).join("snapshots")
+}
+
+/// Makes a folder and a file in it, and takes the file away again.
+fn writable(folder: &Path) -> Result<(), Failure> {
+    let probe = folder.join(format!(".tautline-{}", std::process::id()));
+    fs::create_dir_all(folder).and_then(|()| fs::write(&probe, [])).and_then(|()| fs::remove_file(&probe)).map_err(
+        |error| {
+            Failure::machine(format!("cannot write to {}: {error}", folder.display()))
+                .with_help("give a folder that can be written to with --out, or another --film")
+        },
+    )
+}
+
+/// The pictures asked for, each with its file.
+fn stills(arguments: &RenderArguments, footage: &Footage, folder: &Path) -> Result<Vec<Still>, Failure> {
+    let [start_s, end_s] = footage.range_s();
+    let nothing_else = arguments.every.is_none() && arguments.film.is_none() && arguments.sheet.is_none();
+    let default = ["start", "closest", "end"].map(str::to_owned);
+    let wanted = if arguments.at.is_empty() && nothing_else { &default[..] } else { &arguments.at };
+    let mut stills = Vec::new();
+    for text in wanted {
+        let (time_s, name) = match text.trim() {
+            "start" => (start_s, "start".to_owned()),
+            "end" => (end_s, "end".to_owned()),
+            "closest" => match footage.closest() {
+                Some(closest) => (closest.time_s, "closest".to_owned()),
+                // One vehicle alone has no closest approach; nobody asked for one by default.
+                None if arguments.at.is_empty() => continue,
+                None => {
+                    return Err(Failure::input(
+                        "the recording has no closest approach: it has fewer than two vehicles at a time",
+                        "leave `closest` out of --at",
+                    ));
+                }
+            },
+            seconds => {
+                let time_s = seconds.parse().ok().filter(|time: &f64| time.is_finite());
+                let time_s = time_s.ok_or_else(|| {
+                    Failure::input(
+                        format!("`{text}` is not a time"),
+                        "give start, closest, end or seconds, such as --at start,12.5,end",
+                    )
+                })?;
+                (time_s, format!("at-{time_s:.3}s"))
+            }
+        };
+        if !(start_s..=end_s).contains(&time_s) {
+            return Err(Failure::input(
+                format!("{time_s} s is outside the recording, which goes from {start_s} s to {end_s} s"),
+                "give a time within the recording with --at",
+            ));
+        }
+        stills.push(Still { time_s, path: folder.join(format!("{name}.png")) });
+    }
+    if let Some(every_s) = arguments.every {
+        let times = even_times(footage, every_s, "--every")?;
+        stills.extend(
+            times
+                .into_iter()
+                .enumerate()
+                .map(|(k, time_s)| Still { time_s, path: folder.join(format!("frame-{:05}.png", k + 1)) }),
+        );
+    }
+    Ok(stills)
+}
+
+/// Times from the start of a flight to its end, so far apart \[s\].
+fn even_times(footage: &Footage, apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
+    let [start_s, end_s] = footage.range_s();
+    if !(apart_s > 0.0 && apart_s.is_finite()) {
+        return Err(Failure::input(
+            format!("{option}: {apart_s} is not a positive number"),
+            format!("give a positive number with {option}"),
+        ));
+    }
+    let count = ((end_s - start_s) / apart_s + 1e-6).floor() + 1.0;
+    if count > MOST_PICTURES {
+        return Err(Failure::input(
+            format!("these would be {count:.0} pictures, more than {MOST_PICTURES:.0}"),
+            format!("give a larger number with {option}"),
+        ));
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded above")]
+    let count = count as u32;
+    Ok((0..count).map(|k| start_s + f64::from(k) * apart_s).collect())
+}
+
+fn film_times(arguments: &RenderArguments, footage: &Footage) -> Result<Vec<f64>, Failure> {
+    let [start_s, end_s] = footage.range_s();
+    let speed = arguments.speed.unwrap_or_else(|| ((end_s - start_s) / LONGEST_FILM_S).max(1.0));
+    even_times(footage, speed / f64::from(arguments.fps.max(1)), "--speed")
+}
+
+/// The times of a sheet's pictures and their size.
+fn sheet_plan(
+    [columns, rows]: [u32; 2],
+    [width, height]: [u32; 2],
+    footage: &Footage,
+) -> Result<(Vec<f64>, [u32; 2]), Failure> {
+    let size_px = [width / columns, height / rows];
+    if size_px.contains(&0) {
+        return Err(Failure::input(
+            format!("a sheet of {columns} x {rows} pictures does not fit into {width} x {height} pixels"),
+            "give fewer pictures with --sheet, or a larger --size",
+        ));
+    }
+    let [start_s, end_s] = footage.range_s();
+    let last = (u64::from(columns) * u64::from(rows) - 1).max(1) as f64;
+    if last > MOST_PICTURES {
+        return Err(Failure::input(
+            format!("{columns} x {rows} pictures are more than {MOST_PICTURES:.0}"),
+            "give fewer pictures with --sheet",
+        ));
+    }
+    let times = (0..columns * rows).map(|k| start_s + (end_s - start_s) * (f64::from(k) / last)).collect();
+    Ok((times, size_px))
+}

@@ -1,0 +1,128 @@
+//! `tautline view`: a window on a recording, or on a scenario that is flown while it is watched.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use clap::Args;
+
+use super::drawing;
+use super::{Exit, Failure};
+use crate::plant;
+use crate::read::ReadOptions;
+use crate::record::{Event, OwnedSample, RecordError, Recorder, Sample};
+use crate::render::{Fed, Footage, Theme, WindowError, show};
+use crate::scenario::{Override, Scenario, Source};
+use crate::sim;
+
+/// Samples of a flight in the air that wait for the window.
+const WAITING: usize = 256;
+
+/// Arguments of `tautline view`.
+#[derive(Debug, Args)]
+pub(super) struct ViewArguments {
+    /// A recording, a scenario file, or the name of a built-in scenario.
+    #[arg(default_value = "pentagon")]
+    what: String,
+    /// Set any key of the scenario; may be given several times.
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    overrides: Vec<String>,
+    /// Safety distance for a recording that has none [m].
+    #[arg(long, value_name = "M")]
+    delta: Option<f64>,
+    /// Colours: dark, light, or paper.
+    #[arg(long, default_value = "dark", value_parser = drawing::theme)]
+    theme: Theme,
+    /// What draws: best, hardware, software, or a part of an adapter's name.
+    #[arg(long, value_name = "NAME", default_value = "best")]
+    adapter: String,
+}
+
+pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
+    let path = Path::new(&arguments.what);
+    let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
+    let (footage, feed) = if is_recording {
+        (drawing::footage(path, &ReadOptions::default(), arguments.delta)?.0, None)
+    } else {
+        let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+        let scenario = Scenario::read(&Source::resolve(&arguments.what)?, &overrides)?;
+        (Footage::of(&scenario), Some(take_off(scenario)?))
+    };
+    show(footage, feed, arguments.theme, drawing::adapter(&arguments.adapter))?;
+    Ok(Exit::Good)
+}
+
+/// Starts a flight in a thread of its own. It waits for the window where that is slower, and ends when the window is
+/// closed.
+fn take_off(scenario: Scenario) -> Result<Receiver<Fed>, Failure> {
+    let mut law = scenario.law()?;
+    let (sender, receiver) = sync_channel(WAITING);
+    std::thread::spawn(move || {
+        let mut plant = plant::for_scenario(&scenario);
+        let mut downlink = Downlink { sender, cut: false };
+        let mut carry_on = |_| ControlFlow::Continue(());
+        let flown = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut downlink, &mut carry_on);
+        let said = match flown {
+            Ok(flight) => match flight.ending {
+                sim::Ending::LawUndefined(why) => Some(format!("the flight ended: the law is undefined: {why}")),
+                sim::Ending::BrokeDown(why) => Some(format!("the flight ended: {why}")),
+                sim::Ending::Completed | sim::Ending::Interrupted => None,
+            },
+            Err(error) => Some(format!("the flight ended: {error}")),
+        };
+        downlink.send(Fed::Ended(said));
+    });
+    Ok(receiver)
+}
+
+/// Sends a flight to the window.
+struct Downlink {
+    sender: SyncSender<Fed>,
+    cut: bool,
+}
+
+impl Downlink {
+    fn send(&mut self, fed: Fed) {
+        self.cut |= self.sender.send(fed).is_err();
+    }
+
+    /// A window that is closed ends the flight.
+    fn result(&self) -> Result<(), RecordError> {
+        if self.cut {
+            let source = std::io::Error::from(std::io::ErrorKind::BrokenPipe);
+            return Err(RecordError::Write { path: "the window".to_owned(), source });
+        }
+        Ok(())
+    }
+}
+
+impl Recorder for Downlink {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.send(Fed::Sample(Box::new(OwnedSample {
+            time_s: sample.time_s,
+            step: sample.step,
+            swarm: sample.swarm.clone(),
+            control: sample.control.clone(),
+            separation: sample.separation,
+            energy: sample.energy,
+        })));
+        self.result()
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        self.send(Fed::Event(event.clone()));
+        self.result()
+    }
+}
+
+impl From<WindowError> for Failure {
+    fn from(error: WindowError) -> Self {
+        let message = error.to_string();
+        match error {
+            WindowError::NoDisplay(_) => Self::machine(message)
+                .with_help("run it on a machine with a screen, or draw without one: tautline render RECORDING"),
+            WindowError::Refused(_) => Self::machine(message),
+            WindowError::Gpu(error) => error.into(),
+        }
+    }
+}

@@ -1,0 +1,88 @@
+use super::*;
+
+fn pictures(size_px: [u32; 2], count: u8) -> Vec<Picture> {
+    let plain = |k: u8| [k * 20, 100, 200, 255].repeat(size_px[0] as usize * size_px[1] as usize);
+    (0..count).map(|k| Picture { size_px, rgba: plain(k) }).collect()
+}
+
+fn film(format: FilmFormat, fps: u32, pictures: &[Picture]) -> Vec<u8> {
+    let mut film = Film::new(format, pictures[0].size_px, fps).expect("a film");
+    for few in pictures.chunks(2) {
+        film.add(few).expect("room for pictures");
+    }
+    film.finish().expect("bytes")
+}
+
+#[test]
+fn a_gif_holds_every_picture_and_lasts_as_long_as_it_should() {
+    let bytes = film(FilmFormat::Gif, 30, &pictures([20, 10], 6));
+    let mut decoder = gif_decoder(&bytes);
+    let mut delays = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().expect("a frame") {
+        delays.push(frame.delay);
+    }
+    assert_eq!((delays.len(), delays.iter().sum::<u16>()), (6, 20));
+}
+
+fn gif_decoder(bytes: &[u8]) -> ::gif::Decoder<&[u8]> {
+    ::gif::DecodeOptions::new().read_info(bytes).expect("a GIF")
+}
+
+#[test]
+fn an_animated_png_holds_every_picture_without_loss() {
+    let pictures = pictures([20, 10], 5);
+    let bytes = film(FilmFormat::Png, 25, &pictures);
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
+    let animation = reader.info().animation_control.expect("an animation");
+    assert_eq!((animation.num_frames, animation.num_plays), (5, 0));
+    for picture in &pictures {
+        let mut rgb = vec![0; reader.output_buffer_size().expect("a size")];
+        reader.next_frame(&mut rgb).expect("a frame");
+        assert_eq!(rgb[..3], picture.rgba[..3]);
+        let control = reader.info().frame_control.expect("a frame");
+        assert_eq!((control.delay_num, control.delay_den), (1, 25));
+    }
+}
+
+#[test]
+fn an_mp4_holds_every_picture_in_its_colours() {
+    let pictures = pictures([64, 32], 10);
+    let bytes = film(FilmFormat::Mp4, 20, &pictures);
+    assert_eq!(bytes[4..8], *b"ftyp");
+    for name in [b"moov", b"avc1", b"avcC", b"mdat"] {
+        assert!(bytes.windows(4).any(|window| window == name), "{name:?}");
+    }
+    // The stream itself is decoded again.
+    let mut mp4 = mp4::Mp4::new([64, 32], 20).expect("an encoder");
+    let mut decoder = openh264::decoder::Decoder::new().expect("a decoder");
+    let mut decoded = 0;
+    for picture in &pictures {
+        let stream = mp4.encoded(&mp4::prepare(picture)).expect("a picture");
+        if let Some(yuv) = decoder.decode(&stream).expect("a picture") {
+            let mut rgb = vec![0; 64 * 32 * 3];
+            yuv.write_rgb8(&mut rgb);
+            let middle = &rgb[(16 * 64 + 32) * 3..][..3];
+            for (found, wanted) in middle.iter().zip(&picture.rgba[..3]) {
+                // 8 bits of brightness and colour in less than the full range lose some units.
+                assert!(found.abs_diff(*wanted) <= 8, "{middle:?} of {:?}", &picture.rgba[..3]);
+            }
+            decoded += 1;
+        }
+    }
+    assert_eq!(decoded, 10);
+}
+
+#[test]
+fn what_a_format_does_not_allow_is_refused() {
+    assert!(matches!(Film::new(FilmFormat::Mp4, [63, 32], 20), Err(FilmError::Size { .. })));
+    assert!(matches!(Film::new(FilmFormat::Mp4, [8000, 4000], 20), Err(FilmError::Size { .. })));
+    assert!(matches!(Film::new(FilmFormat::Gif, [70_000, 10], 20), Err(FilmError::Size { .. })));
+    assert!(matches!(Film::new(FilmFormat::Gif, [10, 10], 60), Err(FilmError::Rate { most: 50, .. })));
+    assert!(matches!(Film::new(FilmFormat::Png, [10, 10], 0), Err(FilmError::Rate { .. })));
+    let mut film = Film::new(FilmFormat::Png, [10, 10], 10).expect("a film");
+    assert_eq!(film.add(&pictures([20, 10], 1)), Err(FilmError::Mixed));
+    assert!(film.finish().is_err(), "a film without pictures is none");
+    assert_eq!(FilmFormat::of(Path::new("a/film.MP4")), Ok(FilmFormat::Mp4));
+    assert_eq!(FilmFormat::of(Path::new("film.avi")), Err(FilmError::UnknownFormat("film.avi".to_owned())));
+    assert!(FilmFormat::of(Path::new("film")).is_err());
+}

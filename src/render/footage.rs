@@ -1,0 +1,376 @@
+//! A recorded flight, ready to be drawn at any time of it.
+
+mod tracks;
+
+use std::path::Path;
+
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::law::EdgeTension;
+use crate::record::mcap::{Entry, McapRecording};
+use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::scenario::{LawSpec, Scenario, Source};
+use crate::swarm::{ClosestApproach, Pair, Rows};
+
+/// Most memory that the instants of a flight take \[bytes\]; beyond it every second one is dropped.
+pub const BUDGET_BYTES: usize = 256 << 20;
+/// Most vehicles whose closest pair is sought anew at each instant that is drawn.
+const SEARCHED_VEHICLES: usize = 2000;
+/// Radius of a vehicle of which nothing is known \[m\].
+const UNKNOWN_RADIUS_M: f64 = 0.1;
+
+/// A flight in memory: instants in order of time, and what is known about it.
+///
+/// It is a [`Recorder`] and can watch a flight as it is flown. What goes beyond [`BUDGET_BYTES`] is thinned: pictures are
+/// then drawn from every second, fourth, ... sample and the last one; the closest approach stays that of all.
+#[derive(Clone, Debug)]
+pub struct Footage {
+    /// What was flown.
+    pub name: String,
+    /// Names of the vehicles.
+    pub vehicles: Vec<String>,
+    /// Radius of each vehicle's hull \[m\].
+    pub radius_m: Vec<f64>,
+    /// Safety distance delta \[m\], where one is judged by.
+    pub delta_m: Option<f64>,
+    /// Formation and graph, where the flight has them.
+    pub plan: Option<Plan>,
+    instants: Vec<Instant>,
+    spans: Vec<Span>,
+    closest: Option<ClosestApproach>,
+    /// One in so many samples is kept.
+    every: usize,
+    /// Samples since the last one that stays.
+    since_kept: usize,
+    budget_bytes: usize,
+}
+
+/// Formation, graph and how hard an edge pulls.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The slots to be reached.
+    pub formation: Formation,
+    /// Who senses whom.
+    pub graph: Graph,
+    law: LawSpec,
+    delta_m: f64,
+}
+
+/// A time at which every position is known.
+#[derive(Clone, Debug)]
+struct Instant {
+    time_s: f64,
+    positions_m: Rows,
+    control_m_s2: Option<Rows>,
+    /// Closest approach since the instant before.
+    here: Option<ClosestApproach>,
+    /// Closest approach since the start.
+    so_far: Option<ClosestApproach>,
+}
+
+/// A time during which a pair was closer than delta.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// The pair.
+    pub pair: Pair,
+    /// When it began \[s\].
+    pub from_s: f64,
+    /// When it ended \[s\]; infinite while it lasts.
+    pub to_s: f64,
+}
+
+/// A flight at a time of it.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// The time \[s\].
+    pub time_s: f64,
+    /// Positions \[m\], N x 3; NaN for a vehicle that is not there.
+    pub positions_m: Rows,
+    /// Commanded accelerations \[m/s^2\] at the last sample, where they were recorded.
+    pub control_m_s2: Option<Rows>,
+    /// The two nearest vehicles and their distance \[m\].
+    pub nearest: Option<(Pair, f64)>,
+    /// Closest approach up to this time.
+    pub so_far: Option<ClosestApproach>,
+    /// The last instant at or before this time.
+    pub(super) last: usize,
+}
+
+/// Why there is nothing to draw.
+#[derive(Debug, thiserror::Error)]
+pub enum FootageError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// It holds no instant.
+    #[error("{name} holds no samples, so there is nothing to draw")]
+    Empty {
+        /// The recording.
+        name: String,
+    },
+}
+
+impl Plan {
+    /// Formation, graph and law of a scenario.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self {
+            formation: scenario.formation.clone(),
+            graph: scenario.graph.clone(),
+            law: scenario.law.clone(),
+            delta_m: scenario.delta_m,
+        }
+    }
+
+    /// How hard the edge between two vehicles pulls (above 0) or pushes (below 0) at a distance \[m\], from -1 to 1.
+    ///
+    /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
+    /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: the stretch over the desired distance.
+    #[must_use]
+    pub fn tension(&self, pair: Pair, distance_m: f64) -> f64 {
+        let rest_m = self.formation.desired_distance(pair.first(), pair.second());
+        let spring = (distance_m - rest_m) / rest_m;
+        let tension = match self.law {
+            LawSpec::EdgeTension { alpha } => EdgeTension::new(alpha, self.delta_m, rest_m)
+                .map_or(spring, |tension| tension.derivative(distance_m) * tension.k_m() / alpha),
+            LawSpec::Laplacian { .. } => spring,
+        };
+        tension.clamp(-1.0, 1.0)
+    }
+}
+
+impl Footage {
+    /// No instants yet of a flight of this name by so many vehicles, numbered from 1.
+    #[must_use]
+    pub fn new(name: &str, vehicles: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            vehicles: (1..=vehicles).map(|number| number.to_string()).collect(),
+            radius_m: vec![UNKNOWN_RADIUS_M; vehicles],
+            delta_m: None,
+            plan: None,
+            instants: Vec::new(),
+            spans: Vec::new(),
+            closest: None,
+            every: 1,
+            since_kept: 0,
+            budget_bytes: BUDGET_BYTES,
+        }
+    }
+
+    /// No instants yet of a flight of this scenario.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self {
+            radius_m: scenario.hull_radius_m.clone(),
+            delta_m: Some(scenario.delta_m),
+            plan: Some(Plan::of(scenario)),
+            ..Self::new(&scenario.name, scenario.count())
+        }
+    }
+
+    /// Reads a recording of this program. Where its scenario cannot be understood, formation and graph are not known.
+    ///
+    /// # Errors
+    /// [`FootageError`] when it cannot be read or holds no samples.
+    pub fn read_mcap(path: &Path) -> Result<Self, FootageError> {
+        let recording = McapRecording::open(path)?;
+        let header = recording.header().clone();
+        let source = Source::Text { name: header.scenario_name.clone(), text: header.scenario_toml.clone() };
+        let mut footage = match Scenario::read(&source, &[]) {
+            Ok(scenario) if scenario.count() == header.vehicles => Self::of(&scenario),
+            _ => Self { delta_m: Some(header.delta_m), ..Self::new(&header.scenario_name, header.vehicles) },
+        };
+        for entry in recording {
+            match entry? {
+                Entry::Sample(sample) => footage.take(&sample.as_sample()),
+                Entry::Event(event) => footage.note(&event),
+            }
+        }
+        footage.complete(&path.display().to_string())
+    }
+
+    fn complete(self, name: &str) -> Result<Self, FootageError> {
+        if self.instants.is_empty() { Err(FootageError::Empty { name: name.to_owned() }) } else { Ok(self) }
+    }
+
+    /// Number of vehicles N.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.vehicles.len()
+    }
+
+    /// Number of instants in memory.
+    #[must_use]
+    pub fn instants(&self) -> usize {
+        self.instants.len()
+    }
+
+    /// One in so many samples is in memory.
+    #[must_use]
+    pub fn every(&self) -> usize {
+        self.every
+    }
+
+    /// First and last time \[s\]; both 0 before there is one.
+    #[must_use]
+    pub fn range_s(&self) -> [f64; 2] {
+        [self.instants.first(), self.instants.last()].map(|instant| instant.map_or(0.0, |instant| instant.time_s))
+    }
+
+    /// Closest approach of the whole flight.
+    #[must_use]
+    pub fn closest(&self) -> Option<ClosestApproach> {
+        self.closest
+    }
+
+    /// Every time that a pair was closer than delta, in order of its beginning.
+    #[must_use]
+    pub fn violations(&self) -> &[Span] {
+        &self.spans
+    }
+
+    /// When a pair came closest while it was closer than delta \[s\], as far as the samples tell.
+    #[must_use]
+    pub fn worst_s(&self, span: &Span) -> f64 {
+        let within = self.instants.iter().filter_map(|instant| instant.here);
+        let within = within.filter(|here| here.pair == span.pair && (span.from_s..=span.to_s).contains(&here.time_s));
+        let worst = within.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m));
+        worst.map_or(span.from_s, |worst| worst.time_s)
+    }
+
+    /// Times and positions in memory, in order.
+    pub(super) fn positions(&self) -> impl ExactSizeIterator<Item = (f64, &Rows)> {
+        self.instants.iter().map(|instant| (instant.time_s, &instant.positions_m))
+    }
+
+    /// Time \[s\] and positions \[m\] of an instant in memory.
+    pub(super) fn instant(&self, k: usize) -> (f64, &Rows) {
+        (self.instants[k].time_s, &self.instants[k].positions_m)
+    }
+
+    /// Times in memory \[s\], in order.
+    pub fn times(&self) -> impl Iterator<Item = f64> + '_ {
+        self.instants.iter().map(|instant| instant.time_s)
+    }
+
+    /// Times \[s\] and the separation \[m\] that was smallest since the time before.
+    pub fn separations(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        self.instants.iter().filter_map(|instant| Some([instant.time_s, instant.here?.separation_m]))
+    }
+
+    /// The flight at a time \[s\], which is brought into its range; between two instants every vehicle moves on a straight
+    /// line. None before there is an instant.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> Option<Moment> {
+        let [first_s, last_s] = self.range_s();
+        let time_s = if time_s.is_nan() { first_s } else { time_s.clamp(first_s, last_s) };
+        let last = self.instants.partition_point(|instant| instant.time_s <= time_s).checked_sub(1)?;
+        let before = &self.instants[last];
+        let mut positions_m = before.positions_m.clone();
+        let mut so_far = before.so_far;
+        if let Some(after) = self.instants.get(last + 1) {
+            let part = (time_s - before.time_s) / (after.time_s - before.time_s);
+            if part > 0.0 {
+                positions_m.zip_apply(&after.positions_m, |here, there| *here += (there - *here) * part);
+            }
+            so_far = nearer(so_far, after.here.filter(|approach| approach.time_s <= time_s));
+        }
+        let nearest = self.nearest(&positions_m, before.here.map(|approach| approach.pair));
+        Some(Moment { time_s, positions_m, control_m_s2: before.control_m_s2.clone(), nearest, so_far, last })
+    }
+
+    /// The nearest two vehicles; of many vehicles the pair that was nearest just before.
+    fn nearest(&self, positions_m: &Rows, recorded: Option<Pair>) -> Option<(Pair, f64)> {
+        match recorded {
+            Some(pair) if self.count() > SEARCHED_VEHICLES => {
+                Some((pair, crate::swarm::separation(positions_m, pair.first(), pair.second())))
+            }
+            _ => tracks::nearest_present(positions_m),
+        }
+    }
+
+    /// Takes one sample, which must be later than the one before.
+    pub fn take(&mut self, sample: &Sample<'_>) {
+        self.push(Instant {
+            time_s: sample.time_s,
+            positions_m: sample.swarm.positions_m.clone(),
+            control_m_s2: Some(sample.control.clone()),
+            here: sample.separation,
+            so_far: None,
+        });
+    }
+
+    fn push(&mut self, mut instant: Instant) {
+        self.closest = nearer(self.closest, instant.here);
+        instant.so_far = self.closest;
+        // The last instant is always there; it makes room for the next one unless its turn has come.
+        if self.since_kept > 0
+            && let Some(last) = self.instants.pop()
+        {
+            instant.here = nearer(last.here, instant.here);
+        }
+        self.since_kept = (self.since_kept + 1) % self.every;
+        self.instants.push(instant);
+        let bytes_each = self.count() * 6 * size_of::<f64>() + size_of::<Instant>();
+        if self.instants.len() >= 16 && self.instants.len() * bytes_each > self.budget_bytes {
+            self.thin();
+        }
+    }
+
+    /// Drops every second instant, but neither the first nor the last.
+    fn thin(&mut self) {
+        let last = self.instants.len() - 1;
+        let mut dropped = None;
+        let mut k = 0;
+        self.instants.retain_mut(|instant| {
+            let keep = k % 2 == 0 || k == last;
+            instant.here = nearer(dropped.take(), instant.here);
+            if !keep {
+                dropped = instant.here;
+            }
+            k += 1;
+            keep
+        });
+        self.every *= 2;
+        self.since_kept = if last.is_multiple_of(2) { 0 } else { self.every / 2 };
+    }
+
+    /// Takes one event.
+    pub fn note(&mut self, event: &Event) {
+        match *event {
+            Event::ViolationBegan { pair, time_s } => {
+                self.spans.push(Span { pair, from_s: time_s, to_s: f64::INFINITY });
+            }
+            Event::ViolationEnded { pair, time_s, .. } => {
+                if let Some(span) = self.spans.iter_mut().rev().find(|span| span.pair == pair) {
+                    span.to_s = time_s;
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Recorder for Footage {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.take(sample);
+        Ok(())
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        self.note(event);
+        Ok(())
+    }
+}
+
+/// The nearer of two approaches, the earlier one among equals.
+fn nearer(a: Option<ClosestApproach>, b: Option<ClosestApproach>) -> Option<ClosestApproach> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b.separation_m < a.separation_m { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+#[cfg(test)]
+mod tests;

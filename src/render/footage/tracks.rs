@@ -1,0 +1,152 @@
+//! Footage of recorded motion, whoever recorded it.
+
+use nalgebra::Vector3;
+
+use super::{BUDGET_BYTES, Footage, Instant, Span, UNKNOWN_RADIUS_M};
+use crate::formation::closest_pair;
+use crate::swarm::{ClosestApproach, Pair, Rows, row, set_row};
+use crate::track::{Item, Piece, Tracks};
+
+/// Instants a second at which known curves are drawn \[Hz\].
+const CURVE_HZ: f64 = 30.0;
+/// Instants of vehicles that were seen at times of their own, over those of the one that was seen most often.
+const SHARED: usize = 2;
+
+/// What is known of one vehicle.
+#[derive(Default)]
+struct Course {
+    samples: Vec<(f64, Vector3<f64>)>,
+    pieces: Vec<Piece>,
+    radius_m: Option<f64>,
+}
+
+impl Footage {
+    /// Reads recorded motion. Vehicles that were seen at times of their own are put on common ones, with straight lines
+    /// between; one that has not been seen yet, or no longer, is not there. Separations are those at the common times.
+    ///
+    /// The result may be without instants.
+    ///
+    /// # Errors
+    /// When the recording cannot be read.
+    pub fn from_tracks<T: Tracks + ?Sized>(name: &str, tracks: &mut T, delta_m: Option<f64>) -> Result<Self, T::Error> {
+        let (mut courses, mut items): (Vec<Course>, _) = (Vec::new(), Vec::new());
+        while tracks.read(&mut items)? {
+            for item in items.drain(..) {
+                if courses.len() <= item.vehicle() {
+                    courses.resize_with(item.vehicle() + 1, Course::default);
+                }
+                courses[item.vehicle()].take(item);
+            }
+        }
+        for item in items.drain(..) {
+            if courses.len() <= item.vehicle() {
+                courses.resize_with(item.vehicle() + 1, Course::default);
+            }
+            courses[item.vehicle()].take(item);
+        }
+        let mut footage = Self { delta_m, ..Self::new(name, courses.len()) };
+        footage.vehicles = (0..courses.len())
+            .map(|k| tracks.vehicles().get(k).cloned().unwrap_or_else(|| format!("{}", k + 1)))
+            .collect();
+        footage.radius_m = courses.iter().map(|course| course.radius_m.unwrap_or(UNKNOWN_RADIUS_M)).collect();
+        let mut places = vec![0; courses.len()];
+        for time_s in common_times(&courses) {
+            let mut positions_m = Rows::zeros(courses.len());
+            for (k, course) in courses.iter().enumerate() {
+                set_row(&mut positions_m, k, course.at(time_s, &mut places[k]));
+            }
+            footage.see(time_s, positions_m);
+        }
+        Ok(footage)
+    }
+
+    fn see(&mut self, time_s: f64, positions_m: Rows) {
+        let here =
+            nearest_present(&positions_m).map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s });
+        let inside = here.filter(|here| self.delta_m.is_some_and(|delta_m| here.separation_m < delta_m));
+        match (self.spans.last_mut().filter(|span| span.to_s.is_infinite()), inside) {
+            (Some(span), Some(here)) if span.pair == here.pair => {}
+            (open, inside) => {
+                if let Some(span) = open {
+                    span.to_s = time_s;
+                }
+                self.spans.extend(inside.map(|here| Span { pair: here.pair, from_s: time_s, to_s: f64::INFINITY }));
+            }
+        }
+        self.push(Instant { time_s, positions_m, control_m_s2: None, here, so_far: None });
+    }
+}
+
+impl Course {
+    fn take(&mut self, item: Item) {
+        match item {
+            Item::Sample(sample) => {
+                self.radius_m = sample.radius_m.or(self.radius_m);
+                self.samples.push((sample.time_s, sample.position_m));
+            }
+            Item::Piece(piece) => self.pieces.push(piece),
+        }
+    }
+
+    /// Where the vehicle is at a time that is not before the time of the last call; `place` is kept between calls.
+    fn at(&self, time_s: f64, place: &mut usize) -> Vector3<f64> {
+        let nowhere = Vector3::repeat(f64::NAN);
+        if self.pieces.is_empty() {
+            while self.samples.get(*place + 1).is_some_and(|next| next.0 <= time_s) {
+                *place += 1;
+            }
+            return match (self.samples.get(*place), self.samples.get(*place + 1)) {
+                (Some(here), _) if here.0 == time_s => here.1,
+                (Some(here), Some(next)) if here.0 < time_s => {
+                    here.1 + (next.1 - here.1) * ((time_s - here.0) / (next.0 - here.0))
+                }
+                _ => nowhere,
+            };
+        }
+        while self.pieces.get(*place).is_some_and(|piece| piece.to_s < time_s) {
+            *place += 1;
+        }
+        self.pieces.get(*place).filter(|piece| piece.from_s <= time_s).map_or(nowhere, |piece| {
+            let t = time_s - piece.from_s;
+            piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * t + coefficient)
+        })
+    }
+}
+
+/// The times of all samples where they are few, else evenly spaced ones.
+fn common_times(courses: &[Course]) -> Vec<f64> {
+    let mut times: Vec<f64> = Vec::new();
+    for course in courses {
+        times.extend(course.samples.iter().map(|sample| sample.0));
+        times.extend(course.pieces.iter().flat_map(|piece| [piece.from_s, piece.to_s]));
+    }
+    times.retain(|time| time.is_finite());
+    times.sort_unstable_by(f64::total_cmp);
+    times.dedup();
+    let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return times };
+    let most = BUDGET_BYTES / (courses.len().max(1) * 6 * size_of::<f64>());
+    let has_curves = courses.iter().any(|course| !course.pieces.is_empty());
+    let longest = courses.iter().map(|course| course.samples.len()).max().unwrap_or(0);
+    if !has_curves && times.len() <= most && times.len() <= SHARED * longest {
+        return times;
+    }
+    let wanted = if has_curves { (last - first) * CURVE_HZ } else { longest as f64 };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded by both")]
+    let steps = wanted.ceil().clamp(1.0, most.max(2) as f64) as usize;
+    (0..=steps).map(|k| first + (last - first) * (k as f64 / steps as f64)).collect()
+}
+
+/// The nearest two of the vehicles that are there, and their distance \[m\].
+pub(super) fn nearest_present(positions_m: &Rows) -> Option<(Pair, f64)> {
+    let is_there = |i: &usize| row(positions_m, *i).iter().all(|x| x.is_finite());
+    let there: Vec<usize> = (0..positions_m.nrows()).filter(is_there).collect();
+    if there.len() == positions_m.nrows() {
+        return closest_pair(positions_m);
+    }
+    let mut rows = Rows::zeros(there.len());
+    for (k, &i) in there.iter().enumerate() {
+        set_row(&mut rows, k, row(positions_m, i));
+    }
+    let (pair, distance_m) = closest_pair(&rows)?;
+    Some((Pair::new(there[pair.first()], there[pair.second()]), distance_m))
+}

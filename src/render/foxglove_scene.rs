@@ -1,0 +1,197 @@
+//! A run as a 3-D scene that Foxglove shows without a plug-in.
+
+use std::io;
+
+use foxglove::Encode as _;
+use foxglove::messages::line_primitive::Type as LineType;
+use foxglove::messages::{
+    Color, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3,
+};
+
+use super::footage::Plan;
+use super::scene::{Colour, Theme};
+use crate::record::Sample;
+use crate::record::mcap::{Channel, Companion};
+use crate::scenario::Scenario;
+use crate::swarm::{Pair, Rows, row};
+
+/// Scenes a second \[Hz\].
+pub const SCENE_HZ: f64 = 5.0;
+/// Most edges that are in a scene.
+const MOST_EDGES: usize = 300;
+/// Width of an edge \[m\].
+const EDGE_M: f64 = 0.03;
+/// Times are products of steps.
+const ROUNDING_S: f64 = 1e-6;
+
+/// Makes `foxglove.SceneUpdate` messages on `/scene`: vehicles as balls, keep-out shells, edges in the colour of their
+/// tension, in the colours of [`Theme::Dark`], [`SCENE_HZ`] times a second.
+///
+/// A scene takes some 230 bytes for each vehicle, of which a half is its shell, and 140 for each edge (none where there
+/// are more than 300), so beside 72 bytes for each vehicle and sample at 60 Hz a recording grows by less than a third,
+/// and one of few vehicles by a half.
+pub struct FoxgloveScene {
+    plan: Plan,
+    radius_m: Vec<f64>,
+    delta_m: f64,
+    next_s: f64,
+}
+
+impl FoxgloveScene {
+    /// Scenes of a flight of this scenario.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self {
+            plan: Plan::of(scenario),
+            radius_m: scenario.hull_radius_m.clone(),
+            delta_m: scenario.delta_m,
+            next_s: f64::NEG_INFINITY,
+        }
+    }
+
+    fn scene(&self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
+        let theme = Theme::Dark;
+        let count = positions_m.nrows();
+        let violated = |i: usize, j: usize| (row(positions_m, i) - row(positions_m, j)).norm() < self.delta_m;
+        let graph = &self.plan.graph;
+        let edges: Vec<(usize, usize)> =
+            if graph.edge_count() <= MOST_EDGES { graph.edges().collect() } else { Vec::new() };
+        let mut alarm = vec![false; count];
+        for &(i, j) in edges.iter().filter(|(i, j)| violated(*i, *j)) {
+            (alarm[i], alarm[j]) = (true, true);
+        }
+        let hulls = (0..count).map(|k| {
+            let colour = if alarm[k] { theme.alarm() } else { theme.vehicle(k) };
+            sphere(positions_m, k, self.radius_m[k], colour)
+        });
+        let shells = (0..count).map(|k| {
+            let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
+            sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15))
+        });
+        let mut lines =
+            LinePrimitive { r#type: LineType::LineList.into(), thickness: EDGE_M, ..LinePrimitive::default() };
+        for &(i, j) in &edges {
+            let distance_m = (row(positions_m, i) - row(positions_m, j)).norm();
+            #[expect(clippy::cast_possible_truncation, reason = "a colour")]
+            let tension = self.plan.tension(Pair::new(i, j), distance_m) as f32;
+            for k in [i, j] {
+                let place = row(positions_m, k);
+                lines.points.push(Point3 { x: place.x, y: place.y, z: place.z });
+                lines.colors.push(colour(theme.tension(tension).at(0.8)));
+            }
+        }
+        SceneUpdate {
+            deletions: Vec::new(),
+            entities: vec![SceneEntity {
+                timestamp: Some(timestamp(time_s)),
+                frame_id: "world".to_owned(),
+                id: "swarm".to_owned(),
+                spheres: hulls.chain(shells).collect(),
+                lines: if edges.is_empty() { Vec::new() } else { vec![lines] },
+                ..SceneEntity::default()
+            }],
+        }
+    }
+}
+
+impl Companion for FoxgloveScene {
+    fn channel(&self) -> Channel {
+        let schema = SceneUpdate::get_schema();
+        let (name, encoding, data) =
+            schema.map(|schema| (schema.name, schema.encoding, schema.data.into_owned())).unwrap_or_default();
+        Channel {
+            topic: "/scene".to_owned(),
+            message_encoding: SceneUpdate::get_message_encoding(),
+            schema_name: name,
+            schema_encoding: encoding,
+            schema: data,
+        }
+    }
+
+    fn message(&mut self, sample: &Sample<'_>, message: &mut Vec<u8>) -> io::Result<bool> {
+        if sample.time_s < self.next_s - ROUNDING_S {
+            return Ok(false);
+        }
+        self.next_s = sample.time_s + 1.0 / SCENE_HZ;
+        message.clear();
+        let scene = self.scene(sample.time_s, &sample.swarm.positions_m);
+        scene.encode(message).map_err(io::Error::other)?;
+        Ok(true)
+    }
+}
+
+fn sphere(positions_m: &Rows, k: usize, radius_m: f64, shown: Colour) -> SpherePrimitive {
+    let place = row(positions_m, k);
+    let side = 2.0 * radius_m;
+    SpherePrimitive {
+        pose: Some(Pose {
+            position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
+            orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
+        }),
+        size: Some(Vector3 { x: side, y: side, z: side }),
+        color: Some(colour(shown)),
+    }
+}
+
+fn colour(colour: Colour) -> Color {
+    let [r, g, b, a] = colour.rgba.map(|channel| f64::from(channel) / 255.0);
+    Color { r, g, b, a }
+}
+
+fn timestamp(time_s: f64) -> Timestamp {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the casts saturate")]
+    let (seconds, nanoseconds) = (time_s.floor() as u32, ((time_s - time_s.floor()) * 1e9) as u32);
+    Timestamp::new_checked(seconds, nanoseconds).unwrap_or(Timestamp::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use foxglove::Decode as _;
+
+    use super::*;
+    use crate::scenario::Source;
+    use crate::swarm::Swarm;
+
+    fn pentagon() -> Scenario {
+        Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in")
+    }
+
+    fn message(scene: &mut FoxgloveScene, time_s: f64, swarm: &Swarm) -> Option<Vec<u8>> {
+        let control = Rows::zeros(swarm.count());
+        let sample = Sample { time_s, step: 0, swarm, control: &control, separation: None, energy: None };
+        let mut bytes = Vec::new();
+        scene.message(&sample, &mut bytes).expect("encoded").then_some(bytes)
+    }
+
+    #[test]
+    fn a_scene_holds_every_vehicle_with_its_shell_and_every_edge() {
+        let scenario = pentagon();
+        let mut scene = FoxgloveScene::of(&scenario);
+        let bytes = message(&mut scene, 0.0, &scenario.start).expect("a message");
+        let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
+        let entity = &update.entities[0];
+        assert_eq!((entity.spheres.len(), entity.lines[0].points.len()), (10, 20));
+        assert_eq!(entity.spheres[0].size.map(|size| size.x), Some(0.5));
+        assert_eq!(entity.spheres[0].pose.and_then(|pose| pose.position).map(|at| (at.x, at.y)), Some((3.0, -0.05)));
+        assert_eq!(entity.spheres[5].size.map(|size| size.x), Some(2.0));
+        let channel = scene.channel();
+        assert_eq!(
+            (channel.schema_name.as_str(), channel.message_encoding.as_str()),
+            ("foxglove.SceneUpdate", "protobuf")
+        );
+        assert!(!channel.schema.is_empty());
+    }
+
+    #[test]
+    fn scenes_come_five_times_a_second_and_take_what_the_documentation_says() {
+        let scenario = pentagon();
+        let mut scene = FoxgloveScene::of(&scenario);
+        let sizes: Vec<usize> = (0..=60_u32)
+            .filter_map(|k| message(&mut scene, f64::from(k) / 60.0, &scenario.start))
+            .map(|bytes| bytes.len())
+            .collect();
+        assert_eq!(sizes.len(), 6);
+        let most = 5 * 230 + 10 * 140 + 60;
+        assert!(sizes.iter().all(|&size| size <= most && size > most / 2), "{sizes:?} of {most}");
+    }
+}

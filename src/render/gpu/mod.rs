@@ -1,0 +1,121 @@
+//! Draws scenes with wgpu, with or without a screen.
+//!
+//! Balls are flat pieces on which every pixel finds its own point of the sphere and every sample of a pixel its own
+//! edge, so that they are round at any size and cost what they cover. Everything is multisampled four times and blended
+//! as light; words and legends are laid over it by egui. A frame is uploaded once and drawn in two passes.
+//!
+//! The same scene gives the same bytes on the same adapter and driver.
+
+mod adapter;
+mod overlay;
+mod pipelines;
+mod target;
+
+pub use adapter::{AdapterChoice, GpuError};
+
+pub(crate) use adapter::Gpu;
+pub(crate) use overlay::paint;
+
+use super::picture::Picture;
+use super::scene::{CameraError, Scene, Stage, View};
+use super::{Footage, Moment};
+use overlay::Overlay;
+use pipelines::Pipelines;
+use target::Target;
+
+/// Draws scenes into pictures.
+pub struct Renderer {
+    gpu: Gpu,
+    pipelines: Pipelines,
+    overlay: Overlay,
+    target: Option<Target>,
+}
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum ShootError {
+    /// The camera cannot be used.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// It cannot be drawn.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// There is nothing to draw.
+    #[error("the flight has no samples")]
+    Empty,
+}
+
+impl Renderer {
+    /// Starts an adapter.
+    ///
+    /// # Errors
+    /// [`GpuError`] when there is none of this choice.
+    pub fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
+        Ok(Self::on(Gpu::open(choice)?))
+    }
+
+    pub(crate) fn on(gpu: Gpu) -> Self {
+        let (pipelines, overlay) = (Pipelines::new(&gpu.device), Overlay::new(&gpu.device));
+        Self { gpu, pipelines, overlay, target: None }
+    }
+
+    /// Name of the adapter, what kind it is and how it is driven.
+    #[must_use]
+    pub fn adapter(&self) -> &str {
+        &self.gpu.name
+    }
+
+    /// Largest width and height of a picture \[pixels\].
+    #[must_use]
+    pub fn largest_px(&self) -> u32 {
+        self.gpu.largest_px
+    }
+
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// The picture of a scene.
+    ///
+    /// # Errors
+    /// [`GpuError`] when the picture's size is not between 1 and [`Renderer::largest_px`], or the adapter fails.
+    pub fn paint(&mut self, scene: &Scene) -> Result<Picture, GpuError> {
+        self.draw(scene, true)?;
+        let target = self.target.as_ref().ok_or(GpuError::Lost)?;
+        let picture = target.read(&self.gpu)?;
+        self.gpu.check()?;
+        Ok(picture)
+    }
+
+    /// The picture of a flight at a time \[s\], which is brought into its range.
+    ///
+    /// # Errors
+    /// [`ShootError`] when there is nothing to draw, the camera cannot be used or the adapter fails.
+    pub fn shoot(&mut self, footage: &Footage, time_s: f64, view: &View) -> Result<Picture, ShootError> {
+        let moment: Moment = footage.at(time_s).ok_or(ShootError::Empty)?;
+        let scene = Scene::compose(footage, &Stage::of(footage), &moment, view)?;
+        Ok(self.paint(&scene)?)
+    }
+
+    /// Draws a scene into a texture, with or without its marks.
+    pub(crate) fn draw(&mut self, scene: &Scene, with_marks: bool) -> Result<&wgpu::TextureView, GpuError> {
+        let size_px = scene.camera.size_px;
+        self.gpu.check_size(size_px)?;
+        let device = &self.gpu.device;
+        let fits = self.target.as_ref().is_some_and(|target| target.size_px == size_px);
+        if !fits {
+            self.target = None;
+            self.target = Some(Target::new(&self.gpu, size_px)?);
+        }
+        let target = self.target.as_ref().ok_or(GpuError::Lost)?;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.pipelines.upload(device, &self.gpu.queue, scene);
+        self.pipelines.draw(&mut encoder, target, scene);
+        if with_marks {
+            self.overlay.draw(&self.gpu, &mut encoder, target, &scene.marks);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.check()?;
+        Ok(&target.words_view)
+    }
+}

@@ -1,0 +1,135 @@
+//! Words and legends, by egui.
+
+use egui::epaint::{ClippedPrimitive, Mesh, Vertex};
+use egui::{Color32, FontId, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2, pos2};
+use egui_wgpu::ScreenDescriptor;
+
+use super::Gpu;
+use super::target::{LIGHT_FORMAT, Target, WORDS_FORMAT};
+use crate::render::scene::{Colour, Mark};
+
+/// Lays marks over pictures.
+pub(super) struct Overlay {
+    context: egui::Context,
+    /// For pictures seen as bytes, and for those that cannot be.
+    renderers: [egui_wgpu::Renderer; 2],
+}
+
+impl Overlay {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let context = egui::Context::default();
+        let renderer = |format| {
+            egui_wgpu::Renderer::new(
+                device,
+                format,
+                egui_wgpu::RendererOptions { dithering: false, ..egui_wgpu::RendererOptions::PREDICTABLE },
+            )
+        };
+        Self { context, renderers: [WORDS_FORMAT, LIGHT_FORMAT].map(renderer) }
+    }
+
+    pub(super) fn draw(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, target: &Target, marks: &[Mark]) {
+        let [width, height] = target.size_px;
+        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(width as f32, height as f32));
+        let input = egui::RawInput {
+            screen_rect: Some(screen),
+            max_texture_side: Some(gpu.largest_px as usize),
+            // A clock would be an input that differs from run to run.
+            time: Some(0.0),
+            ..egui::RawInput::default()
+        };
+        let mut output = self.context.run_pass(input, |context| {
+            let layer = egui::LayerId::background();
+            paint(&context.layer_painter(layer).with_clip_rect(screen), marks, Vec2::ZERO, 1.0);
+        });
+        let primitives: Vec<ClippedPrimitive> = self.context.tessellate(std::mem::take(&mut output.shapes), 1.0);
+        let screen = ScreenDescriptor { size_in_pixels: target.size_px, pixels_per_point: 1.0 };
+        for renderer in &mut self.renderers {
+            for (id, deltas) in &output.textures_delta.set {
+                for delta in deltas {
+                    renderer.update_texture(&gpu.device, &gpu.queue, *id, delta);
+                }
+            }
+        }
+        let renderer = &mut self.renderers[usize::from(!gpu.other_views)];
+        renderer.update_buffers(&gpu.device, &gpu.queue, encoder, &primitives, &screen);
+        let mut pass = encoder
+            .begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("words"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &target.words_view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+                })],
+                ..wgpu::RenderPassDescriptor::default()
+            })
+            .forget_lifetime();
+        renderer.render(&mut pass, &primitives, &screen);
+        drop(pass);
+        for renderer in &mut self.renderers {
+            for id in &output.textures_delta.free {
+                renderer.free_texture(id);
+            }
+        }
+        output.textures_delta.clear();
+    }
+}
+
+/// Paints marks with the top left corner of their picture at `origin` \[points\], so many pixels a point.
+pub(crate) fn paint(painter: &egui::Painter, marks: &[Mark], origin: Vec2, pixels_per_point: f32) {
+    let scale = 1.0 / pixels_per_point;
+    let at = |[x, y]: [f32; 2]| pos2(x * scale, y * scale) + origin;
+    let corners = |[low, high]: [[f32; 2]; 2]| Rect::from_min_max(at(low), at(high));
+    let stroke = |width_px: f32, colour| Stroke::new(width_px * scale, colour32(colour));
+    for mark in marks {
+        match mark {
+            Mark::Words { at_px, anchor, size_px, colour, text } => {
+                let font = FontId::proportional(size_px * scale);
+                let galley = painter.layout_no_wrap(text.clone(), font, colour32(*colour));
+                let place = at(*at_px) - Vec2::new(anchor[0], anchor[1]) * galley.size();
+                // Whole pixels keep letters sharp.
+                let place =
+                    pos2((place.x * pixels_per_point).round() * scale, (place.y * pixels_per_point).round() * scale);
+                painter.galley(place, galley, colour32(*colour));
+            }
+            Mark::Box { corners_px, colour, round_px } => {
+                painter.rect_filled(corners(*corners_px), round_px * scale, colour32(*colour));
+            }
+            Mark::Outline { corners_px, colour, width_px } => {
+                painter.rect_stroke(corners(*corners_px), 0.0, stroke(*width_px, *colour), StrokeKind::Inside);
+            }
+            Mark::Scale { corners_px, colours } => {
+                painter.add(Shape::mesh(gradient(corners(*corners_px), colours)));
+            }
+            Mark::Stroke { ends_px, colour, width_px } => {
+                painter.line_segment(ends_px.map(at), stroke(*width_px, *colour));
+            }
+            Mark::Ring { at_px, radius_px, colour, width_px } => {
+                painter.circle_stroke(at(*at_px), radius_px * scale, stroke(*width_px, *colour));
+            }
+        }
+    }
+}
+
+fn gradient(area: Rect, colours: &[Colour]) -> Mesh {
+    let mut mesh = Mesh::default();
+    let last = colours.len().saturating_sub(1).max(1) as f32;
+    for (k, colour) in colours.iter().enumerate() {
+        let x = area.left() + area.width() * (k as f32 / last);
+        for y in [area.top(), area.bottom()] {
+            mesh.vertices.push(Vertex { pos: pos2(x, y), uv: egui::epaint::WHITE_UV, color: colour32(*colour) });
+        }
+    }
+    for k in 1..u32::try_from(colours.len()).unwrap_or(0) {
+        let right = 2 * k;
+        mesh.add_triangle(right - 2, right - 1, right);
+        mesh.add_triangle(right - 1, right, right + 1);
+    }
+    mesh
+}
+
+fn colour32(colour: Colour) -> Color32 {
+    let [red, green, blue, opacity] = colour.rgba;
+    Color32::from_rgba_unmultiplied(red, green, blue, opacity)
+}

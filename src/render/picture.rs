@@ -1,0 +1,120 @@
+//! Pictures in memory.
+
+/// A picture: rows from the top, pixels from the left, red, green, blue and opacity in sRGB.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Width and height \[pixels\].
+    pub size_px: [u32; 2],
+    /// 4 bytes a pixel.
+    pub rgba: Vec<u8>,
+}
+
+/// A picture cannot be encoded or put together.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the picture cannot be made: {0}")]
+pub struct PictureError(String);
+
+impl std::fmt::Debug for Picture {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Picture of {} x {} pixels", self.size_px[0], self.size_px[1])
+    }
+}
+
+impl Picture {
+    /// The colour of a pixel; `None` outside.
+    #[must_use]
+    pub fn pixel(&self, x: u32, y: u32) -> Option<[u8; 4]> {
+        let [width, height] = self.size_px;
+        if x >= width || y >= height {
+            return None;
+        }
+        let at = (y as usize * width as usize + x as usize) * 4;
+        self.rgba.get(at..at + 4)?.try_into().ok()
+    }
+
+    /// The picture as PNG, without its opacity, which is full.
+    ///
+    /// # Errors
+    /// [`PictureError`] when the number of bytes does not fit the size.
+    pub fn to_png(&self) -> Result<Vec<u8>, PictureError> {
+        let rgb: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.size_px[0], self.size_px[1]);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Balanced);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let error = |error: png::EncodingError| PictureError(error.to_string());
+        let mut writer = encoder.write_header().map_err(error)?;
+        writer.write_image_data(&rgb).map_err(error)?;
+        writer.finish().map_err(error)?;
+        Ok(bytes)
+    }
+}
+
+/// A PNG within an address, for pages that load nothing.
+#[must_use]
+pub fn data_uri(png: &[u8]) -> String {
+    use base64::Engine as _;
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
+}
+
+/// Pictures of one size side by side, so many in a row; what is left of the last row has the first pixel's colour.
+///
+/// # Errors
+/// [`PictureError`] when there is none, or they differ in size.
+pub fn contact_sheet(pictures: &[Picture], columns: u32) -> Result<Picture, PictureError> {
+    let Some(first) = pictures.first() else { return Err(PictureError("there are none".to_owned())) };
+    let [width, height] = first.size_px;
+    if columns == 0 || pictures.iter().any(|picture| picture.size_px != first.size_px) {
+        return Err(PictureError("a sheet needs a column and pictures of one size".to_owned()));
+    }
+    let rows = u32::try_from(pictures.len().div_ceil(columns as usize)).unwrap_or(u32::MAX);
+    let size_px = [width.saturating_mul(columns), height.saturating_mul(rows)];
+    let row_bytes = size_px[0] as usize * 4;
+    let ground = first.pixel(0, 0).unwrap_or([255; 4]);
+    let mut rgba = ground.repeat(size_px[0] as usize * size_px[1] as usize);
+    for (k, picture) in pictures.iter().enumerate() {
+        let (left, top) = (k % columns as usize * width as usize * 4, k / columns as usize * height as usize);
+        for (y, row) in picture.rgba.chunks_exact(width as usize * 4).enumerate() {
+            let at = (top + y) * row_bytes + left;
+            rgba[at..at + row.len()].copy_from_slice(row);
+        }
+    }
+    Ok(Picture { size_px, rgba })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(size_px: [u32; 2], colour: [u8; 4]) -> Picture {
+        Picture { size_px, rgba: colour.repeat(size_px[0] as usize * size_px[1] as usize) }
+    }
+
+    #[test]
+    fn a_picture_comes_back_from_its_png() {
+        let mut picture = plain([3, 2], [10, 20, 30, 255]);
+        picture.rgba[..4].copy_from_slice(&[1, 2, 3, 255]);
+        let png = picture.to_png().expect("a PNG");
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().expect("a header");
+        let mut rgb = vec![0; reader.output_buffer_size().expect("a size")];
+        reader.next_frame(&mut rgb).expect("a frame");
+        assert_eq!(rgb[..6], [1, 2, 3, 10, 20, 30]);
+        assert_eq!((reader.info().width, reader.info().height), (3, 2));
+    }
+
+    #[test]
+    fn a_sheet_holds_every_picture_in_its_place() {
+        let colours = [[1, 0, 0, 255], [2, 0, 0, 255], [3, 0, 0, 255]];
+        let sheet = contact_sheet(&colours.map(|colour| plain([4, 2], colour)), 2).expect("a sheet");
+        assert_eq!(sheet.size_px, [8, 4]);
+        assert_eq!(
+            [[0, 0], [4, 1], [3, 2], [7, 3]].map(|[x, y]| sheet.pixel(x, y).map(|pixel| pixel[0])),
+            [Some(1), Some(2), Some(3), Some(1)]
+        );
+        assert_eq!(sheet.pixel(8, 0), None);
+        assert!(contact_sheet(&[], 2).is_err());
+        assert!(contact_sheet(&[plain([1, 1], [0; 4]), plain([2, 1], [0; 4])], 2).is_err());
+    }
+}

@@ -1,0 +1,117 @@
+//! The ground with its scale, and axes.
+
+use nalgebra::Vector3;
+
+use super::placing::Placing;
+use super::{Colour, Line, Painting, Scene, single};
+
+/// Most lines of the ground in each direction.
+const MOST_LINES: u32 = 60;
+/// Length of the axes in distances of lines of the ground.
+const AXIS: f64 = 1.0;
+/// Colours of x, y and z on dark and on light ground: the usual red, green and blue, none of them pure.
+const AXES: [[Colour; 3]; 2] = [
+    [Colour::hex(0xE0_6C_75), Colour::hex(0x7F_C9_7F), Colour::hex(0x61_AF_EF)],
+    [Colour::hex(0xB0_2A_37), Colour::hex(0x2B_7A_2B), Colour::hex(0x1F_5F_B0)],
+];
+
+impl Painting<'_> {
+    pub(super) fn ground(&self, scene: &mut Scene) {
+        let [low, high] = self.stage.ground_m;
+        let (step, z) = (self.stage.grid_m, low.z);
+        let width_px = self.view.unit_px().max(0.7);
+        let colour = self.view.theme.grid();
+        let mut line = |from: Vector3<f64>, to: Vector3<f64>, colour, width_px| {
+            scene.lines.push(Line { ends_m: [single(from), single(to)], colours: [colour; 2], width_px });
+        };
+        for k in 0..=lines(high.x - low.x, step) {
+            let x = low.x + f64::from(k) * step;
+            line(Vector3::new(x, low.y, z), Vector3::new(x, high.y, z), colour, width_px);
+        }
+        for k in 0..=lines(high.y - low.y, step) {
+            let y = low.y + f64::from(k) * step;
+            line(Vector3::new(low.x, y, z), Vector3::new(high.x, y, z), colour, width_px);
+        }
+        for (axis, colour) in self.axes().into_iter().enumerate() {
+            line(low, low + Vector3::ith(axis, AXIS * step), colour, 2.4 * width_px);
+        }
+    }
+
+    fn axes(&self) -> [Colour; 3] {
+        AXES[usize::from(self.view.theme != super::Theme::Dark)]
+    }
+
+    /// Metres along the two edges of the ground that are nearest to the camera, and the names of the axes.
+    pub(super) fn scale(&self, placing: &mut Placing<'_>) {
+        let [low, high] = self.stage.ground_m;
+        let (step, origin_m) = (self.stage.grid_m, self.stage.origin_m());
+        let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
+        for (axis, colour) in self.axes().into_iter().enumerate() {
+            let tip = low + Vector3::ith(axis, (AXIS + 0.22) * step);
+            let foreshortened = self.camera.back[axis].abs() > 0.97;
+            if let Some(at) = self.camera.project(tip).filter(|_| !foreshortened) {
+                placing.words_at(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
+            }
+        }
+        let centre = (low + high) / 2.0;
+        for axis in 0..2 {
+            let other = 1 - axis;
+            // Edge-on there is no edge to write along.
+            if self.camera.back[axis].abs() > 0.97
+                || self.camera.back.z.abs() < 0.05 && axis == 1 && self.camera.back.y.abs() > 0.5
+            {
+                continue;
+            }
+            let edge = [low[other], high[other]].into_iter().max_by(|&a, &b| {
+                let height = |at: f64| {
+                    let mut point = centre;
+                    point[other] = at;
+                    self.camera.project(point).map_or(f64::NEG_INFINITY, |projected| projected.at_px[1])
+                };
+                height(a).total_cmp(&height(b))
+            });
+            let Some(edge) = edge else { continue };
+            let outwards = if edge > centre[other] { 1.0 } else { -1.0 };
+            let count = lines(high[axis] - low[axis], step);
+            for k in 0..=count {
+                let mut point = low;
+                point[axis] += f64::from(k) * step;
+                point[other] = edge + outwards * 0.42 * step;
+                let metres = point[axis] + origin_m[axis];
+                let text = if k == count { format!("{} m", plain(metres, step)) } else { plain(metres, step) };
+                if let Some(at) = self.camera.project(point) {
+                    placing.words_at(at.at_px, [0.5, 0.5], size_px, soft, &text);
+                }
+            }
+        }
+    }
+}
+
+/// How many whole steps there are in a length.
+fn lines(length: f64, step: f64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+    let lines = (length / step).round() as u32;
+    lines.min(MOST_LINES)
+}
+
+/// A multiple of a step with as many decimals as the step has.
+fn plain(metres: f64, step: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 9")]
+    let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    // Adding 0 turns a negative zero into zero.
+    format!("{:.decimals$}", (metres / step).round() * step + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_shows_round_numbers() {
+        assert_eq!(
+            [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| plain(at, step)),
+            ["0", "4", "0.30", "-15"]
+        );
+        assert_eq!(lines(f64::INFINITY, 1.0), MOST_LINES);
+    }
+}

@@ -1,0 +1,224 @@
+//! What does not change from one moment of a flight to the next.
+
+use std::sync::{Mutex, PoisonError};
+
+use nalgebra::Vector3;
+
+use super::{Camera, CameraError, CameraSpec, Lens, Orbit, View};
+use crate::render::footage::{Footage, Moment};
+use crate::swarm::{Rows, row};
+
+/// Most places of vehicles that framing looks at.
+const FRAMED_PLACES: usize = 200_000;
+/// The ground is at z = 0 for a flight that is not higher above it than this part of its extent.
+const NEAR_GROUND: f64 = 0.3;
+/// Lines of the ground along its longer side, about.
+const GROUND_LINES: f64 = 12.0;
+/// Vehicles that are named in a message at most.
+const NAMED: usize = 8;
+/// How far around a followed vehicle one sees, in units of delta (or of its radius, where there is no delta).
+const FOLLOWED_DELTAS: f64 = 3.0;
+const FOLLOWED_RADII: f64 = 20.0;
+/// How far around the closest pair one sees, in units of its distance.
+const CLOSEST_DISTANCES: f64 = 1.1;
+
+/// Room around the ground for its scale, in distances of its lines.
+const SCALE_ROOM: f64 = 0.6;
+
+/// Extent of a flight, the frame it is drawn in, and its ground.
+#[derive(Debug)]
+pub struct Stage {
+    origin_m: Vector3<f64>,
+    /// Places of vehicles over the flight with the radius that must be seen around them, and corners of the ground.
+    places: Vec<(Vector3<f64>, f64)>,
+    /// The framing asked for last: it is the same for all pictures of a film.
+    framed: Mutex<Option<(CameraSpec, Camera)>>,
+    /// Corners of the ground, in the scene's frame \[m\].
+    pub(super) ground_m: [Vector3<f64>; 2],
+    /// Distance of its lines \[m\].
+    pub(super) grid_m: f64,
+    /// A ball that holds everything.
+    reach: (Vector3<f64>, f64),
+}
+
+impl Stage {
+    /// The stage of a flight, as far as it is known.
+    #[must_use]
+    pub fn of(footage: &Footage) -> Self {
+        let instants = footage.positions();
+        let count = footage.count().max(1);
+        let stride = instants.len().div_ceil((FRAMED_PLACES / count).max(2)).max(1);
+        let last = instants.len().saturating_sub(1);
+        let mut places: Vec<(Vector3<f64>, f64)> = Vec::new();
+        for (k, (_, positions_m)) in instants.enumerate() {
+            if k % stride == 0 || k == last {
+                for vehicle in 0..positions_m.nrows() {
+                    let place = row(positions_m, vehicle);
+                    if place.iter().all(|x| x.is_finite()) {
+                        places.push((place, keep_out_m(footage, vehicle)));
+                    }
+                }
+            }
+        }
+        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        let mut largest = 0.0_f64;
+        for (place, radius) in &places {
+            (low, high, largest) = (low.inf(place), high.sup(place), largest.max(*radius));
+        }
+        if places.is_empty() {
+            (low, high, largest) = (Vector3::zeros(), Vector3::zeros(), 1.0);
+        }
+        // Halves first: the extent of the largest numbers is not a number.
+        let origin_m = low / 2.0 + high / 2.0;
+        for (place, _) in &mut places {
+            *place -= origin_m;
+        }
+        let is_near = low.z >= 0.0 && low.z <= NEAR_GROUND * (high - low).norm() + largest;
+        let ground_z = if is_near { 0.0 } else { low.z - largest };
+        let (low, high) = (low - origin_m, high - origin_m);
+        let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
+        let grid_m = round_step(span / GROUND_LINES);
+        let snap = |x: f64, origin: f64, round: fn(f64) -> f64| round((x + origin) / grid_m) * grid_m - origin;
+        let z = ground_z - origin_m.z;
+        let ground_m = [
+            Vector3::new(
+                snap(low.x - largest, origin_m.x, f64::floor),
+                snap(low.y - largest, origin_m.y, f64::floor),
+                z,
+            ),
+            Vector3::new(
+                snap(high.x + largest, origin_m.x, f64::ceil),
+                snap(high.y + largest, origin_m.y, f64::ceil),
+                z,
+            ),
+        ];
+        for x in [ground_m[0].x - SCALE_ROOM * grid_m, ground_m[1].x + SCALE_ROOM * grid_m] {
+            for y in [ground_m[0].y - SCALE_ROOM * grid_m, ground_m[1].y + SCALE_ROOM * grid_m] {
+                places.push((Vector3::new(x, y, z), 0.0));
+            }
+        }
+        let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
+        let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
+        Self { origin_m, places, framed: Mutex::new(None), ground_m, grid_m, reach }
+    }
+
+    /// Where the origin of the scene's frame is in the recording's \[m\].
+    #[must_use]
+    pub fn origin_m(&self) -> Vector3<f64> {
+        self.origin_m
+    }
+
+    /// Where a row of a table of positions is in the scene's frame \[m\]; none where it is not finite.
+    pub(super) fn place(&self, positions_m: &Rows, k: usize) -> Option<Vector3<f64>> {
+        let place = row(positions_m, k) - self.origin_m;
+        place.iter().all(|x| x.is_finite()).then_some(place)
+    }
+
+    /// The camera of a view at a moment.
+    ///
+    /// # Errors
+    /// [`CameraError`] when it follows a vehicle that the flight does not have.
+    pub fn camera(&self, footage: &Footage, moment: &Moment, view: &View) -> Result<Camera, CameraError> {
+        let framing = |spec| self.framing(spec, view.size_px);
+        Ok(match &view.camera {
+            CameraSpec::Orbit(orbit) => Camera::orbiting(*orbit, Vector3::zeros(), view.size_px),
+            CameraSpec::Follow(name) => {
+                let vehicle = self.find(footage, name)?;
+                let around_m = footage
+                    .delta_m
+                    .map_or(FOLLOWED_RADII * footage.radius_m[vehicle], |delta_m| FOLLOWED_DELTAS * delta_m);
+                match self.place(&moment.positions_m, vehicle) {
+                    Some(place) => Camera::close_up(place, around_m, view.size_px),
+                    None => framing(&CameraSpec::Iso),
+                }
+            }
+            CameraSpec::Closest => {
+                let pair = moment.nearest.map(|(pair, distance_m)| {
+                    let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&moment.positions_m, k));
+                    (first, second, distance_m)
+                });
+                match pair {
+                    Some((Some(first), Some(second), distance_m)) => {
+                        let keep_out_m = footage.delta_m.unwrap_or(distance_m);
+                        let around_m = CLOSEST_DISTANCES * distance_m.max(keep_out_m);
+                        Camera::close_up((first + second) / 2.0, around_m, view.size_px)
+                    }
+                    _ => framing(&CameraSpec::Iso),
+                }
+            }
+            spec => framing(spec),
+        })
+    }
+
+    fn framing(&self, spec: &CameraSpec, size_px: [u32; 2]) -> Camera {
+        let mut framed = self.framed.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*framed {
+            Some((known, camera)) if known == spec && camera.size_px == size_px => *camera,
+            _ => {
+                let camera = Camera::framing(spec, &self.places, size_px);
+                *framed = Some((spec.clone(), camera));
+                camera
+            }
+        }
+    }
+
+    fn find(&self, footage: &Footage, name: &str) -> Result<usize, CameraError> {
+        footage.vehicles.iter().position(|vehicle| vehicle == name).ok_or_else(|| {
+            let mut vehicles = footage.vehicles.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+            if footage.count() > NAMED {
+                vehicles += &format!(" and {} more", footage.count() - NAMED);
+            }
+            CameraError::NoVehicle { name: name.to_owned(), vehicles }
+        })
+    }
+
+    /// The orbit and the target \[m\] of a camera that frames the flight: where a person begins to look around.
+    #[must_use]
+    pub fn orbit(&self, spec: &CameraSpec, size_px: [u32; 2]) -> (Orbit, Vector3<f64>) {
+        let camera = self.framing(spec, size_px);
+        let back = camera.back;
+        let distance_m = match camera.lens {
+            Lens::Perspective(_) => back.dot(&camera.eye_m).max(self.grid_m),
+            Lens::Parallel(half) => half[1] / 0.315,
+        };
+        let elevation_deg = back.z.clamp(-1.0, 1.0).asin().to_degrees();
+        // Seen straight from above, the azimuth is that of the picture's lower edge.
+        let azimuth_deg = (-camera.right.x).atan2(camera.right.y).to_degrees();
+        let target_m = camera.eye_m - back * back.dot(&camera.eye_m);
+        (Orbit { azimuth_deg, elevation_deg, distance_m }, target_m)
+    }
+
+    /// Nearest and farthest that anything is from a camera \[m\].
+    pub(super) fn depth_m(&self, camera: &Camera) -> [f64; 2] {
+        let (centre, radius) = self.reach;
+        let middle = -camera.seen(centre).z;
+        let far = (middle + radius).max(1e-2);
+        [(middle - radius).max(1e-3 * far), far]
+    }
+}
+
+/// How far around a vehicle nothing may be: half of delta, or its own radius where there is no delta \[m\].
+pub(super) fn keep_out_m(footage: &Footage, vehicle: usize) -> f64 {
+    footage.delta_m.map_or(0.0, |delta_m| delta_m / 2.0).max(footage.radius_m[vehicle])
+}
+
+/// The nearest of 1, 2 and 5 times a power of ten at or above a length; 1 for what has none.
+fn round_step(length_m: f64) -> f64 {
+    if !(length_m > 0.0 && length_m.is_finite()) {
+        return 1.0;
+    }
+    let power = 10.0_f64.powf(length_m.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|&step| step >= length_m).unwrap_or(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_the_ground_are_round_numbers() {
+        let steps = [0.9, 1.0, 1.1, 3.0, 7.0, 0.03, 1234.0].map(round_step);
+        assert_eq!(steps, [1.0, 1.0, 2.0, 5.0, 10.0, 0.05, 2000.0]);
+        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(round_step), [1.0; 4]);
+    }
+}

@@ -1,0 +1,189 @@
+use super::*;
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::record::{Event, Sample};
+use crate::scenario::Scenario;
+use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
+
+/// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
+fn footage() -> Footage {
+    let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0, 3.0, 1.0, 0.0, 3.0, 1.0]));
+    let formation = Formation { slots_m: start.positions_m.clone() };
+    let scenario = Scenario::new("square", start.clone(), formation, 2.0, 10.0);
+    let mut footage = Footage::of(&scenario);
+    for k in 0..=10_u32 {
+        let time_s = f64::from(k);
+        let mut swarm = start.clone();
+        swarm.positions_m.column_mut(0).add_scalar_mut(time_s);
+        let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 3.0 - 0.1 * time_s, time_s });
+        let control = Rows::zeros(4);
+        footage.take(&Sample {
+            time_s,
+            step: u64::from(k),
+            swarm: &swarm,
+            control: &control,
+            separation,
+            energy: None,
+        });
+    }
+    footage.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 4.0 });
+    footage.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: 6.0, min_m: 1.5 });
+    footage
+}
+
+fn scene(footage: &Footage, time_s: f64, view: &View) -> Scene {
+    let moment = footage.at(time_s).expect("a moment");
+    Scene::compose(footage, &Stage::of(footage), &moment, view).expect("a scene")
+}
+
+fn words(scene: &Scene) -> Vec<&str> {
+    let text = |mark: &'_ Mark| matches!(mark, Mark::Words { .. });
+    scene
+        .marks
+        .iter()
+        .filter(|mark| text(mark))
+        .map(|mark| if let Mark::Words { text, .. } = mark { text } else { "" })
+        .collect()
+}
+
+fn camera(text: &str) -> View {
+    View { camera: text.parse().expect(text), ..View::default() }
+}
+
+#[test]
+fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
+    let footage = footage();
+    for text in ["iso", "top", "front", "side", "closest", "follow:3", "10,80,5", "200,-30,100"] {
+        let scene = scene(&footage, 2.0, &camera(text));
+        assert_eq!((scene.balls.len(), scene.shells.len()), (4, 4), "{text}");
+        assert!(scene.balls.iter().all(|ball| ball.radius_m == 0.25), "{text}");
+        assert!(scene.shells.iter().all(|shell| shell.radius_m == 1.0), "{text}");
+    }
+}
+
+#[test]
+fn shells_come_farthest_first_along_every_line_of_sight() {
+    let footage = footage();
+    for text in ["iso", "front", "40,20,9"] {
+        let scene = scene(&footage, 2.0, &camera(text));
+        let camera = scene.camera;
+        let centre = |ball: &Ball| Vector3::from(ball.centre_m.map(f64::from));
+        // Where rays enter each shell, through points all over the picture.
+        for n in 0..400_u32 {
+            let at_px = [f64::from(n % 20) * 64.0, f64::from(n / 20) * 36.0];
+            let [origin, direction] = camera.ray(at_px);
+            let entries: Vec<f64> = scene
+                .shells
+                .iter()
+                .filter_map(|shell| {
+                    let to_centre = centre(shell) - origin;
+                    let along = to_centre.dot(&direction);
+                    let squared = 1.0 - (to_centre.norm_squared() - along * along);
+                    (squared > 0.0).then(|| along - squared.sqrt())
+                })
+                .collect();
+            assert!(entries.windows(2).all(|pair| pair[0] >= pair[1]), "{text}: {entries:?}");
+        }
+    }
+}
+
+#[test]
+fn layers_that_are_off_leave_nothing_behind() {
+    let footage = footage();
+    let bare = scene(&footage, 2.0, &View { layers: Layers::NONE, ..View::default() });
+    assert_eq!((bare.balls.len(), bare.shells.len(), bare.lines.len(), bare.marks.len()), (4, 0, 0, 0));
+    let whole = scene(&footage, 2.0, &View::default());
+    assert!(whole.lines.len() > 6 + 4 * 2 && whole.marks.len() > 10);
+}
+
+#[test]
+fn a_violation_shows_while_it_lasts_and_is_remembered() {
+    let footage = footage();
+    let alarm = Theme::Dark.alarm();
+    let red = |scene: &Scene| scene.balls.iter().filter(|ball| ball.colour == alarm).count();
+    let says = |scene: &Scene, what: &str| words(scene).iter().any(|text| text.contains(what));
+    let [before, during, after] = [3.9, 5.0, 6.1].map(|time_s| scene(&footage, time_s, &View::default()));
+    assert_eq!([&before, &during, &after].map(red), [0, 2, 0]);
+    assert!(says(&before, "clear so far") && !says(&before, "VIOLATION"), "{:?}", words(&before));
+    assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1-2"), "{:?}", words(&during));
+    assert!(!says(&after, "VIOLATION") && says(&after, "violated at 4.00 s"), "{:?}", words(&after));
+    // Even with every layer off, what is violated has its shell.
+    let bare = scene(&footage, 5.0, &View { layers: Layers::NONE, ..View::default() });
+    assert_eq!(bare.shells.len(), 2);
+}
+
+#[test]
+fn the_caption_says_the_smallest_separation_so_far() {
+    let footage = footage();
+    let scene = scene(&footage, 3.0, &View::default());
+    assert!(words(&scene).iter().any(|text| text.starts_with("closest so far 2.700 m, vehicles 1-2 at 3.00 s")));
+    assert!(words(&scene).contains(&"t = 3.00 s") && words(&scene).contains(&"square"));
+}
+
+#[test]
+fn goals_are_where_the_formation_fits_and_starts_where_it_began() {
+    let footage = footage();
+    let only = View { layers: Layers { marks: true, ..Layers::NONE }, ..camera("top") };
+    let scene = scene(&footage, 10.0, &only);
+    let stage = Stage::of(&footage);
+    // Two strokes of a cross for each start, then rings.
+    assert_eq!(scene.lines.len(), 4 * 2 + 4 * 28);
+    let middle = |line: &Line| {
+        let [a, b] = line.ends_m.map(|end| Vector3::from(end.map(f64::from)));
+        (a + b) / 2.0 + stage.origin_m()
+    };
+    assert!((middle(&scene.lines[0]) - Vector3::new(0.0, 0.0, 1.0)).norm() < 1e-6);
+    let ring: Vector3<f64> = scene.lines[8..36].iter().map(middle).sum::<Vector3<f64>>() / 28.0;
+    assert!((ring - Vector3::new(10.0, 0.0, 1.0)).norm() < 1e-6, "{ring}");
+}
+
+#[test]
+fn edges_push_below_their_rest_length_and_pull_beyond_it() {
+    let footage = footage();
+    let plan = footage.plan.as_ref().expect("a plan");
+    assert_eq!(plan.graph, Graph::complete(4));
+    let tension = |distance_m| plan.tension(Pair::new(0, 1), distance_m);
+    assert!(tension(3.0).abs() < 1e-12 && tension(2.5) < 0.0 && tension(4.0) > 0.0);
+    assert_eq!((tension(2.0), tension(2.001)), (-1.0, -1.0));
+    assert!(tension(1e3) > 0.999_999);
+}
+
+#[test]
+fn a_follower_of_nobody_is_told_whom_it_can_follow() {
+    let footage = footage();
+    let moment = footage.at(0.0).expect("a moment");
+    let error = Scene::compose(&footage, &Stage::of(&footage), &moment, &camera("follow:9")).expect_err("no vehicle 9");
+    assert_eq!(error.to_string(), "there is no vehicle `9` to follow; the flight has 1, 2, 3, 4");
+}
+
+#[test]
+fn no_size_of_picture_and_no_swarm_breaks_the_list() {
+    let footage = footage();
+    for size_px in [[1, 1], [64, 2000], [16_384, 16], [320, 180]] {
+        let scene = scene(&footage, 5.0, &View { size_px, ..View::default() });
+        let finite = |at: &[f32; 2]| at.iter().all(|x| x.is_finite());
+        assert!(scene.marks.iter().all(|mark| if let Mark::Words { at_px, .. } = mark { finite(at_px) } else { true }));
+    }
+    let mut alone = Footage::new("alone", 1);
+    let swarm = Swarm::at_rest(Rows::from_row_slice(&[f64::NAN, 0.0, 0.0]));
+    alone.take(&Sample {
+        time_s: 0.0,
+        step: 0,
+        swarm: &swarm,
+        control: &Rows::zeros(1),
+        separation: None,
+        energy: None,
+    });
+    assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
+    let far = Swarm::at_rest(Rows::from_row_slice(&[5e6, 4e6, 100.0]));
+    let mut far_away = Footage::new("far", 1);
+    far_away.take(&Sample {
+        time_s: 0.0,
+        step: 0,
+        swarm: &far,
+        control: &Rows::zeros(1),
+        separation: None,
+        energy: None,
+    });
+    assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
+}

@@ -1,0 +1,188 @@
+//! Where in a flight the window is, and how it goes on.
+
+use std::sync::mpsc::{Receiver, TryRecvError};
+
+use crate::record::{Event, OwnedSample};
+use crate::render::Footage;
+
+/// Speeds that keys go through.
+const SPEEDS: [f64; 10] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
+/// Most that is taken from a flight in the air before a picture is drawn.
+const TAKEN_AT_ONCE: usize = 2000;
+
+/// What a flight in the air sends.
+#[derive(Clone, Debug)]
+pub enum Fed {
+    /// A sample.
+    Sample(Box<OwnedSample>),
+    /// An event.
+    Event(Event),
+    /// The end, with a sentence where something went wrong.
+    Ended(Option<String>),
+}
+
+/// A flight being watched.
+pub(super) struct Player {
+    pub(super) footage: Footage,
+    feed: Option<Receiver<Fed>>,
+    /// What the flight said at its end.
+    pub(super) said: Option<String>,
+    pub(super) time_s: f64,
+    pub(super) playing: bool,
+    pub(super) speed: f64,
+}
+
+impl Player {
+    pub(super) fn new(footage: Footage, feed: Option<Receiver<Fed>>) -> Self {
+        let time_s = footage.range_s()[0];
+        Self { footage, feed, said: None, time_s, playing: true, speed: 1.0 }
+    }
+
+    /// Whether the flight is still being flown.
+    pub(super) fn is_live(&self) -> bool {
+        self.feed.is_some()
+    }
+
+    /// Takes what has been flown; whether there was anything.
+    pub(super) fn receive(&mut self) -> bool {
+        let Some(feed) = &self.feed else { return false };
+        for taken in 0..TAKEN_AT_ONCE {
+            match feed.try_recv() {
+                Ok(Fed::Sample(sample)) => self.footage.take(&sample.as_sample()),
+                Ok(Fed::Event(event)) => self.footage.note(&event),
+                Ok(Fed::Ended(said)) => {
+                    self.said = said;
+                    self.feed = None;
+                    return true;
+                }
+                Err(TryRecvError::Empty) => return taken > 0,
+                Err(TryRecvError::Disconnected) => {
+                    self.feed = None;
+                    return true;
+                }
+            }
+        }
+        true
+    }
+
+    /// Lets time pass; at the end of a flight that has ended it stops, at the end of one in the air it waits.
+    pub(super) fn pass(&mut self, seconds: f64) {
+        let [first_s, last_s] = self.footage.range_s();
+        if self.playing {
+            self.time_s += seconds * self.speed;
+        }
+        if self.time_s >= last_s && !self.is_live() {
+            self.playing = false;
+        }
+        self.time_s = self.time_s.clamp(first_s, last_s.max(first_s));
+    }
+
+    /// Plays or pauses; from the end it plays again from the start.
+    pub(super) fn toggle(&mut self) {
+        let [first_s, last_s] = self.footage.range_s();
+        if !self.playing && self.time_s >= last_s && !self.is_live() {
+            self.time_s = first_s;
+        }
+        self.playing = !self.playing;
+    }
+
+    pub(super) fn seek(&mut self, time_s: f64) {
+        let [first_s, last_s] = self.footage.range_s();
+        self.time_s = time_s.clamp(first_s, last_s.max(first_s));
+    }
+
+    /// Goes so many samples on, or back.
+    pub(super) fn step(&mut self, samples: isize) {
+        self.playing = false;
+        let times: Vec<f64> = self.footage.times().collect();
+        let at = times.partition_point(|&time| time <= self.time_s).saturating_sub(1);
+        let between = times.get(at).is_some_and(|&time| time < self.time_s);
+        // Back from between two samples is the one before.
+        let by = if samples < 0 && between { samples + 1 } else { samples };
+        let to = at.saturating_add_signed(by).min(times.len().saturating_sub(1));
+        if let Some(&time_s) = times.get(to) {
+            self.time_s = time_s;
+        }
+    }
+
+    /// The next speed up, or down.
+    pub(super) fn faster(&mut self, up: bool) {
+        let next = if up {
+            SPEEDS.into_iter().find(|&speed| speed > self.speed)
+        } else {
+            SPEEDS.into_iter().rev().find(|&speed| speed < self.speed)
+        };
+        self.speed = next.unwrap_or(self.speed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::{Rows, Swarm};
+
+    fn sample(time_s: f64) -> OwnedSample {
+        let swarm = Swarm::at_rest(Rows::zeros(1));
+        OwnedSample { time_s, step: 0, swarm, control: Rows::zeros(1), separation: None, energy: None }
+    }
+
+    fn player() -> Player {
+        let mut footage = Footage::new("one", 1);
+        for time_s in [0.0, 1.0, 2.0] {
+            footage.take(&sample(time_s).as_sample());
+        }
+        Player::new(footage, None)
+    }
+
+    #[test]
+    fn playing_ends_at_the_end_and_starts_again_from_the_start() {
+        let mut player = player();
+        player.pass(0.75);
+        assert_eq!((player.time_s, player.playing), (0.75, true));
+        player.pass(9.0);
+        assert_eq!((player.time_s, player.playing), (2.0, false));
+        player.toggle();
+        assert_eq!((player.time_s, player.playing), (0.0, true));
+    }
+
+    #[test]
+    fn steps_go_from_sample_to_sample() {
+        let mut player = player();
+        player.seek(0.5);
+        player.step(1);
+        assert_eq!(player.time_s, 1.0);
+        player.seek(1.5);
+        player.step(-1);
+        assert_eq!(player.time_s, 1.0);
+        player.step(-1);
+        player.step(-1);
+        assert_eq!((player.time_s, player.playing), (0.0, false));
+        player.step(100);
+        assert_eq!(player.time_s, 2.0);
+    }
+
+    #[test]
+    fn speed_goes_up_and_down_and_stays_in_range() {
+        let mut player = player();
+        player.faster(true);
+        assert_eq!(player.speed, 2.0);
+        (0..20).for_each(|_| player.faster(false));
+        assert_eq!(player.speed, 0.05);
+    }
+
+    #[test]
+    fn a_flight_in_the_air_is_waited_for() {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let mut player = Player::new(Footage::new("one", 1), Some(receiver));
+        sender.send(Fed::Sample(Box::new(sample(0.0)))).expect("sent");
+        sender.send(Fed::Sample(Box::new(sample(1.0)))).expect("sent");
+        assert!(player.receive());
+        player.pass(5.0);
+        assert_eq!((player.time_s, player.playing, player.is_live()), (1.0, true, true));
+        sender.send(Fed::Ended(Some("it broke".to_owned()))).expect("sent");
+        assert!(player.receive() && !player.is_live());
+        assert_eq!(player.said.as_deref(), Some("it broke"));
+        player.pass(0.1);
+        assert!(!player.playing);
+    }
+}

@@ -1,0 +1,281 @@
+//! What is drawn is what is there: sizes true to the metre, colours true, what is in front hides what is behind.
+//!
+//! Needs a graphics adapter, or a driver in software; `tests/run.sh` installs one.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use tautline::record::{Event, Sample};
+use tautline::render::gpu::Renderer;
+use tautline::render::scene::{Ball, Camera, Colour, Lens, Line, Orbit};
+use tautline::render::{AdapterChoice, Footage, GpuError, Layers, Picture, Scene, Theme, View};
+use tautline::scenario::{Scenario, Source};
+use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
+
+/// Adapters round differently at edges; a picture that looks the same has a mean FLIP below this. Five small balls that
+/// move by a part of their width give 0.005 (see the negative twin).
+const FLIP_CEILING: f32 = 0.003;
+
+fn renderer() -> Renderer {
+    Renderer::open(&AdapterChoice::Best)
+        .unwrap_or_else(|error| panic!("{error}; `sh tests/run.sh` installs what this test needs"))
+}
+
+const BACKGROUND: Colour = Colour::hex(0x12_34_56);
+const WHITE: Colour = Colour::hex(0xFF_FF_FF);
+const RED: Colour = Colour::hex(0xC0_00_00);
+const SIZE: [u32; 2] = [301, 201];
+
+/// A scene seen from +x, 10 m away, y to the right.
+fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
+    let orbit = Orbit { azimuth_deg: 0.0, elevation_deg: 0.0, distance_m: 10.0 };
+    let mut camera = Camera::orbiting(orbit, Vector3::zeros(), SIZE);
+    if let Some(half_m) = lens {
+        camera.lens = Lens::Parallel([half_m * f64::from(SIZE[0]) / f64::from(SIZE[1]), half_m]);
+    }
+    Scene {
+        camera,
+        depth_m: [1.0, 30.0],
+        background: BACKGROUND,
+        balls: balls.to_vec(),
+        shells: Vec::new(),
+        lines: Vec::new(),
+        marks: Vec::new(),
+    }
+}
+
+fn ball(centre_m: [f32; 3], radius_m: f32, colour: Colour) -> Ball {
+    Ball { centre_m, radius_m, colour }
+}
+
+fn is_background(pixel: [u8; 4]) -> bool {
+    pixel == BACKGROUND.rgba
+}
+
+/// The area of everything that is not background \[pixels\], edges counted by how much they are covered: brightness of a
+/// white ball does not matter, whether a pixel is background does.
+fn extent(picture: &Picture) -> [u32; 4] {
+    let mut extent = [u32::MAX, 0, u32::MAX, 0];
+    for y in 0..picture.size_px[1] {
+        for x in 0..picture.size_px[0] {
+            if !is_background(picture.pixel(x, y).expect("inside")) {
+                extent = [extent[0].min(x), extent[1].max(x), extent[2].min(y), extent[3].max(y)];
+            }
+        }
+    }
+    extent
+}
+
+#[test]
+fn the_background_is_exactly_its_colour() {
+    let picture = renderer().paint(&scene(None, &[])).expect("a picture");
+    assert_eq!(picture.size_px, SIZE);
+    assert!(picture.rgba.chunks_exact(4).all(|pixel| pixel == BACKGROUND.rgba));
+}
+
+#[test]
+fn a_ball_is_as_many_pixels_wide_as_its_radius_asks_for() {
+    let mut renderer = renderer();
+    let tangent = (35.0_f64 / 2.0).to_radians().tan();
+    for radius_m in [0.05_f32, 0.25, 1.0, 2.5] {
+        // In perspective the outline is where rays touch the ball: at the tangent of asin(r / d).
+        let outline = (f64::from(radius_m) / 10.0).asin().tan() / tangent * 100.5;
+        let parallel = f64::from(radius_m) / 3.0 * 100.5;
+        for (lens, expected_px) in [(None, outline), (Some(3.0), parallel)] {
+            let picture = renderer.paint(&scene(lens, &[ball([0.0; 3], radius_m, WHITE)])).expect("a picture");
+            let [left, right, top, bottom] = extent(&picture).map(f64::from);
+            for width in [right - left + 1.0, bottom - top + 1.0] {
+                // A pixel at each end is touched or not.
+                let slack = width - 2.0 * expected_px;
+                assert!((-0.6..=2.0).contains(&slack), "{radius_m} m: {width} pixels, expected {}", 2.0 * expected_px);
+            }
+            assert!((left + right + 1.0 - 301.0).abs() <= 1.0 && (top + bottom + 1.0 - 201.0).abs() <= 1.0);
+        }
+    }
+}
+
+#[test]
+fn the_edge_of_a_ball_is_smooth() {
+    let picture = renderer().paint(&scene(Some(3.0), &[ball([0.0; 3], 1.0, WHITE)])).expect("a picture");
+    // Covered pixels, each by its part, add up to the area of the disc. A ball without light is as dark as its shadow
+    // side, so parts are read against a flat one: a pixel is covered by a quarter, a half, three quarters or whole.
+    let half_covered = picture
+        .rgba
+        .chunks_exact(4)
+        .filter(|pixel| pixel[2] != BACKGROUND.rgba[2] && pixel[2] < 150 && pixel[0] < pixel[2])
+        .count();
+    assert!(half_covered > 20, "{half_covered} pixels at the edge are mixed with the background");
+}
+
+#[test]
+fn a_ball_in_front_hides_the_one_behind_in_whatever_order_they_come() {
+    let mut renderer = renderer();
+    let front = ball([2.0, 0.0, 0.0], 0.5, RED);
+    let behind = ball([-2.0, 0.0, 0.0], 0.5, WHITE);
+    for balls in [[front, behind], [behind, front]] {
+        let picture = renderer.paint(&scene(Some(3.0), &balls)).expect("a picture");
+        let [red, green, _, _] = picture.pixel(150, 100).expect("inside");
+        assert!(red > 90 && green < 60, "the middle is red");
+        let no_white = picture.rgba.chunks_exact(4).all(|pixel| pixel[1] < 200);
+        assert!(no_white, "nothing of the white one is left");
+    }
+    let beside = renderer.paint(&scene(Some(3.0), &[front, ball([-2.0, 1.5, 0.0], 0.5, WHITE)])).expect("a picture");
+    assert!(beside.rgba.chunks_exact(4).any(|pixel| pixel[1] > 200), "beside it, it is seen");
+}
+
+#[test]
+fn a_shell_lets_through_what_is_within_and_the_camera_may_be_inside() {
+    let mut renderer = renderer();
+    let mut inside = scene(Some(3.0), &[ball([0.0; 3], 0.5, RED)]);
+    let bare = renderer.paint(&inside).expect("a picture");
+    inside.shells.push(ball([0.0; 3], 1.0, WHITE.at(0.5)));
+    let shelled = renderer.paint(&inside).expect("a picture");
+    let middle = |picture: &Picture| picture.pixel(150, 100).expect("inside");
+    assert!(middle(&shelled)[0] > 90 && middle(&shelled)[1] > middle(&bare)[1], "red, seen through white");
+    let mut within = scene(None, &[]);
+    within.shells.push(ball([10.0, 0.0, 0.0], 2.0, WHITE.at(0.5)));
+    let picture = renderer.paint(&within).expect("a picture");
+    assert!(picture.rgba.chunks_exact(4).all(|pixel| !is_background(pixel.try_into().expect("four"))), "all around");
+}
+
+#[test]
+fn a_line_has_the_width_and_colour_that_it_asks_for() {
+    let mut picture = scene(Some(3.0), &[]);
+    let ends_m = [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
+    picture.lines.push(Line { ends_m, colours: [RED; 2], width_px: 6.0 });
+    let picture = renderer().paint(&picture).expect("a picture");
+    let [left, right, top, bottom] = extent(&picture);
+    assert_eq!(picture.pixel(150, 100), Some(RED.rgba));
+    assert!((6..=7).contains(&(bottom - top + 1)) && (66..=68).contains(&(right - left + 1)), "{left} {right}");
+}
+
+#[test]
+fn frames_repeat_bit_for_bit_even_on_another_renderer() {
+    let footage = crossing();
+    let shoot = |renderer: &mut Renderer| renderer.shoot(&footage, 2.0, &small()).expect("a picture");
+    let (mut first, mut second) = (renderer(), renderer());
+    let once = shoot(&mut first);
+    assert!(once == shoot(&mut first) && once == shoot(&mut second));
+    assert!(once != first.shoot(&footage, 2.1, &small()).expect("a picture"), "another time is another picture");
+}
+
+#[test]
+fn a_size_that_cannot_be_drawn_is_refused() {
+    let mut renderer = renderer();
+    for size_px in [[0, 10], [10, 0], [100_000, 10], [10, 100_000]] {
+        let refused = renderer.shoot(&crossing(), 0.0, &View { size_px, ..View::default() }).expect_err("too large");
+        assert!(refused.to_string().contains("pixels a side"), "{refused}");
+    }
+    for size_px in [[1, 1], [7, 333]] {
+        let picture = renderer.shoot(&crossing(), 0.0, &View { size_px, ..View::default() }).expect("a picture");
+        assert_eq!(picture.rgba.len(), size_px[0] as usize * size_px[1] as usize * 4);
+    }
+    let none = Renderer::open(&AdapterChoice::Named("no such adapter".to_owned())).err();
+    assert!(matches!(none, Some(GpuError::NoSuchAdapter { .. })), "{none:?}");
+}
+
+/// Three vehicles pass each other; two of them come too close from 2 s to 3 s.
+fn crossing() -> Footage {
+    let scenario = Scenario::read(&Source::Builtin("pentagon-laplacian".to_owned()), &[]).expect("built in");
+    let mut footage = Footage::of(&scenario);
+    for k in 0..=40_u32 {
+        let time_s = f64::from(k) / 10.0;
+        let mut swarm = Swarm::at_rest(scenario.start.positions_m.clone());
+        for vehicle in 0..5 {
+            let turn = time_s * (0.2 + 0.1 * vehicle as f64);
+            swarm.positions_m[(vehicle, 1)] += 2.0 * turn.sin();
+        }
+        let separation = Some(ClosestApproach { pair: Pair::new(0, 2), separation_m: 3.0 - 0.4 * time_s, time_s });
+        let control = Rows::zeros(5);
+        footage.take(&Sample {
+            time_s,
+            step: u64::from(k),
+            swarm: &swarm,
+            control: &control,
+            separation,
+            energy: None,
+        });
+    }
+    footage.note(&Event::ViolationBegan { pair: Pair::new(0, 2), time_s: 2.0 });
+    footage.note(&Event::ViolationEnded { pair: Pair::new(0, 2), time_s: 3.0, min_m: 1.8 });
+    footage
+}
+
+fn small() -> View {
+    View { size_px: [320, 180], ..View::default() }
+}
+
+fn golden_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pictures")
+}
+
+fn read_png(path: &Path) -> Picture {
+    let file = fs::File::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG");
+    let mut rgb = vec![0; reader.output_buffer_size().expect("a size")];
+    let info = reader.next_frame(&mut rgb).expect("a picture");
+    let rgba = rgb.chunks_exact(3).flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
+    Picture { size_px: [info.width, info.height], rgba }
+}
+
+fn flip_image(picture: &Picture) -> nv_flip::FlipImageRgb8 {
+    let rgb: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    nv_flip::FlipImageRgb8::with_data(picture.size_px[0], picture.size_px[1], &rgb)
+}
+
+/// Mean FLIP of two pictures, from 0 to 1, and where they differ.
+fn flip(expected: &Picture, actual: &Picture) -> (f32, Picture) {
+    let map = nv_flip::flip(flip_image(expected), flip_image(actual), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
+    let mean = nv_flip::FlipPool::from_image(&map).mean();
+    let shown = map.apply_color_lut(&nv_flip::magma_lut()).to_vec();
+    let rgba = shown.chunks_exact(3).flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
+    (mean, Picture { size_px: actual.size_px, rgba })
+}
+
+/// Compares with `tests/pictures/NAME.png`; leaves the actual picture and the difference in the target folder when they
+/// look different. `UPDATE_PICTURES=1` keeps what is drawn now.
+fn looks_like(name: &str, actual: &Picture) {
+    let path = golden_folder().join(format!("{name}.png"));
+    if std::env::var_os("UPDATE_PICTURES").is_some() {
+        fs::create_dir_all(golden_folder()).expect("a folder");
+        fs::write(&path, actual.to_png().expect("a PNG")).expect("written");
+    }
+    let expected = read_png(&path);
+    assert_eq!(expected.size_px, actual.size_px, "{name}");
+    let (mean, difference) = flip(&expected, actual);
+    if mean > FLIP_CEILING {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let write = |suffix: &str, picture: &Picture| {
+            let path = folder.join(format!("{name}-{suffix}.png"));
+            fs::write(&path, picture.to_png().expect("a PNG")).expect("written");
+            path
+        };
+        let (actual, difference) = (write("actual", actual), write("difference", &difference));
+        panic!("{name}: mean FLIP {mean} above {FLIP_CEILING}: see {} and {}", actual.display(), difference.display());
+    }
+}
+
+#[test]
+fn pictures_look_as_they_did() {
+    let (footage, mut renderer) = (crossing(), renderer());
+    let mut shoot = |name: &str, time_s: f64, view: View| {
+        looks_like(name, &renderer.shoot(&footage, time_s, &view).expect(name));
+    };
+    shoot("start", 0.0, small());
+    shoot("violation", 2.5, View { theme: Theme::Light, ..small() });
+    shoot("top", 4.0, View { camera: "top".parse().expect("a camera"), theme: Theme::Paper, ..small() });
+    shoot("vehicles", 4.0, View { layers: Layers::NONE, ..small() });
+}
+
+#[test]
+fn a_vehicle_that_moved_is_seen_to_have_moved() {
+    let mut renderer = renderer();
+    let bare = View { layers: Layers::NONE, ..small() };
+    let footage = crossing();
+    let [first, second] = [2.0, 2.1].map(|time_s| renderer.shoot(&footage, time_s, &bare).expect("a picture"));
+    let (same, _) = flip(&first, &first);
+    let (moved, _) = flip(&first, &second);
+    assert_eq!(same, 0.0);
+    assert!(moved > FLIP_CEILING, "{moved}");
+}

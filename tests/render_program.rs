@@ -1,0 +1,183 @@
+//! `tautline render` and the pictures of a run: files, texts and exit codes.
+//!
+//! Needs a graphics adapter, or a driver in software; `tests/run.sh` installs one.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+
+use program::{Ran, TAUTLINE, ran_by};
+use tautline::record::mcap::{Header, McapRecorder};
+use tempfile::TempDir;
+
+const GOOD: Option<i32> = Some(0);
+const WRONG_INPUT: Option<i32> = Some(2);
+const MACHINE_FAILED: Option<i32> = Some(3);
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+/// A folder with the run of a short flight in `out`.
+fn flown(scenario: &str, more: &[&str]) -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let base = ["run", scenario, "--out", "out", "--quiet", "--set", "time.duration_s=4"];
+    let Ran { exit, err, .. } = ran(folder.path(), &[&base, more].concat());
+    assert!(exit <= Some(1), "{err}");
+    folder
+}
+
+fn size_of(path: &Path) -> [u32; 2] {
+    let bytes = fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    assert!(bytes.starts_with(b"\x89PNG"), "{}", path.display());
+    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("UTF-8")).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_run_leaves_pictures_and_its_page_shows_them() {
+    let folder = flown("pentagon-laplacian", &[]);
+    let out = folder.path().join("out");
+    assert_eq!(names(&out.join("snapshots")), ["closest.png", "end.png", "start.png", "violation-1.png"]);
+    assert_eq!(size_of(&out.join("snapshots/closest.png")), [1280, 720]);
+    let page = fs::read_to_string(out.join("report.html")).expect("a page");
+    assert_eq!(page.matches("data:image/png;base64,").count(), 4);
+    assert!(page.contains("Vehicles 4-5 were closer than delta from"), "the violation is told in words too");
+
+    // A run without pictures takes those of the run before away.
+    let again = ["run", "pentagon", "--out", "out", "--force", "--no-snapshots", "--set", "time.duration_s=1"];
+    ran(folder.path(), &again);
+    assert_eq!(names(&out.join("snapshots")), Vec::<String>::new());
+    assert!(!fs::read_to_string(out.join("report.html")).expect("a page").contains("data:image/png"));
+}
+
+#[test]
+fn a_machine_that_cannot_draw_flies_all_the_same_and_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let set = ["--set", "time.duration_s=1"];
+    let run = [&["run", "pentagon", "--out", "out", "--adapter", "no such adapter"], &set[..]].concat();
+    let Ran { exit, err, .. } = ran(folder.path(), &run);
+    assert_eq!(exit, Some(1), "{err}");
+    assert!(err.contains("no pictures were taken: there is no `no such adapter` adapter"), "{err}");
+    assert!(folder.path().join("out/report.html").exists() && !folder.path().join("out/snapshots").exists());
+}
+
+#[test]
+fn without_any_driver_render_ends_with_the_name_of_a_package() {
+    let folder = flown("pentagon", &["--no-snapshots"]);
+    let done = std::process::Command::new(TAUTLINE)
+        .args(["render", "out/run.mcap"])
+        .current_dir(folder.path())
+        // The loader finds no Vulkan driver, and EGL no vendor.
+        .env("VK_DRIVER_FILES", "/nonexistent.json")
+        .env("VK_ICD_FILENAMES", "/nonexistent.json")
+        .env("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+        .env("LIBGL_DRIVERS_PATH", "/nonexistent")
+        .output()
+        .expect("the program runs");
+    let err = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), MACHINE_FAILED, "{err}");
+    assert!(err.contains("no graphics adapter") && err.contains("mesa-vulkan-drivers"), "{err}");
+    assert!(!folder.path().join("out/snapshots/start.png").exists());
+}
+
+#[test]
+fn every_kind_of_picture_is_written_where_it_is_asked_for() {
+    let folder = flown("pentagon", &["--no-snapshots"]);
+    let render = |more: &[&str]| {
+        let arguments = [&["render", "out/run.mcap", "--size", "160x90"], more].concat();
+        let Ran { exit, err, .. } = ran(folder.path(), &arguments);
+        assert_eq!(exit, GOOD, "{more:?}: {err}");
+    };
+    let at = |name: &str| folder.path().join(name);
+    render(&[]);
+    assert_eq!(names(&at("out/snapshots")), ["closest.png", "end.png", "start.png"]);
+    render(&["--at", "start,1.5", "--out", "a", "--camera", "top", "--theme", "paper"]);
+    assert_eq!(names(&at("a")), ["at-1.500s.png", "start.png"]);
+    assert_eq!(size_of(&at("a/start.png")), [160, 90]);
+    render(&["--every", "1", "--out", "b", "--camera", "-60,30,25"]);
+    assert_eq!(names(&at("b")), (1..=5).map(|k| format!("frame-0000{k}.png")).collect::<Vec<_>>());
+    render(&["--sheet", "3x2", "--out", "c"]);
+    assert_eq!(size_of(&at("c/sheet.png")), [159, 90]);
+    for film in ["d.mp4", "d.gif", "d.png"] {
+        render(&["--film", film, "--fps", "5"]);
+        assert!(fs::metadata(at(film)).expect(film).len() > 1000, "{film}");
+    }
+    let gif = fs::File::open(at("d.gif")).expect("a film");
+    let mut decoder = gif::DecodeOptions::new().read_info(gif).expect("a GIF");
+    let mut frames = 0;
+    while decoder.read_next_frame().expect("a frame").is_some() {
+        frames += 1;
+    }
+    assert_eq!(frames, 21, "4 s at 5 pictures a second, both ends included");
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_with_its_remedy() {
+    let folder = flown("pentagon", &["--no-snapshots"]);
+    let header = Header::new("empty", "", 2, 1.0);
+    McapRecorder::create(&folder.path().join("empty.mcap"), &header).expect("a file").finish().expect("closed");
+    fs::write(folder.path().join("noise.mcap"), b"this is not a recording").expect("written");
+    fs::write(folder.path().join("a-file"), b"").expect("written");
+    // Arguments after `render`, exit code, part of the message.
+    let cases: &[(&[&str], Option<i32>, &str)] = &[
+        (&["out/run.mcap", "--size", "0x10"], WRONG_INPUT, "each at least 1"),
+        (&["out/run.mcap", "--size", "10"], WRONG_INPUT, "such as 1280x720"),
+        (&["out/run.mcap", "--size", "100000x100000"], WRONG_INPUT, "pixels a side"),
+        (&["out/run.mcap", "--camera", "isometric"], WRONG_INPUT, "`isometric` is not a camera"),
+        (&["out/run.mcap", "--camera", "follow:9"], WRONG_INPUT, "there is no vehicle `9` to follow"),
+        (&["out/run.mcap", "--camera", "0,100,5"], WRONG_INPUT, "an elevation that is not between"),
+        (&["out/run.mcap", "--theme", "pink"], WRONG_INPUT, "give dark, light or paper"),
+        (&["out/run.mcap", "--at", "5"], WRONG_INPUT, "5 s is outside the recording, which goes from 0 s to 4 s"),
+        (&["out/run.mcap", "--at", "soon"], WRONG_INPUT, "`soon` is not a time"),
+        (&["out/run.mcap", "--at", "nan"], WRONG_INPUT, "`nan` is not a time"),
+        (&["out/run.mcap", "--every", "0"], WRONG_INPUT, "0 is not a positive number"),
+        (&["out/run.mcap", "--every", "1e-9"], WRONG_INPUT, "more than 100000"),
+        (&["out/run.mcap", "--sheet", "4"], WRONG_INPUT, "such as 4x3"),
+        (&["out/run.mcap", "--sheet", "4000x4"], WRONG_INPUT, "does not fit into"),
+        (&["out/run.mcap", "--film", "film.avi"], WRONG_INPUT, "does not end in .mp4, .gif or .png"),
+        (&["out/run.mcap", "--film", "film.gif", "--fps", "0"], WRONG_INPUT, "not 0"),
+        (&["out/run.mcap", "--film", "film.mp4", "--size", "101x50"], WRONG_INPUT, "even sides"),
+        (&["out/run.mcap", "--film", "film.mp4", "--speed", "0"], WRONG_INPUT, "not a positive number"),
+        (&["out/run.mcap", "--adapter", "no such adapter"], WRONG_INPUT, "there is no `no such adapter` adapter"),
+        (&["nowhere.mcap"], WRONG_INPUT, "nowhere.mcap"),
+        (&["noise.mcap"], WRONG_INPUT, "not an MCAP file"),
+        (&["empty.mcap"], WRONG_INPUT, "no samples"),
+        (&["out/run.mcap", "--out", "a-file/below"], MACHINE_FAILED, "cannot write to a-file/below"),
+        (&["out/run.mcap", "--film", "a-file/film.gif"], MACHINE_FAILED, "cannot write to a-file"),
+    ];
+    for (arguments, exit, message) in cases {
+        let Ran { exit: found, err, .. } = ran(folder.path(), &[&["render"], *arguments].concat());
+        // Long lines are broken for the terminal.
+        let text = err.split_whitespace().filter(|word| *word != "|" && *word != "│").collect::<Vec<_>>().join(" ");
+        assert_eq!(found, *exit, "{arguments:?}: {err}");
+        assert!(text.contains(message), "{arguments:?}: {text}");
+        assert!(!err.contains("panicked"), "{arguments:?}: {err}");
+    }
+    assert_eq!(names(&folder.path().join("out")), ["figures", "report.html", "report.json", "run.mcap"]);
+}
+
+#[test]
+fn a_window_without_a_display_ends_with_a_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let done = std::process::Command::new(TAUTLINE)
+        .args(["view", "pentagon"])
+        .current_dir(folder.path())
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .output()
+        .expect("the program runs");
+    let err = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), MACHINE_FAILED, "{err}");
+    assert!(err.contains("no display") && err.contains("tautline render"), "{err}");
+}
