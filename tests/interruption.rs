@@ -22,7 +22,7 @@ const DRAG: &str = "swarm.a22_per_s=-0.1";
 const FOREVER: &str = "time.duration_s=1e6";
 /// Some tens of chunks.
 const GROWN_BYTES: u64 = 1 << 20;
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_mins(2);
 
 /// A run that is under way. Killed when dropped, so that a test that fails leaves none behind.
 struct Underway {

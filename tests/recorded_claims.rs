@@ -239,6 +239,7 @@ fn the_rate_that_is_said_to_decide_does() {
     let straight = |rate_hz: f64| {
         let mut items = Vec::new();
         let steps = rate_hz.ceil();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
         for k in 0..=(steps as u32) {
             let u = f64::from(k) / steps;
             items.extend([seen(0, u, [10.0 * u - 5.0, 0.0, 0.0]), seen(1, u, [5.0 - 10.0 * u, 3.0, 0.0])]);

@@ -24,7 +24,7 @@ const TIE: f64 = 1e-12;
 /// Distances within this of delta are computed in fractions: far above rounding, and above every graze that is asked for.
 const NEAR_M: f64 = 1e-4;
 
-/// SplitMix64 (Steele, Lea, Flood 2014): the same scenes everywhere.
+/// `SplitMix64` (Steele, Lea, Flood 2014): the same scenes everywhere.
 struct Random(u64);
 
 impl Random {
@@ -38,6 +38,10 @@ impl Random {
 
     fn below(&mut self, limit: u64) -> u64 {
         self.bits() % limit
+    }
+
+    fn index(&mut self, length: usize) -> usize {
+        usize::try_from(self.below(length as u64)).expect("below a length")
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -71,13 +75,15 @@ fn scene(number: u64) -> Tracks {
             let mut own = times.clone();
             if !together {
                 // Clocks of its own, sometimes the same as another's.
-                let shift = [0.0, 0.25, random.between(0.0, 0.5)][random.below(3) as usize];
-                own.iter_mut().for_each(|time_s| *time_s += shift);
+                let shift = [0.0, 0.25, random.between(0.0, 0.5)][random.index(3)];
+                for time_s in &mut own {
+                    *time_s += shift;
+                }
             }
             if kind == 0 {
                 // Late, or gone early, or seen once.
-                own.drain(..random.below(instants) as usize);
-                own.truncate(1 + random.below(own.len() as u64) as usize);
+                own.drain(..random.index(own.len()));
+                own.truncate(1 + random.index(own.len()));
             }
             let at = |time_s: f64, random: &mut Random| match kind {
                 1 => start,
@@ -89,7 +95,10 @@ fn scene(number: u64) -> Tracks {
         .collect();
     match random.below(3) {
         0 => graze(&mut tracks, origin_m, &mut random),
-        1 if tracks.len() > 2 => tracks[1] = tracks[0].clone(),
+        1 if tracks.len() > 2 => {
+            let same = tracks[0].clone();
+            tracks[1] = same;
+        }
         _ => {}
     }
     tracks
@@ -107,16 +116,6 @@ fn graze(tracks: &mut Tracks, origin_m: Vector3<f64>, random: &mut Random) {
     let middle = origin_m + random.vector(5.0);
     tracks[0] = vec![(0.0, middle + along * before), (1.0, middle - along * after)];
     tracks[1] = vec![(0.0, middle + aside * miss_m - along * before), (1.0, middle + aside * miss_m + along * after)];
-}
-
-trait Yzx {
-    fn yzx(&self) -> Self;
-}
-
-impl Yzx for Vector3<f64> {
-    fn yzx(&self) -> Self {
-        Vector3::new(self.y, self.z, self.x)
-    }
 }
 
 fn items(tracks: &Tracks) -> Vec<Item> {
@@ -303,13 +302,12 @@ fn compare(number: u64, tracks: &Tracks) -> bool {
 
 #[test]
 fn twenty_thousand_scenes_are_judged_as_brute_force_judges_them() {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let misled: u64 = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads)
+        let workers: Vec<_> = (0..threads as u64)
             .map(|first| {
                 scope.spawn(move || {
-                    (first..SCENES).step_by(threads as usize).filter(|&number| compare(number, &scene(number))).count()
-                        as u64
+                    (first..SCENES).step_by(threads).filter(|&number| compare(number, &scene(number))).count() as u64
                 })
             })
             .collect();

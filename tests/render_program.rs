@@ -156,10 +156,10 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         (&["out/run.mcap", "--film", "a-file/film.gif"], MACHINE_FAILED, "cannot write to a-file"),
     ];
     for (arguments, exit, message) in cases {
-        let Ran { exit: found, err, .. } = ran(folder.path(), &[&["render"], *arguments].concat());
+        let Ran { exit: found, out, err } = ran(folder.path(), &[&["render"], *arguments].concat());
         // Long lines are broken for the terminal.
         let text = err.split_whitespace().filter(|word| *word != "|" && *word != "│").collect::<Vec<_>>().join(" ");
-        assert_eq!(found, *exit, "{arguments:?}: {err}");
+        assert_eq!((found, out.as_str()), (*exit, ""), "{arguments:?}: {err}");
         assert!(text.contains(message), "{arguments:?}: {text}");
         assert!(!err.contains("panicked"), "{arguments:?}: {err}");
     }

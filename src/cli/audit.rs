@@ -25,7 +25,6 @@ const DRAWN_PAIRS: usize = 3;
 
 /// Arguments of `tautline audit`.
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 #[command(after_help = "\
 Exits with 0 where it is proved that nothing came too close, with 1 where something did or where it cannot be told \
 (unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
@@ -80,7 +79,7 @@ pub(super) struct AuditArguments {
     /// Print no summary and no progress: the exit code says it.
     #[arg(long, help_heading = "Answer")]
     quiet: bool,
-    /// Write the verdict as a JUnit file.
+    /// Write the verdict as a `JUnit` file.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.

@@ -1,4 +1,4 @@
-//! What was found in a recording, for programs: CSV and JUnit.
+//! What was found in a recording, for programs: CSV and `JUnit`.
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 

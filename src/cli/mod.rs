@@ -8,9 +8,9 @@ mod check;
 mod completions;
 mod console;
 mod diagnostic;
-mod events;
 #[cfg(feature = "viewer")]
 mod drawing;
+mod events;
 mod export;
 mod folder;
 mod list;

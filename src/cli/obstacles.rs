@@ -72,6 +72,7 @@ struct Cuboid {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "each is in metres")]
 struct Capsule {
     from_m: [f64; 3],
     to_m: [f64; 3],

@@ -246,7 +246,9 @@ mod tests {
     fn timing(texts: &[&str], known: KnownUnit) -> (Timing, Option<String>, Vec<f64>) {
         let stamps: Vec<_> = texts.iter().map(|text| Stamp::parse(text).expect("a number")).collect();
         let mut probe = Probe::new(stamps[0]);
-        stamps.iter().for_each(|&stamp| probe.see(stamp));
+        for &stamp in &stamps {
+            probe.see(stamp);
+        }
         let (timing, note) = Timing::settle(&probe, known);
         let seconds = stamps.iter().map(|&stamp| timing.seconds(stamp)).collect();
         (timing, note, seconds)

@@ -11,6 +11,7 @@ use super::words::{metres, metres_below, seconds};
 use super::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, Status, Violation, finite};
 use crate::audit::recorded::{self, Approach, Outcome, Question, Who};
 use crate::figures::Figure;
+use crate::swarm::Pair;
 
 /// Violations that are listed in words, and on the page.
 const LISTED_IN_WORDS: usize = 10;
@@ -200,7 +201,7 @@ impl RecordedReport {
                 delta_m,
                 min_m,
                 min_at_s: first.and_then(|first| finite(first.time_s)),
-                min_pair: first.and_then(|first| first.who.pair()).map(|pair| pair.numbers()),
+                min_pair: first.and_then(|first| first.who.pair()).map(Pair::numbers),
                 certified_m: None,
                 certificate_void: Vec::new(),
             },

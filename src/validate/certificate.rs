@@ -77,7 +77,7 @@ fn honest_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, ValidateE
 type MakeLaw = fn(&Scenario) -> Result<Box<dyn Law>, ParameterError>;
 
 fn fly(start: &RandomStart) -> Result<Trial, ValidateError> {
-    fly_under(start, |scenario| scenario.law())
+    fly_under(start, Scenario::law)
 }
 
 /// Flies a start under this law by the promise of the scenario's own. A flight in which the law loses its answer has no

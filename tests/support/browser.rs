@@ -8,7 +8,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// A page loads in a second or two; a browser that hangs is stopped.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_mins(2);
 const WIDTHS_PX: [u32; 3] = [320, 390, 1280];
 /// A contrast of text that people with moderately low vision read (WCAG 2.2, level AA).
 const CONTRAST: f64 = 4.5;

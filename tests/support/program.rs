@@ -6,7 +6,7 @@ use std::time::Duration;
 use assert_cmd::Command;
 
 /// Longer than any command of a test takes on a slow machine.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_mins(5);
 
 /// The program under test.
 pub(crate) const TAUTLINE: &str = env!("CARGO_BIN_EXE_tautline");

@@ -134,7 +134,7 @@ impl Shape {
     pub(super) fn distance(&self, point: Vector3<f64>) -> f64 {
         match self {
             Self::HalfSpace { normal } => point.dot(&normal.normalize()),
-            _ => self.from_core(self.turned(point)).norm() - self.radius(),
+            _ => self.off_core(self.turned(point)).norm() - self.radius(),
         }
     }
 
@@ -150,9 +150,9 @@ impl Shape {
         let (from, to) = (self.turned(from), self.turned(to));
         let at = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
         let mut best = (f64::INFINITY, 0.0);
-        let mut start = (0.0, self.from_core(from));
+        let mut start = (0.0, self.off_core(from));
         for u in self.changes(from, to).into_iter().chain([1.0]) {
-            let end = (u, self.from_core(at(u)));
+            let end = (u, self.off_core(at(u)));
             let part = RelativeMotion::new(start.1, end.1).closest();
             if part.squared < best.0 {
                 best = (part.squared, start.0 + (end.0 - start.0) * part.at);
@@ -181,7 +181,7 @@ impl Shape {
     }
 
     /// The vector from the nearest point of the core.
-    fn from_core(&self, point: Vector3<f64>) -> Vector3<f64> {
+    fn off_core(&self, point: Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Ball { .. } | Self::HalfSpace { .. } => point,
             Self::Box { half_m, .. } => point.zip_map(half_m, |x, half| x - x.clamp(-half, half)),

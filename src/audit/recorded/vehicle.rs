@@ -157,7 +157,7 @@ impl Vehicle {
         }
         let length = curve.to_s - curve.from_s;
         let reach = curve.coefficients.iter().rev().fold(0.0, |sum, c| sum * length + c.abs().sum());
-        if !(reach <= MAX_COORDINATE_M) {
+        if reach.is_nan() || reach > MAX_COORDINATE_M {
             return wrong("a coefficient is not a finite number, or leads beyond 1e70 m");
         }
         Ok(Segment::curved(curve))

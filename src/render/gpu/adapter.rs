@@ -106,7 +106,7 @@ impl Gpu {
             let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
             descriptor.backends = backends;
             if let Some(adapter) = pick(&wgpu::Instance::new(descriptor), choice, None, &mut found) {
-                return Self::start(adapter);
+                return Self::start(&adapter);
             }
         }
         Err(not_found(choice, &found))
@@ -121,11 +121,11 @@ impl Gpu {
         let mut found = Vec::new();
         let adapter = pick(instance, choice, Some(surface), &mut found).ok_or_else(|| not_found(choice, &found))?;
         let capabilities = surface.get_capabilities(&adapter);
-        Ok((Self::start(adapter)?, capabilities))
+        Ok((Self::start(&adapter)?, capabilities))
     }
 
-    fn start(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
-        let name = name(&adapter);
+    fn start(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        let name = name(adapter);
         let limits = adapter.limits();
         let downlevel = adapter.get_downlevel_capabilities();
         // The limits of the adapter itself would forbid another one to do the same; a picture needs few of them.

@@ -123,7 +123,7 @@ impl Stage {
         Ok(match &view.camera {
             CameraSpec::Orbit(orbit) => Camera::orbiting(*orbit, Vector3::zeros(), view.size_px),
             CameraSpec::Follow(name) => {
-                let vehicle = self.find(footage, name)?;
+                let vehicle = Self::find(footage, name)?;
                 let around_m = footage
                     .delta_m
                     .map_or(FOLLOWED_RADII * footage.radius_m[vehicle], |delta_m| FOLLOWED_DELTAS * delta_m);
@@ -162,11 +162,11 @@ impl Stage {
         }
     }
 
-    fn find(&self, footage: &Footage, name: &str) -> Result<usize, CameraError> {
+    fn find(footage: &Footage, name: &str) -> Result<usize, CameraError> {
         footage.vehicles.iter().position(|vehicle| vehicle == name).ok_or_else(|| {
             let mut vehicles = footage.vehicles.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
             if footage.count() > NAMED {
-                vehicles += &format!(" and {} more", footage.count() - NAMED);
+                vehicles = format!("{vehicles} and {} more", footage.count() - NAMED);
             }
             CameraError::NoVehicle { name: name.to_owned(), vehicles }
         })
