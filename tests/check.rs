@@ -1,12 +1,16 @@
 //! `tautline check` and the warnings of `tautline run`, through the program.
 
-use assert_cmd::Command;
+#[path = "support/program.rs"]
+mod program;
+
+use std::path::Path;
+
+use program::{TAUTLINE, ran_by};
 use serde_json::Value;
 
 fn tautline(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("tautline").expect("the program").args(arguments).output().expect("an end");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
-    (output.status.code().expect("a code"), text(output.stdout), text(output.stderr))
+    let ran = ran_by(TAUTLINE, Path::new(env!("CARGO_TARGET_TMPDIR")), arguments);
+    (ran.exit.expect("a code"), ran.out, ran.err)
 }
 
 fn json(arguments: &[&str]) -> (i32, Value) {

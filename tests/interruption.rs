@@ -37,6 +37,7 @@ impl Underway {
         let child = Command::new(TAUTLINE)
             .args(["run", "--json", "--quiet", "--out", "out", "--set", DRAG, "--set", FOREVER])
             .current_dir(folder.path())
+            .env("XDG_RUNTIME_DIR", folder.path())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -173,7 +173,7 @@ fn without_arguments_the_pentagon_is_flown_into_out() {
     let mut names: Vec<_> =
         fs::read_dir(&run_folder).expect("the folder").map(|entry| entry.expect("an entry").file_name()).collect();
     names.sort();
-    assert_eq!(names, ["figures", "report.html", "report.json", "run.mcap"], "nothing temporary is left");
+    assert_eq!(names, ["figures", "report.html", "report.json", "run.mcap", "snapshots"], "nothing temporary is left");
     let recording = McapRecording::open(&run_folder.join("run.mcap")).expect("a recording");
     assert_eq!(recording.header().scenario_name, "pentagon");
     let report = json(&fs::read_to_string(run_folder.join("report.json")).expect("a report"));
@@ -316,6 +316,7 @@ fn a_reader_that_went_away_is_no_error_and_no_panic() {
         let mut child = Command::new(TAUTLINE)
             .args(arguments)
             .current_dir(folder.path())
+            .env("XDG_RUNTIME_DIR", folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()

@@ -226,11 +226,11 @@ impl Chart {
         let (across, up) = (self.x.to - self.x.from, self.y.to - self.y.from);
         let height = (width * up / across).clamp(f64::from(LEAST_HEIGHT), f64::from(MOST_HEIGHT)).round();
         let unit = (across / width).max(up / height);
-        let widen = |axis: &Axis, pixels: f64| {
+        let widen = |axis: &Axis, pixels: f64, tick_px: f64| {
             let (middle, half) = (0.5 * (axis.from + axis.to), 0.5 * unit * pixels);
-            Axis::spanning(&axis.label, middle - half, middle + half, pixels / 60.0)
+            Axis::spanning(&axis.label, middle - half, middle + half, pixels / tick_px)
         };
-        (self.x, self.y) = (widen(&self.x, width), widen(&self.y, height));
+        (self.x, self.y) = (widen(&self.x, width, 60.0), widen(&self.y, height, 40.0));
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
         let height = height as u32;
         height

@@ -11,6 +11,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{Field, Place, ScenarioError};
 use super::file::{CHOICES, ScenarioFile};
+use super::homes::homes;
 use super::overrides::Override;
 
 /// Keys that give a missing key its value, in order: an error at one of these keys stands where its value comes from.
@@ -105,7 +106,11 @@ impl<'a> Document<'a> {
         let message = error.message();
         let (said, help) = if message.starts_with("unknown field ") || message.starts_with("unexpected keys ") {
             let known = self.with_common_keys(known_names(message), &span);
-            (format!("unknown key `{name}`"), suggest(&name, &known))
+            let help = match homes(&name)[..] {
+                [] => suggest(&name, &known),
+                ref homes => format!("`{name}` belongs in {}; {}", homes.join(", or "), suggest(&name, &known)),
+            };
+            (format!("unknown key `{name}`"), help)
         } else if message.starts_with("unknown variant ") {
             (format!("unknown choice `{name}`"), suggest(&name, &known_names(message)))
         } else {

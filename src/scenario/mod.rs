@@ -9,6 +9,7 @@ pub mod builtin;
 mod document;
 mod error;
 pub mod file;
+mod homes;
 mod neighbours;
 mod overrides;
 mod resolved;

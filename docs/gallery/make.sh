@@ -1,0 +1,21 @@
+#!/bin/sh
+# Draws the pictures of the README anew. From anywhere: sh docs/gallery/make.sh
+set -eu
+cd "$(dirname "$0")/../.."
+cargo build --release
+out=$(mktemp -d)
+trap 'rm -r "$out"' EXIT
+
+# The classical law ends in a violation, which is exit code 1.
+fly() { target/release/tautline run "$1" --out "$out/$2" --quiet --no-figures || [ "$2" = laplacian ]; }
+fly pentagon pentagon
+fly pentagon-laplacian laplacian
+fly examples/sphere.toml sphere
+target/release/tautline render "$out/sphere/run.mcap" --out "$out/ball" --at end --camera 35,22,38 --theme light \
+    --size 960x540 --quiet
+
+for moment in start closest end; do
+    cp "$out/pentagon/snapshots/$moment.png" "docs/gallery/pentagon-$moment.png"
+done
+cp "$out/laplacian/snapshots/violation-1.png" docs/gallery/laplacian-violation.png
+cp "$out/ball/end.png" docs/gallery/sphere.png
