@@ -123,7 +123,8 @@ fn the_window_plays_answers_keys_and_mouse_and_closes() {
     screen.tell(&["key", "--window", &window, "Right"]);
     screen.tell(&["key", "--window", &window, "p"]);
     wait_for("another picture", || (pictures(folder.path()).len() == 2).then_some(()));
-    assert!(pictures(folder.path())[1] - closest_s < 0.02, "a step is a sample");
+    let next_s = pictures(folder.path())[1];
+    assert!(next_s - closest_s < 0.02, "a step is a sample: {closest_s} s to {next_s} s");
     // Play: time goes on.
     screen.tell(&["key", "--window", &window, "space"]);
     std::thread::sleep(Duration::from_secs(1));

@@ -300,7 +300,9 @@ fn controls(ui: &mut Ui, player: &mut Player, message: Option<&str>) {
         let [first_s, last_s] = player.footage.range_s();
         let mut time_s = player.time_s;
         ui.spacing_mut().slider_width = (ui.available_width() - 230.0).max(60.0);
-        let slider = Slider::new(&mut time_s, first_s..=last_s.max(first_s + 1e-9)).fixed_decimals(2).suffix(" s");
+        let slider = Slider::new(&mut time_s, first_s..=last_s.max(first_s + 1e-9))
+            .custom_formatter(|time_s, _| format!("{time_s:.2}"))
+            .suffix(" s");
         if ui.add(slider).changed() {
             player.playing = false;
             player.seek(time_s);
