@@ -82,8 +82,8 @@ fn fly(start: &RandomStart) -> Result<Trial, ValidateError> {
     fly_under(start, Scenario::law)
 }
 
-/// Flies a start under this law by the promise of the scenario's own. A flight in which the law loses its answer has no
-/// closest approach that keeps a promise.
+/// Flies a start under this law by the promise of the scenario's own. A flight in which the law loses its answer, or the
+/// solver its step, has no closest approach that keeps a promise.
 fn fly_under(start: &RandomStart, make_law: MakeLaw) -> Result<Trial, ValidateError> {
     let scenario = scenario(start);
     let certificate = scenario.law()?.certificate(&scenario.start);
@@ -100,7 +100,7 @@ fn fly_under(start: &RandomStart, make_law: MakeLaw) -> Result<Trial, ValidateEr
                 let rises = energies.windows(2).map(|pair| (pair[1] - pair[0]) / energy_initial);
                 (separation_m(solution.closest), rises.fold(0.0, larger))
             }
-            Err(IdealError::Law { .. }) => (f64::NAN, f64::NAN),
+            Err(IdealError::Law { .. } | IdealError::Stalled { .. }) => (f64::NAN, f64::NAN),
             Err(error) => return Err(error.into()),
         };
 
