@@ -234,6 +234,14 @@ impl Fault {
         Self::Damaged { reason: reason.to_string() }
     }
 
+    /// The same of a time: a row without one says nothing.
+    pub(super) fn of_time(self) -> Self {
+        match self {
+            Self::NotFinite { .. } => Self::content(self.to_string(), "take the row out: each needs a time"),
+            other => other,
+        }
+    }
+
     fn help(&self) -> String {
         let text = match self {
             Self::System(error) if error.kind() == io::ErrorKind::NotFound => "look at the spelling of the path",
