@@ -8,7 +8,7 @@
 //! | `foxglove.FrameTransform(s)`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/TransformStamped` | the same | the child frame |
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped` | the same | the topic |
 //!
-//! Times are those of the messages; where a message has none, the time when it was logged. All positions must be given
+//! Times are those of the messages; where no message of a channel has one, those when they were logged. All positions must be given
 //! in one frame. A file that was not closed is refused, unless the user accepts what it holds.
 
 pub(crate) mod exported;
