@@ -55,7 +55,7 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         (last("0.5,2,1,2,-inf"), line(5), "column `z` holds `-inf`", "leave the cells empty"),
         (last("0.5,2,1,2,1e999"), line(5), "`1e999`, which is not finite", "leave the cells empty"),
         (last("later,2,1,2,3"), line(5), "column `t` holds `later`", "decimal point"),
-        (last("nan,2,1,2,3"), line(5), "column `t` holds `nan`", "take the row out"),
+        (last("nan,2,1,2,3"), line(5), "column `t` holds `nan`", "each needs a time"),
         (last(",2,1,2,3"), line(5), "column `t` is empty", "fill it"),
         (last("0.5,,1,2,3"), line(5), "column `id` is empty", "fill it"),
         (last("0.5,2,1,,3"), line(5), "column `y` is empty", "fill it"),
@@ -84,6 +84,16 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         ("0 1 2 3 4\n".into(), line(1), "5 numbers where time and three", "t x y z x y z"),
         ("0 1 2 3\n1 1 2 3\n0.5 1 2 3\n".into(), line(3), "time runs backwards", "sort the lines"),
         ("t,id,x,y,z,radius\n0,1,1,2,3,-1\n".into(), line(2), "a negative radius", "0 or more"),
+        (
+            "t,id,x,y,z,radius\n0,a,1,2,3,1\n1,a,1,2,3,\n".into(),
+            line(3),
+            "`a` has no radius here and one at line 2",
+            "fill",
+        ),
+        ("t,id,x,y,z,vx,vy\n0,1,1,2,3,4,5\n".into(), line(1), "no column for the velocity along z", "--column vz=NAME"),
+        ("0,0 1,5 2,5 3,5\n".into(), line(1), "`0,0`, a number with a decimal comma", "decimal point"),
+        ("# at rest\n0 1,5 2 3\n".into(), line(2), "`1,5`, a number with a decimal comma", "decimal point"),
+        (change("0,2,1", "#0,2,1"), line(3), "column `t` holds `#0`", "decimal point"),
     ] {
         let error = refused("flight.csv", content.as_bytes());
         assert_eq!(error.place, place, "{error}\n{content}");
@@ -279,7 +289,10 @@ fn polynomials_are_refused_where_they_are_wrong() {
         assert_eq!(error.place, place, "{error}");
         assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
     }
-    assert!(refused("cf1.csv", b"duration,x^0,y^0\n1,0,0\n").to_string().contains("no column `z^0`"));
+    for (header, missing) in [("x^0,y^0", "z^0"), ("x^0,y^0,z^0,x^1,y^1", "z^1"), ("x^0,y^0,z^0,x^2,y^2,z^2", "x^1")] {
+        let said = refused("cf1.csv", format!("duration,{header}\n1,0,0\n").as_bytes()).to_string();
+        assert!(said.contains(&format!("no column `{missing}`")), "{said}");
+    }
 }
 
 #[test]

@@ -25,6 +25,10 @@ pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognise
     if data.is_dir() {
         return Ok(Recognised { format: Format::Crazyflie, gzip: false });
     }
+    if !data.is_file() {
+        let problem = "it is a pipe or a device, and a recording is read more than once";
+        return Err(error(Fault::content(problem, "save it to a file first, and give the file")));
+    }
     let mut source = Source { path: path.to_owned(), gzip: false };
     let mut head = Vec::new();
     let file = File::open(path).map_err(|source| error(Fault::System(source)))?;
