@@ -205,6 +205,7 @@ fn a_file_that_was_not_closed_is_refused_until_it_is_accepted() {
     let cut = &file[..file.len() / 2];
     let refused = read_bytes("cut.mcap", cut, &ReadOptions::default()).expect_err("refused");
     assert!(refused.to_string().contains("breaks off"), "{refused}");
+    assert!(refused.help().contains("--allow-unfinished"), "{}", refused.help());
     let options = ReadOptions { allow_unfinished: true, ..ReadOptions::default() };
     let found = read_bytes("cut.mcap", cut, &options).expect("read");
     assert!(!found.items.is_empty() && found.notes.iter().any(|note| note.contains("not closed")), "{found:?}");
@@ -378,6 +379,20 @@ fn shows_are_read_alone_and_out_of_an_archive_with_parts() {
         assert_eq!(pieces[2].coefficients[1].x, 0.0);
     }
     assert_eq!(alone.items, parted.items);
+}
+
+#[test]
+fn a_drone_with_a_single_point_stands_there_until_the_show_ends() {
+    let drone = |name: &str, points: &str| {
+        format!(r#"{{"settings": {{"name": "{name}", "trajectory": {{"points": {points}}}}}}}"#)
+    };
+    let show = |drones: &[String]| format!(r#"{{"swarm": {{"drones": [{}]}}}}"#, drones.join(", "));
+    let (still, flies) = (drone("A", "[[0, [1, 2, 3], []]]"), drone("B", "[[0, [9, 9, 0], []], [7, [9, 9, 9], []]]"));
+    let found = whole("show.json", show(&[still.clone(), flies]).as_bytes());
+    let a: Vec<_> = pieces(&found).into_iter().filter(|piece| piece.vehicle == 0).collect();
+    assert_eq!(a.iter().map(|piece| (piece.from_s, piece.to_s)).collect::<Vec<_>>(), [(0.0, 7.0)]);
+    assert_eq!(at(a[0], 5.0), [1.0, 2.0, 3.0]);
+    assert_eq!(whole("still.json", show(&[still]).as_bytes()).samples(), [(0.0, "A", [1.0, 2.0, 3.0])]);
 }
 
 fn polynomial(pieces: &[(f64, [f64; 3])]) -> String {

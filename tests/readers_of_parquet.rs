@@ -109,7 +109,7 @@ fn a_codec_that_is_not_read_is_named() {
     packed[codec] = 8;
     fs::write(&path, packed).expect("written");
     let refused = Whole::read(&path, &ReadOptions::default()).expect_err("refused");
-    assert!(refused.to_string().contains("column `t_s` is packed by BROTLI"), "{refused}");
+    assert!(refused.to_string().contains("column `t_s` is packed by brotli"), "{refused}");
     assert!(refused.help().contains("zstd"), "{}", refused.help());
 }
 

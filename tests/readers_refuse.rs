@@ -5,7 +5,7 @@ use std::io::{Cursor, Write as _};
 use std::path::PathBuf;
 
 use tautline::export::{self, ExportOptions};
-use tautline::read::{self, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
+use tautline::read::{self, AxisOrder, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -171,7 +171,7 @@ fn a_file_that_breaks_off_anywhere_is_refused() {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
             let cut = (bytes.len() as f64 * part) as usize;
             let error = refused(name, &bytes[..cut]);
-            let truncated = matches!(error.fault, Fault::Truncated { .. });
+            let truncated = matches!(error.fault, Fault::Truncated { .. } | Fault::Unfinished);
             assert!(truncated, "{name} at {part}: {error}");
             assert!(error.help().contains("copy or record it again"), "{}", error.help());
         }
@@ -299,11 +299,21 @@ fn polynomials_are_refused_where_they_are_wrong() {
 fn a_format_that_is_forced_on_other_content_is_refused() {
     let forced = |format| ReadOptions { format: Some(format), ..ReadOptions::default() };
     for format in [Format::Parquet, Format::Npz, Format::Mcap, Format::Crazyflie, Format::Skybrush] {
-        refused_with("flight.csv", LONG.as_bytes(), &forced(format));
+        let error = refused_with("flight.csv", LONG.as_bytes(), &forced(format));
+        let has_magic = matches!(format, Format::Parquet | Format::Npz | Format::Mcap);
+        assert_eq!(has_magic, matches!(error.fault, Fault::WrongFormat { .. }), "{format:?}: {error}");
     }
     let unit = ReadOptions { time_unit: Some(TimeUnit::Milliseconds), ..ReadOptions::default() };
     let error = refused_with("cf1.csv", b"duration,x^0,y^0,z^0\n1,0,0,0\n", &unit);
     assert!(error.help().contains("leave --time-unit away"), "{error}");
+    for (options, option) in [
+        (ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() }, "--frame"),
+        (ReadOptions { axis_order: Some(AxisOrder::TimeFirst), ..ReadOptions::default() }, "--axis-order"),
+        (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "--allow-unfinished"),
+    ] {
+        let error = refused_with("flight.csv", LONG.as_bytes(), &options);
+        assert_eq!(error.help(), format!("leave {option} away"), "{error}");
+    }
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let options = ReadOptions { scale, ..ReadOptions::default() };
         assert!(refused_with("flight.csv", LONG.as_bytes(), &options).help().contains("positive"));

@@ -12,7 +12,6 @@ use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as Parque
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
@@ -135,10 +134,13 @@ fn other_than_numbers(column: &ColumnDescriptor) -> Option<&'static str> {
 }
 
 /// The codec of a column that is packed by one that is not read.
-fn packed_otherwise(reader: &SerializedFileReader<File>, column: usize) -> Option<Compression> {
-    let groups = reader.metadata().row_groups().iter();
-    let mut codecs = groups.filter_map(|group| group.columns().get(column)).map(ColumnChunkMetaData::compression);
-    codecs.find(|codec| matches!(codec, Compression::BROTLI(_) | Compression::LZO))
+fn packed_otherwise(reader: &SerializedFileReader<File>, column: usize) -> Option<&'static str> {
+    let mut columns = reader.metadata().row_groups().iter().filter_map(|group| group.columns().get(column));
+    columns.find_map(|column| match column.compression() {
+        Compression::BROTLI(_) => Some("brotli"),
+        Compression::LZO => Some("lzo"),
+        _ => None,
+    })
 }
 
 /// Whether the whole numbers of a column have no sign.

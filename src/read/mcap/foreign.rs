@@ -9,17 +9,13 @@ use super::super::order::{BATCH, Ordered, Row, Rows, survey};
 use super::super::source::Source;
 use super::super::{ReadOptions, Recording, TimeUnit};
 use super::messages::{self, Encoding, Kind, Seen, Who};
-use super::{UNFINISHED, error_of, records, unfinished};
+use super::{accept_unfinished, error_of, records};
 use crate::record::mcap::framing::{Fields, Record, RecordReader};
 use mcap::records::op;
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let records = records(source)?;
-    let complete = records.is_complete();
-    if !complete && !options.allow_unfinished {
-        return Err(source.error(unfinished()));
-    }
-    let notes = if complete { Vec::new() } else { vec![UNFINISHED.to_owned()] };
+    let notes = accept_unfinished(source, records.is_complete(), options)?;
     let poses = Poses {
         source: source.clone(),
         records,
