@@ -102,8 +102,8 @@ fn an_export_that_is_interrupted_leaves_no_file() {
     /// Rows that take some seconds to export.
     const ROWS: u32 = 400_000;
     let folder = folder();
-    let rows: String = (0..ROWS).map(|k| format!("{k},a,{k}.25,2,3\n")).collect();
-    fs::write(folder.path().join("long.csv"), format!("t_s,id,x,y,z\n{rows}")).expect("written");
+    let rows: Vec<_> = (0..ROWS).map(|k| format!("{k},a,{k}.25,2,3\n")).collect();
+    fs::write(folder.path().join("long.csv"), format!("t_s,id,x,y,z\n{}", rows.concat())).expect("written");
     let names = || -> Vec<String> {
         let entries = fs::read_dir(folder.path()).expect("a folder");
         entries.map(|entry| entry.expect("one").file_name().to_string_lossy().into_owned()).collect()

@@ -26,8 +26,8 @@ enum Cells {
 use Cells::{Int, Long, Real};
 
 fn write(path: &Path, columns: &[(&str, Cells)], packed: Compression) {
-    let fields: String = columns.iter().map(|(column, _)| format!("required {column}; ")).collect();
-    let schema = parse_message_type(&format!("message samples {{ {fields} }}")).expect("a schema");
+    let fields: Vec<_> = columns.iter().map(|(column, _)| format!("required {column};")).collect();
+    let schema = parse_message_type(&format!("message samples {{ {} }}", fields.join(" "))).expect("a schema");
     let properties = WriterProperties::builder().set_compression(packed).build();
     let file = File::create(path).expect("a file");
     let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
