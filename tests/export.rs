@@ -61,6 +61,7 @@ fn every_format_gives_back_the_same_bits() {
     for (first, more) in [
         ("0.1", "0.30000000000000004"),
         ("-3.5", "0"),
+        ("-0.0", "1"),
         ("1700000000.123456789", "1700000000.2"),
         ("999999.9", "1000000.1"),
     ] {
@@ -129,6 +130,21 @@ fn curves_are_sampled_only_where_it_is_asked_for() {
     assert_eq!(positions, expected);
     let Item::Sample(last) = whole(&target).items[4].clone() else { panic!("a piece") };
     assert_eq!(last.velocity_m_s.map(|v| v.x), Some(14.0));
+}
+
+#[test]
+fn the_end_of_every_curve_is_sampled() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let curves = folder.path().join("curves");
+    fs::create_dir(&curves).expect("a folder");
+    fs::write(curves.join("cf1.csv"), PARABOLA).expect("written");
+    fs::write(curves.join("cf2.csv"), PARABOLA.replace("\n2,", "\n1.75,")).expect("written");
+    let target = folder.path().join("target.csv");
+    export(&curves, &target, Format::Csv, &ExportOptions { sample_hz: Some(0.8) }).expect("exported");
+    let whole = whole(&target);
+    let times = |name: &str| whole.samples().iter().filter(|s| s.1 == name).map(|s| s.0).collect::<Vec<_>>();
+    assert_eq!(times("cf1"), [0.0, 1.25, 1.75, 2.0]);
+    assert_eq!(times("cf2"), [0.0, 1.25, 1.75]);
 }
 
 #[test]

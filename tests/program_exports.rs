@@ -2,6 +2,8 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 #[path = "support/program.rs"]
 mod program;
@@ -92,6 +94,36 @@ fn wrong_input_ends_with_2_and_leaves_no_file() {
             fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("one").file_name()).collect();
         assert_eq!(names.len(), 3, "{names:?}");
     }
+}
+
+#[test]
+#[cfg(unix)]
+fn an_export_that_is_interrupted_leaves_no_file() {
+    /// Rows that take some seconds to export.
+    const ROWS: u32 = 400_000;
+    let folder = folder();
+    let rows: Vec<_> = (0..ROWS).map(|k| format!("{k},a,{k}.25,2,3\n")).collect();
+    fs::write(folder.path().join("long.csv"), format!("t_s,id,x,y,z\n{}", rows.concat())).expect("written");
+    let names = || -> Vec<String> {
+        let entries = fs::read_dir(folder.path()).expect("a folder");
+        entries.map(|entry| entry.expect("one").file_name().to_string_lossy().into_owned()).collect()
+    };
+    let mut child = Command::new(TAUTLINE)
+        .args(["export", "long.csv", "-o", "out.npz"])
+        .current_dir(folder.path())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("started");
+    while !names().iter().any(|name| name.ends_with(".partial")) {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended before it could be interrupted");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().expect("kill").success());
+    let ended = child.wait_with_output().expect("an end");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(3), "{said}");
+    assert!(said.contains("interrupted"), "{said}");
+    assert_eq!(names().len(), 3, "{:?}", names());
 }
 
 #[test]

@@ -80,6 +80,19 @@ fn rows_out_of_order_are_sorted_and_it_is_said() {
 }
 
 #[test]
+fn times_that_differ_by_less_than_a_double_are_sorted_too() {
+    let whole = read("fine.csv", "t,id,x,y,z\n1700000000.00000005,a,1,0,0\n1700000000,b,2,0,0\n");
+    assert_eq!(whole.samples(), [(0.0, "b", [2.0, 0.0, 0.0]), (5e-8, "a", [1.0, 0.0, 0.0])]);
+}
+
+#[test]
+fn a_name_may_begin_with_a_hash_and_comments_stand_above_the_header() {
+    let whole = read("hash.csv", "# made up\nid,t_s,x,y,z\nleader,0,0,0,0\n#2,0,0,0,0\n");
+    assert_eq!(whole.vehicles, ["leader", "#2"]);
+    assert_eq!(read("hash.txt", "# up\n0 1 2 3\n# down\n1 1 2 3\n").items.len(), 2);
+}
+
+#[test]
 fn vehicles_with_numbers_come_in_their_order_and_others_as_they_appear() {
     let vehicles = |ids: [&str; 3]| {
         let rows = ids.map(|id| format!("0,{id},1,2,3\n")).concat();

@@ -171,6 +171,20 @@ fn messages_without_a_time_are_at_the_time_when_they_were_logged() {
 }
 
 #[test]
+fn a_time_of_zero_is_a_time_where_other_messages_have_one() {
+    let json = |nsec: u32| {
+        format!(r#"{{"timestamp": {{"sec": 0, "nsec": {nsec}}}, "poses": [{{"position": {{"x": {nsec}}}}}]}}"#)
+            .into_bytes()
+    };
+    let kind = "foxglove.PosesInFrame";
+    let wall = 1_700_000_000_000_000_000;
+    let sent = [0, 100, 200].map(|ns| ("/p", kind, "json", wall + u64::from(ns), json(ns)));
+    let found = whole("sim.mcap", &mcap_of(&sent));
+    let times: Vec<_> = found.samples().iter().map(|&(t, _, [x, ..])| (t, x)).collect();
+    assert_eq!((times, found.clock.epoch_ns), (vec![(0.0, 0.0), (1e-7, 100.0), (2e-7, 200.0)], 0));
+}
+
+#[test]
 fn two_frames_are_refused_until_one_is_named() {
     let at = |frame: &'static str| cdr(&(((1, 0), frame), ([1.0, 2.0, 3.0], NO_TURN)), true);
     let kind = "geometry_msgs/msg/PoseStamped";
@@ -191,6 +205,7 @@ fn a_file_that_was_not_closed_is_refused_until_it_is_accepted() {
     let cut = &file[..file.len() / 2];
     let refused = read_bytes("cut.mcap", cut, &ReadOptions::default()).expect_err("refused");
     assert!(refused.to_string().contains("breaks off"), "{refused}");
+    assert!(refused.help().contains("--allow-unfinished"), "{}", refused.help());
     let options = ReadOptions { allow_unfinished: true, ..ReadOptions::default() };
     let found = read_bytes("cut.mcap", cut, &options).expect("read");
     assert!(!found.items.is_empty() && found.notes.iter().any(|note| note.contains("not closed")), "{found:?}");
@@ -261,6 +276,52 @@ fn arrays_are_read_in_every_order_of_their_axes_packed_or_not() {
 }
 
 #[test]
+fn what_was_seen_is_laid_out_as_the_positions_are() {
+    let t = || ("t.npy", npy("<f8", "False", "(3,)", &doubles(&[0.0, 0.5, 1.0])));
+    let positions = || ("positions.npy", npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3)))));
+    // Vehicle 2 was not seen at 0.5 s.
+    let time_first = [1, 1, 1, 0, 1, 1];
+    let vehicle_first = [1, 1, 1, 1, 0, 1];
+    let all_but_one: Vec<_> = NPZ_TRUTH.iter().copied().filter(|&(t, name, _)| (t, name) != (0.5, "2")).collect();
+    for seen in [npy("|b1", "False", "(3, 2)", &time_first), npy("|b1", "True", "(3, 2)", &vehicle_first)] {
+        let found = whole("seen.npz", &archive(&[t(), positions(), ("seen.npy", seen)], false));
+        assert_eq!(found.samples(), all_but_one);
+    }
+    let turned = (
+        "positions.npy",
+        npy("<f8", "True", "(2, 3, 3)", &doubles(&arranged(cube(3, 3, 2).map(|[axis, k, i]| [k, i, axis])))),
+    );
+    let seen = ("seen.npy", npy("|b1", "False", "(2, 3)", &vehicle_first));
+    assert_eq!(whole("turned.npz", &archive(&[t(), turned, seen], true)).samples(), all_but_one);
+
+    for (name, array, said) in [
+        ("seen.npy", npy("|b1", "False", "(2, 3)", &vehicle_first), "array `seen`: it is of shape [2, 3] where [3, 2]"),
+        ("seen.npy", npy("|b1", "False", "(6,)", &time_first), "array `seen`: it is of shape [6]"),
+        (
+            "velocities.npy",
+            npy("<f8", "False", "(3, 3, 2)", &doubles(&[0.0; 18])),
+            "array `velocities`: it is of shape",
+        ),
+        ("radii.npy", npy("<f8", "False", "(2, 3)", &doubles(&[0.1; 6])), "array `radii`: it is of shape"),
+        ("names.npy", npy("|S1", "False", "(2,)", b"aa"), "two vehicles have the same name"),
+        ("names.npy", npy("|S1", "False", "(3,)", b"abc"), "3 elements for 2 vehicles"),
+    ] {
+        let bytes = archive(&[t(), positions(), (name, array)], false);
+        let refused = read_bytes("odd.npz", &bytes, &ReadOptions::default()).expect_err(said).to_string();
+        assert!(refused.contains(said), "{refused}\ninstead of {said}");
+    }
+}
+
+#[test]
+fn no_time_is_refused() {
+    let stamps: Vec<u8> = [0_i64, i64::MIN, 1000].iter().flat_map(|ms| ms.to_le_bytes()).collect();
+    let t = ("t.npy", npy("<M8[ms]", "False", "(3,)", &stamps));
+    let positions = ("positions.npy", npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3)))));
+    let refused = read_bytes("nat.npz", &archive(&[t, positions], true), &ReadOptions::default()).expect_err("refused");
+    assert!(refused.to_string().contains("t[1]: it is NaN"), "{refused}");
+}
+
+#[test]
 fn times_of_numpy_have_their_unit_and_a_square_of_axes_is_asked_about() {
     let stamps: Vec<u8> = [0_i64, 500, 1000].iter().flat_map(|ms| ms.to_le_bytes()).collect();
     let t = npy("<M8[ms]", "False", "(3,)", &stamps);
@@ -318,6 +379,20 @@ fn shows_are_read_alone_and_out_of_an_archive_with_parts() {
         assert_eq!(pieces[2].coefficients[1].x, 0.0);
     }
     assert_eq!(alone.items, parted.items);
+}
+
+#[test]
+fn a_drone_with_a_single_point_stands_there_until_the_show_ends() {
+    let drone = |name: &str, points: &str| {
+        format!(r#"{{"settings": {{"name": "{name}", "trajectory": {{"points": {points}}}}}}}"#)
+    };
+    let show = |drones: &[String]| format!(r#"{{"swarm": {{"drones": [{}]}}}}"#, drones.join(", "));
+    let (still, flies) = (drone("A", "[[0, [1, 2, 3], []]]"), drone("B", "[[0, [9, 9, 0], []], [7, [9, 9, 9], []]]"));
+    let found = whole("show.json", show(&[still.clone(), flies]).as_bytes());
+    let a: Vec<_> = pieces(&found).into_iter().filter(|piece| piece.vehicle == 0).collect();
+    assert_eq!(a.iter().map(|piece| (piece.from_s, piece.to_s)).collect::<Vec<_>>(), [(0.0, 7.0)]);
+    assert_eq!(at(a[0], 5.0), [1.0, 2.0, 3.0]);
+    assert_eq!(whole("still.json", show(&[still]).as_bytes()).samples(), [(0.0, "A", [1.0, 2.0, 3.0])]);
 }
 
 fn polynomial(pieces: &[(f64, [f64; 3])]) -> String {

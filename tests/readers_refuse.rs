@@ -5,7 +5,7 @@ use std::io::{Cursor, Write as _};
 use std::path::PathBuf;
 
 use tautline::export::{self, ExportOptions};
-use tautline::read::{self, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
+use tautline::read::{self, AxisOrder, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -55,7 +55,7 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         (last("0.5,2,1,2,-inf"), line(5), "column `z` holds `-inf`", "leave the cells empty"),
         (last("0.5,2,1,2,1e999"), line(5), "`1e999`, which is not finite", "leave the cells empty"),
         (last("later,2,1,2,3"), line(5), "column `t` holds `later`", "decimal point"),
-        (last("nan,2,1,2,3"), line(5), "column `t` holds `nan`", "take the row out"),
+        (last("nan,2,1,2,3"), line(5), "column `t` holds `nan`", "each needs a time"),
         (last(",2,1,2,3"), line(5), "column `t` is empty", "fill it"),
         (last("0.5,,1,2,3"), line(5), "column `id` is empty", "fill it"),
         (last("0.5,2,1,,3"), line(5), "column `y` is empty", "fill it"),
@@ -84,6 +84,16 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         ("0 1 2 3 4\n".into(), line(1), "5 numbers where time and three", "t x y z x y z"),
         ("0 1 2 3\n1 1 2 3\n0.5 1 2 3\n".into(), line(3), "time runs backwards", "sort the lines"),
         ("t,id,x,y,z,radius\n0,1,1,2,3,-1\n".into(), line(2), "a negative radius", "0 or more"),
+        (
+            "t,id,x,y,z,radius\n0,a,1,2,3,1\n1,a,1,2,3,\n".into(),
+            line(3),
+            "`a` has no radius here and one at line 2",
+            "fill",
+        ),
+        ("t,id,x,y,z,vx,vy\n0,1,1,2,3,4,5\n".into(), line(1), "no column for the velocity along z", "--column vz=NAME"),
+        ("0,0 1,5 2,5 3,5\n".into(), line(1), "`0,0`, a number with a decimal comma", "decimal point"),
+        ("# at rest\n0 1,5 2 3\n".into(), line(2), "`1,5`, a number with a decimal comma", "decimal point"),
+        (change("0,2,1", "#0,2,1"), line(3), "column `t` holds `#0`", "decimal point"),
     ] {
         let error = refused("flight.csv", content.as_bytes());
         assert_eq!(error.place, place, "{error}\n{content}");
@@ -161,7 +171,7 @@ fn a_file_that_breaks_off_anywhere_is_refused() {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
             let cut = (bytes.len() as f64 * part) as usize;
             let error = refused(name, &bytes[..cut]);
-            let truncated = matches!(error.fault, Fault::Truncated { .. });
+            let truncated = matches!(error.fault, Fault::Truncated { .. } | Fault::Unfinished);
             assert!(truncated, "{name} at {part}: {error}");
             assert!(error.help().contains("copy or record it again"), "{}", error.help());
         }
@@ -279,18 +289,31 @@ fn polynomials_are_refused_where_they_are_wrong() {
         assert_eq!(error.place, place, "{error}");
         assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
     }
-    assert!(refused("cf1.csv", b"duration,x^0,y^0\n1,0,0\n").to_string().contains("no column `z^0`"));
+    for (header, missing) in [("x^0,y^0", "z^0"), ("x^0,y^0,z^0,x^1,y^1", "z^1"), ("x^0,y^0,z^0,x^2,y^2,z^2", "x^1")] {
+        let said = refused("cf1.csv", format!("duration,{header}\n1,0,0\n").as_bytes()).to_string();
+        assert!(said.contains(&format!("no column `{missing}`")), "{said}");
+    }
 }
 
 #[test]
 fn a_format_that_is_forced_on_other_content_is_refused() {
     let forced = |format| ReadOptions { format: Some(format), ..ReadOptions::default() };
     for format in [Format::Parquet, Format::Npz, Format::Mcap, Format::Crazyflie, Format::Skybrush] {
-        refused_with("flight.csv", LONG.as_bytes(), &forced(format));
+        let error = refused_with("flight.csv", LONG.as_bytes(), &forced(format));
+        let has_magic = matches!(format, Format::Parquet | Format::Npz | Format::Mcap);
+        assert_eq!(has_magic, matches!(error.fault, Fault::WrongFormat { .. }), "{format:?}: {error}");
     }
     let unit = ReadOptions { time_unit: Some(TimeUnit::Milliseconds), ..ReadOptions::default() };
     let error = refused_with("cf1.csv", b"duration,x^0,y^0,z^0\n1,0,0,0\n", &unit);
     assert!(error.help().contains("leave --time-unit away"), "{error}");
+    for (options, option) in [
+        (ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() }, "--frame"),
+        (ReadOptions { axis_order: Some(AxisOrder::TimeFirst), ..ReadOptions::default() }, "--axis-order"),
+        (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "--allow-unfinished"),
+    ] {
+        let error = refused_with("flight.csv", LONG.as_bytes(), &options);
+        assert_eq!(error.help(), format!("leave {option} away"), "{error}");
+    }
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let options = ReadOptions { scale, ..ReadOptions::default() };
         assert!(refused_with("flight.csv", LONG.as_bytes(), &options).help().contains("positive"));

@@ -63,9 +63,9 @@ pub(super) struct AuditArguments {
     /// Leave out pairs while both are at or below this height [m].
     #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Question")]
     above: Option<f64>,
-    /// Judge these vehicles alone.
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Question")]
-    ids: Vec<String>,
+    /// Judge these vehicles alone; a name with a comma in quotes. May be given several times.
+    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Question")]
+    ids: Vec<Listed>,
     /// Add this to the times of a vehicle whose clock was off [s]; may be given several times.
     #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
     offset: Vec<(String, f64)>,
@@ -108,6 +108,19 @@ enum MotionArgument {
 
 /// A number, perhaps of one vehicle alone.
 type Named = (Option<String>, f64);
+
+/// Names of vehicles.
+#[derive(Clone, Debug)]
+struct Listed(Vec<String>);
+
+fn listed(text: &str) -> Result<Listed, String> {
+    let mut lines = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
+    match lines.records().next() {
+        Some(Ok(names)) => Ok(Listed(names.iter().map(str::to_owned).collect())),
+        Some(Err(error)) => Err(error.to_string()),
+        None => Err("name at least one vehicle".to_owned()),
+    }
+}
 
 fn number(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
@@ -163,7 +176,7 @@ impl AuditArguments {
             let help = "add --motion bounded, or leave --max-accel out";
             return Err(Failure::input("--max-accel says nothing of a motion that is known exactly", help));
         }
-        let only: BTreeSet<String> = self.ids.iter().cloned().collect();
+        let only: BTreeSet<String> = self.ids.iter().flat_map(|Listed(names)| names.iter().cloned()).collect();
         Ok(Question {
             delta_m: self.delta,
             motion,
@@ -259,7 +272,7 @@ fn judged(
         }
         first = false;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
-        judge.push(recording.vehicles(), &items)?;
+        judge.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(path))?;
         read += items.len() as u64;
         progress.set_position(read);
     }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::Failure;
+use super::diagnostic::harmless;
 
 /// Refresh rate of a progress bar \[Hz\].
 const PROGRESS_HZ: u8 = 10;
@@ -20,12 +21,12 @@ pub(super) struct Console {
 }
 
 impl Console {
-    /// Says something to a person. What nobody reads any more is dropped.
+    /// Says something to a person, and nothing to the terminal. What nobody reads any more is dropped.
     pub(super) fn say(self, text: &str) {
         if self.quiet {
             return;
         }
-        let text = text.trim_end();
+        let text = harmless(text.trim_end());
         let _ = if self.data_on_stdout {
             writeln!(io::stderr().lock(), "{text}")
         } else {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::Write as _;
+use std::path::Path;
 
 use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
 
@@ -36,20 +37,25 @@ struct Excerpt {
 impl Failure {
     /// The input is wrong.
     pub(super) fn input(message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self { help: Some(help.into()), ..Self::plain(Exit::WrongInput, message.into()) }
+        Self::plain(Exit::WrongInput, message).with_help(help)
     }
 
     /// The machine failed.
     pub(super) fn machine(message: impl Into<String>) -> Self {
-        Self::plain(Exit::MachineFailed, message.into())
+        Self::plain(Exit::MachineFailed, message)
     }
 
     pub(super) fn with_help(self, help: impl Into<String>) -> Self {
-        Self { help: Some(help.into()), ..self }
+        Self { help: Some(harmless(&help.into())), ..self }
     }
 
-    fn plain(exit: Exit, message: String) -> Self {
-        Self { exit, message, help: None, place: None }
+    /// The same failure, said of a file.
+    pub(super) fn of(self, file: &Path) -> Self {
+        Self { message: harmless(&format!("{}: {}", file.display(), self.message)), ..self }
+    }
+
+    fn plain(exit: Exit, message: impl Into<String>) -> Self {
+        Self { exit, message: harmless(&message.into()), help: None, place: None }
     }
 
     /// What is wrong and what helps, on one line.
@@ -118,7 +124,7 @@ impl From<ScenarioError> for Failure {
 }
 
 /// The text with control characters blanked, byte for byte: what a file holds must not steer the terminal.
-fn harmless(text: &str) -> String {
+pub(super) fn harmless(text: &str) -> String {
     let blank =
         |c: char| if c.is_control() && c != '\n' && c != '\t' { " ".repeat(c.len_utf8()) } else { c.to_string() };
     text.chars().map(blank).collect()
@@ -144,14 +150,14 @@ impl From<ArtefactError> for Failure {
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
         let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
-        Self::plain(exit, harmless(&error.to_string())).with_help(error.help())
+        Self::plain(exit, error.to_string()).with_help(error.help())
     }
 }
 
 impl From<ExportError> for Failure {
     fn from(error: ExportError) -> Self {
         let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
-        Self::plain(exit, harmless(&error.to_string())).with_help(error.help())
+        Self::plain(exit, error.to_string()).with_help(error.help())
     }
 }
 

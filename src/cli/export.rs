@@ -1,15 +1,20 @@
 //! `tautline export`: a recording in another format.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, ValueEnum};
 
 use super::console::Console;
 use super::reading::{FormatArgument, ReadArguments};
+use super::run::interruption;
 use super::{Exit, Failure};
 use crate::export::{self, ExportOptions, Format};
-use crate::read;
+use crate::read::{self, Fault, ReadError, Recording};
 use crate::report::write_atomically_with;
+use crate::track::{Clock, Item, Tracks};
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
@@ -56,6 +61,36 @@ impl TargetArgument {
     }
 }
 
+/// A recording that ends with an error once the user has had enough, so that no unfinished file is left behind.
+struct Interruptible {
+    tracks: Recording,
+    path: PathBuf,
+    interrupted: Arc<AtomicBool>,
+}
+
+impl Tracks for Interruptible {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        self.tracks.vehicles()
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(ReadError::new(&self.path, Fault::System(ErrorKind::Interrupted.into())));
+        }
+        self.tracks.read(items)
+    }
+
+    fn clock(&self) -> &Clock {
+        self.tracks.clock()
+    }
+
+    fn notes(&self) -> &[String] {
+        self.tracks.notes()
+    }
+}
+
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options(arguments.input_format)?;
     let path = &arguments.output;
@@ -69,9 +104,18 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
         return Err(Failure::input(message, "overwrite it with --force, or write another file"));
     }
     let options = ExportOptions { sample_hz: arguments.sample_hz };
-    let open = || read::open(&arguments.reading.recording, &reading);
+    let interrupted = interruption()?;
+    let recording = &arguments.reading.recording;
+    let open = || -> Result<Recording, ReadError> {
+        let (tracks, path, interrupted) = (read::open(recording, &reading)?, recording.clone(), interrupted.clone());
+        Ok(Box::new(Interruptible { tracks, path, interrupted }))
+    };
     let exported =
-        write_atomically_with(path, |file| export::export(&open, format, &options, file).map_err(Failure::from))?;
+        write_atomically_with(path, |file| export::export(&open, format, &options, file).map_err(Failure::from));
+    if exported.is_err() && interrupted.load(Ordering::Relaxed) {
+        return Err(Failure::machine(format!("interrupted: `{}` was not written", path.display())));
+    }
+    let exported = exported?;
     let console = Console { data_on_stdout: false, quiet: arguments.quiet };
     for note in &exported.notes {
         console.warn(&format!("note: {note}"));

@@ -254,8 +254,8 @@ impl Watched {
     }
 }
 
-/// Set by Ctrl-C (and by a request to terminate). The second one does not wait for the step to end.
-fn interruption() -> Result<Arc<AtomicBool>, Failure> {
+/// Set by Ctrl-C (and by a request to terminate). The second one does not wait for what is under way to end.
+pub(super) fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     let again = move || {

@@ -50,7 +50,10 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
 
 /// A time after an epoch in decimal digits: whole seconds are added exactly.
 fn time_text(epoch_s: i64, time_s: f64) -> String {
-    if epoch_s == 0 || time_s < 0.0 {
+    if epoch_s == 0 {
+        return format!("{time_s:?}");
+    }
+    if time_s < 0.0 {
         return format!("{:?}", time_s + epoch_s as f64);
     }
     let digits = time_s.to_string();
@@ -81,5 +84,6 @@ mod tests {
         assert_eq!(time_text(1_700_000_000, 12.345_678_901), "1700000012.345678901");
         assert_eq!(time_text(1_700_000_000, 1e-7), "1700000000.0000001");
         assert_eq!(time_text(0, 0.1), "0.1");
+        assert_eq!(time_text(0, -0.0), "-0.0");
     }
 }

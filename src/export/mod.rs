@@ -1,8 +1,9 @@
 //! Recordings written in other formats, without losing a bit.
 //!
-//! What is read back from an exported file has the same times, vehicles, positions, velocities and radii, bit for bit. A
-//! recording is read several times, so that memory is bounded by an instant and a block, not by the recording. Curves
-//! cannot be written as samples silently: [`ExportOptions::sample_hz`] says how often they are sampled.
+//! What is read back from an exported file has the same times, vehicles, positions, velocities and radii, bit for bit;
+//! only a table in text cannot say what its times count from, and holds the same instants since 1970. A recording is
+//! read several times, so that memory is bounded by an instant and a block, not by the recording. Curves cannot be
+//! written as samples silently: [`ExportOptions::sample_hz`] says how often they are sampled.
 
 mod csv;
 mod mcap;

@@ -17,7 +17,6 @@ pub(super) struct Sampled {
     samples: Vec<Sample>,
     hz: f64,
     from_s: f64,
-    to_s: f64,
 }
 
 impl Sampled {
@@ -43,7 +42,24 @@ impl Sampled {
         if !(hz > 0.0 && hz.is_finite() && count <= MOST_SAMPLES) {
             return Err(ExportError::SampleRate(hz));
         }
-        Ok(Self { pieces, samples, hz, from_s, to_s })
+        Ok(Self { pieces, samples, hz, from_s })
+    }
+
+    /// When the curves are looked at \[s\]: in regular intervals, and where the curve of a vehicle ends.
+    fn times_s(&self) -> impl Iterator<Item = f64> + '_ {
+        let mut ends: Vec<f64> = self.pieces.iter().filter_map(|pieces| Some(pieces.last()?.to_s)).collect();
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        let mut ends = ends.into_iter().peekable();
+        let mut regular = (0_u64..).map(|k| self.from_s + k as f64 / self.hz).peekable();
+        std::iter::from_fn(move || {
+            let end_s = *ends.peek()?;
+            let regular_s = regular.next_if(|&time_s| time_s <= end_s);
+            if regular_s.is_none_or(|time_s| time_s == end_s) {
+                ends.next();
+            }
+            regular_s.or(Some(end_s))
+        })
     }
 
     /// Calls `take` with the samples of each instant, in order of time.
@@ -54,11 +70,7 @@ impl Sampled {
         let mut recorded = self.samples.chunk_by(|a, b| a.time_s == b.time_s).peekable();
         let mut current = vec![0; self.pieces.len()];
         let mut instant = Vec::new();
-        for k in 0_u64.. {
-            let time_s = self.from_s + k as f64 / self.hz;
-            if time_s > self.to_s {
-                break;
-            }
+        for time_s in self.times_s() {
             while let Some(before) = recorded.next_if(|samples| samples[0].time_s < time_s) {
                 take(before)?;
             }

@@ -8,6 +8,10 @@ use crate::track::Clock;
 /// From this distance to zero on, a clock is counted from an epoch \[s\]: there doubles are coarser than 0.1 ns.
 const EPOCH_FROM_S: f64 = 1e6;
 
+/// Longest step that times of the size of those since 1970 have \[s\]; where it is longer, the size is that of a clock
+/// which counts smaller units from somewhere else.
+const LONGEST_STEP_S: f64 = 1e3;
+
 /// Decimals that a [`Stamp::Fixed`] keeps.
 const DECIMALS: usize = 18;
 
@@ -101,11 +105,25 @@ impl Stamp {
         }
     }
 
+    /// A total order, also of times that are written in different ways.
     pub(super) fn compare(self, other: Self) -> Ordering {
         match (self, other) {
             (Self::Whole(a), Self::Whole(b)) => a.cmp(&b),
-            (Self::Fixed { whole: a, decimals: c }, Self::Fixed { whole: b, decimals: d }) => (a, c).cmp(&(b, d)),
-            _ => self.approximately().total_cmp(&other.approximately()),
+            (Self::Real(a), Self::Real(b)) => a.total_cmp(&b),
+            _ => {
+                let ((a, c), (b, d)) = (self.digits(), other.digits());
+                (a, c).cmp(&(b, d)).then(self.approximately().total_cmp(&other.approximately()))
+            }
+        }
+    }
+
+    /// The largest whole number that is not above it, and what is left in units of 10^-18.
+    fn digits(self) -> (i64, u64) {
+        match self {
+            Self::Whole(whole) => (whole, 0),
+            Self::Fixed { whole, decimals } => (whole, decimals),
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the casts saturate")]
+            Self::Real(real) => (real.floor() as i64, ((real - real.floor()) * 1e18) as u64),
         }
     }
 
@@ -173,16 +191,17 @@ impl Probe {
 
     /// The unit that times of this size and step are most likely in.
     ///
-    /// Times of day since 1970 tell by their size. Other whole numbers tell by their step: vehicles are recorded some
+    /// Times of day since 1970 tell by their size, unless their step is too long for it. Other whole numbers tell by their step: vehicles are recorded some
     /// 1 to 1000 times a second. Everything else is in seconds.
     fn likely_unit(&self) -> (TimeUnit, &'static str) {
         let size = self.first.approximately();
-        let by_size = [(1e8, TimeUnit::Seconds), (1e11, TimeUnit::Milliseconds), (1e14, TimeUnit::Microseconds)];
-        if let Some(&(_, unit)) = by_size.iter().find(|(from, _)| (*from..100.0 * from).contains(&size)) {
+        let by_size = TimeUnit::ALL.into_iter().find(|unit| {
+            let per_second = unit.per_second() as f64;
+            let fits = !self.step.is_finite() || self.step <= LONGEST_STEP_S * per_second;
+            fits && (1e8 * per_second..1e10 * per_second).contains(&size)
+        });
+        if let Some(unit) = by_size {
             return (unit, "because they are of the size of times since 1970");
-        }
-        if (1e17..9.3e18).contains(&size) {
-            return (TimeUnit::Nanoseconds, "because they are of the size of times since 1970");
         }
         let by_step = "because they are whole numbers with steps of that size";
         match self.step {
@@ -286,9 +305,41 @@ mod tests {
             (["0", "0.02"], "s"),
             (["1700000000000", "1700000000010"], "ms"),
             (["1700000000000000", "1700000000010000"], "us"),
+            (["1700000000", "1700000600"], "s"),
+            (["1500000000", "1510000000"], "ns"),
+            (["200000000", "200010000"], "us"),
+            (["500000000000", "500010000000"], "ns"),
         ] {
             assert_eq!(timing(&texts, KnownUnit::Unsaid).0.clock.unit, unit, "{texts:?}");
         }
+    }
+
+    #[test]
+    fn times_written_in_different_ways_are_in_one_order() {
+        let texts = [
+            "-1",
+            "-1e-3",
+            "-1e-30",
+            "0",
+            "1e-30",
+            "9999999",
+            "9999999.000000000000000001",
+            "9999999.1",
+            "1.7e9",
+            "1700000000.00000005",
+            "1700000000.0000001",
+            "1700000000.5",
+            "1700000001",
+            "1e30",
+        ];
+        let stamps = texts.map(|text| Stamp::parse(text).expect("a number"));
+        for (i, a) in stamps.iter().enumerate() {
+            for (j, b) in stamps.iter().enumerate() {
+                assert_eq!(a.compare(*b), i.cmp(&j), "{} and {}", texts[i], texts[j]);
+            }
+        }
+        let same = ["1700000000", "1700000000.0", "1.7e9"].map(|text| Stamp::parse(text).expect("a number"));
+        assert!(same.iter().all(|a| same.iter().all(|b| a.compare(*b) == Ordering::Equal)), "{same:?}");
     }
 
     #[test]

@@ -109,7 +109,7 @@ struct Columns {
     count: usize,
     duration: usize,
     /// Column of each power and axis.
-    powers: Vec<[Option<usize>; 3]>,
+    powers: Vec<[usize; 3]>,
     names: Vec<String>,
 }
 
@@ -134,11 +134,17 @@ impl Columns {
             }
             powers[power][axis] = Some(column);
         }
-        if let Some(axis) = (0..3).find(|&axis| powers.first().is_none_or(|columns: &[_; 3]| columns[axis].is_none())) {
-            return Err(missing(["x^0", "y^0", "z^0"][axis]));
+        let mut whole = Vec::new();
+        for (power, columns) in powers.iter().enumerate() {
+            let [x, y, z] = *columns;
+            let column = |axis: &str, column: Option<usize>| column.ok_or_else(|| missing(&format!("{axis}^{power}")));
+            whole.push([column("x", x)?, column("y", y)?, column("z", z)?]);
+        }
+        if whole.is_empty() {
+            return Err(missing("x^0"));
         }
         let count = names.len() - usize::from(names.last().is_some_and(String::is_empty));
-        Ok(Self { count, duration, powers, names })
+        Ok(Self { count, duration, powers: whole, names })
     }
 }
 
@@ -196,12 +202,8 @@ impl Curve {
             return Err(Fault::content(problem, "take pieces without a duration out"));
         }
         let mut coefficients = Vec::with_capacity(columns.powers.len());
-        for power in &columns.powers {
-            let mut coefficient = Vector3::zeros();
-            for (axis, column) in power.iter().enumerate() {
-                coefficient[axis] = column.map_or(Ok(0.0), number)?;
-            }
-            coefficients.push(coefficient);
+        for &[x, y, z] in &columns.powers {
+            coefficients.push(Vector3::new(number(x)?, number(y)?, number(z)?));
         }
         let piece = piece(self.vehicle, self.time_s, to_s, coefficients, self.scale).ok_or_else(out_of_range)?;
         self.items.push(Item::Piece(piece));

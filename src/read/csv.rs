@@ -42,8 +42,12 @@ impl Table {
     /// Opens a table and reads its header.
     pub(super) fn open(source: Source, format: Format, columns: &ColumnNames) -> Result<Self, ReadError> {
         let mut lines = Lines::new(&source)?;
-        if !next_line(&mut lines)? {
+        if !next_line(&mut lines, true)? {
             return Err(source.error(Fault::Empty));
+        }
+        if let Some(value) = decimal_comma(lines.line()) {
+            let fault = Fault::DecimalComma { column: "1".to_owned(), value };
+            return Err(source.error(fault).at(Place::Line(lines.number())));
         }
         let separator = separator(lines.line(), format);
         let mut fields = Fields::default();
@@ -135,7 +139,7 @@ impl Table {
         let stamp = str::from_utf8(bytes).ok().and_then(|text| Stamp::parse(text.trim()));
         let stamp = match stamp {
             Some(stamp) if stamp.approximately().is_finite() => stamp,
-            _ => match self.odd_number(column)? {
+            _ => match self.odd_number(column).map_err(Fault::of_time)? {
                 Some(number) => Stamp::Real(number),
                 None => return Err(Fault::EmptyCell { column: self.header[column].clone() }),
             },
@@ -226,7 +230,7 @@ impl Rows for Table {
         let before = rows.len();
         let mut done = Ok(());
         while done.is_ok() && rows.len() < before + BATCH {
-            match next_line(&mut self.lines) {
+            match next_line(&mut self.lines, !self.has_header) {
                 Ok(true) => done = self.rows_of_line(&shape, rows).map_err(|fault| self.at_line(fault)),
                 Ok(false) => break,
                 Err(error) => done = Err(error),
@@ -239,7 +243,7 @@ impl Rows for Table {
     fn rewind(&mut self) -> Result<(), ReadError> {
         self.lines = Lines::new(&self.source)?;
         if self.has_header {
-            next_line(&mut self.lines)?;
+            next_line(&mut self.lines, true)?;
         }
         self.time.0.clear();
         Ok(())
@@ -270,7 +274,7 @@ impl Rows for Table {
         let Shape::Long { id, .. } = self.layout.shape else { return Ok(None) };
         let last = id.max(self.layout.time);
         let mut probe: Option<Probe> = None;
-        while next_line(&mut self.lines)? {
+        while next_line(&mut self.lines, !self.has_header)? {
             let row = self.split(last + 1).and_then(|()| {
                 let found = self.fields.count();
                 if found <= last {
@@ -287,16 +291,17 @@ impl Rows for Table {
     }
 }
 
-/// Goes to the next line that is neither blank nor a comment.
+/// Goes to the next line that is not blank, nor a comment where there may be `comments`: below a header the first field
+/// may be a name that begins with `#`.
 #[inline]
-fn next_line(lines: &mut Lines) -> Result<bool, ReadError> {
+fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     loop {
         if !lines.advance()? {
             return Ok(false);
         }
         match lines.line() {
             [b'0'..=b'9' | b'-', ..] => return Ok(true),
-            line if line.starts_with(b"#") || line.trim_ascii().is_empty() => {}
+            line if (comments && line.starts_with(b"#")) || line.trim_ascii().is_empty() => {}
             _ => return Ok(true),
         }
     }
@@ -312,6 +317,14 @@ fn separator(line: &[u8], format: Format) -> Separator {
         _ if tab > comma => Separator::Byte(b'\t'),
         _ => Separator::Byte(b','),
     }
+}
+
+/// The first of some numbers between blanks, where one of them has a decimal comma and so none a comma behind it.
+fn decimal_comma(line: &[u8]) -> Option<String> {
+    let words: Vec<_> = str::from_utf8(line).ok()?.split_whitespace().collect();
+    let number = |word: &&str| word.replacen(',', ".", 1).parse::<f64>().is_ok();
+    let comma = words.iter().find(|word| word.contains(','))?;
+    (words.len() > 1 && words.iter().all(number)).then(|| (*comma).to_owned())
 }
 
 /// The fields of a line.

@@ -201,6 +201,9 @@ pub enum Fault {
         /// What is missing.
         what: String,
     },
+    /// The file was not closed, so that its end may be missing.
+    #[error("it breaks off: it was not closed, so that its end may be missing")]
+    Unfinished,
     /// Compressed data grow beyond all measure.
     #[error("it grows to more than {inflated_bytes} bytes out of {packed_bytes}")]
     Bomb {
@@ -232,6 +235,14 @@ impl Fault {
 
     pub(super) fn damaged(reason: impl fmt::Display) -> Self {
         Self::Damaged { reason: reason.to_string() }
+    }
+
+    /// The same of a time: a row without one says nothing.
+    pub(super) fn of_time(self) -> Self {
+        match self {
+            Self::NotFinite { .. } => Self::content(self.to_string(), "take the row out: each needs a time"),
+            other => other,
+        }
     }
 
     fn help(&self) -> String {
@@ -272,6 +283,7 @@ impl Fault {
             }
             Self::NotUtf8 => "save it as UTF-8",
             Self::Truncated { .. } => "copy or record it again",
+            Self::Unfinished => "copy or record it again, or accept what it holds with --allow-unfinished",
             Self::Bomb { .. } => "unpack it yourself if it is what you expect, and give the unpacked file",
             Self::Damaged { .. } => "copy or record it again, or name the format with --format",
             Self::Content { remedy, .. } => remedy,

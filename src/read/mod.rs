@@ -87,11 +87,6 @@ impl Format {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
-    /// Whether the format itself says in what unit its times are.
-    fn has_its_own_clock(self) -> bool {
-        matches!(self, Self::Mcap | Self::Crazyflie | Self::Skybrush)
-    }
-
     /// What a sentence calls it.
     #[must_use]
     pub fn title(self) -> &'static str {
@@ -179,6 +174,20 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
+    /// An option that means nothing for a format, and why.
+    fn needless_for(&self, format: Format) -> Option<(&'static str, &'static str)> {
+        let is_table = matches!(format, Format::Csv | Format::Text | Format::Parquet | Format::Npz);
+        let (is_npz, is_mcap) = (format == Format::Npz, format == Format::Mcap);
+        let given = [
+            (self.time_unit.is_some() && !is_table, "--time-unit", "has a unit of time of its own"),
+            (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
+            (self.axis_order.is_some() && !is_npz, "--axis-order", "has no arrays"),
+            (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
+            (self.allow_unfinished && !is_mcap, "--allow-unfinished", "cannot be read before it is closed"),
+        ];
+        given.into_iter().find_map(|(needless, option, why)| needless.then_some((option, why)))
+    }
+
     /// What is known of a recording: what the user says of the unit of time goes before what the file says.
     fn about(&self, said: Option<TimeUnit>, notes: Vec<String>, none: Fault) -> About {
         let unit = self.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given);
@@ -198,9 +207,9 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     }
     let recognised = recognise::recognise(path, options.format)?;
     let source = Source { path: path.to_owned(), gzip: recognised.gzip };
-    if recognised.format.has_its_own_clock() && options.time_unit.is_some() {
-        let problem = format!("{} has a unit of time of its own", recognised.format.title());
-        return Err(source.error(Fault::content(problem, "leave --time-unit away")));
+    if let Some((option, why)) = options.needless_for(recognised.format) {
+        let problem = format!("{} {why}", recognised.format.title());
+        return Err(source.error(Fault::content(problem, format!("leave {option} away"))));
     }
     match recognised.format {
         format @ (Format::Csv | Format::Text) => table(source, format, options),

@@ -14,6 +14,9 @@ const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Longest header that is read \[bytes\].
 const HEADER_LIMIT_BYTES: usize = 64 * 1024;
 
+/// The `NaT` of `datetime64`.
+const NOT_A_TIME: i64 = i64::MIN;
+
 /// What an array holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Kind {
@@ -135,8 +138,15 @@ impl Array {
     /// The next element as a time.
     pub(super) fn next_stamp(&mut self) -> Result<Stamp, Fault> {
         self.next_element()?;
-        let stamp = self.integer().map(Stamp::Whole).or_else(|| self.float().map(Stamp::Real));
+        let stamp = self.integer().map(|whole| self.stamp_of(whole)).or_else(|| self.float().map(Stamp::Real));
         stamp.ok_or_else(|| self.not("times"))
+    }
+
+    fn stamp_of(&self, whole: i64) -> Stamp {
+        match self.kind {
+            Kind::Time(_) if whole == NOT_A_TIME => Stamp::Real(f64::NAN),
+            _ => Stamp::Whole(whole),
+        }
     }
 
     /// The next element as text.

@@ -5,13 +5,15 @@
 //! | `t` | T | times, as numbers or `datetime64` |
 //! | `positions` | T x N x 3, or N x T x 3 | positions; two columns instead of three are a plane |
 //! | `velocities` | as `positions` | velocities, if there are any |
-//! | `radii` | N, or T x N | radii, if there are any; NaN where unknown |
-//! | `names` | N | names, if there are any |
-//! | `seen` | T x N | whether a vehicle was seen; where it was not, its position means nothing |
+//! | `radii` | N, or the first two axes of `positions` | radii, if there are any; NaN where unknown |
+//! | `names` | N | names, if there are any, each another |
+//! | `seen` | the first two axes of `positions` | whether a vehicle was seen; where it was not, its position means nothing |
 //! | `axes` | 1 to 3 | names of the axes: `time` first or `vehicle` first, if it is said |
 //! | `epoch_ns` | 1 or no axis | what `t` counts from |
 //!
 //! Arrays whose first axis is time are streamed; others are in memory.
+
+use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
@@ -55,27 +57,16 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         _ => None,
     });
     let table = arrays.table(&positions, times.len(), order)?;
-    let velocities = arrays.optional("velocities", |arrays| arrays.table("velocities", times.len(), order))?;
-    let seen = arrays.optional("seen", |arrays| arrays.array("seen"))?;
-    let radii = arrays.optional("radii", |arrays| arrays.radii(times.len(), table.vehicles))?;
-    let names = arrays.optional("names", |arrays| arrays.texts("names"))?;
+    let velocities = arrays.optional("velocities", |arrays| arrays.like(&table, "velocities", 3))?;
+    let seen = arrays.optional("seen", |arrays| arrays.like(&table, "seen", 2))?;
+    let radii = arrays.optional("radii", |arrays| arrays.radii(&table))?;
+    let names = arrays.optional("names", |arrays| arrays.names(table.vehicles()))?;
     let epoch_ns = arrays
         .optional("epoch_ns", |arrays| arrays.array("epoch_ns")?.next_stamp().map_err(|fault| source.error(fault)))?;
 
-    let (vehicles, axes) = (table.vehicles, table.axes);
-    let fits = |name: &str, found: usize, expected: usize| {
-        let problem = format!("`{name}` has {found} elements where {expected} belong to `{positions}`");
-        let fault = Fault::content(problem, "save arrays of one recording together");
-        if found == expected { Ok(()) } else { Err(source.error(fault)) }
-    };
-    fits("seen", seen.as_ref().map_or(times.len() * vehicles, Array::count), times.len() * vehicles)?;
-    fits("names", names.as_ref().map_or(vehicles, Vec::len), vehicles)?;
-    if let Some(table) = &velocities {
-        fits("velocities", table.vehicles * table.axes, vehicles * axes)?;
-    }
     let names = names.map_or_else(Names::default, Names::from_list);
     let mut notes = Vec::new();
-    if axes == 2 {
+    if table.axes() == 2 {
         notes.push("positions have two columns: z is taken as 0".to_owned());
     }
     let rows =
@@ -137,18 +128,37 @@ impl Arrays {
         if self.holds(name) { read(self).map(Some) } else { Ok(None) }
     }
 
-    fn radii(&mut self, times: usize, vehicles: usize) -> Result<Radii, ReadError> {
+    fn radii(&mut self, positions: &Table) -> Result<Radii, ReadError> {
         let mut array = self.array("radii")?;
-        if array.shape == [times, vehicles] && !array.fortran_order {
-            return Ok(Radii::Each(array));
-        }
+        let vehicles = positions.vehicles();
         if array.shape != [vehicles] {
-            let problem = format!("it is of shape {:?}", array.shape);
-            let fault = Fault::content(problem, "save a radius for each vehicle, or for each time and vehicle");
-            return Err(self.at("radii")(fault));
+            return self.like(positions, "radii", 2).map(Radii::Each);
         }
         let radii = (0..vehicles).map(|_| array.next_number()).collect::<Result<_, _>>();
         radii.map(Radii::Same).map_err(self.at("radii"))
+    }
+
+    /// The numbers of an array whose axes are the first `axes` of those of the positions.
+    fn like(&mut self, positions: &Table, name: &str, axes: usize) -> Result<Numbers, ReadError> {
+        let array = self.array(name)?;
+        let expected = &positions.shape[..axes];
+        if array.shape != expected {
+            let problem = format!("it is of shape {:?} where {expected:?} belongs to the positions", array.shape);
+            return Err(self.at(name)(Fault::content(problem, "save arrays of one recording together")));
+        }
+        Numbers::of(array, positions.order).map_err(self.at(name))
+    }
+
+    /// Names of as many vehicles.
+    fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
+        let names = self.texts("names")?;
+        let different: BTreeSet<_> = names.iter().collect();
+        let problem = match different.len() {
+            _ if names.len() != vehicles => format!("it has {} elements for {vehicles} vehicles", names.len()),
+            count if count < vehicles => "two vehicles have the same name".to_owned(),
+            _ => return Ok(names),
+        };
+        Err(self.at("names")(Fault::content(problem, "save a name of its own for each vehicle, or leave `names` out")))
     }
 
     fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
@@ -162,7 +172,7 @@ impl Arrays {
 
     /// An array of vectors with `times` instants.
     fn table(&mut self, name: &str, times: usize, order: Option<AxisOrder>) -> Result<Table, ReadError> {
-        let mut array = self.array(name)?;
+        let array = self.array(name)?;
         let at = self.at(name);
         let &[first, second, axes @ (2 | 3)] = array.shape.as_slice() else {
             let problem = format!("it is of shape {:?}", array.shape);
@@ -186,46 +196,70 @@ impl Arrays {
                 return Err(at(Fault::content(problem, "save as many instants as times")));
             }
         };
-        let vehicles = if order == AxisOrder::TimeFirst { second } else { first };
-        if order == AxisOrder::TimeFirst && !array.fortran_order {
-            return Ok(Table { vehicles, axes, numbers: Numbers::Streamed(array) });
-        }
-        let count = array.count();
-        let mut stored = Vec::new();
-        for _ in 0..count {
-            stored.push(array.next_number().map_err(&at)?);
-        }
-        let index = |k: usize, i: usize, axis: usize| {
-            let (a, b) = if order == AxisOrder::TimeFirst { (k, i) } else { (i, k) };
-            if array.fortran_order { a + first * (b + second * axis) } else { (a * second + b) * axes + axis }
-        };
-        let instants =
-            (0..times).flat_map(|k| (0..vehicles).flat_map(move |i| (0..axes).map(move |axis| (k, i, axis))));
-        let sorted: Vec<f64> = instants.map(|(k, i, axis)| stored[index(k, i, axis)]).collect();
-        Ok(Table { vehicles, axes, numbers: Numbers::Sorted(sorted.into_iter()) })
+        let shape = [first, second, axes];
+        Ok(Table { shape, order, numbers: Numbers::of(array, order).map_err(at)? })
     }
 }
 
-/// Vectors of all vehicles, instant by instant.
+/// Positions of all vehicles, instant by instant.
 struct Table {
-    vehicles: usize,
-    axes: usize,
+    /// As the archive has it: time and vehicle in their `order`, then the axes of space.
+    shape: [usize; 3],
+    order: AxisOrder,
     numbers: Numbers,
 }
 
+impl Table {
+    fn vehicles(&self) -> usize {
+        self.shape[usize::from(self.order == AxisOrder::TimeFirst)]
+    }
+
+    fn axes(&self) -> usize {
+        self.shape[2]
+    }
+}
+
+/// The numbers of an array of times and vehicles, instant by instant.
 enum Numbers {
     Streamed(Array),
     Sorted(std::vec::IntoIter<f64>),
 }
 
-impl Table {
-    fn next_vector(&mut self) -> Result<Vector3<f64>, Fault> {
+impl Numbers {
+    /// The numbers of an array whose first two axes are time and vehicle in this order.
+    fn of(mut array: Array, order: AxisOrder) -> Result<Self, Fault> {
+        if order == AxisOrder::TimeFirst && !array.fortran_order {
+            return Ok(Self::Streamed(array));
+        }
+        let stored = (0..array.count()).map(|_| array.next_number()).collect::<Result<Vec<_>, _>>()?;
+        let (first, second) = (array.shape[0], array.shape[1]);
+        let axes = array.shape[2..].iter().product();
+        let index = |a: usize, b: usize, axis: usize| {
+            if array.fortran_order { a + first * (b + second * axis) } else { (a * second + b) * axes + axis }
+        };
+        let mut sorted = Vec::with_capacity(stored.len());
+        let (times, vehicles) = if order == AxisOrder::TimeFirst { (first, second) } else { (second, first) };
+        for k in 0..times {
+            for i in 0..vehicles {
+                let (a, b) = if order == AxisOrder::TimeFirst { (k, i) } else { (i, k) };
+                sorted.extend((0..axes).map(|axis| stored[index(a, b, axis)]));
+            }
+        }
+        Ok(Self::Sorted(sorted.into_iter()))
+    }
+
+    fn next(&mut self) -> Result<f64, Fault> {
+        match self {
+            Self::Streamed(array) => array.next_number(),
+            Self::Sorted(numbers) => Ok(numbers.next().unwrap_or(f64::NAN)),
+        }
+    }
+
+    /// The next vector of so many axes; what is missing is 0.
+    fn next_vector(&mut self, axes: usize) -> Result<Vector3<f64>, Fault> {
         let mut vector = Vector3::zeros();
-        for axis in 0..self.axes {
-            vector[axis] = match &mut self.numbers {
-                Numbers::Streamed(array) => array.next_number()?,
-                Numbers::Sorted(numbers) => numbers.next().unwrap_or(f64::NAN),
-            };
+        for x in vector.iter_mut().take(axes) {
+            *x = self.next()?;
         }
         Ok(vector)
     }
@@ -236,14 +270,14 @@ enum Radii {
     /// The same at all times.
     Same(Vec<f64>),
     /// Of each time and vehicle.
-    Each(Array),
+    Each(Numbers),
 }
 
 impl Radii {
     fn next(&mut self, vehicle: usize) -> Result<Option<f64>, Fault> {
         let radius = match self {
             Self::Same(radii) => radii[vehicle],
-            Self::Each(array) => array.next_number()?,
+            Self::Each(radii) => radii.next()?,
         };
         if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
             return Ok(Some(radius).filter(|radius| !radius.is_nan()));
@@ -261,18 +295,19 @@ struct Instants {
     /// Number of the next instant.
     at: usize,
     table: Table,
-    velocities: Option<Table>,
-    seen: Option<Array>,
+    velocities: Option<Numbers>,
+    seen: Option<Numbers>,
     radii: Option<Radii>,
     names: Names,
 }
 
 impl Instants {
     fn row(&mut self, stamp: Stamp, vehicle: usize) -> Result<Option<Row>, Fault> {
-        let position = self.table.next_vector()?;
-        let velocity = self.velocities.as_mut().map(Table::next_vector).transpose()?;
+        let axes = self.table.axes();
+        let position = self.table.numbers.next_vector(axes)?;
+        let velocity = self.velocities.as_mut().map(|velocities| velocities.next_vector(axes)).transpose()?;
         let radius = self.radii.as_mut().map(|radii| radii.next(vehicle)).transpose()?.flatten();
-        let seen = self.seen.as_mut().map(Array::next_number).transpose()?.is_none_or(|seen| seen != 0.0);
+        let seen = self.seen.as_mut().map(Numbers::next).transpose()?.is_none_or(|seen| seen != 0.0);
         if !seen {
             return Ok(None);
         }
@@ -288,7 +323,7 @@ impl Instants {
                 "velocities are finite, or all NaN where unknown",
             ));
         }
-        let place = (self.at * self.table.vehicles + vehicle) as u64;
+        let place = (self.at * self.table.vehicles() + vehicle) as u64;
         Ok(Some(Row { stamp, place, vehicle, position, velocity, radius }))
     }
 }
@@ -298,16 +333,16 @@ impl Rows for Instants {
         let before = rows.len();
         while rows.len() < before + BATCH {
             let Some(&stamp) = self.times.get(self.at) else { break };
-            for vehicle in 0..self.table.vehicles {
+            for vehicle in 0..self.table.vehicles() {
                 let row = self.row(stamp, vehicle).map_err(|fault| {
-                    let place = self.place((self.at * self.table.vehicles + vehicle) as u64);
+                    let place = self.place((self.at * self.table.vehicles() + vehicle) as u64);
                     self.source.error(fault).at(place)
                 })?;
                 rows.extend(row);
             }
             if self.names.all().is_empty() {
                 // So many have really been read: the shape is no longer a claim.
-                self.names = Names::numbered(self.table.vehicles);
+                self.names = Names::numbered(self.table.vehicles());
             }
             self.at += 1;
         }
@@ -330,7 +365,7 @@ impl Rows for Instants {
     }
 
     fn place(&self, number: u64) -> Place {
-        let vehicles = self.table.vehicles.max(1) as u64;
+        let vehicles = self.table.vehicles().max(1) as u64;
         Place::Part(format!("{}[{}, {}]", self.name, number / vehicles, number % vehicles))
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::clock::{KnownUnit, Probe, Stamp, Timing};
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, Place, ReadError, quoted};
 use crate::track::{Clock, Item, Sample, Tracks};
 
 /// Rows given out at a time.
@@ -47,15 +47,20 @@ pub(super) trait Rows {
 
     /// Looks at all times and names; none where there are no rows.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
-        let mut probe: Option<Probe> = None;
-        let mut batch = Vec::new();
-        while self.next(&mut batch)? {
-            for row in batch.drain(..) {
-                probe.get_or_insert_with(|| Probe::new(row.stamp)).see(row.stamp);
-            }
-        }
-        Ok(probe)
+        survey(self)
     }
+}
+
+/// Looks at all times by reading all rows.
+pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
+    let mut probe: Option<Probe> = None;
+    let mut batch = Vec::new();
+    while rows.next(&mut batch)? {
+        for row in batch.drain(..) {
+            probe.get_or_insert_with(|| Probe::new(row.stamp)).see(row.stamp);
+        }
+    }
+    Ok(probe)
 }
 
 /// What is known of a recording beside its rows.
@@ -86,8 +91,8 @@ pub(super) struct Ordered<R> {
     ended: bool,
     /// Stamp and time of the last row.
     now: Option<(Stamp, f64)>,
-    /// Time and place of each vehicle's last row.
-    last: Vec<(f64, u64)>,
+    /// Time of each vehicle's last row, and the row.
+    last: Vec<Option<(f64, Row)>>,
 }
 
 impl<R: Rows> Ordered<R> {
@@ -145,16 +150,24 @@ impl<R: Rows> Ordered<R> {
     fn sample(&mut self, row: &Row) -> Result<Sample, ReadError> {
         let time_s = self.time_of(row)?;
         if row.vehicle >= self.last.len() {
-            self.last.resize(row.vehicle + 1, (f64::NEG_INFINITY, 0));
+            self.last.resize(row.vehicle + 1, None);
         }
-        let (before_s, place) = self.last[row.vehicle];
-        if before_s == time_s {
-            let vehicle = self.rows.vehicles().get(row.vehicle).cloned().unwrap_or_default();
-            let first = self.rows.place(place);
-            let fault = Fault::Duplicate { vehicle, time_s, first };
-            return Err(self.rows.error(fault).at(self.rows.place(row.place)));
+        if let Some((before_s, before)) = self.last[row.vehicle].replace((time_s, *row)) {
+            let vehicle = || self.rows.vehicles().get(row.vehicle).cloned().unwrap_or_default();
+            let first = self.rows.place(before.place);
+            let fault = if before_s == time_s {
+                Some(Fault::Duplicate { vehicle: vehicle(), time_s, first })
+            } else if before.radius.is_some() != row.radius.is_some() {
+                let which = if row.radius.is_some() { "a radius here and none" } else { "no radius here and one" };
+                let problem = format!("vehicle {} has {which} at {first}", quoted(&vehicle()));
+                Some(Fault::content(problem, "fill the empty cells, or leave all radii of the vehicle empty"))
+            } else {
+                None
+            };
+            if let Some(fault) = fault {
+                return Err(self.rows.error(fault).at(self.rows.place(row.place)));
+            }
         }
-        self.last[row.vehicle] = (time_s, row.place);
         let sample = Sample {
             vehicle: row.vehicle,
             time_s,

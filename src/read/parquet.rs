@@ -8,7 +8,7 @@ use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use nalgebra::Vector3;
-use parquet::basic::{ConvertedType, LogicalType, TimeUnit as ParquetUnit};
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
@@ -45,6 +45,17 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         if descriptor.max_rep_level() > 0 {
             let problem = format!("column `{}` holds lists", header[column]);
             return Err(at(Fault::content(problem, "save a number in each cell")));
+        }
+        if let Some(what) = other_than_numbers(&descriptor) {
+            let problem = format!("column `{}` holds {what}", header[column]);
+            return Err(at(Fault::content(
+                problem,
+                "save numbers as double, and time as double, int64 or time stamps",
+            )));
+        }
+        if let Some(packed) = packed_otherwise(&reader, column) {
+            let problem = format!("column `{}` is packed by {packed}, which is not read", header[column]);
+            return Err(at(Fault::content(problem, "save it plain, or packed by snappy, gzip, lz4 or zstd")));
         }
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
@@ -110,6 +121,40 @@ fn unit_of(column: &ColumnDescriptor) -> Option<TimeUnit> {
     }
 }
 
+/// What the cells of a column are, where reading them as numbers or text would change their meaning.
+fn other_than_numbers(column: &ColumnDescriptor) -> Option<&'static str> {
+    match (column.logical_type_ref(), column.converted_type()) {
+        (Some(LogicalType::Decimal(_)), _) | (_, ConvertedType::DECIMAL) => Some("decimals"),
+        (Some(LogicalType::Date), _) | (_, ConvertedType::DATE) => Some("dates"),
+        (Some(LogicalType::Time(_)), _) | (_, ConvertedType::TIME_MILLIS | ConvertedType::TIME_MICROS) => {
+            Some("times of day")
+        }
+        _ => None,
+    }
+}
+
+/// The codec of a column that is packed by one that is not read.
+fn packed_otherwise(reader: &SerializedFileReader<File>, column: usize) -> Option<&'static str> {
+    let mut columns = reader.metadata().row_groups().iter().filter_map(|group| group.columns().get(column));
+    columns.find_map(|column| match column.compression() {
+        Compression::BROTLI(_) => Some("brotli"),
+        Compression::LZO => Some("lzo"),
+        _ => None,
+    })
+}
+
+/// Whether the whole numbers of a column have no sign.
+fn is_unsigned(column: &ColumnDescriptor) -> bool {
+    use ConvertedType as Converted;
+    match column.logical_type_ref() {
+        Some(LogicalType::Integer(integer)) => !integer.is_signed,
+        _ => matches!(
+            column.converted_type(),
+            Converted::UINT_8 | Converted::UINT_16 | Converted::UINT_32 | Converted::UINT_64
+        ),
+    }
+}
+
 /// The columns that are read, each once.
 fn columns_of(layout: &Layout) -> Vec<usize> {
     let of = |body: &Body| {
@@ -131,7 +176,8 @@ fn columns_of(layout: &Layout) -> Vec<usize> {
 
 /// Some cells of a column; none where a cell is null.
 enum Cells {
-    Whole(Vec<Option<i64>>),
+    /// Wide enough for all of 64 bits, with and without a sign.
+    Whole(Vec<Option<i128>>),
     Real(Vec<Option<f64>>),
     Text(Vec<Option<ByteArray>>),
 }
@@ -146,15 +192,20 @@ impl Cells {
     }
 
     /// The next cells of a column.
-    fn read(reader: &mut ColumnReader, present: i16, count: usize) -> Result<Self, Fault> {
-        match reader {
+    fn read(column: &mut Column, count: usize) -> Result<Self, Fault> {
+        let (present, unsigned) = (column.present, column.unsigned);
+        match &mut column.reader {
             ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count).map(Self::Real),
             ColumnReader::FloatColumnReader(reader) => {
                 cells(reader, present, count).map(|cells| Self::Real(each(cells, f64::from)))
             }
-            ColumnReader::Int64ColumnReader(reader) => cells(reader, present, count).map(Self::Whole),
+            ColumnReader::Int64ColumnReader(reader) => {
+                let wide = |cell: i64| if unsigned { cell.cast_unsigned().into() } else { cell.into() };
+                cells(reader, present, count).map(|cells| Self::Whole(each(cells, wide)))
+            }
             ColumnReader::Int32ColumnReader(reader) => {
-                cells(reader, present, count).map(|cells| Self::Whole(each(cells, i64::from)))
+                let wide = |cell: i32| if unsigned { cell.cast_unsigned().into() } else { cell.into() };
+                cells(reader, present, count).map(|cells| Self::Whole(each(cells, wide)))
             }
             ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count).map(Self::Text),
             _ => Err(Fault::content(
@@ -196,6 +247,7 @@ struct Column {
     number: usize,
     /// The definition level of a cell that is there.
     present: i16,
+    unsigned: bool,
     reader: ColumnReader,
     cells: Cells,
 }
@@ -227,8 +279,9 @@ impl Table {
         let mut columns = Vec::new();
         for &number in wanted {
             let column = guarded(|| reader.get_row_group(group)?.get_column_reader(number))?;
-            let present = schema.column(number).max_def_level();
-            columns.push(Column { number, present, reader: column, cells: Cells::Whole(Vec::new()) });
+            let descriptor = schema.column(number);
+            let (present, unsigned) = (descriptor.max_def_level(), is_unsigned(&descriptor));
+            columns.push(Column { number, present, unsigned, reader: column, cells: Cells::Whole(Vec::new()) });
         }
         let rows = self.reader.metadata().row_group(self.group).num_rows();
         self.rows_left = usize::try_from(rows).map_err(|_| Fault::damaged("a group has less than no rows"))?;
@@ -246,7 +299,7 @@ impl Table {
         }
         let count = self.rows_left.min(BATCH);
         for column in &mut self.columns {
-            column.cells = Cells::read(&mut column.reader, column.present, count)?;
+            column.cells = Cells::read(column, count)?;
             if column.cells.len() != count {
                 let what = format!("column `{}` has fewer cells than its group has rows", self.header[column.number]);
                 return Err(Fault::Truncated { what });
@@ -275,8 +328,10 @@ impl Table {
     fn stamp(&self, row: usize) -> Result<Stamp, Fault> {
         let column = self.layout.time;
         let stamp = match self.cells(column) {
-            Some(Cells::Whole(cells)) => cells[row].map(Stamp::Whole),
-            _ => self.number(column, row)?.map(Stamp::Real),
+            Some(Cells::Whole(cells)) => {
+                cells[row].map(|whole| i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole))
+            }
+            _ => self.number(column, row).map_err(Fault::of_time)?.map(Stamp::Real),
         };
         stamp.ok_or_else(|| Fault::EmptyCell { column: self.header[column].clone() })
     }

@@ -11,6 +11,9 @@ use super::source::{GZIP_MAGIC, Source, fault_of};
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;
 
+const PARQUET_MAGIC: &[u8] = b"PAR1";
+const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
 /// What a file is.
 pub(super) struct Recognised {
     pub(super) format: Format,
@@ -24,6 +27,10 @@ pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognise
     let data = fs::metadata(path).map_err(|source| error(Fault::System(source)))?;
     if data.is_dir() {
         return Ok(Recognised { format: Format::Crazyflie, gzip: false });
+    }
+    if !data.is_file() {
+        let problem = "it is a pipe or a device, and a recording is read more than once";
+        return Err(error(Fault::content(problem, "save it to a file first, and give the file")));
     }
     let mut source = Source { path: path.to_owned(), gzip: false };
     let mut head = Vec::new();
@@ -41,6 +48,10 @@ pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognise
         }
     }
     let format = match forced {
+        Some(format) if first_bytes(format).is_some_and(|bytes| !head.starts_with(bytes)) => {
+            let reason = "it does not begin as one does".to_owned();
+            return Err(error(Fault::WrongFormat { format, reason }));
+        }
         Some(format) => format,
         None => format_of(&head, path)?,
     };
@@ -51,12 +62,22 @@ pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognise
     Ok(Recognised { format, gzip: source.gzip })
 }
 
+/// How every file of a format begins, if they all begin alike.
+fn first_bytes(format: Format) -> Option<&'static [u8]> {
+    match format {
+        Format::Parquet => Some(PARQUET_MAGIC),
+        Format::Mcap => Some(MCAP_MAGIC),
+        Format::Npz => Some(b"PK"),
+        Format::Csv | Format::Text | Format::Crazyflie | Format::Skybrush => None,
+    }
+}
+
 fn format_of(head: &[u8], path: &Path) -> Result<Format, ReadError> {
     let error = |fault| ReadError::new(path, fault);
-    if head.starts_with(b"PAR1") {
+    if head.starts_with(PARQUET_MAGIC) {
         return Ok(Format::Parquet);
     }
-    if head.starts_with(b"\x89MCAP0\r\n") {
+    if head.starts_with(MCAP_MAGIC) {
         return Ok(Format::Mcap);
     }
     if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") {

@@ -1,7 +1,7 @@
 //! Skybrush shows: `show.json`, alone or inside a `.skyc` archive.
 //!
 //! Each drone has a trajectory of keyed points `[t, [x, y, z], [control points]]`. Times count from the drone's take-off,
-//! before which it stands at its first point. The control points belong to the segment that ends at the point: with n of
+//! before which it stands at its first point; a drone with a single point stands there throughout. The control points belong to the segment that ends at the point: with n of
 //! them the segment is a Bezier curve of degree n + 1, so without any it is a straight line.
 
 use std::fmt;
@@ -16,7 +16,7 @@ use super::curves::{Curves, distinct, piece};
 use super::error::{Fault, Place, ReadError};
 use super::source::{Source, fault_of};
 use super::{ReadOptions, Recording};
-use crate::track::{Item, Sample};
+use crate::track::{Item, Piece, Sample};
 
 /// Highest degree of a Bezier segment that is read.
 const HIGHEST_DEGREE: usize = 15;
@@ -115,11 +115,26 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         names.push(name);
         curves.push(items);
     }
+    stand_throughout(&mut curves);
     if curves.iter().all(Vec::is_empty) {
         let remedy = "export the show with its trajectories";
         return Err(source.error(Fault::content("the show has no drone with a trajectory", remedy)));
     }
     Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
+}
+
+/// A drone with a single point stands there until the show ends.
+fn stand_throughout(curves: &mut [Vec<Item>]) {
+    let end_of = |item: &Item| if let Item::Piece(piece) = item { piece.to_s } else { f64::NEG_INFINITY };
+    let end_s = curves.iter().flatten().map(end_of).fold(f64::NEG_INFINITY, f64::max);
+    for curve in curves {
+        if let [Item::Sample(sample)] = curve[..]
+            && sample.time_s < end_s
+        {
+            let Sample { vehicle, time_s: from_s, position_m, .. } = sample;
+            curve[0] = Item::Piece(Piece { vehicle, from_s, to_s: end_s, coefficients: vec![position_m] });
+        }
+    }
 }
 
 /// The JSON documents of a show.
@@ -183,13 +198,14 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
     let begin_s = trajectory.takeoff_s + first.time_s;
     let range =
         |at| (at, Fault::content("its numbers leave the range of numbers", "look at --scale and at the numbers"));
+    if trajectory.points.len() == 1 {
+        let (time_s, position_m) = (begin_s.min(0.0), first.position * scale);
+        return Ok(vec![Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })]);
+    }
     let mut items = Vec::new();
     if begin_s > 0.0 {
         let standing = piece(vehicle, 0.0, begin_s, [first.position], scale).ok_or_else(|| range(Some(0)))?;
         items.push(Item::Piece(standing));
-    } else if trajectory.points.len() == 1 {
-        let position_m = first.position * scale;
-        items.push(Item::Sample(Sample { vehicle, time_s: begin_s, position_m, velocity_m_s: None, radius_m: None }));
     }
     for (index, pair) in trajectory.points.windows(2).enumerate() {
         let [before, point] = pair else { continue };

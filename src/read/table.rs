@@ -123,7 +123,7 @@ impl Layout {
         let id = named(&given.id, "the vehicle", "id")?.or_else(|| first(is_id));
         let mut used = vec![time];
         let shape = if let Some(id) = id {
-            let body = columns.body("").map_err(|axis| missing(&Quantity::Position(axis).words(), AXES[axis]))?;
+            let body = columns.body("").map_err(|quantity| missing(&quantity.words(), quantity.option()))?;
             used.push(id);
             Shape::Long { id, body }
         } else {
@@ -184,16 +184,24 @@ impl Columns<'_> {
         }
     }
 
-    /// The columns of a vehicle, or the axis that is missing.
-    fn body(&self, vehicle: &str) -> Result<Body, usize> {
+    /// The columns of a vehicle, or the quantity that is missing: x and y of its position, and its velocity along each
+    /// axis of its position where it has one along some axis.
+    fn body(&self, vehicle: &str) -> Result<Body, Quantity> {
         let get = |quantity| self.found.get(&(vehicle.to_owned(), quantity)).copied();
         let position = [0, 1, 2].map(|axis| get(Quantity::Position(axis)));
         if let Some(axis) = position[..2].iter().position(Option::is_none) {
-            return Err(axis);
+            return Err(Quantity::Position(axis));
         }
         let velocity = [0, 1, 2].map(|axis| get(Quantity::Velocity(axis)));
-        let velocity = (velocity[0].is_some() && velocity[1].is_some()).then_some(velocity);
-        Ok(Body { position, velocity, radius: get(Quantity::Radius) })
+        let moves = velocity.iter().any(Option::is_some);
+        for axis in (0..3).filter(|_| moves) {
+            match (position[axis], velocity[axis]) {
+                (Some(_), None) => return Err(Quantity::Velocity(axis)),
+                (None, Some(_)) => return Err(Quantity::Position(axis)),
+                _ => {}
+            }
+        }
+        Ok(Body { position, velocity: moves.then_some(velocity), radius: get(Quantity::Radius) })
     }
 }
 
@@ -216,9 +224,9 @@ fn wide(
         return Err(missing("the vehicle and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)", "id"));
     }
     let body = |vehicle: &String| {
-        columns.body(vehicle).map_err(|axis| {
-            missing(&format!("{} of vehicle `{vehicle}`", Quantity::Position(axis).words()), AXES[axis])
-        })
+        columns
+            .body(vehicle)
+            .map_err(|quantity| missing(&format!("{} of vehicle `{vehicle}`", quantity.words()), quantity.option()))
     };
     let bodies = names.iter().map(body).collect::<Result<_, _>>()?;
     Ok(Shape::Wide { names, bodies })
@@ -301,6 +309,12 @@ mod tests {
     }
 
     #[test]
+    fn what_moves_in_a_plane_needs_no_velocity_along_z() {
+        let Shape::Long { body, .. } = layout("t,id,x,y,vx,vy").expect("a layout").shape else { panic!("wide") };
+        assert_eq!((body.position[2], body.velocity), (None, Some([Some(4), Some(5), None])));
+    }
+
+    #[test]
     fn wide_headers_are_read_by_number_and_by_name() {
         for (header, vehicles) in [
             ("t,x1,y1,z1,x2,y2,z2", ["1", "2"]),
@@ -320,6 +334,10 @@ mod tests {
         assert!(fault("t,x,y,z").contains("for the vehicle"));
         assert!(fault("t,id,x,z").contains("along y"));
         assert!(fault("t,x1,y1,z1,x2,z2").contains("along y of vehicle `2`"));
+        assert!(fault("t,id,x,y,z,vx,vy").contains("velocity along z"));
+        assert!(fault("t,id,x,y,z,vz").contains("velocity along x"));
+        assert!(fault("t,id,x,y,vx,vy,vz").contains("position along z"));
+        assert!(fault("t,a.x,a.y,a.z,a.vx,a.vy").contains("velocity along z of vehicle `a`"));
         assert!(fault("t,id,x,y,pos_x").contains("`x` and `pos_x` both give the position along x"));
     }
 }

@@ -1,30 +1,28 @@
 //! Recordings of others.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::clock::Stamp;
+use super::super::clock::{Probe, Stamp};
 use super::super::error::{Fault, Place, ReadError, quoted};
 use super::super::names::Names;
-use super::super::order::{BATCH, Ordered, Row, Rows};
+use super::super::order::{BATCH, Ordered, Row, Rows, survey};
 use super::super::source::Source;
 use super::super::{ReadOptions, Recording, TimeUnit};
 use super::messages::{self, Encoding, Kind, Seen, Who};
-use super::{UNFINISHED, error_of, records, unfinished};
+use super::{accept_unfinished, error_of, records};
 use crate::record::mcap::framing::{Fields, Record, RecordReader};
 use mcap::records::op;
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let records = records(source)?;
-    let complete = records.is_complete();
-    if !complete && !options.allow_unfinished {
-        return Err(source.error(unfinished()));
-    }
-    let notes = if complete { Vec::new() } else { vec![UNFINISHED.to_owned()] };
+    let notes = accept_unfinished(source, records.is_complete(), options)?;
     let poses = Poses {
         source: source.clone(),
         records,
         schemas: BTreeMap::new(),
         channels: BTreeMap::new(),
+        stamped: BTreeSet::new(),
+        logged: BTreeSet::new(),
         wanted_frame: options.frame.clone(),
         frame: None,
         names: Names::default(),
@@ -54,6 +52,9 @@ struct Poses {
     records: RecordReader,
     schemas: BTreeMap<u16, Option<Kind>>,
     channels: BTreeMap<u16, Channel>,
+    /// Channels with a message that says its time, and those with one that was taken at the time of logging.
+    stamped: BTreeSet<u16>,
+    logged: BTreeSet<u16>,
     /// The frame that the user asks for.
     wanted_frame: Option<String>,
     /// The frame of all positions so far, and the topic that it was met on.
@@ -89,7 +90,7 @@ impl Poses {
                     self.messages += 1;
                     let seen = messages::decode(channel.kind, channel.encoding, bytes);
                     let topic = channel.topic.clone();
-                    self.take(&topic, log_ns, seen, rows)?;
+                    self.take((number, &topic), log_ns, seen, rows)?;
                     Some(())
                 }
                 None => None,
@@ -106,7 +107,7 @@ impl Poses {
     /// Appends the rows of a message.
     fn take(
         &mut self,
-        topic: &str,
+        (channel, topic): (u16, &str),
         log_ns: i64,
         seen: Result<Vec<Seen>, String>,
         rows: &mut Vec<Row>,
@@ -127,11 +128,23 @@ impl Poses {
                 Who::Named(name) => name,
             };
             self.vehicle = self.names.index(&name, self.vehicle);
-            let stamp = Stamp::Whole(if seen.stamp_ns == 0 { log_ns } else { seen.stamp_ns });
+            let stamp = Stamp::Whole(self.time_of(channel, seen.stamp_ns, log_ns));
             let (vehicle, position) = (self.vehicle, seen.position);
             rows.push(Row { stamp, place: self.messages, vehicle, position, velocity: None, radius: None });
         }
         Ok(())
+    }
+
+    /// When a message speaks of \[ns\]. A stamp of 0 is a time like any other on a channel with other stamps.
+    fn time_of(&mut self, channel: u16, stamp_ns: i64, log_ns: i64) -> i64 {
+        if stamp_ns != 0 {
+            self.stamped.insert(channel);
+        }
+        if self.stamped.contains(&channel) {
+            return stamp_ns;
+        }
+        self.logged.insert(channel);
+        log_ns
     }
 
     /// Whether a position is given in the frame that is read.
@@ -218,6 +231,16 @@ impl Rows for Poses {
 
     fn is_wide(&self) -> bool {
         false
+    }
+
+    /// Whether a channel says its times is known when all of it has been read.
+    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+        let probe = survey(self)?;
+        if self.stamped.is_disjoint(&self.logged) {
+            return Ok(probe);
+        }
+        self.rewind()?;
+        survey(self)
     }
 }
 

@@ -8,7 +8,7 @@
 //! | `foxglove.FrameTransform(s)`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/TransformStamped` | the same | the child frame |
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped` | the same | the topic |
 //!
-//! Times are those of the messages; where a message has none, the time when it was logged. All positions must be given
+//! Times are those of the messages; where no message of a channel has one, those when they were logged. All positions must be given
 //! in one frame. A file that was not closed is refused, unless the user accepts what it holds.
 
 pub(crate) mod exported;
@@ -25,7 +25,7 @@ use mcap::records::op;
 
 /// Opens a recording, going by the first channel that is known.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    match first_known_schema(source)? {
+    match first_known_schema(source, options)? {
         Some(Known::Run) => own::open_run(source, options),
         Some(Known::Exported) => own::open_exported(source, options),
         Some(Known::Foreign) => foreign::open(source, options),
@@ -43,7 +43,7 @@ enum Known {
     Foreign,
 }
 
-fn first_known_schema(source: &Source) -> Result<Option<Known>, ReadError> {
+fn first_known_schema(source: &Source, options: &ReadOptions) -> Result<Option<Known>, ReadError> {
     let mut records = records(source)?;
     while let Some(Record { opcode, body, .. }) = records.next().map_err(|trouble| error_of(source, trouble))? {
         if opcode != op::SCHEMA {
@@ -58,7 +58,7 @@ fn first_known_schema(source: &Source) -> Result<Option<Known>, ReadError> {
             _ => {}
         }
     }
-    if records.is_complete() { Ok(None) } else { Err(source.error(unfinished())) }
+    accept_unfinished(source, records.is_complete(), options).map(|_| None)
 }
 
 fn records(source: &Source) -> Result<RecordReader, ReadError> {
@@ -91,10 +91,12 @@ fn fault_of(source: &Source, fault: ReadFault) -> ReadError {
     }
 }
 
-/// The fault of a file that was not closed.
-fn unfinished() -> Fault {
-    Fault::Truncated { what: "it was not closed, so that its end may be missing".to_owned() }
+/// What is to be said of a file that was not closed, or the error that it is.
+fn accept_unfinished(source: &Source, complete: bool, options: &ReadOptions) -> Result<Vec<String>, ReadError> {
+    let note = "the recording was not closed: it is read up to the last part that was written";
+    match (complete, options.allow_unfinished) {
+        (true, _) => Ok(Vec::new()),
+        (false, true) => Ok(vec![note.to_owned()]),
+        (false, false) => Err(source.error(Fault::Unfinished)),
+    }
 }
-
-/// What is said where an unfinished file is accepted.
-const UNFINISHED: &str = "the recording was not closed: it is read up to the last part that was written";

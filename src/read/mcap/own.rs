@@ -9,7 +9,7 @@ use super::super::order::{BATCH, Ordered, Row, Rows};
 use super::super::source::Source;
 use super::super::{ReadOptions, Recording, TimeUnit};
 use super::exported::{self, Instant, TRACKS, VEHICLES, Vehicles};
-use super::{UNFINISHED, error_of, fault_of, records, unfinished};
+use super::{accept_unfinished, error_of, fault_of, records};
 use crate::record::RecordError;
 use crate::record::mcap::framing::{Fields, Record, RecordReader};
 use crate::record::mcap::{Entry, McapRecording};
@@ -17,21 +17,12 @@ use mcap::records::op;
 
 pub(super) fn open_run(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let recording = McapRecording::open(&source.path).map_err(|error| run_error(source, error))?;
-    let notes = notes(source, recording.is_complete(), options)?;
+    let notes = accept_unfinished(source, recording.is_complete(), options)?;
     let vehicles = recording.header().vehicles;
     let run = Run { source: source.clone(), recording, vehicles, names: Names::default(), samples: 0 };
     let none = Fault::content("it holds no sample", "record again");
     let about = options.about(Some(TimeUnit::Seconds), notes, none);
     Ok(Box::new(Ordered::open(run, about)?))
-}
-
-/// What is to be said of a file that was not closed, or the error that it is.
-fn notes(source: &Source, complete: bool, options: &ReadOptions) -> Result<Vec<String>, ReadError> {
-    match (complete, options.allow_unfinished) {
-        (true, _) => Ok(Vec::new()),
-        (false, true) => Ok(vec![UNFINISHED.to_owned()]),
-        (false, false) => Err(source.error(unfinished())),
-    }
 }
 
 fn run_error(source: &Source, error: RecordError) -> ReadError {
@@ -107,7 +98,7 @@ pub(super) fn open_exported(source: &Source, options: &ReadOptions) -> Result<Re
         epoch_ns: 0,
         instants: 0,
     };
-    let notes = notes(source, exported.records.is_complete(), options)?;
+    let notes = accept_unfinished(source, exported.records.is_complete(), options)?;
     let mut first = Vec::new();
     exported.next(&mut first)?;
     let none = Fault::content("it holds no instant", "export again");

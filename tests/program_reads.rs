@@ -1,0 +1,74 @@
+//! What the program makes of recordings that are not plain files, of odd names, and of errors inside a recording.
+
+use std::fs;
+
+use assert_cmd::Command;
+
+#[path = "support/program.rs"]
+mod program;
+
+use program::{Ran, TAUTLINE, ran_by};
+
+fn audit(text: &str, arguments: &[&str]) -> Ran {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("flight.csv"), text).expect("written");
+    ran_by(TAUTLINE, folder.path(), &[&["audit", "flight.csv", "--delta", "1"], arguments].concat())
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_pipe_is_refused_because_its_beginning_would_be_lost() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lines: Vec<_> = (0..20_000).map(|k| format!("{k} 0 0 0 {} 0 0\n", if k == 9 { 0.5 } else { 5.0 })).collect();
+    let text = lines.concat();
+    fs::write(folder.path().join("flight.txt"), &text).expect("written");
+    let ran = |arguments: &[&str], input: &str| {
+        let mut command = Command::new(TAUTLINE);
+        let done = command.args(arguments).current_dir(folder.path()).write_stdin(input).output().expect("ran");
+        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    assert_eq!(ran(&["audit", "flight.txt", "--delta", "1"], "").0, Some(1));
+    for arguments in [&["audit", "/dev/stdin", "--delta", "1"][..], &["export", "/dev/stdin", "-o", "out.npz"]] {
+        let (exit, said) = ran(arguments, &text);
+        assert_eq!(exit, Some(2), "{said}");
+        assert!(said.contains("pipe") && said.contains("file first"), "{said}");
+        assert!(!folder.path().join("out.npz").exists());
+    }
+}
+
+/// Vehicles `a,b`, `c` and `d` in a row, 2 m and 0.5 m apart.
+const NAMES: &str = "t,id,x,y,z\n0,\"a,b\",0,0,0\n0,c,2,0,0\n0,d,2.5,0,0\n";
+
+#[test]
+fn a_name_with_a_comma_is_named_in_quotes() {
+    for (arguments, exit) in [
+        (&[][..], 1),
+        (&["--ids", "\"a,b\",c"], 0),
+        (&["--ids", "\"a,b\"", "--ids", "c"], 0),
+        (&["--ids", "c,d"], 1),
+        (&["--ids", "c", "--ids", "d"], 1),
+        (&["--ids", "a,b"], 2),
+        (&["--ids", ""], 2),
+    ] {
+        let ran = audit(NAMES, arguments);
+        assert_eq!(ran.exit, Some(exit), "{arguments:?}: {ran:?}");
+    }
+}
+
+#[test]
+fn a_name_does_not_steer_the_terminal() {
+    let names = NAMES.replace(",c,", ",\u{1b}[31mc,");
+    for arguments in [&[][..], &["--ids", "nobody"]] {
+        let ran = audit(&names, arguments);
+        let said = ran.out + &ran.err;
+        assert!(said.contains("[31mc"), "{said}");
+        assert!(!said.contains('\u{1b}'), "{said:?}");
+    }
+}
+
+#[test]
+fn what_is_wrong_inside_a_recording_is_said_with_its_file() {
+    let ran = audit("t,id,x,y,z,radius\n0,a,0,0,0,0.1\n1,a,0,0,0,0.2\n", &[]);
+    assert_eq!(ran.exit, Some(2), "{ran:?}");
+    assert!(ran.err.contains("flight.csv: vehicle a at 1 s"), "{}", ran.err);
+}
