@@ -213,6 +213,58 @@ fn the_time_below_delta_on_curves_ends_where_delta_is_reached() {
     assert!(found.from_s < 1.7 && found.to_s > 1.7);
 }
 
+/// Two come as near as this along x at each whole second, and are 30 m apart in between.
+fn visits(nearest_m: &[f64]) -> Vec<Item> {
+    let mut items = Vec::new();
+    for k in 0..=2 * nearest_m.len() {
+        let x = if k % 2 == 1 { nearest_m[k / 2] } else { 30.0 };
+        items.extend([seen(0, k as f64, [0.0; 3]), seen(1, k as f64, [x, 0.0, 0.0])]);
+    }
+    items
+}
+
+#[test]
+fn every_time_too_close_and_every_doubt_is_listed_once_with_its_own_smallest_distance() {
+    let near = [0.3, 0.7, 0.4, 5.0, 0.6];
+    let expected = [(1.0, 0.3), (3.0, 0.7), (5.0, 0.4), (9.0, 0.6)];
+    // Alone, and in such company that neighbours are compared first and windows are halved.
+    let mut crowd = visits(&near);
+    for item in visits(&near) {
+        crowd.extend((2..8).map(|k| seen(k, item.time_s(), [0.0, 90.0 * k as f64, 0.0])).take(6 * (1 - item.vehicle())));
+    }
+    crowd.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    for (items, count) in [(visits(&near), 2), (crowd, 8)] {
+        let crowd: Vec<String> = (0..count).map(|k| k.to_string()).collect();
+        let outcome = judge(&crowd, &items, Question::delta(1.0)).unwrap();
+        let found: Vec<_> = outcome.violations.iter().map(|v| (v.min_at_s, v.min_m)).collect();
+        assert_eq!(found, expected);
+        assert!(count > 2 || outcome.swept == 1 + 2 * near.len() as u64, "{}", outcome.swept);
+    }
+    // Two accelerations of 4 m/s^2 over 1 s: at most 1 m of deviation together.
+    let outcome = asked(&visits(&[1.3, 9.0, 1.9]), bounded(1.0, 4.0));
+    let found: Vec<_> = outcome.undecided.iter().map(|u| (u.from_s, u.to_s, u.lower_m.max(0.0))).collect();
+    let near = |x: f64, y: f64| (x - y).abs() < ROUNDING;
+    assert!(found.len() == 2 && near(found[0].2, 0.3) && near(found[1].2, 0.9), "{found:?}");
+    assert_eq!([found[0], found[1]].map(|u| (u.0, u.1)), [(0.0, 2.0), (4.0, 6.0)]);
+}
+
+#[test]
+fn each_dip_of_one_curve_has_its_own_smallest_distance() {
+    // ((t - 1)(t - 3))^2 / 2 + 0.15 t - 0.05: down to 0.097 m and to 0.397 m.
+    let x = [4.45, -11.85, 11.0, -4.0, 0.5];
+    let curve = |vehicle, x: &[f64]| {
+        let coefficients = x.iter().map(|x| Vector3::new(*x, 0.0, 0.0)).collect();
+        Item::Piece(Piece { vehicle, from_s: 0.0, to_s: 4.0, coefficients })
+    };
+    let outcome = asked(&[curve(0, &[0.0]), curve(1, &x)], Question::delta(0.5));
+    let [first, second] = outcome.violations[..] else { panic!("{:?}", outcome.violations) };
+    for (dip, at_s, min_m) in [(first, 0.96, 0.097), (second, 2.96, 0.397)] {
+        assert!((dip.min_at_s - at_s).abs() < 0.01 && (dip.min_m - min_m).abs() < 1e-3, "{dip:?}");
+        assert!(dip.from_s < dip.min_at_s && dip.min_at_s < dip.to_s, "{dip:?}");
+    }
+    assert_eq!(asked(&[curve(0, &[0.0]), curve(1, &x)], Question::delta(0.3)).violations.len(), 1);
+}
+
 fn bounded(delta_m: f64, max_accel_m_s2: f64) -> Question {
     Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(max_accel_m_s2), ..Question::delta(delta_m) }
 }
@@ -236,23 +288,34 @@ fn bounded_motion_is_at_least_the_sweep_less_what_acceleration_allows() {
 
 #[test]
 fn the_rate_that_is_said_to_decide_does() {
-    let straight = |rate_hz: f64| {
+    let straight = |rates_hz: [f64; 2]| {
         let mut items = Vec::new();
-        let steps = rate_hz.ceil();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
-        for k in 0..=(steps as u32) {
-            let u = f64::from(k) / steps;
-            items.extend([seen(0, u, [10.0 * u - 5.0, 0.0, 0.0]), seen(1, u, [5.0 - 10.0 * u, 3.0, 0.0])]);
+        for (vehicle, rate_hz) in rates_hz.into_iter().enumerate() {
+            let steps = rate_hz.ceil();
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
+            for k in 0..=(steps as u32) {
+                let u = f64::from(k) / steps;
+                items.push(seen(vehicle, u, [(10.0 * u - 5.0) * [1.0, -1.0][vehicle], 3.0 * vehicle as f64, 0.0]));
+            }
         }
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         items
     };
-    let question = bounded(2.9, 4.0);
-    let outcome = asked(&straight(1.0), question.clone());
-    let rate_hz = outcome.undecided[0].rate_hz.expect("a rate decides");
-    assert!((rate_hz - (8.0_f64 / 8.0 / 0.1).sqrt()).abs() < 1e-9, "{rate_hz}");
-    assert_eq!(outcome.status, Status::Undecided);
-    assert_eq!(status(&straight(rate_hz), question.clone()), Status::Clear);
-    assert_eq!(status(&straight(0.7 * rate_hz), question), Status::Undecided);
+    let both = |accels: [f64; 2]| {
+        let terms = |accel| Terms { max_accel_m_s2: Some(accel), ..Terms::default() };
+        let vehicles = of(&[("alpha", terms(accels[0])), ("bravo", terms(accels[1]))]);
+        Question { motion: Some(Motion::Bounded), vehicles, max_gap_s: Some(1.0), ..Question::delta(2.9) }
+    };
+    // The same rate and acceleration of both, and a slow one beside a quick one that is seen often.
+    for (rates_hz, accels) in [([1.0, 1.0], [4.0, 4.0]), ([1.0, 10.0], [8.0, 400.0])] {
+        let question = both(accels);
+        let outcome = asked(&straight(rates_hz), question.clone());
+        assert_eq!(outcome.status, Status::Undecided);
+        let rate_hz = outcome.undecided[0].rate_hz.expect("a rate decides");
+        assert!((rate_hz - ((accels[0] + accels[1]) / 8.0 / 0.1).sqrt()).abs() < 1e-9, "{rate_hz}");
+        assert_eq!(status(&straight([rate_hz; 2]), question.clone()), Status::Clear);
+        assert_eq!(status(&straight([0.7 * rate_hz; 2]), question), Status::Undecided);
+    }
 }
 
 #[test]

@@ -88,13 +88,18 @@ impl<'a> Search<'a> {
 
     /// The smallest distance, to within `width`; `None` if it is not below `cutoff`.
     pub(super) fn minimum(&mut self, cutoff: f64, width: f64) -> Option<Minimum> {
-        let (low, _) = self.enclose(0.0, 1.0);
+        self.minimum_within((0.0, 1.0), cutoff, width)
+    }
+
+    /// The smallest distance between two fractions of the stretch, likewise.
+    pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64, width: f64) -> Option<Minimum> {
+        let (low, _) = self.enclose(from, to - from);
         if low >= cutoff {
             return None;
         }
-        let (start, end) = (self.distance(0.0), self.distance(1.0));
-        let (mut upper, mut at) = if end < start { (end, 1.0) } else { (start, 0.0) };
-        let mut parts = BinaryHeap::from([Part { low, start: 0.0, length: 1.0 }]);
+        let (start, end) = (self.distance(from), self.distance(to));
+        let (mut upper, mut at) = if end < start { (end, to) } else { (start, from) };
+        let mut parts = BinaryHeap::from([Part { low, start: from, length: to - from }]);
         let mut looked_at = 0;
         let mut lower = f64::INFINITY;
         while let Some(part) = parts.pop() {

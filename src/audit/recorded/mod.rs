@@ -255,7 +255,9 @@ impl Judge {
         });
         let contradiction =
             self.vehicles.iter().filter_map(|v| v.contradiction).max_by(|a, b| a.needs_m_s2.total_cmp(&b.needs_m_s2));
-        let Findings { closest, obstacles, mut violations, mut undecided, .. } = self.findings;
+        let Findings { closest, obstacles, violations, undecided, .. } = self.findings;
+        let mut violations: Vec<_> = violations.into_values().flatten().collect();
+        let mut undecided: Vec<_> = undecided.into_values().flatten().collect();
         violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.who.cmp(&b.who)));
         undecided.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.who.cmp(&b.who)));
         self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
