@@ -213,58 +213,6 @@ fn the_time_below_delta_on_curves_ends_where_delta_is_reached() {
     assert!(found.from_s < 1.7 && found.to_s > 1.7);
 }
 
-/// Two come as near as this along x at each whole second, and are 30 m apart in between.
-fn visits(nearest_m: &[f64]) -> Vec<Item> {
-    let mut items = Vec::new();
-    for k in 0..=2 * nearest_m.len() {
-        let x = if k % 2 == 1 { nearest_m[k / 2] } else { 30.0 };
-        items.extend([seen(0, k as f64, [0.0; 3]), seen(1, k as f64, [x, 0.0, 0.0])]);
-    }
-    items
-}
-
-#[test]
-fn every_time_too_close_and_every_doubt_is_listed_once_with_its_own_smallest_distance() {
-    let near = [0.3, 0.7, 0.4, 5.0, 0.6];
-    let expected = [(1.0, 0.3), (3.0, 0.7), (5.0, 0.4), (9.0, 0.6)];
-    // Alone, and in such company that neighbours are compared first and windows are halved.
-    let mut crowd = visits(&near);
-    for item in visits(&near) {
-        crowd.extend((2..8).map(|k| seen(k, item.time_s(), [0.0, 90.0 * k as f64, 0.0])).take(6 * (1 - item.vehicle())));
-    }
-    crowd.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-    for (items, count) in [(visits(&near), 2), (crowd, 8)] {
-        let crowd: Vec<String> = (0..count).map(|k| k.to_string()).collect();
-        let outcome = judge(&crowd, &items, Question::delta(1.0)).unwrap();
-        let found: Vec<_> = outcome.violations.iter().map(|v| (v.min_at_s, v.min_m)).collect();
-        assert_eq!(found, expected);
-        assert!(count > 2 || outcome.swept == 1 + 2 * near.len() as u64, "{}", outcome.swept);
-    }
-    // Two accelerations of 4 m/s^2 over 1 s: at most 1 m of deviation together.
-    let outcome = asked(&visits(&[1.3, 9.0, 1.9]), bounded(1.0, 4.0));
-    let found: Vec<_> = outcome.undecided.iter().map(|u| (u.from_s, u.to_s, u.lower_m.max(0.0))).collect();
-    let near = |x: f64, y: f64| (x - y).abs() < ROUNDING;
-    assert!(found.len() == 2 && near(found[0].2, 0.3) && near(found[1].2, 0.9), "{found:?}");
-    assert_eq!([found[0], found[1]].map(|u| (u.0, u.1)), [(0.0, 2.0), (4.0, 6.0)]);
-}
-
-#[test]
-fn each_dip_of_one_curve_has_its_own_smallest_distance() {
-    // ((t - 1)(t - 3))^2 / 2 + 0.15 t - 0.05: down to 0.097 m and to 0.397 m.
-    let x = [4.45, -11.85, 11.0, -4.0, 0.5];
-    let curve = |vehicle, x: &[f64]| {
-        let coefficients = x.iter().map(|x| Vector3::new(*x, 0.0, 0.0)).collect();
-        Item::Piece(Piece { vehicle, from_s: 0.0, to_s: 4.0, coefficients })
-    };
-    let outcome = asked(&[curve(0, &[0.0]), curve(1, &x)], Question::delta(0.5));
-    let [first, second] = outcome.violations[..] else { panic!("{:?}", outcome.violations) };
-    for (dip, at_s, min_m) in [(first, 0.96, 0.097), (second, 2.96, 0.397)] {
-        assert!((dip.min_at_s - at_s).abs() < 0.01 && (dip.min_m - min_m).abs() < 1e-3, "{dip:?}");
-        assert!(dip.from_s < dip.min_at_s && dip.min_at_s < dip.to_s, "{dip:?}");
-    }
-    assert_eq!(asked(&[curve(0, &[0.0]), curve(1, &x)], Question::delta(0.3)).violations.len(), 1);
-}
-
 fn bounded(delta_m: f64, max_accel_m_s2: f64) -> Question {
     Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(max_accel_m_s2), ..Question::delta(delta_m) }
 }
@@ -478,8 +426,15 @@ fn obstacles_are_kept_clear_of() {
     let capsule =
         Shape::Capsule { from_m: Vector3::new(0.0, -3.0, 0.0), to_m: Vector3::new(0.0, 3.0, 0.0), radius_m: 1.0 };
     for shape in [ball, cuboid, capsule] {
-        for (z, expected) in [(0.4, Status::Clear), (0.5, Status::Clear), (0.6, Status::Violation)] {
-            let outcome = asked(&flight, with(thing(shape, [0.0, 0.0, z])));
+        // At no clearance it may be touched and not be entered.
+        for (clearance_m, z, expected) in [
+            (None, 0.4, Status::Clear),
+            (None, 0.5, Status::Clear),
+            (None, 0.6, Status::Violation),
+            (Some(0.0), 1.0, Status::Clear),
+            (Some(0.0), 1.1, Status::Violation),
+        ] {
+            let outcome = asked(&flight, with(Obstacle { clearance_m, ..thing(shape, [0.0, 0.0, z]) }));
             assert_eq!((outcome.status, outcome.disagreements), (expected, 0), "{shape:?} {z} {outcome:?}");
             assert!((outcome.obstacles[0].lower_m - (1.0 - z)).abs() < 1e-9, "{outcome:?}");
         }
@@ -501,6 +456,13 @@ fn obstacles_are_kept_clear_of() {
     // On a curve.
     let outcome = asked(&curves(5.0), Question { obstacles: vec![ground(-20.0)], ..Question::delta(0.1) });
     assert_eq!((outcome.disagreements, outcome.status), (0, Status::Clear));
+    // Alpha begins within one box, 0.1 m deep, and never comes near the other.
+    for (at, expected) in [([0.3, 1.0, 1.5], Status::Violation), ([0.3, 1.0, 9.5], Status::Clear)] {
+        let cuboid = Shape::Box { half_m: Vector3::repeat(0.1), yaw_rad: 0.3 };
+        let entered = with(Obstacle { clearance_m: Some(0.0), ..thing(cuboid, at) });
+        let outcome = asked(&curves(5.0), entered);
+        assert_eq!((outcome.disagreements, outcome.status), (0, expected), "{outcome:?}");
+    }
 }
 
 #[test]
@@ -522,12 +484,12 @@ fn only_those_who_are_asked_for_are_judged() {
 fn wrong_recordings_and_questions_are_refused_by_name() {
     let refused = |items: &[Item], question: Question| judge(&names(2), items, question).unwrap_err().to_string();
     let twice = [seen(0, 1.0, [0.0; 3]), seen(0, 1.0, [1.0, 0.0, 0.0])];
-    assert!(refused(&twice, Question::delta(1.0)).contains("alpha: the time 1 s is not later than 1 s"));
+    assert!(refused(&twice, Question::delta(1.0)).contains("alpha: the time 1.0 s is not later than 1.0 s"));
     assert!(
-        refused(&[seen(1, 1.0, [f64::NAN, 0.0, 0.0])], Question::delta(1.0)).contains("bravo at 1 s: the position")
+        refused(&[seen(1, 1.0, [f64::NAN, 0.0, 0.0])], Question::delta(1.0)).contains("bravo at 1.0 s: the position")
     );
     let back = [seen(0, 1.0, [0.0; 3]), seen(1, 0.5, [0.0; 3])];
-    assert!(refused(&back, Question::delta(1.0)).contains("comes after one at 1 s"));
+    assert!(refused(&back, Question::delta(1.0)).contains("comes after one at 1.0 s"));
     assert!(refused(&[seen(7, 1.0, [0.0; 3])], Question::delta(1.0)).contains("no name for vehicle 8"));
     let with = |motion| Question { motion: Some(motion), ..Question::delta(1.0) };
     assert!(refused(&pass(1.0), with(Motion::Polynomial)).contains("has samples and no curve"));

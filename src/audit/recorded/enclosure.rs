@@ -26,6 +26,16 @@ pub(super) enum Target<'a> {
     Shape(&'a Shape),
 }
 
+impl Target<'_> {
+    /// The distance of a point from it.
+    pub(super) fn distance(&self, point: Vector3<f64>) -> f64 {
+        match self {
+            Self::Origin => point.norm(),
+            Self::Shape(shape) => shape.distance(point),
+        }
+    }
+}
+
 /// The smallest distance over a stretch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Minimum {
@@ -154,11 +164,7 @@ impl<'a> Search<'a> {
 
     /// The distance at a fraction of the stretch.
     pub(super) fn distance(&self, u: f64) -> f64 {
-        let at = self.position(u);
-        match self.target {
-            Target::Origin => at.norm(),
-            Target::Shape(shape) => shape.distance(at),
-        }
+        self.target.distance(self.position(u))
     }
 
     pub(super) fn position(&self, u: f64) -> Vector3<f64> {
@@ -216,8 +222,8 @@ impl<'a> Search<'a> {
         ((low - rounding).max(0.0).sqrt(), (high + rounding).max(0.0).sqrt())
     }
 
-    /// The distance from a convex set changes no faster than the point moves, and is greatest at a corner of what encloses
-    /// the point. The box is the one shape whose distance ends at zero within, which changes neither.
+    /// The distance from a convex set, below zero within, changes no faster than the point moves, and is greatest at a
+    /// corner of what encloses the point.
     fn enclose_shape(&self, shape: &Shape) -> (f64, f64) {
         let n = self.part.len();
         let from = self.part[0];
