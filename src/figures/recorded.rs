@@ -52,8 +52,10 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Result<F
     let (limit, unit) = encounters.first().map_or((0.0, "m"), |first| (first.limit_m, first.unit));
     let largest = numbers.iter().copied().filter(|y| y.is_finite()).fold(limit, f64::max);
     let with_limit = numbers.iter().copied().chain([limit]);
+    // Within an obstacle distances are below zero.
+    let within = all().any(|point| point.1 < 0.0);
     let label = format!("distance [{unit}]");
-    let y = if limit > 0.0 && largest > LOG_FROM * limit {
+    let y = if limit > 0.0 && !within && largest > LOG_FROM * limit {
         Axis::log(&label, with_limit.filter(|y| *y > 0.0))
     } else {
         Axis::linear(&label, with_limit.chain([0.0]), true)
@@ -67,7 +69,11 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Result<F
         Axis::spanning("time [s]", from_s, from_s + 1.0, 5.0)
     };
     // A logarithmic axis has no place for what may be zero.
-    let least = if y.scale == Scale::Log { 10_f64.powf(y.from) } else { 0.0 };
+    let least = match y.scale {
+        Scale::Log => 10_f64.powf(y.from),
+        Scale::Linear if within => f64::NEG_INFINITY,
+        Scale::Linear => 0.0,
+    };
     let mut chart = Chart::new(x, y);
     for (k, encounter) in encounters.iter().enumerate() {
         let [first, second] = &encounter.names;

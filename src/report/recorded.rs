@@ -443,7 +443,7 @@ impl RecordedReport {
             }
         }
         let assumed = vec![
-            format!("Between samples: {}.", self.motion),
+            format!("Motion: {}.", self.motion),
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
