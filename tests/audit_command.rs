@@ -1,5 +1,6 @@
 //! `tautline audit`, run as a user runs it.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -169,8 +170,8 @@ fn what_is_said_names_the_closest_and_every_limit_as_it_is() {
     // Twelve pairs of radii 0.1 m; in the last two they overlap, or nearly do.
     let mut rows = "t_s,id,x,y,z,radius\n".to_owned();
     for k in 0..12 {
-        let (x, apart) = (100 * k, 1.0 + 0.1 * f64::from(k));
-        rows += &format!("0,a{k},{x},0,0,0.1\n0,b{k},{},0,0,0.1\n", f64::from(x) + apart);
+        let x = 100.0 * f64::from(k);
+        let _ = write!(rows, "0,a{k},{x},0,0,0.1\n0,b{k},{},0,0,0.1\n", x + 1.0 + 0.1 * f64::from(k));
     }
     rows += "0,big,0,900,0,5\n0,too,9,900,0,5\n";
     let obstacle =
@@ -196,7 +197,7 @@ fn what_is_said_names_the_closest_and_every_limit_as_it_is() {
 fn the_page_says_what_the_verdict_says() {
     let mut gap = "t,id,x,y,z\n".to_owned();
     for t in [0, 1, 2, 3, 8, 9, 10] {
-        gap += &format!("{t},alpha,0,0,0\n{t},bravo,{},0,0\n", t + 1);
+        let _ = write!(gap, "{t},alpha,0,0,0\n{t},bravo,{},0,0\n", t + 1);
     }
     let folder = folder(&[("pass.csv", PASS), ("gap.csv", &gap)]);
     let page = |arguments: &[&str]| {

@@ -28,7 +28,7 @@ pub(super) enum Target<'a> {
 
 impl Target<'_> {
     /// The distance of a point from it.
-    pub(super) fn distance(&self, point: Vector3<f64>) -> f64 {
+    pub(super) fn distance(self, point: Vector3<f64>) -> f64 {
         match self {
             Self::Origin => point.norm(),
             Self::Shape(shape) => shape.distance(point),
