@@ -1,5 +1,6 @@
 //! `tautline audit`, run as a user runs it.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -122,6 +123,19 @@ fn wrong_input_is_named_with_its_remedy_and_exits_with_2() {
         (&["pass.csv"][..], "--radius NAME=R"),
         (&["pass.csv", "--delta", "0"], "delta must be above 0"),
         (&["pass.csv", "--delta", "nan"], "delta"),
+        (&["pass.csv", "--delta", "-1"], "delta must be above 0, and finite, not -1"),
+        (&["pass.csv", "--delta", "1", "--max-gap", "-1"], "the longest gap must be 0 s or more, not -1"),
+        (&["pass.csv", "--radius", "-1"], "the radius must be 0 m or more, and finite, not -1"),
+        (&["pass.csv", "--ellipsoid", "-1,1,1"], "each axis of the ellipsoid must be above 0"),
+        (&["pass.csv", "--delta", "1", "--motion", "bounded", "--max-accel", "-1"], "acceleration must be 0 or more"),
+        (&["pass.csv", "--delta", "1e71"], "not 1e71"),
+        (&["pass.csv", "--delta", "1e-300"], "not 1e-300"),
+        (&["pass.csv", "--delta", "1", "--events", "./pass.csv"], "would overwrite the recording"),
+        (
+            &["pass.csv", "--delta", "1", "--obstacles", "bad.toml", "--html", "bad.toml"],
+            "overwrite the file of obstacles",
+        ),
+        (&["pass.csv", "--delta", "1", "--junit", "new.xml", "--html", "./new.xml"], "would overwrite --junit"),
         (&["pass.csv", "--delta", "1", "--ids", "zulu"], "no vehicle zulu"),
         (&["pass.csv", "--delta", "1", "--radius", "zulu=1"], "no vehicle zulu"),
         (&["pass.csv", "--delta", "1", "--motion", "bounded"], "--max-accel"),
@@ -148,4 +162,55 @@ fn a_file_that_cannot_be_written_is_the_machines_failure() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--html", "none/a.html"]);
     assert_eq!(ran.exit, Some(3), "{ran:?}");
+    assert!(ran.out.starts_with("VIOLATION: alpha and bravo"), "the verdict is said all the same: {ran:?}");
+}
+
+#[test]
+fn what_is_said_names_the_closest_and_every_limit_as_it_is() {
+    // Twelve pairs of radii 0.1 m; in the last two they overlap, or nearly do.
+    let mut rows = "t_s,id,x,y,z,radius\n".to_owned();
+    for k in 0..12 {
+        let x = 100.0 * f64::from(k);
+        let _ = write!(rows, "0,a{k},{x},0,0,0.1\n0,b{k},{},0,0,0.1\n", x + 1.0 + 0.1 * f64::from(k));
+    }
+    rows += "0,big,0,900,0,5\n0,too,9,900,0,5\n";
+    let obstacle =
+        "[[obstacle]]\nname = \"mast\"\nball = { radius_m = 1.0 }\nat_m = [-5.0, -1.5, 0.0]\nclearance_m = 0\n";
+    let folder = folder(&[("lim.csv", &rows), ("pass.csv", PASS), ("mast.toml", obstacle)]);
+    let limits = audit(folder.path(), &["lim.csv", "--json", "--events", "lim.ev.csv", "--quiet"]);
+    let json: serde_json::Value = serde_json::from_str(&limits.out).expect("JSON alone");
+    assert_eq!(json["separation"]["delta_m"], serde_json::Value::Null);
+    assert_eq!(json["violations"][0]["limit_m"], 10.0);
+    let events = fs::read_to_string(folder.path().join("lim.ev.csv")).expect("events");
+    assert!(events.contains("violation,big,too,0.0,0.0,9.0,9.0,0.0,10.0,"), "{events}");
+    // The mast is closer than the two ever are to each other, and may be touched.
+    let mast = audit(folder.path(), &["pass.csv", "--delta", "0.5", "--obstacles", "mast.toml", "--html", "a.html"]);
+    assert!(mast.out.starts_with("PROVED CLEAR: never closer than 0.500000 m, alpha and mast at 0.00 s"), "{mast:?}");
+    let page = fs::read_to_string(folder.path().join("a.html")).expect("a page");
+    assert!(page.contains("Distances from the closest obstacles"));
+    let alone = audit(folder.path(), &["pass.csv", "--delta", "0.5", "--ids", "alpha", "--html", "a.html"]);
+    assert!(alone.out.contains("1.000 s, 1 vehicle, "), "{alone:?}");
+    assert!(!fs::read_to_string(folder.path().join("a.html")).expect("a page").contains("Closest pairs"));
+}
+
+#[test]
+fn the_page_says_what_the_verdict_says() {
+    let mut gap = "t,id,x,y,z\n".to_owned();
+    for t in [0, 1, 2, 3, 8, 9, 10] {
+        let _ = write!(gap, "{t},alpha,0,0,0\n{t},bravo,{},0,0\n", t + 1);
+    }
+    let folder = folder(&[("pass.csv", PASS), ("gap.csv", &gap)]);
+    let page = |arguments: &[&str]| {
+        audit(folder.path(), &[arguments, &["--html", "a.html"]].concat());
+        fs::read_to_string(folder.path().join("a.html")).expect("a page")
+    };
+    let lines = |page: &str| page.matches("<polyline").count();
+    assert_eq!(
+        lines(&page(&["gap.csv", "--delta", "1"])),
+        lines(&page(&["gap.csv", "--delta", "1", "--max-gap", "9"])) + 3
+    );
+    let scaled = page(&["pass.csv", "--ellipsoid", "0.5,0.5,0.5"]);
+    assert!(scaled.contains("distance [ellipsoids]") && scaled.contains("closest 2.000000 ellipsoids"), "{scaled}");
+    let doubtful = page(&["pass.csv", "--delta", "0.9", "--motion", "bounded", "--max-accel", "1"]);
+    assert!(doubtful.contains("closest 0.750000 .. 1.250000 m at 0.500 s") && !doubtful.contains("UNDECIDED:"));
 }

@@ -236,23 +236,34 @@ fn bounded_motion_is_at_least_the_sweep_less_what_acceleration_allows() {
 
 #[test]
 fn the_rate_that_is_said_to_decide_does() {
-    let straight = |rate_hz: f64| {
+    let straight = |rates_hz: [f64; 2]| {
         let mut items = Vec::new();
-        let steps = rate_hz.ceil();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
-        for k in 0..=(steps as u32) {
-            let u = f64::from(k) / steps;
-            items.extend([seen(0, u, [10.0 * u - 5.0, 0.0, 0.0]), seen(1, u, [5.0 - 10.0 * u, 3.0, 0.0])]);
+        for (vehicle, rate_hz) in rates_hz.into_iter().enumerate() {
+            let steps = rate_hz.ceil();
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
+            for k in 0..=(steps as u32) {
+                let u = f64::from(k) / steps;
+                items.push(seen(vehicle, u, [(10.0 * u - 5.0) * [1.0, -1.0][vehicle], 3.0 * vehicle as f64, 0.0]));
+            }
         }
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         items
     };
-    let question = bounded(2.9, 4.0);
-    let outcome = asked(&straight(1.0), question.clone());
-    let rate_hz = outcome.undecided[0].rate_hz.expect("a rate decides");
-    assert!((rate_hz - (8.0_f64 / 8.0 / 0.1).sqrt()).abs() < 1e-9, "{rate_hz}");
-    assert_eq!(outcome.status, Status::Undecided);
-    assert_eq!(status(&straight(rate_hz), question.clone()), Status::Clear);
-    assert_eq!(status(&straight(0.7 * rate_hz), question), Status::Undecided);
+    let both = |accels: [f64; 2]| {
+        let terms = |accel| Terms { max_accel_m_s2: Some(accel), ..Terms::default() };
+        let vehicles = of(&[("alpha", terms(accels[0])), ("bravo", terms(accels[1]))]);
+        Question { motion: Some(Motion::Bounded), vehicles, max_gap_s: Some(1.0), ..Question::delta(2.9) }
+    };
+    // The same rate and acceleration of both, and a slow one beside a quick one that is seen often.
+    for (rates_hz, accels) in [([1.0, 1.0], [4.0, 4.0]), ([1.0, 10.0], [8.0, 400.0])] {
+        let question = both(accels);
+        let outcome = asked(&straight(rates_hz), question.clone());
+        assert_eq!(outcome.status, Status::Undecided);
+        let rate_hz = outcome.undecided[0].rate_hz.expect("a rate decides");
+        assert!((rate_hz - ((accels[0] + accels[1]) / 8.0 / 0.1).sqrt()).abs() < 1e-9, "{rate_hz}");
+        assert_eq!(status(&straight([rate_hz; 2]), question.clone()), Status::Clear);
+        assert_eq!(status(&straight([0.7 * rate_hz; 2]), question), Status::Undecided);
+    }
 }
 
 #[test]
@@ -415,8 +426,15 @@ fn obstacles_are_kept_clear_of() {
     let capsule =
         Shape::Capsule { from_m: Vector3::new(0.0, -3.0, 0.0), to_m: Vector3::new(0.0, 3.0, 0.0), radius_m: 1.0 };
     for shape in [ball, cuboid, capsule] {
-        for (z, expected) in [(0.4, Status::Clear), (0.5, Status::Clear), (0.6, Status::Violation)] {
-            let outcome = asked(&flight, with(thing(shape, [0.0, 0.0, z])));
+        // At no clearance it may be touched and not be entered.
+        for (clearance_m, z, expected) in [
+            (None, 0.4, Status::Clear),
+            (None, 0.5, Status::Clear),
+            (None, 0.6, Status::Violation),
+            (Some(0.0), 1.0, Status::Clear),
+            (Some(0.0), 1.1, Status::Violation),
+        ] {
+            let outcome = asked(&flight, with(Obstacle { clearance_m, ..thing(shape, [0.0, 0.0, z]) }));
             assert_eq!((outcome.status, outcome.disagreements), (expected, 0), "{shape:?} {z} {outcome:?}");
             assert!((outcome.obstacles[0].lower_m - (1.0 - z)).abs() < 1e-9, "{outcome:?}");
         }
@@ -438,6 +456,13 @@ fn obstacles_are_kept_clear_of() {
     // On a curve.
     let outcome = asked(&curves(5.0), Question { obstacles: vec![ground(-20.0)], ..Question::delta(0.1) });
     assert_eq!((outcome.disagreements, outcome.status), (0, Status::Clear));
+    // Alpha begins within one box, 0.1 m deep, and never comes near the other.
+    for (at, expected) in [([0.3, 1.0, 1.5], Status::Violation), ([0.3, 1.0, 9.5], Status::Clear)] {
+        let cuboid = Shape::Box { half_m: Vector3::repeat(0.1), yaw_rad: 0.3 };
+        let entered = with(Obstacle { clearance_m: Some(0.0), ..thing(cuboid, at) });
+        let outcome = asked(&curves(5.0), entered);
+        assert_eq!((outcome.disagreements, outcome.status), (0, expected), "{outcome:?}");
+    }
 }
 
 #[test]
@@ -459,12 +484,12 @@ fn only_those_who_are_asked_for_are_judged() {
 fn wrong_recordings_and_questions_are_refused_by_name() {
     let refused = |items: &[Item], question: Question| judge(&names(2), items, question).unwrap_err().to_string();
     let twice = [seen(0, 1.0, [0.0; 3]), seen(0, 1.0, [1.0, 0.0, 0.0])];
-    assert!(refused(&twice, Question::delta(1.0)).contains("alpha: the time 1 s is not later than 1 s"));
+    assert!(refused(&twice, Question::delta(1.0)).contains("alpha: the time 1.0 s is not later than 1.0 s"));
     assert!(
-        refused(&[seen(1, 1.0, [f64::NAN, 0.0, 0.0])], Question::delta(1.0)).contains("bravo at 1 s: the position")
+        refused(&[seen(1, 1.0, [f64::NAN, 0.0, 0.0])], Question::delta(1.0)).contains("bravo at 1.0 s: the position")
     );
     let back = [seen(0, 1.0, [0.0; 3]), seen(1, 0.5, [0.0; 3])];
-    assert!(refused(&back, Question::delta(1.0)).contains("comes after one at 1 s"));
+    assert!(refused(&back, Question::delta(1.0)).contains("comes after one at 1.0 s"));
     assert!(refused(&[seen(7, 1.0, [0.0; 3])], Question::delta(1.0)).contains("no name for vehicle 8"));
     let with = |motion| Question { motion: Some(motion), ..Question::delta(1.0) };
     assert!(refused(&pass(1.0), with(Motion::Polynomial)).contains("has samples and no curve"));

@@ -9,19 +9,20 @@ use nalgebra::Vector3;
 use super::console::{self, Console};
 use super::events;
 use super::obstacles;
+use super::outputs;
 use super::reading::{FormatArgument, ReadArguments};
 use super::{Exit, Failure};
-use crate::audit::recorded::{History, Judge, Motion, Outcome, Question, RecordedError, Terms, Who};
+use crate::audit::recorded::{Approach, History, Judge, Motion, Outcome, Question, RecordedError, Terms, Who};
 use crate::figures::{self, Encounter, Figure};
 use crate::read::{self, ReadOptions};
-use crate::report::recorded::{Clock, RecordedReport, Source};
+use crate::report::recorded::{Clock, RecordedReport, Source, interval};
 use crate::report::{Status, write_atomically};
 use crate::track::Item;
 
 /// Items that are read before the first is judged: usual intervals are learnt from them.
 const OPENING: usize = 65_536;
-/// Pairs that the page draws.
-const DRAWN_PAIRS: usize = 3;
+/// Pairs, and approaches to obstacles, that the page draws.
+const DRAWN: usize = 3;
 
 /// Arguments of `tautline audit`.
 #[derive(Debug, Args)]
@@ -37,19 +38,19 @@ pub(super) struct AuditArguments {
     format: Option<FormatArgument>,
 
     /// Safety distance between two centres [m]; with --ellipsoid a scaled distance, by default 2.
-    #[arg(long, value_name = "METRES", help_heading = "Question")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Question")]
     delta: Option<f64>,
     /// What happens between samples [default: linear for samples, polynomial for curves].
     #[arg(long, value_name = "MOTION", help_heading = "Question")]
     motion: Option<MotionArgument>,
     /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
-    #[arg(long, value_name = "[NAME=]A", value_parser = named, help_heading = "Question")]
+    #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
     max_accel: Vec<Named>,
     /// Radius [m] of every vehicle, or of one; may be given several times.
-    #[arg(long, value_name = "[NAME=]R", value_parser = named, help_heading = "Question")]
+    #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
     radius: Vec<Named>,
     /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash; two touch at a scaled distance of 2.
-    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, conflicts_with_all = ["radius", "obstacles"], help_heading = "Question")]
+    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, allow_hyphen_values = true, conflicts_with_all = ["radius", "obstacles"], help_heading = "Question")]
     ellipsoid: Option<Vector3<f64>>,
     /// TOML file of obstacles: balls, boxes, capsules, half-spaces; at rest or moving.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
@@ -70,7 +71,7 @@ pub(super) struct AuditArguments {
     #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
     offset: Vec<(String, f64)>,
     /// Longest time between two samples that is no gap [s] [default: 1.5 of the vehicle's usual interval].
-    #[arg(long, value_name = "SECONDS", help_heading = "Question")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     max_gap: Option<f64>,
 
     /// Print the report as JSON on standard output, and nothing else there.
@@ -193,11 +194,20 @@ impl AuditArguments {
         })
     }
 
+    fn check_outputs(&self) -> Result<(), Failure> {
+        let mut inputs = vec![("the recording", self.reading.recording.as_path())];
+        inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--html", &self.html)];
+        let outputs: Vec<_> =
+            outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
+        outputs::check(&inputs, &outputs)
+    }
+
     fn motion_in_words(&self, curves: bool) -> String {
         let most = |accel: &[Named]| {
             let listed = accel.iter().map(|(name, a)| match name {
-                Some(name) => format!("{a} m/s^2 for {name}"),
-                None => format!("{a} m/s^2"),
+                Some(name) => format!("{a:?} m/s^2 for {name}"),
+                None => format!("{a:?} m/s^2"),
             });
             listed.collect::<Vec<_>>().join(", ")
         };
@@ -212,6 +222,7 @@ impl AuditArguments {
 
 pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    arguments.check_outputs()?;
     let question = arguments.question()?;
     let options = arguments.reading.options(arguments.format)?;
     let path = &arguments.reading.recording;
@@ -223,9 +234,11 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let source = Source { recording: path.display().to_string(), clock, notes };
     let report = RecordedReport::new(&outcome, &question, source, &arguments.motion_in_words(curves));
 
-    if let Some(html) = &arguments.html {
-        let figures = figures(arguments, &options, &question, &outcome)?;
-        write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
+    // The verdict first: a file that cannot be written does not cost it.
+    console.say(&format!("{}\n{}", report.headline(), report.text()));
+    if arguments.json {
+        let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
+        console::data(&json)?;
     }
     if let Some(file) = &arguments.events {
         write_atomically(file, &events::csv(&report)?)?;
@@ -233,10 +246,9 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     if let Some(file) = &arguments.junit {
         write_atomically(file, events::junit(&report, arguments.allow_undecided)?.as_bytes())?;
     }
-    console.say(&format!("{}\n{}", report.headline(), report.text()));
-    if arguments.json {
-        let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
-        console::data(&json)?;
+    if let Some(html) = &arguments.html {
+        let figures = figures(arguments, &options, &question, &outcome)?;
+        write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
     }
     Ok(match report.status {
         Status::Clear => Exit::Good,
@@ -282,52 +294,78 @@ fn judged(
     Ok(Judged { outcome: judge.finish()?, clock, notes: recording.notes().to_vec(), curves })
 }
 
-/// Reads the recording again for the pairs that came closest.
+/// Reads the recording again for those who came closest.
 fn figures(
     arguments: &AuditArguments,
     options: &ReadOptions,
     question: &Question,
     outcome: &Outcome,
 ) -> Result<Vec<Figure>, Failure> {
-    let closest: Vec<_> = outcome.closest.iter().take(DRAWN_PAIRS).collect();
-    let mut histories = Vec::new();
-    for approach in &closest {
-        if let Who::Pair(pair) = approach.who {
-            histories.push(History::new(question, &outcome.vehicles, [pair.first(), pair.second()])?);
-        }
-    }
+    let follow = |approach: &Approach| Ok((History::new(question, outcome, approach.who)?, *approach));
+    let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();
+    let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
     let mut recording = read::open(&arguments.reading.recording, options)?;
-    let (mut items, mut more) = (Vec::new(), !histories.is_empty());
+    let (mut items, mut more) = (Vec::new(), !(pairs.is_empty() && obstacles.is_empty()));
     while more {
         items.clear();
         more = recording.read(&mut items)?;
-        for history in &mut histories {
+        for (history, _) in pairs.iter_mut().chain(&mut obstacles) {
             history.push(&items)?;
         }
     }
-    let encounters: Vec<_> = histories
-        .into_iter()
-        .zip(&closest)
-        .filter_map(|(history, approach)| {
-            let pair = approach.who.pair()?;
-            let moments = history.finish();
-            let path =
-                |which: usize| moments.iter().map(|m| (m.positions_m[which].x, m.positions_m[which].y)).collect();
-            Some(Encounter {
-                names: [pair.first(), pair.second()].map(|k| outcome.vehicles.get(k).cloned().unwrap_or_default()),
-                distances: moments.iter().map(|m| (m.time_s, m.distance_m, m.slack_m)).collect(),
-                paths_m: [path(0), path(1)],
-                limit_m: approach.limit_m,
-                closest: (approach.time_s, approach.certain_m()),
-            })
-        })
-        .collect();
-    let Some(nearest) = encounters.first() else { return Ok(Vec::new()) };
-    let drawn = [
-        figures::encounters(&encounters, "Distances of the closest pairs"),
-        figures::closest_approach(nearest, "Closest approach from above"),
-    ];
+    let unit = if question.ellipsoid_m.is_some() { "ellipsoids" } else { "m" };
+    let encounters = |followed: Vec<(History, Approach)>| {
+        let drawn =
+            followed.into_iter().map(|(history, approach)| encounter(history, &approach, question, outcome, unit));
+        drawn.collect::<Vec<_>>()
+    };
+    let (pairs, obstacles) = (encounters(pairs), encounters(obstacles));
+    let mut drawn = Vec::new();
+    if let Some(nearest) = pairs.first() {
+        drawn.push(figures::encounters(&pairs, "encounters", "Distances of the closest pairs"));
+        drawn.push(figures::closest_approach(nearest, "Closest approach from above"));
+    }
+    if !obstacles.is_empty() {
+        drawn.push(figures::encounters(&obstacles, "obstacles", "Distances from the closest obstacles"));
+    }
     drawn.into_iter().map(|figure| figure.map_err(|error| Failure::machine(error.to_string()))).collect()
+}
+
+/// What a figure shows of two who came close.
+fn encounter(
+    history: History,
+    approach: &Approach,
+    question: &Question,
+    outcome: &Outcome,
+    unit: &'static str,
+) -> Encounter {
+    let vehicle = |k: usize| outcome.vehicles.get(k).cloned().unwrap_or_default();
+    let names = match approach.who {
+        Who::Pair(pair) => [vehicle(pair.first()), vehicle(pair.second())],
+        Who::Obstacle { vehicle: k, obstacle } => {
+            [vehicle(k), question.obstacles.get(obstacle).map(|thing| thing.name.clone()).unwrap_or_default()]
+        }
+    };
+    let mut encounter = Encounter {
+        names,
+        unit,
+        distances: Vec::new(),
+        paths_m: [Vec::new(), Vec::new()],
+        limit_m: approach.limit_m,
+        closest_s: approach.time_s,
+        closest: format!("{} {unit}", interval(approach.lower_m, approach.upper_m)),
+    };
+    for moment in history.finish() {
+        if moment.unseen_before {
+            encounter.distances.push((moment.time_s, f64::NAN, 0.0));
+            encounter.paths_m.iter_mut().for_each(|path| path.push((f64::NAN, f64::NAN)));
+        }
+        encounter.distances.push((moment.time_s, moment.distance_m, moment.slack_m));
+        for (path, at) in encounter.paths_m.iter_mut().zip(moment.positions_m) {
+            path.push((at.x, at.y));
+        }
+    }
+    encounter
 }
 
 /// The command as it was given, for a shell.

@@ -13,20 +13,19 @@ const COLUMNS: [&str; 10] =
 pub(super) fn csv(report: &RecordedReport) -> Result<Vec<u8>, Failure> {
     let none = String::new;
     let mut rows: Vec<(f64, [String; 10])> = Vec::new();
-    for b in report.breaches() {
-        let [first, second] = b.who;
-        let [from, to, min, at, limit] = [b.from_s, b.to_s, b.min_m, b.min_at_s, b.limit_m].map(|x| x.to_string());
+    for b in &report.violations {
+        let [first, second] = b.who.clone();
+        let [from, to, min, at, limit] = [b.from_s, b.to_s, b.min_m, b.min_at_s, b.limit_m].map(number);
         rows.push((b.from_s, ["violation".to_owned(), first, second, from, to, min.clone(), min, at, limit, none()]));
     }
     for u in &report.undecided {
         let [first, second] = u.who.clone();
-        let [from, to, lower, upper, limit] =
-            [u.from_s, u.to_s, u.lower_m, u.upper_m, u.limit_m].map(|x| x.to_string());
-        let rate = u.rate_hz.map_or_else(none, |hz| hz.to_string());
+        let [from, to, lower, upper, limit] = [u.from_s, u.to_s, u.lower_m, u.upper_m, u.limit_m].map(number);
+        let rate = u.rate_hz.map_or_else(none, number);
         rows.push((u.from_s, ["undecided".to_owned(), first, second, from, to, lower, upper, none(), limit, rate]));
     }
     for gap in &report.gaps {
-        let [from, to] = [gap.from_s, gap.to_s].map(|x| x.to_string());
+        let [from, to] = [gap.from_s, gap.to_s].map(number);
         let [second, lower, upper, at, limit, rate] = std::array::from_fn(|_| none());
         rows.push((
             gap.from_s,
@@ -41,6 +40,11 @@ pub(super) fn csv(report: &RecordedReport) -> Result<Vec<u8>, Failure> {
         writer.write_record(row).map_err(failed)?;
     }
     writer.into_inner().map_err(|error| Failure::machine(format!("cannot write the events: {error}")))
+}
+
+/// Every digit of a number, in powers of ten where it is very large or small.
+fn number(x: f64) -> String {
+    format!("{x:?}")
 }
 
 /// A suite with a case for the verdict and one for each thing found. What is undecided fails, or is skipped where it is
@@ -66,18 +70,18 @@ pub(super) fn junit(report: &RecordedReport, allow_undecided: bool) -> Result<St
         Status::Undecided => doubtful(&headline),
     };
     let mut cases = vec![TestCase::new("separation", verdict)];
-    for b in report.breaches() {
+    for b in &report.violations {
         let [first, second] = &b.who;
-        let words = format!("{} below {} from {} s to {} s", b.min_m, b.limit_m, b.from_s, b.to_s);
+        let words = format!("{:?} below {:?} from {:?} s to {:?} s", b.min_m, b.limit_m, b.from_s, b.to_s);
         cases.push(TestCase::new(format!("{first} and {second} at {:.3} s", b.min_at_s), failed(&words)));
     }
     for u in &report.undecided {
         let [first, second] = &u.who;
-        let words = format!("between {} and {} against {} by {} s", u.lower_m, u.upper_m, u.limit_m, u.to_s);
+        let words = format!("between {:?} and {:?} against {:?} by {:?} s", u.lower_m, u.upper_m, u.limit_m, u.to_s);
         cases.push(TestCase::new(format!("{first} and {second} from {:.3} s", u.from_s), doubtful(&words)));
     }
     for gap in &report.gaps {
-        let words = format!("not seen from {} s to {} s", gap.from_s, gap.to_s);
+        let words = format!("not seen from {:?} s to {:?} s", gap.from_s, gap.to_s);
         cases.push(TestCase::new(format!("{} from {:.3} s", gap.vehicle, gap.from_s), doubtful(&words)));
     }
     for case in &mut cases {

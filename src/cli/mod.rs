@@ -15,6 +15,7 @@ mod export;
 mod folder;
 mod list;
 mod obstacles;
+mod outputs;
 mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]

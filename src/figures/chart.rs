@@ -369,9 +369,9 @@ const SPACE: f64 = 5.0;
 const BETWEEN: f64 = 12.0;
 
 impl Entry<'_> {
-    /// Width by a crude estimate of the font \[px\].
+    /// Width by a crude estimate of the font \[px\], rather that of a wide one.
     fn width_px(&self) -> f64 {
-        SAMPLE + SPACE + 0.52 * TEXT * self.words.chars().count() as f64
+        SAMPLE + SPACE + 0.6 * TEXT * self.words.chars().count() as f64
     }
 }
 

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A file could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +24,8 @@ impl ArtefactError {
 /// Writes a file so that nobody ever sees a part of it: the bytes go to a temporary name in the same folder, down to the
 /// disk, and the file is then renamed over `path`. An error leaves `path` as it was and no temporary file behind.
 ///
+/// A link stays one: what it leads to is replaced. What is no file, such as a pipe or a device, is written into.
+///
 /// # Errors
 /// [`ArtefactError`] when the system refuses.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
@@ -39,22 +41,34 @@ pub fn write_atomically_with<T, E: From<ArtefactError>>(
     write: impl FnOnce(&mut File) -> Result<T, E>,
 ) -> Result<T, E> {
     let error = |source| E::from(ArtefactError::new(path, source));
+    if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        return write(&mut File::options().write(true).open(path).map_err(error)?);
+    }
+    let target = behind_links(path);
     let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "it names no file"));
     let mut temporary = OsString::from(".");
-    temporary.push(path.file_name().ok_or_else(no_name)?);
+    temporary.push(target.file_name().ok_or_else(no_name)?);
     // Two processes may write the same file; the later one wins, whole.
     temporary.push(format!(".{}.partial", std::process::id()));
-    let temporary = path.with_file_name(temporary);
+    let temporary = target.with_file_name(temporary);
     let written = File::create(&temporary).map_err(error).and_then(|mut file| {
         let written = write(&mut file)?;
         file.sync_all().map_err(error)?;
         Ok(written)
     });
-    let renamed = written.and_then(|written| fs::rename(&temporary, path).map(|()| written).map_err(error));
+    let renamed = written.and_then(|written| fs::rename(&temporary, &target).map(|()| written).map_err(error));
     renamed.inspect_err(|_| {
         // The first error is the one to report.
         let _ = fs::remove_file(&temporary);
     })
+}
+
+/// The file that a path leads to, also where it is yet to be made.
+fn behind_links(path: &Path) -> PathBuf {
+    match fs::read_link(path) {
+        Ok(next) => fs::canonicalize(path).unwrap_or_else(|_| path.with_file_name(next)),
+        Err(_) => path.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -95,5 +109,33 @@ mod tests {
         assert!(write_atomically(&folder.path().join("missing/report.json"), b"").is_err());
         assert!(write_atomically(Path::new("/"), b"").is_err());
         assert!(write_atomically(Path::new(""), b"").is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_what_is_no_file_is_written_into() {
+        use std::io::Read as _;
+        use std::os::unix::{fs::FileTypeExt as _, fs::symlink};
+
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("runs")).expect("a folder");
+        fs::write(at("runs/3.html"), b"old").expect("writes");
+        for target in ["runs/3.html", "runs/4.html"] {
+            let _ = fs::remove_file(at("latest.html"));
+            symlink(target, at("latest.html")).expect("a link");
+            write_atomically(&at("latest.html"), b"new").expect("writes");
+            assert_eq!(fs::read_link(at("latest.html")).expect("still a link"), Path::new(target));
+            assert_eq!(fs::read(at(target)).expect("reads"), b"new");
+        }
+        assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().expect("runs").success());
+        // Opened for both, so that neither end waits for the other.
+        let mut pipe = File::options().read(true).write(true).open(at("pipe")).expect("a pipe");
+        write_atomically(&at("pipe"), b"through").expect("writes");
+        let mut through = [0; 7];
+        pipe.read_exact(&mut through).expect("reads");
+        assert_eq!(&through, b"through");
+        assert!(fs::metadata(at("pipe")).expect("there").file_type().is_fifo());
+        assert_eq!(names(folder.path()).len(), 3, "nothing else is left");
     }
 }

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::page::{Badge, Block, Column, Page, Section, Table, Tone};
-use super::words::{metres, metres_below, seconds};
-use super::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, Status, Violation, finite};
+use super::words::{fixed, metres, metres_below, seconds};
+use super::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Status, Violation, finite};
 use crate::audit::recorded::{self, Approach, Outcome, Question, Who};
 use crate::figures::Figure;
 use crate::swarm::Pair;
@@ -55,12 +55,16 @@ pub struct RecordedReport {
     pub motion: String,
     /// Names of the vehicles; numbers of pairs count them from 1.
     pub vehicles: Vec<String>,
+    /// How many of them were judged: asked for, and there.
+    pub judged: usize,
     /// First and last instant judged \[s\].
     pub span_s: Option<(f64, f64)>,
     /// How close vehicles came.
     pub separation: Separation,
     /// What the judgement rests on.
     pub audit: Audit,
+    /// Every violation, of pairs and of obstacles, in order of time.
+    pub violations: Vec<Breach>,
     /// The ten closest pairs.
     pub closest: Vec<Closest>,
     /// What obstacles were in the way of.
@@ -71,6 +75,23 @@ pub struct RecordedReport {
     pub undecided: Vec<Undecided>,
     /// Where the recording contradicts the assumed bound on acceleration.
     pub contradiction: Option<Contradiction>,
+}
+
+/// How close vehicles came, by the keys of a flight's report.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Separation {
+    /// Safety distance delta \[m\]; none where radii alone were asked about.
+    pub delta_m: Option<f64>,
+    /// Smallest distance of two vehicles \[m\].
+    pub min_m: Option<f64>,
+    /// When it occurred \[s\].
+    pub min_at_s: Option<f64>,
+    /// Which pair.
+    pub min_pair: Option<[usize; 2]>,
+    /// Of flights alone.
+    pub certified_m: Option<f64>,
+    /// Of flights alone.
+    pub certificate_void: Vec<String>,
 }
 
 /// The closest that two came.
@@ -186,8 +207,6 @@ impl RecordedReport {
         let is_pair = |who: Who| matches!(who, Who::Pair(_));
         let first = outcome.closest.first();
         let scaled = question.ellipsoid_m.is_some();
-        let limit_m = first.map_or(0.0, |first| first.limit_m);
-        let delta_m = question.delta_m.unwrap_or(if scaled { 2.0 } else { limit_m });
         let min_m = first.and_then(|first| finite(first.certain_m()));
         Self {
             schema_version: SCHEMA_VERSION,
@@ -196,14 +215,14 @@ impl RecordedReport {
             measure: if scaled { "ellipsoids" } else { "metres" },
             motion: motion.to_owned(),
             vehicles: outcome.vehicles.clone(),
+            judged: outcome.presence.iter().flatten().count(),
             span_s: outcome.span_s,
             separation: Separation {
-                delta_m,
+                delta_m: question.delta_m.or(scaled.then_some(recorded::TOUCHING_ELLIPSOIDS)),
                 min_m,
                 min_at_s: first.and_then(|first| finite(first.time_s)),
                 min_pair: first.and_then(|first| first.who.pair()).map(Pair::numbers),
-                certified_m: None,
-                certificate_void: Vec::new(),
+                ..Separation::default()
             },
             audit: Audit {
                 status: outcome.status.into(),
@@ -214,6 +233,7 @@ impl RecordedReport {
                 parry: Parry { min_toi_s: outcome.min_toi_s.and_then(finite), disagreements: outcome.disagreements },
                 rapier: Rapier { contact_pairs: None },
             },
+            violations: outcome.violations.iter().map(breach).collect(),
             closest: outcome.closest.iter().map(closest).collect(),
             obstacles: Obstacles {
                 closest: outcome.obstacles.iter().map(closest).collect(),
@@ -254,26 +274,6 @@ impl RecordedReport {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// Every violation by names, of pairs and of obstacles, in order of time.
-    #[must_use]
-    pub fn breaches(&self) -> Vec<Breach> {
-        let name = |number: usize| self.vehicles.get(number.wrapping_sub(1)).cloned().unwrap_or_default();
-        let pairs = self.audit.violations.iter().filter_map(|v| {
-            let [first, second] = v.pair;
-            let limit_m = self.limit_of([&name(first), &name(second)]);
-            let (from_s, to_s, min_m, min_at_s) = (v.from_s?, v.to_s?, v.min_m?, v.min_at_s?);
-            Some(Breach { who: [name(first), name(second)], from_s, to_s, min_m, min_at_s, limit_m })
-        });
-        let mut all: Vec<_> = pairs.chain(self.obstacles.violations.iter().cloned()).collect();
-        all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
-        all
-    }
-
-    fn limit_of(&self, who: [&str; 2]) -> f64 {
-        let known = self.closest.iter().find(|closest| closest.who[0] == who[0] && closest.who[1] == who[1]);
-        known.map_or(self.separation.delta_m, |closest| closest.limit_m)
-    }
-
     fn unit(&self) -> &'static str {
         if self.measure == "metres" { " m" } else { " ellipsoids" }
     }
@@ -281,11 +281,25 @@ impl RecordedReport {
     /// The verdict in one line.
     #[must_use]
     pub fn headline(&self) -> String {
+        format!("{}: {}", self.verdict(), self.finding())
+    }
+
+    fn verdict(&self) -> &'static str {
+        match self.status {
+            Status::Clear => "PROVED CLEAR",
+            Status::Violation => "VIOLATION",
+            Status::Undecided => "UNDECIDED",
+        }
+    }
+
+    /// The headline behind the verdict.
+    fn finding(&self) -> String {
         let unit = self.unit();
-        let delta = format!("{}{unit}", metres(self.separation.delta_m));
+        let delta = self.separation.delta_m.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", metres(m)));
         match self.status {
             Status::Clear => {
-                let closest = self.closest.iter().chain(&self.obstacles.closest).next().map_or_else(
+                let all = self.closest.iter().chain(&self.obstacles.closest);
+                let closest = all.min_by(|a, b| a.lower_m.total_cmp(&b.lower_m)).map_or_else(
                     || "no two vehicles were there together".to_owned(),
                     |closest| {
                         let [first, second] = &closest.who;
@@ -293,19 +307,19 @@ impl RecordedReport {
                         format!("never closer than {}{unit}, {first} and {second} at {at}", at_least(closest.lower_m))
                     },
                 );
-                format!("PROVED CLEAR: {closest} (delta {delta}, {})", self.motion)
+                format!("{closest} ({delta}, {})", self.motion)
             }
             Status::Violation => {
-                let breaches = self.breaches();
-                let deepest = breaches.iter().min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
-                let others = match breaches.len() {
+                let violations = &self.violations;
+                let deepest = violations.iter().min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
+                let others = match violations.len() {
                     0 | 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
-                deepest.map_or("VIOLATION".to_owned(), |b| {
+                deepest.map_or(String::new(), |b| {
                     let [first, second] = &b.who;
                     format!(
-                        "VIOLATION: {first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
+                        "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
                         metres_below(b.min_m, b.limit_m),
                         metres(b.limit_m),
                         seconds(b.min_at_s),
@@ -313,7 +327,7 @@ impl RecordedReport {
                     )
                 })
             }
-            Status::Undecided => format!("UNDECIDED: {} (delta {delta}, {})", self.why_undecided(), self.motion),
+            Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(), self.motion),
         }
     }
 
@@ -324,16 +338,17 @@ impl RecordedReport {
         }
         if let Some(c) = &self.contradiction {
             return format!(
-                "{} needs {:.3} m/s^2 at {}, more than the assumed {} m/s^2",
+                "{} needs {} m/s^2 at {}, more than the assumed {:?} m/s^2",
                 c.vehicle,
-                c.needs_m_s2,
+                fixed(c.needs_m_s2, 3),
                 seconds(c.time_s),
                 c.assumed_m_s2
             );
         }
         if let Some(u) = self.undecided.iter().min_by(|a, b| a.lower_m.total_cmp(&b.lower_m)) {
             let [first, second] = &u.who;
-            let rate = self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {hz:.1} Hz would decide"));
+            let rate =
+                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
             return format!(
                 "{first} and {second} came to between {}{unit} and {}{unit} by {}{rate}",
                 at_least(u.lower_m),
@@ -361,10 +376,11 @@ impl RecordedReport {
         let mut line = |words: String| {
             let _ = writeln!(text, "{words}");
         };
-        let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| format!("{from_s:.3} s to {to_s:.3} s"));
+        let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
         line(format!(
-            "judged       {span}, {} vehicles, {} stretches of motion, {} swept",
-            self.vehicles.len(),
+            "judged       {span}, {} vehicle{}, {} stretches of motion, {} swept",
+            self.judged,
+            if self.judged == 1 { "" } else { "s" },
             self.audit.steps,
             self.audit.pairs_checked
         ));
@@ -375,10 +391,10 @@ impl RecordedReport {
             }
             for c in closest {
                 let [first, second] = &c.who;
-                line(format!("  {}  at {:.3} s  {first} and {second}", interval(c.lower_m, c.upper_m), c.time_s));
+                let at = fixed(c.time_s, 3);
+                line(format!("  {}  at {at} s  {first} and {second}", interval(c.lower_m, c.upper_m)));
             }
         }
-        let breaches = self.breaches();
         let mut list = |heading: &str, lines: Vec<String>| {
             if !lines.is_empty() {
                 line(format!("{heading}: {}", lines.len()));
@@ -391,7 +407,7 @@ impl RecordedReport {
                 line(format!("  and {rest} more"));
             }
         };
-        list("violations", breaches.iter().map(Breach::words).collect());
+        list("violations", self.violations.iter().map(Breach::words).collect());
         list("undecided", self.undecided.iter().map(Undecided::words).collect());
         list("gaps", self.gaps.iter().map(Gap::words).collect());
         text
@@ -400,7 +416,10 @@ impl RecordedReport {
     /// The report as a self-contained HTML page.
     #[must_use]
     pub fn to_html(&self, figures: &[Figure], command: &str) -> String {
-        let mut sections = vec![section("Closest pairs", vec![Block::Table(closest_table(&self.closest))])];
+        let mut sections = Vec::new();
+        if !self.closest.is_empty() {
+            sections.push(section("Closest pairs", vec![Block::Table(closest_table(&self.closest))]));
+        }
         if !figures.is_empty() {
             sections.push(section("Figures", vec![Block::Figures(figures.to_vec())]));
         }
@@ -408,7 +427,7 @@ impl RecordedReport {
             sections.push(section("Obstacles", vec![Block::Table(closest_table(&self.obstacles.closest))]));
         }
         let lists = [
-            ("Violations", self.breaches().iter().map(Breach::words).collect::<Vec<_>>()),
+            ("Violations", self.violations.iter().map(Breach::words).collect::<Vec<_>>()),
             ("Undecided", self.undecided.iter().map(Undecided::words).collect()),
             ("Gaps", self.gaps.iter().map(Gap::words).collect()),
             ("How it was read", self.source.notes.clone()),
@@ -424,22 +443,22 @@ impl RecordedReport {
             }
         }
         let assumed = vec![
-            format!("Between samples: {}.", self.motion),
+            format!("Motion: {}.", self.motion),
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
         sections.push(section("What was assumed", vec![Block::List(assumed)]));
         sections.push(section("Repeat it", vec![Block::Command(command.to_owned())]));
-        let (tone, word) = match self.status {
-            Status::Clear => (Tone::Good, "clear"),
-            Status::Violation => (Tone::Bad, "violation"),
-            Status::Undecided => (Tone::Neutral, "undecided"),
+        let tone = match self.status {
+            Status::Clear => Tone::Good,
+            Status::Violation => Tone::Bad,
+            Status::Undecided => Tone::Neutral,
         };
         Page {
             title: self.source.recording.clone(),
             kind: "Audit of a recording".to_owned(),
-            badge: Badge { tone, word: word.to_owned() },
-            verdict: self.headline(),
+            badge: Badge { tone, word: self.verdict().to_owned() },
+            verdict: self.finding(),
             reasons: Vec::new(),
             warnings: Vec::new(),
             sections,
@@ -464,11 +483,10 @@ impl Breach {
         let [first, second] = &self.who;
         let min = metres_below(self.min_m, self.limit_m);
         format!(
-            "{first} and {second}: {min} at {:.3} s, below {} from {:.3} s to {:.3} s",
-            self.min_at_s,
+            "{first} and {second}: {min} at {} s, below {} from {}",
+            fixed(self.min_at_s, 3),
             metres(self.limit_m),
-            self.from_s,
-            self.to_s
+            span(self.from_s, self.to_s)
         )
     }
 }
@@ -476,12 +494,11 @@ impl Breach {
 impl Undecided {
     fn words(&self) -> String {
         let [first, second] = &self.who;
-        let rate = self.rate_hz.map_or(String::new(), |hz| format!("; {hz:.1} Hz would decide"));
+        let rate = self.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
         format!(
-            "{first} and {second}: {} from {:.3} s to {:.3} s, limit {}{rate}",
+            "{first} and {second}: {} from {}, limit {}{rate}",
             interval(self.lower_m, self.upper_m),
-            self.from_s,
-            self.to_s,
+            span(self.from_s, self.to_s),
             metres(self.limit_m)
         )
     }
@@ -489,19 +506,25 @@ impl Undecided {
 
 impl Gap {
     fn words(&self) -> String {
-        format!("{} was not seen from {:.3} s to {:.3} s", self.vehicle, self.from_s, self.to_s)
+        format!("{} was not seen from {}", self.vehicle, span(self.from_s, self.to_s))
     }
 }
 
+/// Two times in words.
+fn span(from_s: f64, to_s: f64) -> String {
+    format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
+}
+
 /// A number with six decimals, or an interval where they differ.
-fn interval(lower: f64, upper: f64) -> String {
-    let (low, high) = (format!("{lower:.6}"), format!("{upper:.6}"));
+#[must_use]
+pub fn interval(lower: f64, upper: f64) -> String {
+    let (low, high) = (fixed(lower, 6), fixed(upper, 6));
     if upper - lower <= 2.0 * recorded::WIDTH_M || low == high { high } else { format!("{low} .. {high}") }
 }
 
 /// A length rounded down to six decimals, so that "never closer than" stays true.
 fn at_least(number: f64) -> String {
-    format!("{:.6}", (number * 1e6).floor() / 1e6)
+    fixed((number * 1e6).floor() / 1e6, 6)
 }
 
 fn section(heading: &str, blocks: Vec<Block>) -> Section {
@@ -514,7 +537,7 @@ fn closest_table(closest: &[Closest]) -> Table {
         vec![
             format!("{first} and {second}").into(),
             interval(c.lower_m, c.upper_m).into(),
-            format!("{:.3}", c.time_s).into(),
+            fixed(c.time_s, 3).into(),
             metres(c.limit_m).into(),
         ]
     });

@@ -10,11 +10,16 @@ pub(super) fn metres(number: f64) -> String {
     if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { format!("{number:.3}") } else { format!("{number:.1e}") }
 }
 
+/// A number with so many decimals, or in powers of ten where that would fill a line.
+pub(super) fn fixed(number: f64, decimals: usize) -> String {
+    if number.abs() < 1e15 { format!("{number:.decimals$}") } else { format!("{number:e}") }
+}
+
 /// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller.
 pub(super) fn metres_below(number: f64, limit_m: f64) -> String {
     (3..=17)
-        .find(|&decimals| format!("{number:.decimals$}") != format!("{limit_m:.decimals$}"))
-        .map_or_else(|| number.to_string(), |decimals| format!("{number:.decimals$}"))
+        .find(|&decimals| fixed(number, decimals) != fixed(limit_m, decimals))
+        .map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
 }
 
 /// A length \[m\] rounded down to three decimals, so that "never closer than" stays true.
@@ -28,7 +33,7 @@ fn metres_at_least(number: f64) -> String {
 
 /// A time with its unit.
 pub(super) fn seconds(time_s: f64) -> String {
-    format!("{time_s:.2} s")
+    format!("{} s", fixed(time_s, 2))
 }
 
 impl Report {

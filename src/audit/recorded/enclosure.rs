@@ -26,6 +26,16 @@ pub(super) enum Target<'a> {
     Shape(&'a Shape),
 }
 
+impl Target<'_> {
+    /// The distance of a point from it.
+    pub(super) fn distance(self, point: Vector3<f64>) -> f64 {
+        match self {
+            Self::Origin => point.norm(),
+            Self::Shape(shape) => shape.distance(point),
+        }
+    }
+}
+
 /// The smallest distance over a stretch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Minimum {
@@ -88,13 +98,18 @@ impl<'a> Search<'a> {
 
     /// The smallest distance, to within `width`; `None` if it is not below `cutoff`.
     pub(super) fn minimum(&mut self, cutoff: f64, width: f64) -> Option<Minimum> {
-        let (low, _) = self.enclose(0.0, 1.0);
+        self.minimum_within((0.0, 1.0), cutoff, width)
+    }
+
+    /// The smallest distance between two fractions of the stretch, likewise.
+    pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64, width: f64) -> Option<Minimum> {
+        let (low, _) = self.enclose(from, to - from);
         if low >= cutoff {
             return None;
         }
-        let (start, end) = (self.distance(0.0), self.distance(1.0));
-        let (mut upper, mut at) = if end < start { (end, 1.0) } else { (start, 0.0) };
-        let mut parts = BinaryHeap::from([Part { low, start: 0.0, length: 1.0 }]);
+        let (start, end) = (self.distance(from), self.distance(to));
+        let (mut upper, mut at) = if end < start { (end, to) } else { (start, from) };
+        let mut parts = BinaryHeap::from([Part { low, start: from, length: to - from }]);
         let mut looked_at = 0;
         let mut lower = f64::INFINITY;
         while let Some(part) = parts.pop() {
@@ -149,11 +164,7 @@ impl<'a> Search<'a> {
 
     /// The distance at a fraction of the stretch.
     pub(super) fn distance(&self, u: f64) -> f64 {
-        let at = self.position(u);
-        match self.target {
-            Target::Origin => at.norm(),
-            Target::Shape(shape) => shape.distance(at),
-        }
+        self.target.distance(self.position(u))
     }
 
     pub(super) fn position(&self, u: f64) -> Vector3<f64> {
@@ -211,8 +222,8 @@ impl<'a> Search<'a> {
         ((low - rounding).max(0.0).sqrt(), (high + rounding).max(0.0).sqrt())
     }
 
-    /// The distance from a convex set changes no faster than the point moves, and is greatest at a corner of what encloses
-    /// the point. The box is the one shape whose distance ends at zero within, which changes neither.
+    /// The distance from a convex set, below zero within, changes no faster than the point moves, and is greatest at a
+    /// corner of what encloses the point.
     fn enclose_shape(&self, shape: &Shape) -> (f64, f64) {
         let n = self.part.len();
         let from = self.part[0];

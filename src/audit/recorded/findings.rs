@@ -72,10 +72,9 @@ pub(super) struct Below {
 pub(super) struct Findings {
     pub(super) closest: Closest,
     pub(super) obstacles: Closest,
-    pub(super) violations: Vec<Violation>,
-    pub(super) undecided: Vec<Undecided>,
-    last_violation: BTreeMap<Who, usize>,
-    last_undecided: BTreeMap<Who, usize>,
+    /// Of each pair in order of time.
+    pub(super) violations: BTreeMap<Who, Vec<Violation>>,
+    pub(super) undecided: BTreeMap<Who, Vec<Undecided>>,
     pub(super) swept: u64,
     pub(super) min_toi_s: Option<f64>,
     pub(super) disagreements: u64,
@@ -91,39 +90,38 @@ impl Findings {
         }
     }
 
-    /// Enters a stretch below the limit. Stretches of one pair come in order of time; one that straddles two windows may
-    /// come twice.
+    /// Enters a stretch below the limit. Stretches of one pair come in order of time, but those that touch the border of
+    /// two windows come twice.
     pub(super) fn violated(&mut self, below: Below) {
         let new = below.violation;
-        if let Some(&index) = self.last_violation.get(&new.who) {
-            let last = &mut self.violations[index];
-            let again = new.from_s >= last.from_s && new.to_s <= last.to_s;
-            if again || (below.from_start && new.from_s <= last.to_s) {
-                last.to_s = last.to_s.max(new.to_s);
-                if new.min_m < last.min_m {
-                    (last.min_m, last.min_at_s) = (new.min_m, new.min_at_s);
+        let known = self.violations.entry(new.who).or_default();
+        let mut touching = (0..known.len()).rev().take_while(|&k| known[k].to_s >= new.from_s);
+        let repeated = touching.find(|&k| known[k].from_s <= new.from_s && new.to_s <= known[k].to_s);
+        let continued = || known.len().checked_sub(1).filter(|&k| below.from_start && new.from_s <= known[k].to_s);
+        match repeated.or_else(continued) {
+            Some(k) => {
+                let old = &mut known[k];
+                old.to_s = old.to_s.max(new.to_s);
+                if new.min_m < old.min_m {
+                    (old.min_m, old.min_at_s) = (new.min_m, new.min_at_s);
                 }
-                return;
             }
+            None => known.push(new),
         }
-        self.last_violation.insert(new.who, self.violations.len());
-        self.violations.push(new);
     }
 
     /// Enters a stretch that cannot be decided; adjacent ones of a pair become one.
     pub(super) fn unknown(&mut self, new: Undecided) {
-        if let Some(&index) = self.last_undecided.get(&new.who) {
-            let last = &mut self.undecided[index];
-            if new.from_s <= last.to_s {
+        let known = self.undecided.entry(new.who).or_default();
+        match known.last_mut() {
+            Some(last) if new.from_s <= last.to_s && last.from_s <= new.to_s => {
                 last.to_s = last.to_s.max(new.to_s);
                 last.lower_m = last.lower_m.min(new.lower_m);
                 last.upper_m = last.upper_m.min(new.upper_m);
                 last.rate_hz = last.rate_hz.zip(new.rate_hz).map(|(a, b)| a.max(b));
-                return;
             }
+            _ => known.push(new),
         }
-        self.last_undecided.insert(new.who, self.undecided.len());
-        self.undecided.push(new);
     }
 
     pub(super) fn contact(&mut self, time_s: f64) {
@@ -174,7 +172,9 @@ mod tests {
         findings.violated(below(1.0, 1.5, 1.2, true));
         findings.violated(below(1.0, 1.5, 1.2, true));
         findings.violated(below(1.5, 1.75, 1.9, false));
-        let found: Vec<_> = findings.violations.iter().map(|v| (v.from_s, v.to_s, v.min_m)).collect();
+        // The border of two windows: what touches it comes again.
+        findings.violated(below(1.0, 1.5, 1.2, true));
+        let found: Vec<_> = findings.violations[&who].iter().map(|v| (v.from_s, v.to_s, v.min_m)).collect();
         assert_eq!(found, [(0.5, 1.5, 1.2), (1.5, 1.75, 1.9)]);
     }
 }

@@ -49,8 +49,9 @@ fn time_at(from_s: f64, to_s: f64, fraction: f64) -> f64 {
 
 /// Calls `f` with the time that each stretch of one shares with each of the other, in order of time.
 ///
-/// Stretches are closed: one that ends where another begins shares that instant with it, unless both of a pair end
-/// together; then the next two follow, so that two jumps at one instant are swept together.
+/// Stretches are closed: one that ends where another begins shares that instant with it. Where two end together the next
+/// two follow, so that two jumps at one instant are swept together; one that nothing follows waits for what follows the
+/// other, unless the two were such jumps.
 pub(super) fn shared<'a>(first: &'a [Segment], second: &'a [Segment], mut f: impl FnMut(Shared<'a>)) {
     let (mut a, mut b) = (0, 0);
     while let (Some(one), Some(other)) = (first.get(a), second.get(b)) {
@@ -58,11 +59,16 @@ pub(super) fn shared<'a>(first: &'a [Segment], second: &'a [Segment], mut f: imp
         if from_s <= to_s {
             f(Shared { first: one, second: other, from_s, to_s });
         }
-        let (last_a, last_b) = (a + 1 == first.len(), b + 1 == second.len());
-        let together = one.to_s == other.to_s;
-        let (step_a, step_b) = (one.to_s < other.to_s || together, other.to_s < one.to_s || together);
-        a += usize::from(step_a && !(together && last_a && !last_b));
-        b += usize::from(step_b && !(together && last_b && !last_a));
+        let (mut step_a, mut step_b) = (one.to_s <= to_s, other.to_s <= to_s);
+        if step_a && step_b {
+            let follows = |next: Option<&Segment>| next.is_some_and(|next| next.from_s <= to_s);
+            let (next_a, next_b) = (follows(first.get(a + 1)), follows(second.get(b + 1)));
+            if next_a != next_b && !(one.jumps() && other.jumps()) {
+                (step_a, step_b) = (next_a, next_b);
+            }
+        }
+        a += usize::from(step_a);
+        b += usize::from(step_b);
     }
 }
 
@@ -160,14 +166,10 @@ impl Meeting<'_> {
 
         let at = |u: f64| time_at(shared.from_s, shared.to_s, u);
         let slack_at = |u: f64| shared.first.slack_at(at(u)) + shared.second.slack_at(at(u));
-        let lower = if matches!(self.target, Target::Origin) {
-            (drawn.lower - slack - rounding).max(0.0)
-        } else {
-            drawn.lower - slack - rounding
-        };
-        // What the ends say is a fact where they are samples.
-        let ends = [0.0, 1.0].map(|u| search.distance(u) + slack_at(u));
-        let upper = (drawn.upper + slack_at(drawn.at)).min(ends[0]).min(ends[1]) + rounding;
+        let floor = if matches!(self.target, Target::Origin) { 0.0 } else { f64::NEG_INFINITY };
+        let least = |lowest: &Minimum| (lowest.lower - slack - rounding).max(floor);
+        let lower = least(&drawn);
+        let upper = upper_over(&search, (0.0, 1.0), &drawn, slack_at) + rounding;
         if lower < self.cutoff {
             self.offer(lower, upper, at(drawn.at), findings);
         }
@@ -179,11 +181,20 @@ impl Meeting<'_> {
                 search.below(limit, drawn.at)
             };
             for (from, to) in spans {
-                let from_start = from <= 0.0 && search.distance(0.0) < limit;
-                self.violated(shared, (from, to), (upper, drawn.at.clamp(from, to)), from_start, findings);
+                let holds = from <= drawn.at && drawn.at <= to;
+                let other = if holds { None } else { search.minimum_within((from, to), f64::INFINITY, WIDTH_M) };
+                let lowest = other.unwrap_or(drawn);
+                let upper = upper_over(&search, (from, to), &lowest, slack_at) + rounding;
+                if upper < limit {
+                    let from_start = from <= 0.0 && search.distance(0.0) < limit;
+                    self.violated(shared, (from, to), (upper, lowest.at), from_start, findings);
+                } else {
+                    let (part, lower) = (Shared { from_s: at(from), to_s: at(to), ..*shared }, least(&lowest));
+                    self.unknown(&part, lower, upper, shared.rate_hz((lowest.upper - limit).abs()), findings);
+                }
             }
         } else if lower < limit || (exact && slack == 0.0 && is_coarse(&motion, lower, limit)) {
-            self.unknown(shared, lower, upper, shared.rate_hz(slack, (drawn.upper - limit).abs()), findings);
+            self.unknown(shared, lower, upper, shared.rate_hz((drawn.upper - limit).abs()), findings);
         }
         if self.may_violate {
             let opinion = self.second_opinion(&r, exact, &motion, &drawn, rounding, &search);
@@ -250,6 +261,12 @@ impl Meeting<'_> {
     }
 }
 
+/// What the smallest distance over a part of a stretch is at most: what the ends say is a fact where they are samples.
+fn upper_over(search: &Search<'_>, (from, to): (f64, f64), lowest: &Minimum, slack_at: impl Fn(f64) -> f64) -> f64 {
+    let [start, end] = [from, to].map(|u| search.distance(u) + slack_at(u));
+    (lowest.upper + slack_at(lowest.at)).min(start).min(end)
+}
+
 /// Whether a separation is clear by less than rounding, where that is no longer negligible against the limit.
 fn is_coarse(motion: &RelativeMotion, min_m: f64, limit: f64) -> bool {
     let resolution = RESOLUTION * motion.from_squared.max(motion.to_squared).sqrt();
@@ -295,14 +312,12 @@ impl Shared<'_> {
         r
     }
 
-    /// The sampling rate at which the slack, which falls with the square of the interval, is no more than the margin.
-    fn rate_hz(&self, slack: f64, margin: f64) -> Option<f64> {
-        let interval_s = [self.first, self.second]
-            .iter()
-            .filter_map(|s| s.curve.as_ref())
-            .map(|c| c.to_s - c.from_s)
-            .fold(0.0, f64::max);
-        (slack > 0.0 && margin > 0.0 && interval_s > 0.0).then(|| (slack / margin).sqrt() / interval_s)
+    /// The sampling rate of both at which the slack is no more than the margin: over intervals of h it is the sum of what
+    /// each has now, c = peak / `h_now`^2, times h^2.
+    fn rate_hz(&self, margin: f64) -> Option<f64> {
+        let curves = [self.first, self.second].into_iter().filter_map(|stretch| stretch.curve.as_ref());
+        let per_s2: f64 = curves.map(|curve| curve.slack.peak() / (curve.to_s - curve.from_s).powi(2)).sum();
+        (per_s2 > 0.0 && margin > 0.0).then(|| (per_s2 / margin).sqrt())
     }
 }
 
@@ -348,5 +363,23 @@ mod tests {
         assert_eq!(times(&first, &[still(0.0, 1.0, 3.0), jump(1.0, [3.0, 4.0])]), [(0.0, 1.0), (1.0, 1.0)]);
         let late = [still(0.0, 1.0, 0.0), still(5.0, 6.0, 0.0)];
         assert_eq!(times(&late, &[still(0.0, 9.0, 0.0)]), [(0.0, 1.0), (5.0, 6.0)]);
+    }
+
+    fn closest(first: &[Segment], second: &[Segment]) -> f64 {
+        let mut closest = f64::INFINITY;
+        shared(first, second, |shared| closest = closest.min(shared.straight().closest().separation_m()));
+        closest
+    }
+
+    #[test]
+    fn a_last_jump_is_swept_once_and_one_seen_once_meets_the_jump_of_the_other() {
+        // In convoy: one takes the place that the other leaves at the same instant, and the other is not seen again.
+        let lead = [still(0.0, 1.0, 0.0), jump(1.0, [0.0, 1.0])];
+        let tail = [still(0.0, 1.0, -1.0), jump(1.0, [-1.0, 0.0]), still(1.0, 2.0, 0.0), jump(2.0, [0.0, 0.0])];
+        assert_eq!((closest(&lead, &tail), closest(&tail, &lead)), (1.0, 1.0));
+        // Seen once between two gaps, where the other's jump leads.
+        let seen_once = [still(0.0, 0.0, 50.0), still(1.0, 1.0, 0.0), still(3.0, 3.0, 50.0)];
+        assert_eq!((closest(&seen_once, &tail), closest(&tail, &seen_once)), (0.0, 0.0));
+        assert_eq!(closest(&[still(0.0, 0.0, 50.0), still(1.0, 1.0, 3.0), still(3.0, 3.0, 50.0)], &tail), 3.0);
     }
 }

@@ -70,7 +70,7 @@ use window::{Limits, Windows};
 pub const WIDTH_M: f64 = 1e-9;
 
 /// Scaled distance at which two equal ellipsoids touch.
-const TOUCHING_ELLIPSOIDS: f64 = 2.0;
+pub const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 /// Smallest and largest distance that is judged by \[m\], and largest time \[s\] and acceleration \[m/s^2\].
 const LEAST: f64 = 1e-70;
 const MOST: f64 = 1e70;
@@ -150,8 +150,9 @@ impl Judge {
             self.rates = Some(if self.question.max_gap_s.is_some() { Rates::default() } else { Rates::learn(items) });
         }
         for name in names.iter().skip(self.vehicles.len()) {
-            let vehicle = self.question.vehicle(name, self.vehicles.len(), self.rates.as_ref());
-            self.vehicles.push(vehicle);
+            let usual = || self.rates.as_ref().map_or(f64::INFINITY, |rates| rates.max_gap_s(self.vehicles.len()));
+            let max_gap_s = self.question.max_gap_s.unwrap_or_else(usual);
+            self.vehicles.push(self.question.vehicle(name, max_gap_s));
         }
         for item in items {
             self.take(item)?;
@@ -255,7 +256,9 @@ impl Judge {
         });
         let contradiction =
             self.vehicles.iter().filter_map(|v| v.contradiction).max_by(|a, b| a.needs_m_s2.total_cmp(&b.needs_m_s2));
-        let Findings { closest, obstacles, mut violations, mut undecided, .. } = self.findings;
+        let Findings { closest, obstacles, violations, undecided, .. } = self.findings;
+        let mut violations: Vec<_> = violations.into_values().flatten().collect();
+        let mut undecided: Vec<_> = undecided.into_values().flatten().collect();
         violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.who.cmp(&b.who)));
         undecided.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.who.cmp(&b.who)));
         self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
@@ -273,6 +276,7 @@ impl Judge {
         };
         Ok(Outcome {
             status,
+            max_gaps_s: self.vehicles.iter().map(|vehicle| vehicle.course.max_gap_s).collect(),
             vehicles: self.vehicles.into_iter().map(|vehicle| vehicle.name).collect(),
             presence,
             span_s,
@@ -311,9 +315,8 @@ impl Question {
         (self.from_s.unwrap_or(f64::NEG_INFINITY), self.to_s.unwrap_or(f64::INFINITY))
     }
 
-    fn vehicle(&self, name: &str, index: usize, rates: Option<&Rates>) -> Vehicle {
+    fn vehicle(&self, name: &str, max_gap_s: f64) -> Vehicle {
         let terms = self.vehicles.get(name).copied().unwrap_or_default();
-        let usual = || rates.map_or(f64::INFINITY, |rates| rates.max_gap_s(index));
         let course = Course {
             offset_s: terms.offset_s,
             motion: self.motion,
@@ -321,7 +324,7 @@ impl Question {
             scale: self.ellipsoid_m.map(|axes| axes.map(f64::recip)),
             window_s: self.window_s(),
             above_m: self.above_m,
-            max_gap_s: self.max_gap_s.unwrap_or_else(usual),
+            max_gap_s,
         };
         let asked_for = self.only.as_ref().is_none_or(|only| only.contains(name));
         Vehicle::new(name.to_owned(), asked_for, course, terms.radius_m.or(self.radius_m))

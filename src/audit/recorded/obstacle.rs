@@ -20,7 +20,7 @@ pub struct Obstacle {
     pub name: String,
     /// Its form.
     pub shape: Shape,
-    /// Distance that a vehicle's centre must keep from the surface \[m\].
+    /// Distance that a vehicle's centre must keep from the surface \[m\]; at 0 m it may touch and not enter.
     pub clearance_m: Option<f64>,
     /// Where it is \[m\], and when \[s\]: one point for a thing that stands, else points at increasing times that it passes
     /// on straight lines. Before the first and after the last it stands.
@@ -79,12 +79,12 @@ impl Obstacle {
         let place = |v: &Vector3<f64>| v.iter().all(|x| x.abs() <= MAX_LENGTH_M);
         match &self.shape {
             Shape::Ball { radius_m } | Shape::Capsule { radius_m, .. } if !length(*radius_m) => {
-                return wrong(format!("the radius must be above 0 m, not {radius_m}"));
+                return wrong(format!("the radius must be above 0 m, not {radius_m:?}"));
             }
             Shape::Box { half_m, .. } if !half_m.iter().all(|x| length(*x)) => {
                 return wrong("every length of the box must be above 0 m".to_owned());
             }
-            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => return wrong(format!("the yaw is {yaw_rad}")),
+            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => return wrong(format!("the yaw is {yaw_rad:?}")),
             Shape::Capsule { from_m, to_m, .. } if !(place(from_m) && place(to_m)) => {
                 return wrong("the ends of the capsule must be finite numbers".to_owned());
             }
@@ -94,9 +94,9 @@ impl Obstacle {
             _ => {}
         }
         if let Some(clearance_m) = self.clearance_m
-            && !length(clearance_m)
+            && !(0.0..=MAX_LENGTH_M).contains(&clearance_m)
         {
-            return wrong(format!("the clearance must be above 0 m, not {clearance_m}"));
+            return wrong(format!("the clearance must not be below 0 m, and not be {clearance_m:?}"));
         }
         let Some((_, first)) = self.path.first() else { return wrong("it has no place".to_owned()) };
         if self.path.len() == 1 && place(first) {
@@ -104,11 +104,13 @@ impl Obstacle {
         }
         for (time_s, at) in &self.path {
             if !(time_s.is_finite() && place(at)) {
-                return wrong(format!("the point at {time_s} s is not a finite place and time"));
+                return wrong(format!("the point at {time_s:?} s is not a finite place and time"));
             }
         }
         match self.path.windows(2).find(|points| points[1].0 <= points[0].0) {
-            Some(points) => wrong(format!("the point at {} s comes after the one at {} s", points[1].0, points[0].0)),
+            Some(points) => {
+                wrong(format!("the point at {:?} s comes after the one at {:?} s", points[1].0, points[0].0))
+            }
             None => Ok(()),
         }
     }
@@ -129,12 +131,16 @@ impl Obstacle {
 }
 
 impl Shape {
-    /// Distance from the surface of a point \[m\], given from the obstacle's place: below zero within a ball, capsule or
-    /// half-space, zero within a box.
+    /// Distance from the surface of a point \[m\], given from the obstacle's place: below zero within.
     pub(super) fn distance(&self, point: Vector3<f64>) -> f64 {
+        if let Self::HalfSpace { normal } = self {
+            return point.dot(&normal.normalize());
+        }
+        let point = self.turned(point);
+        let off = self.off_core(point).norm();
         match self {
-            Self::HalfSpace { normal } => point.dot(&normal.normalize()),
-            _ => self.off_core(self.turned(point)).norm() - self.radius(),
+            Self::Box { half_m, .. } if off == 0.0 => (point.abs() - half_m).max(),
+            _ => off - self.radius(),
         }
     }
 
@@ -159,7 +165,10 @@ impl Shape {
             }
             start = end;
         }
-        (best.0.sqrt() - self.radius(), best.1)
+        match self {
+            Self::Box { half_m, .. } if best.0 == 0.0 => deepest(half_m, from, to),
+            _ => (best.0.sqrt() - self.radius(), best.1),
+        }
     }
 
     pub(super) fn radius(&self) -> f64 {
@@ -224,6 +233,27 @@ impl Shape {
     }
 }
 
+/// How deep a straight way leads into a box that it meets, as a distance below zero, and the fraction of the way at which
+/// it is deepest first.
+///
+/// Over the way the distance from each of the six faces is a straight function of the fraction; the largest of them is
+/// least at an end of the way or where two of them cross.
+fn deepest(half_m: &Vector3<f64>, from: Vector3<f64>, to: Vector3<f64>) -> (f64, f64) {
+    let by = to - from;
+    let faces: [(f64, f64); 6] = std::array::from_fn(|face| {
+        let (axis, sign) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
+        (sign * from[axis] - half_m[axis], sign * by[axis])
+    });
+    let depth = |u: f64| faces.iter().map(|(start, rate)| start + rate * u).fold(f64::NEG_INFINITY, f64::max);
+    let crossings =
+        faces.iter().enumerate().flat_map(|(k, a)| faces[..k].iter().map(move |b| (b.0 - a.0) / (a.1 - b.1)));
+    let within = crossings.filter(|u| (0.0..=1.0).contains(u)).chain([1.0]);
+    within.map(|u| (depth(u), u)).fold((depth(0.0), 0.0), |best, other| {
+        let sooner = other.0 == best.0 && other.1 < best.1;
+        if other.0 < best.0 || sooner { other } else { best }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -266,11 +296,13 @@ mod tests {
             path: vec![(0.0, Vector3::zeros()), (1.0, Vector3::x())],
         };
         assert_eq!(good.check(), Ok(()));
+        assert_eq!(Obstacle { clearance_m: Some(0.0), ..good.clone() }.check(), Ok(()));
         for wrong in [
             Obstacle { shape: Shape::Ball { radius_m: 0.0 }, ..good.clone() },
             Obstacle { shape: Shape::Box { half_m: Vector3::new(1.0, -1.0, 1.0), yaw_rad: 0.0 }, ..good.clone() },
             Obstacle { shape: Shape::HalfSpace { normal: Vector3::zeros() }, ..good.clone() },
             Obstacle { clearance_m: Some(f64::NAN), ..good.clone() },
+            Obstacle { clearance_m: Some(-1e-300), ..good.clone() },
             Obstacle { path: vec![], ..good.clone() },
             Obstacle { path: vec![(1.0, Vector3::zeros()), (1.0, Vector3::x())], ..good.clone() },
             Obstacle { path: vec![(0.0, Vector3::repeat(f64::NAN))], ..good.clone() },

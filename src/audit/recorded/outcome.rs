@@ -152,6 +152,9 @@ pub struct Outcome {
     pub vehicles: Vec<String>,
     /// When each vehicle is there within what was asked; `None` where it is not, or was not asked for.
     pub presence: Vec<Option<Presence>>,
+    /// Longest interval between two samples of each vehicle that was no gap \[s\]: as asked, or one and a half of the
+    /// usual one.
+    pub max_gaps_s: Vec<f64>,
     /// First and last instant judged \[s\]; `None` where there was nothing to judge.
     pub span_s: Option<(f64, f64)>,
     /// The ten pairs that came closest, the closest first, each at its closest.
@@ -183,7 +186,7 @@ pub struct Outcome {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordedError {
     /// A number of the question is out of range.
-    #[error("{what} must be {range}, not {value}")]
+    #[error("{what} must be {range}, not {value:?}")]
     OutOfRange {
         /// What it is.
         what: String,
@@ -193,7 +196,7 @@ pub enum RecordedError {
         value: f64,
     },
     /// The window is empty.
-    #[error("the window from {from_s} s to {to_s} s holds no time")]
+    #[error("the window from {from_s:?} s to {to_s:?} s holds no time")]
     EmptyWindow {
         /// Its start \[s\].
         from_s: f64,
@@ -239,7 +242,7 @@ pub enum RecordedError {
         vehicle: usize,
     },
     /// A number that is not finite, or too large to judge.
-    #[error("vehicle {vehicle} at {time_s} s: {what} is not a finite number below 1e70")]
+    #[error("vehicle {vehicle} at {time_s:?} s: {what} is not a finite number below 1e70")]
     NotFinite {
         /// The vehicle.
         vehicle: String,
@@ -249,7 +252,7 @@ pub enum RecordedError {
         what: &'static str,
     },
     /// A time not later than the one before.
-    #[error("vehicle {vehicle}: the time {time_s} s is not later than {previous_s} s before it")]
+    #[error("vehicle {vehicle}: the time {time_s:?} s is not later than {previous_s:?} s before it")]
     TimeNotIncreasing {
         /// The vehicle.
         vehicle: String,
@@ -259,7 +262,7 @@ pub enum RecordedError {
         time_s: f64,
     },
     /// Items out of order.
-    #[error("the item of vehicle {vehicle} at {time_s} s comes after one at {previous_s} s")]
+    #[error("the item of vehicle {vehicle} at {time_s:?} s comes after one at {previous_s:?} s")]
     OutOfOrder {
         /// The vehicle.
         vehicle: String,
@@ -269,7 +272,7 @@ pub enum RecordedError {
         time_s: f64,
     },
     /// A curve that is none.
-    #[error("vehicle {vehicle} at {time_s} s: {what}")]
+    #[error("vehicle {vehicle} at {time_s:?} s: {what}")]
     Piece {
         /// The vehicle.
         vehicle: String,
@@ -279,7 +282,7 @@ pub enum RecordedError {
         what: &'static str,
     },
     /// A radius that is not the same throughout.
-    #[error("vehicle {vehicle} at {time_s} s: the radius changes to {radius_m} m")]
+    #[error("vehicle {vehicle} at {time_s:?} s: the radius changes to {radius_m:?} m")]
     RadiusChanges {
         /// The vehicle.
         vehicle: String,

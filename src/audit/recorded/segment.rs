@@ -138,6 +138,11 @@ impl Segment {
         Self { from_s, to_s, from, to, grounded: false, curve: Some(Arc::new(curve)) }
     }
 
+    /// Whether the vehicle is at two places at one instant.
+    pub(super) fn jumps(&self) -> bool {
+        self.to_s <= self.from_s && self.from != self.to
+    }
+
     /// How far the vehicle can be from the curve, anywhere on the stretch.
     pub(super) fn slack(&self) -> f64 {
         self.curve.as_ref().map_or(0.0, |curve| curve.slack.peak())

@@ -6,10 +6,12 @@
 //! is as sharp for a swarm that flies together as for one that rests. Sort and sweep along the longest axis finds the pairs
 //! to compare. A window in which too many pairs remain is halved.
 
+use std::mem;
+
 use nalgebra::Vector3;
 
 use super::enclosure::{Target, stray};
-use super::findings::Findings;
+use super::findings::{Closest, Findings, KEPT};
 use super::meeting::Meeting;
 use super::obstacle::{Obstacle, Shape};
 use super::outcome::Who;
@@ -115,8 +117,9 @@ impl Windows {
         }
         if count > 1 {
             self.sort();
-            if halvings == 0 && findings.closest.threshold() == f64::INFINITY {
-                self.compare_neighbours(vehicles, window_s, findings);
+            let few = count * (count - 1) / 2 <= KEPT;
+            if halvings == 0 && !few && findings.closest.threshold() == f64::INFINITY {
+                self.compare_neighbours(vehicles, window_s, &mut findings.closest);
             }
             let fine = stretches < FEWEST_STRETCHES * count && !curved;
             let middle_s = 0.5 * (window_s.0 + window_s.1);
@@ -154,15 +157,17 @@ impl Windows {
         self.hulls.sort_unstable_by(|a, b| a.low[0].total_cmp(&b.low[0]).then(a.vehicle.cmp(&b.vehicle)));
     }
 
-    fn compare_neighbours(&self, vehicles: &[Vehicle], window_s: (f64, f64), findings: &mut Findings) {
-        for apart in 1..=FIRST_NEIGHBOURS {
-            for k in apart..self.hulls.len() {
-                if findings.closest.threshold() < f64::INFINITY {
-                    return;
-                }
-                self.meet(vehicles, k - apart, k, window_s, findings);
-            }
+    /// Finds out how close the closest pairs come, and no more: every pair that matters is met after this.
+    fn compare_neighbours(&self, vehicles: &[Vehicle], window_s: (f64, f64), closest: &mut Closest) {
+        let mut rough = Findings { closest: mem::take(closest), ..Findings::default() };
+        let count = self.hulls.len();
+        let mut neighbours = (1..=FIRST_NEIGHBOURS).flat_map(|apart| (apart..count).map(move |k| (k - apart, k)));
+        while rough.closest.threshold() == f64::INFINITY
+            && let Some((a, b)) = neighbours.next()
+        {
+            self.meet(vehicles, a, b, window_s, &mut rough);
         }
+        *closest = rough.closest;
     }
 
     /// Lists the pairs that could matter; `false` if they are more than `most`.
