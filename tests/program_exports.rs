@@ -58,6 +58,10 @@ fn a_file_that_exists_is_overwritten_only_by_force() {
     assert!(said(&refused).contains("--force"), "{}", said(&refused));
     assert_eq!(fs::read_to_string(folder.path().join("cf1.csv")).expect("read"), CURVE);
     assert_eq!(again(&["--force", "--quiet"]).out, "");
+    let itself = ran(folder.path(), &["export", "flight.csv", "-o", "./flight.csv", "--force"]);
+    assert_eq!(itself.exit, Some(2), "{}", said(&itself));
+    assert!(said(&itself).contains("would overwrite the recording"), "{}", said(&itself));
+    assert_eq!(fs::read_to_string(folder.path().join("flight.csv")).expect("read"), LONG);
     assert!(fs::read_to_string(folder.path().join("cf1.csv")).expect("read").starts_with("t_s,id,x,y,z"));
 }
 

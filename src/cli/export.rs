@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use super::console::Console;
 use super::reading::{FormatArgument, ReadArguments};
 use super::run::interruption;
-use super::{Exit, Failure};
+use super::{Exit, Failure, outputs};
 use crate::export::{self, ExportOptions, Format};
 use crate::read::{self, Fault, ReadError, Recording};
 use crate::report::write_atomically_with;
@@ -103,6 +103,7 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
         let message = format!("`{}` exists", path.display());
         return Err(Failure::input(message, "overwrite it with --force, or write another file"));
     }
+    outputs::check(&[("the recording", &arguments.reading.recording)], &[("--output", path)])?;
     let options = ExportOptions { sample_hz: arguments.sample_hz };
     let interrupted = interruption()?;
     let recording = &arguments.reading.recording;
