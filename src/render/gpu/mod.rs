@@ -13,7 +13,7 @@ mod target;
 
 pub use adapter::{AdapterChoice, GpuError};
 
-pub(crate) use adapter::Gpu;
+pub(crate) use adapter::{BACKENDS, Gpu};
 pub(crate) use overlay::paint;
 
 use super::picture::Picture;

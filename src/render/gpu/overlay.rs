@@ -5,27 +5,20 @@ use egui::{Color32, FontId, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2, pos2};
 use egui_wgpu::ScreenDescriptor;
 
 use super::Gpu;
-use super::target::{LIGHT_FORMAT, Target, WORDS_FORMAT};
+use super::target::{Target, WORDS_FORMAT};
 use crate::render::scene::{Colour, Mark};
 
 /// Lays marks over pictures.
 pub(super) struct Overlay {
     context: egui::Context,
-    /// For pictures seen as bytes, and for those that cannot be.
-    renderers: [egui_wgpu::Renderer; 2],
+    renderer: egui_wgpu::Renderer,
 }
 
 impl Overlay {
     pub(super) fn new(device: &wgpu::Device) -> Self {
-        let context = egui::Context::default();
-        let renderer = |format| {
-            egui_wgpu::Renderer::new(
-                device,
-                format,
-                egui_wgpu::RendererOptions { dithering: false, ..egui_wgpu::RendererOptions::PREDICTABLE },
-            )
-        };
-        Self { context, renderers: [WORDS_FORMAT, LIGHT_FORMAT].map(renderer) }
+        let options = egui_wgpu::RendererOptions { dithering: false, ..egui_wgpu::RendererOptions::PREDICTABLE };
+        let renderer = egui_wgpu::Renderer::new(device, WORDS_FORMAT, options);
+        Self { context: egui::Context::default(), renderer }
     }
 
     pub(super) fn draw(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, target: &Target, marks: &[Mark]) {
@@ -44,15 +37,12 @@ impl Overlay {
         });
         let primitives: Vec<ClippedPrimitive> = self.context.tessellate(std::mem::take(&mut output.shapes), 1.0);
         let screen = ScreenDescriptor { size_in_pixels: target.size_px, pixels_per_point: 1.0 };
-        for renderer in &mut self.renderers {
-            for (id, deltas) in &output.textures_delta.set {
-                for delta in deltas {
-                    renderer.update_texture(&gpu.device, &gpu.queue, *id, delta);
-                }
+        for (id, deltas) in &output.textures_delta.set {
+            for delta in deltas {
+                self.renderer.update_texture(&gpu.device, &gpu.queue, *id, delta);
             }
         }
-        let renderer = &mut self.renderers[usize::from(!gpu.other_views)];
-        renderer.update_buffers(&gpu.device, &gpu.queue, encoder, &primitives, &screen);
+        self.renderer.update_buffers(&gpu.device, &gpu.queue, encoder, &primitives, &screen);
         let mut pass = encoder
             .begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("words"),
@@ -65,12 +55,10 @@ impl Overlay {
                 ..wgpu::RenderPassDescriptor::default()
             })
             .forget_lifetime();
-        renderer.render(&mut pass, &primitives, &screen);
+        self.renderer.render(&mut pass, &primitives, &screen);
         drop(pass);
-        for renderer in &mut self.renderers {
-            for id in &output.textures_delta.free {
-                renderer.free_texture(id);
-            }
+        for id in &output.textures_delta.free {
+            self.renderer.free_texture(id);
         }
         output.textures_delta.clear();
     }

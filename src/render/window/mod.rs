@@ -16,7 +16,7 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::{Window, WindowId};
 
-use super::gpu::{AdapterChoice, Gpu, GpuError, Renderer};
+use super::gpu::{AdapterChoice, BACKENDS, Gpu, GpuError, Renderer};
 use super::scene::{Camera, Scene, Stage, View};
 use super::{Footage, Theme};
 use panels::{Desk, Shown, Wishes};
@@ -154,19 +154,14 @@ impl Shell {
             .with_inner_size(LogicalSize::new(FIRST_SIZE[0], FIRST_SIZE[1]));
         let refused = |error: &dyn std::fmt::Display| WindowError::Refused(error.to_string());
         let window = Arc::new(events.create_window(attributes).map_err(|error| refused(&error))?);
-        let mut nothing = GpuError::NoAdapter;
-        for backends in [wgpu::Backends::PRIMARY, wgpu::Backends::GL] {
-            let display = Box::new(events.owned_display_handle());
-            let mut descriptor = wgpu::InstanceDescriptor::new_with_display_handle(display);
-            descriptor.backends = backends;
-            let instance = wgpu::Instance::new(descriptor);
-            let Ok(surface) = instance.create_surface(Arc::clone(&window)) else { continue };
-            match Gpu::open_for(&instance, &surface, &self.adapter) {
-                Ok((gpu, capabilities)) => return Open::new(window, surface, gpu, &capabilities, &self.player),
-                Err(error) => nothing = error,
-            }
-        }
-        Err(nothing.into())
+        let display = Box::new(events.owned_display_handle());
+        let mut descriptor = wgpu::InstanceDescriptor::new_with_display_handle(display);
+        descriptor.backends = BACKENDS;
+        let instance = wgpu::Instance::new(descriptor);
+        // Without any driver the instance has nothing to make a surface with.
+        let surface = instance.create_surface(Arc::clone(&window)).map_err(|_| GpuError::NoAdapter)?;
+        let (gpu, capabilities) = Gpu::open_for(&instance, &surface, &self.adapter)?;
+        Open::new(window, surface, gpu, &capabilities, &self.player)
     }
 
     /// Draws the picture, then the panels around it, in the order that what the person does is seen at once.
