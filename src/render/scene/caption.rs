@@ -7,6 +7,8 @@ use crate::swarm::Pair;
 
 /// Most vehicles whose names are written on them.
 const NAMED: usize = 64;
+/// Most pairs closer than delta whose distance is written beside them: the worst ones.
+const LABELLED: usize = 3;
 /// Colours of the scale in the legend.
 const SHADES: i16 = 16;
 /// Widest picture \[pixels\] that has no room for a legend, and lowest.
@@ -71,17 +73,18 @@ impl Painting<'_> {
     /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
     fn banner(&self, placing: &mut Placing<'_>) -> f32 {
         let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
-        let violated: Vec<Pair> = self.violated_now().collect();
-        let (Some(&pair), Some(delta_m)) = (violated.first(), self.footage.delta_m) else { return self.margin() };
-        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
-        let distance = match (self.vehicle(pair.first()), self.vehicle(pair.second())) {
-            (Some(first), Some(second)) => format!(" {} apart", metres((second - first).norm())),
-            _ => String::new(),
+        let (Some(&(pair, distance_m)), Some(delta_m)) = (self.violated.first(), self.footage.delta_m) else {
+            return self.margin();
         };
-        let more = if violated.len() > 1 { format!(" and {} more", violated.len() - 1) } else { String::new() };
+        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
+        let (pair, distance) = (self.pair(pair), metres(distance_m));
+        let more = match self.violated.len() - 1 {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
         let texts = [
-            format!("VIOLATION  vehicles {}{distance}, delta {}{more}", self.pair(pair), metres(delta_m)),
-            format!("VIOLATION {}{distance}", self.pair(pair)),
+            format!("VIOLATION  vehicles {pair} {distance} apart, delta {}{more}", metres(delta_m)),
+            format!("VIOLATION {pair} {distance} apart"),
             "VIOLATION".to_owned(),
         ];
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
@@ -194,20 +197,21 @@ impl Painting<'_> {
         }
     }
 
-    /// The distance of the closest pair, and of every pair closer than delta, beside the line that joins it.
+    /// The distance of the closest pair, and of the worst pairs closer than delta, beside the line that joins them; not
+    /// where that is outside the picture or has no room.
     fn distances(&self, placing: &mut Placing<'_>) {
-        let mut alarmed: Vec<Pair> = self.violated_now().collect();
-        alarmed.dedup();
-        let nearest = self.moment.nearest.map(|(pair, _)| pair).filter(|pair| !alarmed.contains(pair));
         let theme = self.view.theme;
         let size_px = self.view.text_px(1.0);
-        for (pair, alarm) in alarmed.into_iter().map(|pair| (pair, true)).chain(nearest.map(|pair| (pair, false))) {
+        let alarmed = self.violated.iter().take(LABELLED).map(|&(pair, distance_m)| (pair, distance_m, true));
+        let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
+        for (pair, distance_m, alarm) in alarmed.chain(nearest) {
             let (Some(first), Some(second)) = (self.vehicle(pair.first()), self.vehicle(pair.second())) else {
                 continue;
             };
             let Some(middle) = self.camera.project((first + second) / 2.0) else { continue };
-            let text = metres((second - first).norm());
-            let at = placing.find(middle.at_px, &[1.1 * size_px, 1.8 * size_px, 3.0 * size_px], size_px, &text);
+            let text = metres(distance_m);
+            let distances_px = [1.1 * size_px, 1.8 * size_px, 3.0 * size_px];
+            let Some(at) = placing.find(middle.at_px, &distances_px, size_px, &text) else { continue };
             let half = width(size_px, &text) / 2.0 + 0.25 * size_px;
             let corners_px = [[at[0] - half, at[1] - 0.68 * size_px], [at[0] + half, at[1] + 0.68 * size_px]];
             let (ground, ink) = if alarm {
@@ -275,7 +279,7 @@ impl Painting<'_> {
 }
 
 /// A length to the millimetre, rounded down: what is said to be clear is clear.
-fn metres(length_m: f64) -> String {
+pub(crate) fn metres(length_m: f64) -> String {
     // A little more, so that 2.46 stays 2.460.
     format!("{:.3} m", (length_m * 1e3 + 1e-6).floor() / 1e3)
 }

@@ -83,23 +83,24 @@ impl<'a> Placing<'a> {
         inside && self.taken.iter().all(clear)
     }
 
-    /// The nearest place around a point, at these distances from it, that has room for words; the last resort is above it
-    /// and within the picture.
-    pub(super) fn find(&self, at_px: [f64; 2], distances_px: &[f32], size_px: f32, text: &str) -> [f32; 2] {
+    /// The nearest place around a point of the picture, at these distances from it, that has room for words.
+    pub(super) fn find(&self, at_px: [f64; 2], distances_px: &[f32], size_px: f32, text: &str) -> Option<[f32; 2]> {
         #[expect(clippy::cast_possible_truncation, reason = "pixels")]
         let [x, y] = at_px.map(|x| x as f32);
+        let [width_px, height_px] = self.size_px;
+        if !((0.0..=width_px).contains(&x) && (0.0..=height_px).contains(&y)) {
+            return None;
+        }
         for &distance in distances_px {
             for [right, down] in [[0.0, -1.0], [0.0, 1.0], [1.0, 0.0], [-1.0, 0.0], [0.7, -0.7], [-0.7, -0.7]] {
                 let half = width(size_px, text) / 2.0;
                 let centre = [x + right * (distance + half), y + down * distance];
                 if self.has_room(area(centre, [0.5, 0.5], size_px, text)) {
-                    return centre;
+                    return Some(centre);
                 }
             }
         }
-        let (half, [width_px, height_px]) = (width(size_px, text) / 2.0, self.size_px);
-        let within = |x: f32, room: f32, size: f32| x.clamp(room.min(size / 2.0), (size - room).max(size / 2.0));
-        [within(x, half, width_px), within(y - 1.5 * size_px, size_px, height_px)]
+        None
     }
 }
 
@@ -126,8 +127,11 @@ mod tests {
         assert!(placing.words_at([50.0, 50.0], [0.5, 0.5], 10.0, ink, "first"));
         assert!(!placing.words_at([55.0, 52.0], [0.5, 0.5], 10.0, ink, "second"), "it would cover the first");
         assert!(!placing.words_at([195.0, 50.0], [0.0, 0.5], 10.0, ink, "third"), "it would stick out");
-        let found = placing.find([50.0, 50.0], &[20.0], 10.0, "fourth");
+        let found = placing.find([50.0, 50.0], &[20.0], 10.0, "fourth").expect("room");
         assert!(placing.words_at(found.map(f64::from), [0.5, 0.5], 10.0, ink, "fourth"), "{found:?}");
+        assert_eq!(placing.find([-50.0, 50.0], &[80.0], 10.0, "fifth"), None, "its point is outside the picture");
+        placing.take([[0.0, 0.0], [200.0, 100.0]]);
+        assert_eq!(placing.find([50.0, 50.0], &[20.0], 10.0, "sixth"), None, "everything is taken");
         assert_eq!(marks.len(), 2);
     }
 }

@@ -187,3 +187,16 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
     });
     assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
 }
+
+#[test]
+fn the_worst_pair_is_named_first_and_few_are_labelled() {
+    let mut footage = footage();
+    for (i, j) in [(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+        footage.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
+    }
+    let scene = scene(&footage, 5.0, &View::default());
+    let banner = "VIOLATION  vehicles 1-2 2.500 m apart, delta 2.000 m and 5 more";
+    assert!(words(&scene).contains(&banner), "{:?}", words(&scene));
+    let labels = words(&scene).iter().filter(|text| text.ends_with(".000 m") || text.ends_with(".500 m")).count();
+    assert!((1..=3).contains(&labels), "{:?}", words(&scene));
+}

@@ -31,13 +31,15 @@ impl Painting<'_> {
     }
 
     pub(super) fn vehicles(&self, scene: &mut Scene) {
-        let violated: Vec<Pair> = self.violated_now().collect();
-        let is_violated = |k: usize| violated.iter().any(|pair| pair.first() == k || pair.second() == k);
+        let mut alarmed = vec![false; self.footage.count()];
+        for (pair, _) in &self.violated {
+            (alarmed[pair.first()], alarmed[pair.second()]) = (true, true);
+        }
         let theme = self.view.theme;
         let mut shells = Vec::new();
         for k in 0..self.footage.count() {
             let Some(place) = self.vehicle(k) else { continue };
-            let (centre_m, alarm) = (single(place), is_violated(k));
+            let (centre_m, alarm) = (single(place), alarmed[k]);
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
             let metres = |length_m: f64| length_m as f32;
             let colour = if alarm { theme.alarm() } else { self.colour(k) };
@@ -81,12 +83,11 @@ impl Painting<'_> {
 
     /// The pair that must be seen: the closest one, and every one that is closer than delta.
     pub(super) fn pairs(&self, scene: &mut Scene) {
-        let mut alarmed: Vec<Pair> = self.violated_now().collect();
-        let alarm = self.view.theme.alarm();
-        let nearest = self.moment.nearest.map(|(pair, _)| pair).filter(|pair| !alarmed.contains(pair));
-        alarmed.dedup();
-        let pairs = alarmed.into_iter().map(|pair| (pair, alarm, 5.0));
-        for (pair, colour, width) in pairs.chain(nearest.map(|pair| (pair, self.view.theme.ink(), 2.6))) {
+        let theme = self.view.theme;
+        // The worst one last, which is over the others.
+        let alarmed = self.violated.iter().rev().map(|(pair, _)| (*pair, theme.alarm(), 5.0));
+        let nearest = self.clear_nearest().map(|(pair, _)| (pair, theme.ink(), 2.6));
+        for (pair, colour, width) in nearest.into_iter().chain(alarmed) {
             if let (Some(from), Some(to)) = (self.vehicle(pair.first()), self.vehicle(pair.second())) {
                 let width_px = width * self.view.unit_px();
                 scene.lines.push(Line { ends_m: [single(from), single(to)], colours: [colour; 2], width_px });
