@@ -1,6 +1,6 @@
 //! A recorded flight, ready to be drawn at any time of it.
 
-mod stretch;
+pub(super) mod stretch;
 mod tracks;
 
 use std::path::Path;
@@ -37,6 +37,8 @@ pub struct Footage {
     pub delta_m: Option<f64>,
     /// Formation and graph, where the flight has them.
     pub plan: Option<Plan>,
+    /// What a person should know about how it was read, a sentence each.
+    pub notes: Vec<String>,
     instants: Vec<Instant>,
     spans: Vec<Span>,
     closest: Option<ClosestApproach>,
@@ -169,6 +171,7 @@ impl Footage {
             radius_m: vec![UNKNOWN_RADIUS_M; vehicles],
             delta_m: None,
             plan: None,
+            notes: Vec::new(),
             instants: Vec::new(),
             spans: Vec::new(),
             closest: None,
@@ -194,18 +197,23 @@ impl Footage {
     /// # Errors
     /// [`FootageError`] when it cannot be read or holds no samples.
     pub fn read_mcap(path: &Path) -> Result<Self, FootageError> {
-        let recording = McapRecording::open(path)?;
+        let mut recording = McapRecording::open(path)?;
         let header = recording.header().clone();
         let source = Source::Text { name: header.scenario_name.clone(), text: header.scenario_toml.clone() };
         let mut footage = match Scenario::read(&source, &[]) {
             Ok(scenario) if scenario.count() == header.vehicles => Self::of(&scenario),
             _ => Self { delta_m: Some(header.delta_m), ..Self::new(&header.scenario_name, header.vehicles) },
         };
-        for entry in recording {
+        for entry in recording.by_ref() {
             match entry? {
                 Entry::Sample(sample) => footage.take(&sample.as_sample()),
                 Entry::Event(event) => footage.note(&event),
             }
+        }
+        if !recording.is_complete() {
+            footage
+                .notes
+                .push("the recording was not closed: it is drawn up to the last part that was written".to_owned());
         }
         footage.complete(&path.display().to_string())
     }

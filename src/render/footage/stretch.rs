@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use crate::swarm::{ClosestApproach, Pair, Rows, row};
 
 /// Two instants, between which every vehicle flies on a straight line. One that is only there at the end is judged there.
-pub(super) struct Stretch<'a> {
-    pub(super) times_s: [f64; 2],
-    pub(super) positions_m: [&'a Rows; 2],
+pub(in crate::render) struct Stretch<'a> {
+    pub(in crate::render) times_s: [f64; 2],
+    pub(in crate::render) positions_m: [&'a Rows; 2],
 }
 
 /// The way from one vehicle to another: `first_m` at the first of two times and longer by `change_m` at the second.
@@ -35,7 +35,7 @@ impl Stretch<'_> {
     }
 
     /// When a pair was nearest, and how near.
-    pub(super) fn approach(&self, pair: Pair) -> Option<ClosestApproach> {
+    pub(in crate::render) fn approach(&self, pair: Pair) -> Option<ClosestApproach> {
         let course = self.course(pair)?;
         let squared = course.change_m.norm_squared();
         let part = if squared > 0.0 { (-course.first_m.dot(&course.change_m) / squared).clamp(0.0, 1.0) } else { 0.0 };
@@ -44,7 +44,7 @@ impl Stretch<'_> {
     }
 
     /// From when to when a pair was closer than delta \[s\].
-    pub(super) fn inside_s(&self, pair: Pair, delta_m: f64) -> Option<[f64; 2]> {
+    pub(in crate::render) fn inside_s(&self, pair: Pair, delta_m: f64) -> Option<[f64; 2]> {
         let course = self.course(pair)?;
         // |first + part change|^2 < delta^2, with its two roots.
         let (a, b) = (course.change_m.norm_squared(), course.first_m.dot(&course.change_m));
@@ -58,7 +58,7 @@ impl Stretch<'_> {
     }
 
     /// Every pair that may come within reach, in order: the boxes around their ways do.
-    pub(super) fn near(&self, reach_m: f64) -> Vec<Pair> {
+    pub(in crate::render) fn near(&self, reach_m: f64) -> Vec<Pair> {
         let mut boxes: Vec<(usize, [Vector3<f64>; 2])> = (0..self.positions_m[1].nrows())
             .filter_map(|k| self.ends(k).map(|([first, second], _)| (k, [first.inf(&second), first.sup(&second)])))
             .collect();

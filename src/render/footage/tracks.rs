@@ -53,6 +53,9 @@ impl Footage {
             .map(|k| tracks.vehicles().get(k).cloned().unwrap_or_else(|| format!("{}", k + 1)))
             .collect();
         footage.radius_m = courses.iter().map(|course| course.radius_m.unwrap_or(UNKNOWN_RADIUS_M)).collect();
+        if courses.iter().any(|course| course.radius_m.is_none()) {
+            footage.notes.push(format!("vehicles of unknown radius are drawn with {UNKNOWN_RADIUS_M} m"));
+        }
         let (mut places, mut last) = (vec![0; courses.len()], BTreeMap::new());
         for time_s in common_times(&courses) {
             let mut positions_m = Rows::zeros(courses.len());
@@ -62,6 +65,7 @@ impl Footage {
             footage.see(time_s, positions_m, &mut last);
         }
         footage.spans.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        footage.notes.extend_from_slice(tracks.notes());
         Ok(footage)
     }
 

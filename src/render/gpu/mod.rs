@@ -71,6 +71,14 @@ impl Renderer {
         self.gpu.largest_px
     }
 
+    /// Whether pictures of this width and height \[pixels\] can be drawn.
+    ///
+    /// # Errors
+    /// [`GpuError::Size`] when a side is not between 1 and [`Renderer::largest_px`].
+    pub fn check_size(&self, size_px: [u32; 2]) -> Result<(), GpuError> {
+        self.gpu.check_size(size_px)
+    }
+
     pub(crate) fn gpu(&self) -> &Gpu {
         &self.gpu
     }

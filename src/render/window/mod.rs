@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
+use winit::error::EventLoopError;
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::{Window, WindowId};
@@ -58,7 +59,7 @@ pub fn show(
     theme: Theme,
     adapter: AdapterChoice,
 ) -> Result<(), WindowError> {
-    let events = EventLoop::new().map_err(|error| WindowError::NoDisplay(error.to_string()))?;
+    let events = EventLoop::new().map_err(|error| WindowError::NoDisplay(reason(&error)))?;
     let mut shell = Shell {
         adapter,
         player: Player::new(footage, feed),
@@ -69,6 +70,15 @@ pub fn show(
     };
     events.run_app(&mut shell).map_err(|error| WindowError::Refused(error.to_string()))?;
     shell.failure.map_or(Ok(()), Err)
+}
+
+/// What the window system said, without the place in a library that noticed it.
+fn reason(error: &EventLoopError) -> String {
+    let text = error.to_string();
+    match text.strip_prefix("os error at ").and_then(|placed| placed.split_once(": ")) {
+        Some((_, reason)) => reason.to_owned(),
+        None => text,
+    }
 }
 
 /// The program between the window system and what is drawn.
