@@ -15,6 +15,8 @@ const TURN_DEG: f64 = 0.35;
 const KEY_TURN_DEG: f64 = 5.0;
 /// Most neighbours of the picked vehicle that are listed.
 const LISTED: usize = 8;
+/// Room for the button of the help \[points\].
+const HELP_HEIGHT: f32 = 28.0;
 /// Most points of the plot.
 const PLOT_POINTS: usize = 600;
 
@@ -104,10 +106,10 @@ impl Desk {
             ("shells", &mut layers.shells),
             ("edges", &mut layers.edges),
             ("trails", &mut layers.trails),
-            ("start and goal", &mut layers.marks),
+            ("marks", &mut layers.marks),
             ("ground", &mut layers.ground),
             ("names", &mut layers.labels),
-            ("closest pair", &mut layers.closest),
+            ("closest", &mut layers.closest),
             ("caption", &mut layers.caption),
         ]
         .into_iter()
@@ -130,6 +132,10 @@ impl Desk {
             };
             input.events.iter().filter_map(pressed).collect()
         });
+        // What was said last is read by now.
+        if !pressed.is_empty() {
+            self.message = None;
+        }
         let mut wishes = Wishes::default();
         for key in pressed.into_iter().filter(|&key| !works_it(key)) {
             match key {
@@ -241,12 +247,13 @@ impl Desk {
         ui.label(RichText::new("Separation").strong());
         plot(ui, player);
         ui.separator();
-        match (self.picked, shown.moment) {
+        let height = (ui.available_height() - HELP_HEIGHT).max(0.0);
+        egui::ScrollArea::vertical().max_height(height).show(ui, |ui| match (self.picked, shown.moment) {
             (Some(picked), Some(moment)) if picked < player.footage.count() => vehicle(ui, player, moment, picked),
             _ => {
                 ui.label("Click a vehicle to see its distances and forces.");
             }
-        }
+        });
         ui.with_layout(egui::Layout::bottom_up(egui::Align::LEFT), |ui| {
             if ui.button("Help (H)").clicked() {
                 self.help = true;
@@ -358,6 +365,13 @@ fn plot(ui: &mut Ui, player: &Player) {
     }
     let curve = points.iter().map(|&[time_s, separation_m]| at(time_s, separation_m)).collect();
     painter.add(egui::Shape::line(curve, Stroke::new(1.5, visuals.hyperlink_color)));
+    let ink = visuals.weak_text_color();
+    let number = |corner: egui::Pos2, anchor, text| {
+        painter.text(corner, anchor, text, egui::FontId::proportional(11.0), ink);
+    };
+    number(area.left_top(), Align2::LEFT_TOP, format!(" {top:.1} m"));
+    number(area.left_bottom(), Align2::LEFT_BOTTOM, format!(" {bottom:.1} m, {first_s:.0} s"));
+    number(area.right_bottom(), Align2::RIGHT_BOTTOM, format!("{last_s:.0} s "));
     let now = at(player.time_s, bottom).x;
     painter.vline(now, area.y_range(), Stroke::new(1.0, visuals.strong_text_color()));
     if let Some(pointer) = response.hover_pos() {
