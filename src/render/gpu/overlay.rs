@@ -121,3 +121,31 @@ fn colour32(colour: Colour) -> Color32 {
     let [red, green, blue, opacity] = colour.rgba;
     Color32::from_rgba_unmultiplied(red, green, blue, opacity)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::scene::width;
+
+    /// Letters are put on quarters of a pixel, or on whole ones.
+    const ROUNDING_PX: f32 = 0.5;
+
+    #[test]
+    fn words_are_as_wide_as_the_scene_takes_them_to_be() {
+        let context = egui::Context::default();
+        let mut most = 0.0_f32;
+        let mut output = context.run_pass(egui::RawInput::default(), |context| {
+            let painter = context.layer_painter(egui::LayerId::background());
+            for text in
+                ["closest so far 2.460 m, vehicles 1-3 at 2.15 s", "WWW", "iii", "keep-out shell, radius delta/2"]
+            {
+                for size_px in [9.0, 17.0, 40.0] {
+                    let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(size_px), Color32::WHITE);
+                    most = most.max((galley.size().x - width(size_px, text)).abs() / text.len() as f32);
+                }
+            }
+        });
+        output.textures_delta.clear();
+        assert!(most <= ROUNDING_PX, "{most} pixels a letter");
+    }
+}

@@ -15,6 +15,8 @@ const SHADES: i16 = 16;
 const NO_LEGEND_PX: [u32; 2] = [420, 260];
 /// Longest name that is written in full.
 const LONGEST_NAME: usize = 40;
+/// Fewest letters of a name that are worth writing.
+const FEWEST_LETTERS: usize = 4;
 /// Opacity of what is behind words.
 const BACKING: f32 = 0.72;
 const WHITE: Colour = Colour::hex(0xFF_FF_FF);
@@ -49,24 +51,31 @@ impl Painting<'_> {
         let mut y = self.banner(placing);
         let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
         let (bottom, taken) = placing.placed();
-        let name = shortened(&self.footage.name);
-        placing.write([margin, y], [0.0, 0.0], 1.35 * size_px, theme.ink(), &name);
-        placing.back(taken, bottom, ground, room_px);
-        let (_, taken) = placing.placed();
+        // What has no room is left out: first the closest approach, then the name, then the verdict, then the time.
+        let large_px = 1.35 * size_px;
         let time = format!("t = {:.2} s", self.moment.time_s);
-        placing.write([width_px - margin, y], [1.0, 0.0], 1.35 * size_px, theme.ink(), &time);
-        y += 1.8 * size_px;
-        let (verdict, colour) = self.verdict();
-        let box_px = placing.write([width_px - margin, y], [1.0, 0.0], size_px, colour, &verdict);
+        let mut free_px = width_px - 2.0 * margin;
+        if width(large_px, &time) > free_px {
+            return;
+        }
+        free_px = placing.write([width_px - margin, y], [1.0, 0.0], large_px, theme.ink(), &time)[0][0] - 2.0 * margin;
+        let below = y + 1.8 * size_px;
+        let (verdicts, colour) = self.verdict();
+        let verdict = verdicts.iter().find(|text| width(size_px, text) <= width_px - 2.0 * margin);
+        let verdict_px =
+            verdict.map(|text| placing.write([width_px - margin, below], [1.0, 0.0], size_px, colour, text));
         placing.back(taken, bottom, ground, room_px);
         let (_, taken) = placing.placed();
-        let free_px = box_px[0][0] - margin;
-        for text in self.closest_so_far() {
-            if width(size_px, &text) <= free_px {
-                placing.write([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), &text);
-                placing.back(taken, bottom, ground, room_px);
-                break;
-            }
+        if let Some(name) = cut(&shortened(&self.footage.name), large_px, free_px) {
+            placing.write([margin, y], [0.0, 0.0], large_px, theme.ink(), &name);
+            placing.back(taken, bottom, ground, room_px);
+        }
+        y = below;
+        let (_, taken) = placing.placed();
+        let free_px = verdict_px.map_or(0.0, |corners_px| corners_px[0][0] - 2.0 * margin);
+        if let Some(text) = self.closest_so_far().iter().find(|text| width(size_px, text) <= free_px) {
+            placing.write([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
+            placing.back(taken, bottom, ground, room_px);
         }
     }
 
@@ -98,18 +107,20 @@ impl Painting<'_> {
         bottom + 0.6 * self.margin()
     }
 
-    /// What can be said up to now, in a few words.
-    fn verdict(&self) -> (String, Colour) {
+    /// What can be said up to now, in a few words and in fewer.
+    fn verdict(&self) -> (Vec<String>, Colour) {
         let theme = self.view.theme;
         if self.footage.delta_m.is_none() {
-            return ("not judged: no delta".to_owned(), theme.soft_ink());
+            return (vec!["not judged: no delta".to_owned(), "not judged".to_owned()], theme.soft_ink());
         }
         let began: Vec<_> = self.footage.violations().iter().filter(|span| span.from_s <= self.moment.time_s).collect();
         match began.first() {
-            None => ("clear so far".to_owned(), theme.good()),
+            None => (vec!["clear so far".to_owned()], theme.good()),
             Some(span) => {
                 let times = if began.len() == 1 { String::new() } else { format!(", {} times", began.len()) };
-                (format!("violated at {:.2} s by {}{times}", span.from_s, self.pair(span.pair)), theme.alarm())
+                let at = format!("violated at {:.2} s", span.from_s);
+                let texts = vec![format!("{at} by {}{times}", self.pair(span.pair)), at, "violated".to_owned()];
+                (texts, theme.alarm())
             }
         }
     }
@@ -234,23 +245,22 @@ impl Painting<'_> {
         for k in 0..self.footage.count() {
             let Some(place) = self.vehicle(k) else { continue };
             let Some(at) = self.camera.project(place).filter(|_| !self.is_hidden(k)) else { continue };
-            let name = &self.footage.vehicles[k];
+            let name = shortened(&self.footage.vehicles[k]);
             #[expect(clippy::cast_possible_truncation, reason = "pixels")]
             let ([x, y], radius) = (at.at_px.map(|v| v as f32), (self.footage.radius_m[k] * at.px_per_m) as f32);
-            let fitting = (1.5 * radius).min(1.7 * radius / (width(1.0, name)).max(0.4)).min(size_px);
+            let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
             if fitting >= 8.0 {
-                let text = name.clone();
                 placing.draw(Mark::Words {
                     at_px: [x, y],
                     anchor: [0.5, 0.5],
                     size_px: fitting,
                     colour: theme.background(),
-                    text,
+                    text: name,
                 });
             } else {
                 let offset = f64::from(radius + 0.2 * size_px);
                 let beside = [at.at_px[0] + offset, at.at_px[1] - offset];
-                placing.words_at(beside, [0.0, 1.0], 0.85 * size_px, self.colour(k), name);
+                placing.words_at(beside, [0.0, 1.0], 0.85 * size_px, self.colour(k), &name);
             }
         }
     }
@@ -284,6 +294,15 @@ pub(crate) fn metres(length_m: f64) -> String {
     format!("{:.3} m", (length_m * 1e3 + 1e-6).floor() / 1e3)
 }
 
+/// As much of a name as has room, with an ellipsis where it is cut; none where even a few letters have none.
+fn cut(name: &str, size_px: f32, room_px: f32) -> Option<String> {
+    if width(size_px, name) <= room_px {
+        return Some(name.to_owned());
+    }
+    let start = |letters: usize| name.chars().take(letters).chain(['…']).collect::<String>();
+    (FEWEST_LETTERS..name.chars().count()).rev().map(start).find(|start| width(size_px, start) <= room_px)
+}
+
 fn shortened(name: &str) -> String {
     let name: String = name.chars().filter(|c| !c.is_control()).collect();
     if name.chars().count() <= LONGEST_NAME {
@@ -299,5 +318,12 @@ mod tests {
     #[test]
     fn a_distance_is_never_shown_larger_than_it_is() {
         assert_eq!([1.999_999, 2.46, 2.0, 0.0].map(metres), ["1.999 m", "2.460 m", "2.000 m", "0.000 m"]);
+    }
+
+    #[test]
+    fn a_name_is_cut_to_its_room_or_left_out() {
+        assert_eq!(cut("pentagon", 10.0, 100.0).as_deref(), Some("pentagon"));
+        assert_eq!(cut("pentagon", 10.0, 40.0).as_deref(), Some("penta…"));
+        assert_eq!(cut("pentagon", 10.0, 20.0), None);
     }
 }

@@ -15,6 +15,8 @@ mod world;
 pub use camera::{Camera, CameraError, CameraSpec, Lens, Orbit, Projected};
 pub(crate) use caption::metres;
 pub use colour::{Colour, Theme};
+#[cfg(test)]
+pub(super) use placing::width;
 pub use stage::Stage;
 
 use nalgebra::Vector3;

@@ -2,8 +2,17 @@
 
 use super::{Colour, Mark};
 
-/// Width of a letter over the height of a line, a little more than that of the widest usual words.
-const LETTER: f32 = 0.56;
+/// Widths of the letters from space to ~ in thousandths of the height of a line, as the overlay's font has them.
+#[rustfmt::skip]
+const LETTERS: [u16; 95] = [
+    228, 274, 392, 653, 564, 831, 648, 240, 310, 310, 472, 564, 246, 282, 246, 359, 564, 564, 564, 564,
+    564, 564, 564, 564, 564, 564, 246, 246, 564, 564, 564, 380, 940, 641, 630, 609, 702, 555, 520, 658,
+    692, 248, 487, 599, 502, 865, 709, 774, 592, 774, 618, 517, 548, 680, 624, 921, 608, 569, 560, 310,
+    359, 310, 564, 490, 376, 509, 583, 460, 583, 548, 376, 573, 569, 237, 237, 495, 255, 863, 569, 582,
+    583, 583, 374, 428, 387, 569, 480, 775, 499, 474, 455, 319, 262, 319, 564,
+];
+/// Width of any other letter.
+const OTHER: u16 = 996;
 /// Room around words over the height of a line.
 const PADDING: f32 = 0.12;
 
@@ -104,9 +113,10 @@ impl<'a> Placing<'a> {
     }
 }
 
-/// About how wide words are \[pixels\].
-pub(super) fn width(size_px: f32, text: &str) -> f32 {
-    text.chars().count() as f32 * LETTER * size_px
+/// How wide words are \[pixels\].
+pub(in crate::render) fn width(size_px: f32, text: &str) -> f32 {
+    let letter = |c: char| (c as usize).checked_sub(32).and_then(|k| LETTERS.get(k)).copied().unwrap_or(OTHER);
+    text.chars().map(|c| f32::from(letter(c))).sum::<f32>() * size_px / 1000.0
 }
 
 fn area(at_px: [f32; 2], anchor: [f32; 2], size_px: f32, text: &str) -> [f32; 4] {
