@@ -330,13 +330,18 @@ impl Footage {
         recorded.or_else(|| tracks::nearest_present(positions_m).map(|(pair, _)| pair))
     }
 
+    /// Whether both of a pair are vehicles of the flight: a file may say anything.
+    fn has(&self, pair: Pair) -> bool {
+        pair.second() < self.count()
+    }
+
     /// Takes one sample, which must be later than the one before.
     pub fn take(&mut self, sample: &Sample<'_>) {
         self.push(Instant {
             time_s: sample.time_s,
             positions_m: sample.swarm.positions_m.clone(),
             control_m_s2: Some(sample.control.clone()),
-            here: sample.separation,
+            here: sample.separation.filter(|approach| self.has(approach.pair)),
             so_far: None,
         });
     }
@@ -379,7 +384,7 @@ impl Footage {
     /// Takes one event.
     pub fn note(&mut self, event: &Event) {
         match *event {
-            Event::ViolationBegan { pair, time_s } => {
+            Event::ViolationBegan { pair, time_s } if self.has(pair) => {
                 self.spans.push(Span { pair, from_s: time_s, to_s: f64::INFINITY });
             }
             Event::ViolationEnded { pair, time_s, .. } => {

@@ -145,3 +145,15 @@ fn the_worst_of_a_violation_is_that_of_its_own_pair() {
     let other = footage.violations().iter().find(|span| span.pair == Pair::new(2, 3)).expect("a violation");
     assert_eq!(footage.worst_s(other), 2.0);
 }
+
+#[test]
+fn pairs_that_the_flight_does_not_have_are_passed_over() {
+    let mut footage = Footage::new("one", 1);
+    let swarm = Swarm::at_rest(Rows::zeros(1));
+    let (pair, time_s) = (Pair::new(3, 9), 0.0);
+    let separation = Some(ClosestApproach { pair, separation_m: 1.0, time_s });
+    footage.take(&Sample { time_s, step: 0, swarm: &swarm, control: &Rows::zeros(1), separation, energy: None });
+    footage.note(&Event::ViolationBegan { pair, time_s });
+    assert_eq!((footage.closest(), footage.violations().len()), (None, 0));
+    assert!(footage.at(0.0).expect("a moment").nearest.is_none());
+}
