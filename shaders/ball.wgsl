@@ -30,7 +30,10 @@ fn corner(@builtin(vertex_index) index: u32, ball: Ball) -> Corner {
     let centre = seen(ball.centre);
     let distance = length(centre);
     var position: vec4<f32>;
-    if is_perspective() && (distance < 1.001 * ball.radius || -centre.z < ball.radius) {
+    if is_perspective() && centre.z >= ball.radius {
+        // All of it is behind the camera: outside the picture.
+        position = vec4(2.0, 2.0, 2.0, 1.0);
+    } else if is_perspective() && (distance < 1.001 * ball.radius || -centre.z < ball.radius) {
         // The camera is within the ball or beside it.
         position = vec4(side, 0.5, 1.0);
     } else if is_perspective() {

@@ -22,14 +22,16 @@ fn is_perspective() -> bool {
     return frame.lens.z > 0.5;
 }
 
+// Depth is 1 at the nearest and 0 at the farthest, so that floating point is as fine as the view is near.
 fn clipped(at: vec3<f32>) -> vec4<f32> {
     let near = frame.range.x;
     let far = frame.range.y;
     let flat = at.xy / frame.lens.xy;
+    let depth = (far + at.z) / (far - near);
     if is_perspective() {
-        return vec4(flat, far * (-at.z - near) / (far - near), -at.z);
+        return vec4(flat, near * depth, -at.z);
     }
-    return vec4(flat, (-at.z - near) / (far - near), 1.0);
+    return vec4(flat, depth, 1.0);
 }
 
 // IEC 61966-2-1.

@@ -95,6 +95,63 @@ fn a_ball_is_as_many_pixels_wide_as_its_radius_asks_for() {
     }
 }
 
+/// Longest that a thousand balls behind the camera may take: over the whole picture they took 24 s in software.
+const NOTHING_S: f64 = 6.0;
+
+#[test]
+fn balls_behind_the_camera_cost_nothing() {
+    let mut renderer = renderer();
+    let behind = vec![ball([12.0, 0.0, 0.0], 0.5, WHITE); 1000];
+    let mut crowd = scene(None, &behind);
+    crowd.shells = behind;
+    crowd.camera.size_px = [1280, 720];
+    let began = std::time::Instant::now();
+    let picture = renderer.paint(&crowd).expect("a picture");
+    assert!(began.elapsed().as_secs_f64() < NOTHING_S, "{:?}", began.elapsed());
+    assert!(picture.rgba.chunks_exact(4).all(|pixel| pixel == BACKGROUND.rgba));
+}
+
+#[test]
+fn of_two_lines_on_one_another_the_later_one_is_seen_whole() {
+    let mut crossed = scene(None, &[]);
+    // Along the line of sight's slant, so that their depths are alike only up to rounding.
+    let ends_m = [[-5.0, -2.0, -0.3], [5.0, 2.0, 0.3]];
+    crossed.lines.push(Line { ends_m, colours: [WHITE; 2], width_px: 2.0 });
+    let under = extent(&renderer().paint(&crossed).expect("a picture"));
+    crossed.lines.push(Line { ends_m: [ends_m[1], ends_m[0]], colours: [RED; 2], width_px: 6.0 });
+    let picture = renderer().paint(&crossed).expect("a picture");
+    assert!(under[1] > under[0] && picture.rgba.chunks_exact(4).all(|pixel| pixel[1] <= BACKGROUND.rgba[1]));
+}
+
+#[test]
+fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
+    let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
+    let mut footage = Footage::of(&scenario);
+    let mut swarm = Swarm::at_rest(scenario.start.positions_m.clone());
+    for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
+        swarm.positions_m[(4, 0)] += 30e3 * time_s;
+        let control = Rows::zeros(5);
+        footage.take(&Sample {
+            time_s,
+            step: step as u64,
+            swarm: &swarm,
+            control: &control,
+            separation: None,
+            energy: None,
+        });
+    }
+    let view = View {
+        layers: Layers { edges: true, ..Layers::NONE },
+        camera: "closest".parse().expect("a camera"),
+        ..small()
+    };
+    let mut renderer = renderer();
+    let with = renderer.shoot(&footage, 0.0, &view).expect("a picture");
+    let without = renderer.shoot(&footage, 0.0, &View { layers: Layers::NONE, ..view }).expect("a picture");
+    let (difference, _) = flip(&without, &with);
+    assert!(difference > FLIP_CEILING, "the edges are missing: {difference}");
+}
+
 #[test]
 fn the_edge_of_a_ball_is_smooth() {
     let picture = renderer().paint(&scene(Some(3.0), &[ball([0.0; 3], 1.0, WHITE)])).expect("a picture");

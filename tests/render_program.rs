@@ -77,11 +77,9 @@ fn without_any_driver_render_ends_with_the_name_of_a_package() {
     let done = std::process::Command::new(TAUTLINE)
         .args(["render", "out/run.mcap"])
         .current_dir(folder.path())
-        // The loader finds no Vulkan driver, and EGL no vendor.
+        // The loader finds no Vulkan driver; one for OpenGL would be of no use.
         .env("VK_DRIVER_FILES", "/nonexistent.json")
         .env("VK_ICD_FILENAMES", "/nonexistent.json")
-        .env("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
-        .env("LIBGL_DRIVERS_PATH", "/nonexistent")
         .output()
         .expect("the program runs");
     let err = String::from_utf8_lossy(&done.stderr);
@@ -128,6 +126,7 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
     McapRecorder::create(&folder.path().join("empty.mcap"), &header).expect("a file").finish().expect("closed");
     fs::write(folder.path().join("noise.mcap"), b"this is not a recording").expect("written");
     fs::write(folder.path().join("a-file"), b"").expect("written");
+    fs::create_dir(folder.path().join("folder.mp4")).expect("a folder");
     // Arguments after `render`, exit code, part of the message.
     let cases: &[(&[&str], Option<i32>, &str)] = &[
         (&["out/run.mcap", "--size", "0x10"], WRONG_INPUT, "each at least 1"),
@@ -140,14 +139,24 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         (&["out/run.mcap", "--at", "5"], WRONG_INPUT, "5 s is outside the recording, which goes from 0 s to 4 s"),
         (&["out/run.mcap", "--at", "soon"], WRONG_INPUT, "`soon` is not a time"),
         (&["out/run.mcap", "--at", "nan"], WRONG_INPUT, "`nan` is not a time"),
+        (&["out/run.mcap", "--at", "-1"], WRONG_INPUT, "-1 s is outside the recording"),
         (&["out/run.mcap", "--every", "0"], WRONG_INPUT, "0 is not a positive number"),
+        (&["out/run.mcap", "--every", "-1"], WRONG_INPUT, "--every: -1 is not a positive number"),
+        (&["out/run.mcap", "--delta", "-1"], WRONG_INPUT, "--delta is -1"),
+        (&["out/run.mcap", "--delta", "2.6"], WRONG_INPUT, "judged by its own delta, 2 m"),
+        (&["out/run.mcap", "--scale", "0.001"], WRONG_INPUT, "says itself how it is read"),
         (&["out/run.mcap", "--every", "1e-9"], WRONG_INPUT, "more than 100000"),
         (&["out/run.mcap", "--sheet", "4"], WRONG_INPUT, "such as 4x3"),
         (&["out/run.mcap", "--sheet", "4000x4"], WRONG_INPUT, "does not fit into"),
+        (&["out/run.mcap", "--sheet", "10x10", "--size", "60000x60000"], WRONG_INPUT, "pixels a side"),
         (&["out/run.mcap", "--film", "film.avi"], WRONG_INPUT, "does not end in .mp4, .gif or .png"),
         (&["out/run.mcap", "--film", "film.gif", "--fps", "0"], WRONG_INPUT, "not 0"),
         (&["out/run.mcap", "--film", "film.mp4", "--size", "101x50"], WRONG_INPUT, "even sides"),
-        (&["out/run.mcap", "--film", "film.mp4", "--speed", "0"], WRONG_INPUT, "not a positive number"),
+        (&["out/run.mcap", "--film", "film.mp4", "--speed", "0"], WRONG_INPUT, "--speed: 0 is not a positive number"),
+        (&["out/run.mcap", "--film", "film.mp4", "--speed", "-3"], WRONG_INPUT, "--speed: -3 is not a positive number"),
+        (&["out/run.mcap", "--film", "folder.mp4"], WRONG_INPUT, "folder.mp4 is a folder"),
+        (&["out/run.mcap", "--out", "refused", "--camera", "follow:9"], WRONG_INPUT, "there is no vehicle `9`"),
+        (&["out/run.mcap", "--out", "refused", "--size", "60000x9"], WRONG_INPUT, "pixels a side"),
         (&["out/run.mcap", "--adapter", "no such adapter"], WRONG_INPUT, "there is no `no such adapter` adapter"),
         (&["nowhere.mcap"], WRONG_INPUT, "nowhere.mcap"),
         (&["noise.mcap"], WRONG_INPUT, "noise.mcap, line 1: there is no column for time"),
@@ -164,6 +173,32 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         assert!(!err.contains("panicked"), "{arguments:?}: {err}");
     }
     assert_eq!(names(&folder.path().join("out")), ["figures", "report.html", "report.json", "run.mcap"]);
+    assert!(!folder.path().join("refused").exists(), "what is refused leaves no folder");
+}
+
+#[test]
+fn vehicles_that_meet_between_two_samples_are_pictured_as_they_meet() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = "t,id,x,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,2,0,0\n1,b,-2,0,0\n";
+    fs::write(folder.path().join("headon.csv"), rows).expect("written");
+    let render = ["render", "headon.csv", "--delta", "1", "--size", "320x180", "--at", "closest,0.5,0.5", "--out", "a"];
+    let Ran { exit, err, .. } = ran(folder.path(), &render);
+    assert_eq!(exit, GOOD, "{err}");
+    assert!(err.contains("vehicles of unknown radius are drawn with 0.1 m"), "{err}");
+    assert_eq!(names(&folder.path().join("a")), ["at-0.500s.png", "closest.png"]);
+    let [closest, halfway] =
+        ["closest.png", "at-0.500s.png"].map(|name| fs::read(folder.path().join("a").join(name)).expect(name));
+    assert!(closest == halfway, "they are closest halfway");
+}
+
+#[test]
+fn a_recording_that_was_not_closed_is_drawn_and_said_to_be_unfinished() {
+    let folder = flown("pentagon", &["--no-snapshots"]);
+    let whole = fs::read(folder.path().join("out/run.mcap")).expect("a recording");
+    fs::write(folder.path().join("cut.mcap"), &whole[..whole.len() - 40]).expect("written");
+    let Ran { exit, err, .. } = ran(folder.path(), &["render", "cut.mcap", "--at", "start", "--size", "160x90"]);
+    assert_eq!(exit, GOOD, "{err}");
+    assert!(err.contains("the recording was not closed"), "{err}");
 }
 
 #[test]
@@ -179,5 +214,5 @@ fn a_window_without_a_display_ends_with_a_remedy() {
         .expect("the program runs");
     let err = String::from_utf8_lossy(&done.stderr);
     assert_eq!(done.status.code(), MACHINE_FAILED, "{err}");
-    assert!(err.contains("no display") && err.contains("tautline render"), "{err}");
+    assert!(err.contains("no display") && err.contains("tautline render") && !err.contains(".rs:"), "{err}");
 }

@@ -125,12 +125,19 @@ fn the_window_plays_answers_keys_and_mouse_and_closes() {
     wait_for("another picture", || (pictures(folder.path()).len() == 2).then_some(()));
     let next_s = pictures(folder.path())[1];
     assert!(next_s - closest_s < 0.02, "a step is a sample: {closest_s} s to {next_s} s");
+    for _ in 0..10 {
+        screen.tell(&["key", "--window", &window, "Right"]);
+    }
+    screen.tell(&["key", "--window", &window, "p"]);
+    wait_for("a picture ten samples on", || (pictures(folder.path()).len() == 3).then_some(()));
+    let later_s = pictures(folder.path())[2];
+    assert!((0.15..0.18).contains(&(later_s - next_s)), "ten steps at 60 Hz: {next_s} s to {later_s} s");
     // Play: time goes on.
     screen.tell(&["key", "--window", &window, "space"]);
     std::thread::sleep(Duration::from_secs(1));
     screen.tell(&["key", "--window", &window, "p"]);
-    wait_for("a third picture", || (pictures(folder.path()).len() == 3).then_some(()));
-    assert!(pictures(folder.path())[2] > closest_s + 0.1, "{:?}", pictures(folder.path()));
+    wait_for("a picture later on", || (pictures(folder.path()).len() == 4).then_some(()));
+    assert!(pictures(folder.path())[3] > later_s + 0.5, "a second was played: {:?}", pictures(folder.path()));
     // Drag, wheel, click, every layer, help, themes, another size: nothing breaks.
     screen.tell(&["mousemove", "--window", &window, "400", "300", "mousedown", "1"]);
     screen.tell(&["mousemove", "--window", &window, "520", "340", "mouseup", "1"]);

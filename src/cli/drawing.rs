@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::Failure;
-use crate::read::{self, ReadOptions};
+use super::console::Console;
+use crate::read::{self, Format, ReadOptions};
 use crate::record::mcap::McapRecording;
 use crate::render::{
     AdapterChoice, CameraError, FilmError, Footage, FootageError, GpuError, PictureError, ShootError, Theme,
@@ -37,32 +38,57 @@ pub(super) fn adapter(text: &str) -> AdapterChoice {
     text.parse().unwrap_or_default()
 }
 
-/// Reads a recording to draw it, and what a person should know about how it was read. `delta_m` is for recordings that
-/// do not say what they are judged by.
+/// Reads a recording to draw it, and says what a person should know about how it was read. `delta_m` is for recordings
+/// that do not say what they are judged by.
 pub(super) fn footage(
     recording: &Path,
     reading: &ReadOptions,
     delta_m: Option<f64>,
-) -> Result<(Footage, Vec<String>), Failure> {
+    console: Console,
+) -> Result<Footage, Failure> {
     if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && delta_m.is_finite())) {
         return Err(Failure::input(format!("--delta is {delta_m}"), "give a positive distance in metres"));
     }
     // Our own recordings know formation, graph and law too.
-    let (mut footage, notes) = if McapRecording::open(recording).is_ok() {
-        (Footage::read_mcap(recording)?, Vec::new())
-    } else {
-        let mut tracks = read::open(recording, reading)?;
-        let name = recording.file_stem().unwrap_or_default().to_string_lossy();
-        let footage = Footage::from_tracks(&name, tracks.as_mut(), delta_m)?;
-        (footage, tracks.notes().to_vec())
+    let may_be_ours = reading.format.is_none_or(|format| format == Format::Mcap);
+    let footage = match McapRecording::open(recording) {
+        Ok(ours) if may_be_ours => {
+            speaks_for_itself(&ours, reading, delta_m)?;
+            Footage::read_mcap(recording)?
+        }
+        _ => {
+            let mut tracks = read::open(recording, reading)?;
+            let name = recording.file_stem().unwrap_or_default().to_string_lossy();
+            Footage::from_tracks(&name, tracks.as_mut(), delta_m)?
+        }
     };
     if footage.instants() == 0 {
         return Err(FootageError::Empty { name: recording.display().to_string() }.into());
     }
-    if let Some(delta_m) = delta_m {
-        footage.delta_m = Some(delta_m);
+    for note in &footage.notes {
+        console.warn(&format!("note: {note}"));
     }
-    Ok((footage, notes))
+    if footage.every() > 1 {
+        console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", footage.every()));
+    }
+    Ok(footage)
+}
+
+/// Refuses what has no effect on a recording of ours.
+fn speaks_for_itself(ours: &McapRecording, reading: &ReadOptions, delta_m: Option<f64>) -> Result<(), Failure> {
+    if delta_m.is_some() {
+        let message =
+            format!("the recording is of tautline and was judged by its own delta, {} m", ours.header().delta_m);
+        return Err(Failure::input(message, "leave --delta out; `tautline audit` judges it by another"));
+    }
+    let said = ReadOptions { format: None, allow_unfinished: false, ..reading.clone() };
+    if said != ReadOptions::default() {
+        return Err(Failure::input(
+            "the recording is of tautline and says itself how it is read",
+            "leave --time-unit, --scale, --column, --axis-order and --frame out",
+        ));
+    }
+    Ok(())
 }
 
 impl From<FootageError> for Failure {

@@ -32,15 +32,16 @@ pub(super) struct RenderArguments {
     /// Format of the recording [default: recognised by its content].
     #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
     input_format: Option<FormatArgument>,
-    /// Safety distance for a recording that has none: shells of half of it, and violations at the times drawn [m].
-    #[arg(long, value_name = "M")]
+    /// Safety distance for a recording that has none: shells of half of it, and violations of straight lines
+    /// between samples [m].
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     delta: Option<f64>,
     /// Times to picture: start, closest, end, or seconds; several with commas. By default start,closest,end, unless
     /// something else is asked for.
-    #[arg(long, value_name = "TIMES", value_delimiter = ',')]
+    #[arg(long, value_name = "TIMES", value_delimiter = ',', allow_negative_numbers = true)]
     at: Vec<String>,
     /// A picture every so many seconds of the flight.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     every: Option<f64>,
     /// A film: H.264 for .mp4, or .gif, or an animated .png.
     #[arg(long, value_name = "FILE")]
@@ -58,7 +59,7 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "N", default_value_t = 30)]
     fps: u32,
     /// Seconds of the flight in a second of the film; by default 1, or more where the film would be longer than 20 s.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     speed: Option<f64>,
     /// Where to look from: iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and
     /// metres.
@@ -96,30 +97,31 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
     let reading = arguments.reading.options(arguments.input_format)?;
     let recording = &arguments.reading.recording;
-    let (footage, notes) = drawing::footage(recording, &reading, arguments.delta)?;
-    for note in notes {
-        console.warn(&format!("note: {note}"));
-    }
-    if footage.every() > 1 {
-        console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", footage.every()));
-    }
+    let footage = drawing::footage(recording, &reading, arguments.delta, console)?;
     let folder = arguments.out.clone().unwrap_or_else(|| beside(recording));
     let stills = stills(arguments, &footage, &folder)?;
     let frames = film.map(|_| film_times(arguments, &footage)).transpose()?.unwrap_or_default();
     let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &footage)).transpose()?;
     let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
     let mut reel = film.map(|(_, format)| Film::new(format, view.size_px, arguments.fps)).transpose()?;
+    let renderer = Renderer::open(&drawing::adapter(&arguments.adapter))?;
+    renderer.check_size(view.size_px)?;
+    let stage = Stage::of(&footage);
+    stage.camera(&footage, &footage.at(f64::NEG_INFINITY).ok_or(ShootError::Empty)?, &view)?;
     // Targets are tried before the work.
     if !stills.is_empty() || sheet.is_some() {
         writable(&folder)?;
     }
     if let Some((path, _)) = film {
+        if path.is_dir() {
+            let message = format!("{} is a folder, not a film", path.display());
+            return Err(Failure::input(message, "name a file with --film"));
+        }
         writable(path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")))?;
     }
-    let renderer = Renderer::open(&drawing::adapter(&arguments.adapter))?;
     let tiles = sheet.as_ref().map_or(0, |(times, _)| times.len());
     let progress = console.progress((stills.len() + frames.len() + tiles) as u64, footage.name.clone());
-    let mut studio = Studio { stage: Stage::of(&footage), footage: &footage, renderer, view, progress };
+    let mut studio = Studio { stage, footage: &footage, renderer, view, progress };
 
     let times: Vec<f64> = stills.iter().map(|still| still.time_s).collect();
     studio.shoot(&times, |first, pictures| {
@@ -246,7 +248,11 @@ fn stills(arguments: &RenderArguments, footage: &Footage, folder: &Path) -> Resu
                 "give a time within the recording with --at",
             ));
         }
-        stills.push(Still { time_s, path: folder.join(format!("{name}.png")) });
+        let path = folder.join(format!("{name}.png"));
+        // One asked for twice is taken once.
+        if stills.iter().all(|still: &Still| still.path != path) {
+            stills.push(Still { time_s, path });
+        }
     }
     if let Some(every_s) = arguments.every {
         let times = even_times(footage, every_s, "--every")?;
@@ -263,12 +269,7 @@ fn stills(arguments: &RenderArguments, footage: &Footage, folder: &Path) -> Resu
 /// Times from the start of a flight to its end, so far apart \[s\].
 fn even_times(footage: &Footage, apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
     let [start_s, end_s] = footage.range_s();
-    if !(apart_s > 0.0 && apart_s.is_finite()) {
-        return Err(Failure::input(
-            format!("{option}: {apart_s} is not a positive number"),
-            format!("give a positive number with {option}"),
-        ));
-    }
+    positive(apart_s, option)?;
     let count = ((end_s - start_s) / apart_s + 1e-6).floor() + 1.0;
     if count > MOST_PICTURES {
         return Err(Failure::input(
@@ -281,10 +282,23 @@ fn even_times(footage: &Footage, apart_s: f64, option: &str) -> Result<Vec<f64>,
     Ok((0..count).map(|k| start_s + f64::from(k) * apart_s).collect())
 }
 
+fn positive(number: f64, option: &str) -> Result<f64, Failure> {
+    if number > 0.0 && number.is_finite() {
+        return Ok(number);
+    }
+    let message = format!("{option}: {number} is not a positive number");
+    Err(Failure::input(message, format!("give a positive number with {option}")))
+}
+
 fn film_times(arguments: &RenderArguments, footage: &Footage) -> Result<Vec<f64>, Failure> {
     let [start_s, end_s] = footage.range_s();
-    let speed = arguments.speed.unwrap_or_else(|| ((end_s - start_s) / LONGEST_FILM_S).max(1.0));
-    even_times(footage, speed / f64::from(arguments.fps.max(1)), "--speed")
+    let fps = f64::from(arguments.fps.max(1));
+    let speed = match arguments.speed {
+        Some(speed) => positive(speed, "--speed")?,
+        // The last picture lasts as long as the others.
+        None => ((end_s - start_s) / (LONGEST_FILM_S - 1.0 / fps)).max(1.0),
+    };
+    even_times(footage, speed / fps, "--speed")
 }
 
 /// The times of a sheet's pictures and their size.

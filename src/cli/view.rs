@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use clap::Args;
 
+use super::console::Console;
 use super::drawing;
 use super::{Exit, Failure};
 use crate::plant;
@@ -28,7 +29,7 @@ pub(super) struct ViewArguments {
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
     /// Safety distance for a recording that has none [m].
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     delta: Option<f64>,
     /// Colours: dark, light, or paper.
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
@@ -40,10 +41,22 @@ pub(super) struct ViewArguments {
 
 pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let path = Path::new(&arguments.what);
+    let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
     let (footage, feed) = if is_recording {
-        (drawing::footage(path, &ReadOptions::default(), arguments.delta)?.0, None)
+        if !arguments.overrides.is_empty() {
+            let help = "leave --set out, or give a scenario";
+            return Err(Failure::input("a recording has been flown: --set has no effect on it", help));
+        }
+        (drawing::footage(path, &ReadOptions::default(), arguments.delta, console)?, None)
     } else {
+        if arguments.delta.is_some() {
+            let help = "leave --delta out, or give --set with the scenario's own key";
+            return Err(Failure::input(
+                "a scenario says itself what it is judged by: --delta has no effect on it",
+                help,
+            ));
+        }
         let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
         let scenario = Scenario::read(&Source::resolve(&arguments.what)?, &overrides)?;
         (Footage::of(&scenario), Some(take_off(scenario)?))

@@ -1,5 +1,6 @@
 //! A recorded flight, ready to be drawn at any time of it.
 
+pub(super) mod stretch;
 mod tracks;
 
 use std::path::Path;
@@ -10,7 +11,8 @@ use crate::law::EdgeTension;
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, RecordError, Recorder, Sample};
 use crate::scenario::{LawSpec, Scenario, Source};
-use crate::swarm::{ClosestApproach, Pair, Rows};
+use crate::swarm::{ClosestApproach, Pair, Rows, separation};
+use stretch::Stretch;
 
 /// Most memory that the instants of a flight take \[bytes\]; beyond it every second one is dropped.
 pub const BUDGET_BYTES: usize = 256 << 20;
@@ -35,6 +37,8 @@ pub struct Footage {
     pub delta_m: Option<f64>,
     /// Formation and graph, where the flight has them.
     pub plan: Option<Plan>,
+    /// What a person should know about how it was read, a sentence each.
+    pub notes: Vec<String>,
     instants: Vec<Instant>,
     spans: Vec<Span>,
     closest: Option<ClosestApproach>,
@@ -92,6 +96,8 @@ pub struct Moment {
     pub nearest: Option<(Pair, f64)>,
     /// Closest approach up to this time.
     pub so_far: Option<ClosestApproach>,
+    /// Closest approach between the instants around this time.
+    around: Option<ClosestApproach>,
     /// The last instant at or before this time.
     pub(super) last: usize,
 }
@@ -108,6 +114,22 @@ pub enum FootageError {
         /// The recording.
         name: String,
     },
+}
+
+impl Moment {
+    /// Distance of a pair \[m\]; NaN where one of the two is not there.
+    ///
+    /// It is the recorded one where the closest approach was, and is nowhere below it: curves that are drawn as straight
+    /// lines come nearer than they were flown.
+    #[must_use]
+    pub fn distance_m(&self, pair: Pair) -> f64 {
+        let drawn_m = separation(&self.positions_m, pair.first(), pair.second());
+        match self.around {
+            Some(around) if around.pair == pair && around.time_s == self.time_s => around.separation_m,
+            Some(around) if drawn_m < around.separation_m => around.separation_m,
+            _ => drawn_m,
+        }
+    }
 }
 
 impl Plan {
@@ -149,6 +171,7 @@ impl Footage {
             radius_m: vec![UNKNOWN_RADIUS_M; vehicles],
             delta_m: None,
             plan: None,
+            notes: Vec::new(),
             instants: Vec::new(),
             spans: Vec::new(),
             closest: None,
@@ -174,18 +197,23 @@ impl Footage {
     /// # Errors
     /// [`FootageError`] when it cannot be read or holds no samples.
     pub fn read_mcap(path: &Path) -> Result<Self, FootageError> {
-        let recording = McapRecording::open(path)?;
+        let mut recording = McapRecording::open(path)?;
         let header = recording.header().clone();
         let source = Source::Text { name: header.scenario_name.clone(), text: header.scenario_toml.clone() };
         let mut footage = match Scenario::read(&source, &[]) {
             Ok(scenario) if scenario.count() == header.vehicles => Self::of(&scenario),
             _ => Self { delta_m: Some(header.delta_m), ..Self::new(&header.scenario_name, header.vehicles) },
         };
-        for entry in recording {
+        for entry in recording.by_ref() {
             match entry? {
                 Entry::Sample(sample) => footage.take(&sample.as_sample()),
                 Entry::Event(event) => footage.note(&event),
             }
+        }
+        if !recording.is_complete() {
+            footage
+                .notes
+                .push("the recording was not closed: it is drawn up to the last part that was written".to_owned());
         }
         footage.complete(&path.display().to_string())
     }
@@ -233,8 +261,17 @@ impl Footage {
     /// When a pair came closest while it was closer than delta \[s\], as far as the samples tell.
     #[must_use]
     pub fn worst_s(&self, span: &Span) -> f64 {
-        let within = self.instants.iter().filter_map(|instant| instant.here);
-        let within = within.filter(|here| here.pair == span.pair && (span.from_s..=span.to_s).contains(&here.time_s));
+        let recorded = self.instants.iter().filter_map(|instant| instant.here).filter(|here| here.pair == span.pair);
+        let drawn = self.instants.iter().zip(self.instants.iter().skip(1)).filter_map(|(before, after)| {
+            let stretch = Stretch {
+                times_s: [before.time_s, after.time_s],
+                positions_m: [&before.positions_m, &after.positions_m],
+            };
+            let approach = stretch.approach(span.pair)?;
+            let least_m = after.here.map_or(0.0, |here| here.separation_m);
+            Some(ClosestApproach { separation_m: approach.separation_m.max(least_m), ..approach })
+        });
+        let within = recorded.chain(drawn).filter(|approach| (span.from_s..=span.to_s).contains(&approach.time_s));
         let worst = within.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m));
         worst.map_or(span.from_s, |worst| worst.time_s)
     }
@@ -268,26 +305,34 @@ impl Footage {
         let last = self.instants.partition_point(|instant| instant.time_s <= time_s).checked_sub(1)?;
         let before = &self.instants[last];
         let mut positions_m = before.positions_m.clone();
-        let mut so_far = before.so_far;
-        if let Some(after) = self.instants.get(last + 1) {
+        let (mut so_far, mut around) = (before.so_far, before.here);
+        if let Some(after) = self.instants.get(last + 1).filter(|_| time_s > before.time_s) {
             let part = (time_s - before.time_s) / (after.time_s - before.time_s);
-            if part > 0.0 {
-                positions_m.zip_apply(&after.positions_m, |here, there| *here += (there - *here) * part);
-            }
+            positions_m.zip_apply(&after.positions_m, |here, there| *here += (there - *here) * part);
             so_far = nearer(so_far, after.here.filter(|approach| approach.time_s <= time_s));
+            around = after.here;
         }
-        let nearest = self.nearest(&positions_m, before.here.map(|approach| approach.pair));
-        Some(Moment { time_s, positions_m, control_m_s2: before.control_m_s2.clone(), nearest, so_far, last })
+        let nearest = match around {
+            Some(around) if around.time_s == time_s => Some(around.pair),
+            _ => self.nearest(&positions_m, before.here.map(|approach| approach.pair)),
+        };
+        let control_m_s2 = before.control_m_s2.clone();
+        let mut moment = Moment { time_s, positions_m, control_m_s2, nearest: None, so_far, around, last };
+        moment.nearest = nearest.map(|pair| (pair, moment.distance_m(pair)));
+        let now = moment.nearest.filter(|(_, distance_m)| distance_m.is_finite());
+        moment.so_far = nearer(so_far, now.map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s }));
+        Some(moment)
     }
 
     /// The nearest two vehicles; of many vehicles the pair that was nearest just before.
-    fn nearest(&self, positions_m: &Rows, recorded: Option<Pair>) -> Option<(Pair, f64)> {
-        match recorded {
-            Some(pair) if self.count() > SEARCHED_VEHICLES => {
-                Some((pair, crate::swarm::separation(positions_m, pair.first(), pair.second())))
-            }
-            _ => tracks::nearest_present(positions_m),
-        }
+    fn nearest(&self, positions_m: &Rows, recorded: Option<Pair>) -> Option<Pair> {
+        let recorded = recorded.filter(|_| self.count() > SEARCHED_VEHICLES);
+        recorded.or_else(|| tracks::nearest_present(positions_m).map(|(pair, _)| pair))
+    }
+
+    /// Whether both of a pair are vehicles of the flight: a file may say anything.
+    fn has(&self, pair: Pair) -> bool {
+        pair.second() < self.count()
     }
 
     /// Takes one sample, which must be later than the one before.
@@ -296,7 +341,7 @@ impl Footage {
             time_s: sample.time_s,
             positions_m: sample.swarm.positions_m.clone(),
             control_m_s2: Some(sample.control.clone()),
-            here: sample.separation,
+            here: sample.separation.filter(|approach| self.has(approach.pair)),
             so_far: None,
         });
     }
@@ -339,7 +384,7 @@ impl Footage {
     /// Takes one event.
     pub fn note(&mut self, event: &Event) {
         match *event {
-            Event::ViolationBegan { pair, time_s } => {
+            Event::ViolationBegan { pair, time_s } if self.has(pair) => {
                 self.spans.push(Span { pair, from_s: time_s, to_s: f64::INFINITY });
             }
             Event::ViolationEnded { pair, time_s, .. } => {

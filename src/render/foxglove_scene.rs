@@ -9,6 +9,7 @@ use foxglove::messages::{
 };
 
 use super::footage::Plan;
+use super::footage::stretch::Stretch;
 use super::scene::{Colour, Theme};
 use crate::record::Sample;
 use crate::record::mcap::{Channel, Companion};
@@ -52,24 +53,30 @@ impl FoxgloveScene {
     fn scene(&self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
         let theme = Theme::Dark;
         let count = positions_m.nrows();
-        let violated = |i: usize, j: usize| (row(positions_m, i) - row(positions_m, j)).norm() < self.delta_m;
+        let now = Stretch { times_s: [time_s; 2], positions_m: [positions_m; 2] };
         let graph = &self.plan.graph;
         let edges: Vec<(usize, usize)> =
             if graph.edge_count() <= MOST_EDGES { graph.edges().collect() } else { Vec::new() };
         let mut alarm = vec![false; count];
-        for &(i, j) in edges.iter().filter(|(i, j)| violated(*i, *j)) {
-            (alarm[i], alarm[j]) = (true, true);
+        for pair in now.near(self.delta_m) {
+            if now.inside_s(pair, self.delta_m).is_some() {
+                (alarm[pair.first()], alarm[pair.second()]) = (true, true);
+            }
         }
         let hulls = (0..count).map(|k| {
-            let colour = if alarm[k] { theme.alarm() } else { theme.vehicle(k) };
+            let colour = if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
             sphere(positions_m, k, self.radius_m[k], colour)
         });
         let shells = (0..count).map(|k| {
             let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
             sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15))
         });
-        let mut lines =
-            LinePrimitive { r#type: LineType::LineList.into(), thickness: EDGE_M, ..LinePrimitive::default() };
+        let mut lines = LinePrimitive {
+            r#type: LineType::LineList.into(),
+            pose: Some(pose(Vector3::default())),
+            thickness: EDGE_M,
+            ..LinePrimitive::default()
+        };
         for &(i, j) in &edges {
             let distance_m = (row(positions_m, i) - row(positions_m, j)).norm();
             #[expect(clippy::cast_possible_truncation, reason = "a colour")]
@@ -124,13 +131,15 @@ fn sphere(positions_m: &Rows, k: usize, radius_m: f64, shown: Colour) -> SphereP
     let place = row(positions_m, k);
     let side = 2.0 * radius_m;
     SpherePrimitive {
-        pose: Some(Pose {
-            position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
-            orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
-        }),
+        pose: Some(pose(Vector3 { x: place.x, y: place.y, z: place.z })),
         size: Some(Vector3 { x: side, y: side, z: side }),
         color: Some(colour(shown)),
     }
+}
+
+/// Moved to a place and not turned.
+fn pose(position: Vector3) -> Pose {
+    Pose { position: Some(position), orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }) }
 }
 
 fn colour(colour: Colour) -> Color {
@@ -180,6 +189,20 @@ mod tests {
             ("foxglove.SceneUpdate", "protobuf")
         );
         assert!(!channel.schema.is_empty());
+    }
+
+    #[test]
+    fn two_without_an_edge_between_them_are_red_too_where_they_are_too_close() {
+        let mut scenario = pentagon();
+        scenario.graph = crate::graph::Graph::ring(5);
+        let mut swarm = scenario.start.clone();
+        let place = row(&swarm.positions_m, 0) + nalgebra::Vector3::new(0.0, 0.0, 1.9);
+        crate::swarm::set_row(&mut swarm.positions_m, 2, place);
+        let bytes = message(&mut FoxgloveScene::of(&scenario), 0.0, &swarm).expect("a message");
+        let entity = SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities.remove(0);
+        let red = |k: usize| entity.spheres[k].color == Some(colour(Theme::Dark.alarm()));
+        assert!(red(0) && red(2) && !red(4));
+        assert!(entity.lines[0].pose.is_some());
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The pictures that a run leaves.
 
+use super::Footage;
 use super::gpu::{Renderer, ShootError};
 use super::picture::Picture;
-use super::scene::{CameraSpec, Scene, Stage, View};
-use super::{Footage, Moment};
+use super::scene::{CameraSpec, Scene, Stage, View, metres};
+use crate::swarm::Pair;
 
 /// Most violations that are pictured.
 const MOST_VIOLATIONS: usize = 10;
@@ -19,23 +20,35 @@ pub struct Snapshot {
     pub picture: Picture,
 }
 
-/// What is worth a picture: name, description, time \[s\] and camera.
-fn occasions(footage: &Footage) -> Vec<(String, String, f64, CameraSpec)> {
+/// What is worth a picture.
+struct Occasion {
+    name: String,
+    description: String,
+    time_s: f64,
+    /// The pair to be seen from near; the whole flight where there is none.
+    pair: Option<Pair>,
+}
+
+fn occasions(footage: &Footage) -> Vec<Occasion> {
     let [start_s, end_s] = footage.range_s();
-    let mut occasions = vec![("start".to_owned(), format!("The start, at {start_s:.2} s."), start_s, CameraSpec::Iso)];
+    let whole = |name: &str, description, time_s| Occasion { name: name.to_owned(), description, time_s, pair: None };
+    let mut occasions = vec![whole("start", format!("The start, at {start_s:.2} s."), start_s)];
     if let Some(closest) = footage.closest() {
         let description = format!(
-            "The closest approach of the flight: vehicles {} at {:.2} s, {:.3} m apart.",
-            closest.pair, closest.time_s, closest.separation_m
+            "The closest approach of the flight: vehicles {} at {:.2} s, {} apart.",
+            closest.pair,
+            closest.time_s,
+            metres(closest.separation_m)
         );
-        occasions.push(("closest".to_owned(), description, closest.time_s, CameraSpec::Iso));
+        occasions.push(whole("closest", description, closest.time_s));
     }
-    occasions.push(("end".to_owned(), format!("The end, at {end_s:.2} s."), end_s, CameraSpec::Iso));
+    occasions.push(whole("end", format!("The end, at {end_s:.2} s."), end_s));
     for (k, span) in footage.violations().iter().take(MOST_VIOLATIONS).enumerate() {
         let until_s = span.to_s.min(end_s);
         let description =
             format!("Vehicles {} were closer than delta from {:.2} s to {until_s:.2} s.", span.pair, span.from_s);
-        occasions.push((format!("violation-{}", k + 1), description, footage.worst_s(span), CameraSpec::Closest));
+        let (name, time_s) = (format!("violation-{}", k + 1), footage.worst_s(span));
+        occasions.push(Occasion { name, description, time_s, pair: Some(span.pair) });
     }
     occasions
 }
@@ -55,10 +68,14 @@ pub fn snapshot_names() -> Vec<String> {
 pub fn snapshots_of_run(renderer: &mut Renderer, footage: &Footage, view: &View) -> Result<Vec<Snapshot>, ShootError> {
     let stage = Stage::of(footage);
     let mut snapshots = Vec::new();
-    for (name, description, time_s, camera) in occasions(footage) {
-        let Some(moment): Option<Moment> = footage.at(time_s) else { break };
-        let view = View { camera, ..view.clone() };
-        let picture = renderer.paint(&Scene::compose(footage, &stage, &moment, &view)?)?;
+    let view = View { camera: CameraSpec::Iso, ..view.clone() };
+    for Occasion { name, description, time_s, pair } in occasions(footage) {
+        let Some(moment) = footage.at(time_s) else { break };
+        let camera = match pair {
+            Some(pair) => stage.close_up(footage, &moment, pair, view.size_px),
+            None => stage.camera(footage, &moment, &view)?,
+        };
+        let picture = renderer.paint(&Scene::seen_by(camera, footage, &stage, &moment, &view))?;
         snapshots.push(Snapshot { name, description, picture });
     }
     Ok(snapshots)

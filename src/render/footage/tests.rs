@@ -1,5 +1,10 @@
+use std::convert::Infallible;
+
+use nalgebra::Vector3;
+
 use super::*;
 use crate::swarm::Swarm;
+use crate::track::{Clock, Item, Tracks};
 
 fn sample(footage: &mut Footage, time_s: f64, x: f64, separation_m: f64) {
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, x, 0.0, 0.0]));
@@ -50,4 +55,105 @@ fn a_long_flight_is_thinned_and_keeps_its_ends_and_its_closest_approach() {
 fn nothing_recorded_is_nothing_to_draw() {
     assert!(Footage::new("pair", 2).at(0.0).is_none());
     assert!(matches!(Footage::new("pair", 2).complete("x.mcap"), Err(FootageError::Empty { .. })));
+}
+
+#[test]
+fn no_distance_is_shown_below_the_closest_so_far() {
+    let mut footage = Footage::new("pair", 2);
+    sample(&mut footage, 0.0, 4.0, 4.0);
+    // Drawn straight, the two are 3 m apart at 0.5 s; they were flown along a curve and never nearer than 3.2 m.
+    sample(&mut footage, 1.0, 2.0, 2.0);
+    let between = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 3.2, time_s: 0.5 });
+    footage.instants[1].here = between;
+    for time_s in [0.3, 0.5, 0.7] {
+        let moment = footage.at(time_s).expect("a moment");
+        let (_, distance_m) = moment.nearest.expect("a pair");
+        let so_far_m = moment.so_far.expect("an approach").separation_m;
+        assert!(so_far_m <= distance_m && distance_m >= 3.2, "{time_s} s: {so_far_m} m, {distance_m} m");
+    }
+    assert_eq!(footage.at(0.5).expect("a moment").so_far, between);
+}
+
+/// Recorded motion: vehicle, time and place of every sample.
+struct Seen(Vec<(usize, f64, f64, f64)>, Vec<String>);
+
+impl Tracks for Seen {
+    type Error = Infallible;
+
+    fn vehicles(&self) -> &[String] {
+        &self.1
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, Infallible> {
+        let position = |x, y| Vector3::new(x, y, 0.0);
+        items.extend(self.0.drain(..).map(|(vehicle, time_s, x, y)| {
+            let position_m = position(x, y);
+            Item::Sample(crate::track::Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
+        }));
+        Ok(false)
+    }
+
+    fn clock(&self) -> &Clock {
+        const CLOCK: Clock = Clock { unit: "s", inferred: false, epoch_ns: 0 };
+        &CLOCK
+    }
+
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+}
+
+fn seen(samples: &[(usize, f64, f64, f64)], delta_m: f64) -> Footage {
+    let mut tracks = Seen(samples.to_vec(), ["a", "b", "c", "d"].map(str::to_owned).to_vec());
+    Footage::from_tracks("seen", &mut tracks, Some(delta_m)).unwrap_or_else(|never| match never {})
+}
+
+#[test]
+fn two_that_meet_between_their_samples_have_met() {
+    let footage = seen(&[(0, 0.0, -2.0, 0.0), (1, 0.0, 2.0, 0.0), (0, 1.0, 2.0, 0.0), (1, 1.0, -2.0, 0.0)], 1.0);
+    let pair = Pair::new(0, 1);
+    assert_eq!(footage.closest(), Some(ClosestApproach { pair, separation_m: 0.0, time_s: 0.5 }));
+    assert_eq!(footage.violations(), [Span { pair, from_s: 0.375, to_s: 0.625 }]);
+    assert_eq!(footage.worst_s(&footage.violations()[0]), 0.5);
+    assert_eq!(footage.at(0.4).and_then(|moment| moment.so_far).map(|so_far| so_far.time_s), Some(0.4));
+}
+
+#[test]
+fn every_pair_that_is_too_close_is_kept_and_not_the_nearest_alone() {
+    let still = [(0, 0.0, 0.0), (1, 0.5, 0.0), (2, 9.0, 0.0), (3, 9.8, 0.0)];
+    let samples: Vec<_> =
+        [0.0, 1.0, 2.0].iter().flat_map(|&time_s| still.map(|(vehicle, x, y)| (vehicle, time_s, x, y))).collect();
+    let footage = seen(&samples, 1.0);
+    let whole = |i, j| Span { pair: Pair::new(i, j), from_s: 0.0, to_s: 2.0 };
+    assert_eq!(footage.violations(), [whole(0, 1), whole(2, 3)]);
+    assert_eq!(seen(&samples, 0.5).violations(), [], "at delta is not below it");
+}
+
+#[test]
+fn the_worst_of_a_violation_is_that_of_its_own_pair() {
+    // 0 and 1 are nearest all the time; 2 and 3 come closest to each other at 2 s.
+    let far = [9.0, 1.0, 0.5, 1.0, 9.0];
+    let samples: Vec<_> = far
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &y)| {
+            let time_s = k as f64;
+            [(0, time_s, 0.0, 0.0), (1, time_s, 0.2, 0.0), (2, time_s, 20.0, 0.0), (3, time_s, 20.0, y)]
+        })
+        .collect();
+    let footage = seen(&samples, 2.0);
+    let other = footage.violations().iter().find(|span| span.pair == Pair::new(2, 3)).expect("a violation");
+    assert_eq!(footage.worst_s(other), 2.0);
+}
+
+#[test]
+fn pairs_that_the_flight_does_not_have_are_passed_over() {
+    let mut footage = Footage::new("one", 1);
+    let swarm = Swarm::at_rest(Rows::zeros(1));
+    let (pair, time_s) = (Pair::new(3, 9), 0.0);
+    let separation = Some(ClosestApproach { pair, separation_m: 1.0, time_s });
+    footage.take(&Sample { time_s, step: 0, swarm: &swarm, control: &Rows::zeros(1), separation, energy: None });
+    footage.note(&Event::ViolationBegan { pair, time_s });
+    assert_eq!((footage.closest(), footage.violations().len()), (None, 0));
+    assert!(footage.at(0.0).expect("a moment").nearest.is_none());
 }

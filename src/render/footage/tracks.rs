@@ -1,10 +1,13 @@
 //! Footage of recorded motion, whoever recorded it.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 
-use super::{BUDGET_BYTES, Footage, Instant, Span, UNKNOWN_RADIUS_M};
+use super::stretch::Stretch;
+use super::{BUDGET_BYTES, Footage, Instant, Span, UNKNOWN_RADIUS_M, nearer};
 use crate::formation::closest_pair;
-use crate::swarm::{ClosestApproach, Pair, Rows, row, set_row};
+use crate::swarm::{Pair, Rows, row, set_row};
 use crate::track::{Item, Piece, Tracks};
 
 /// Instants a second at which known curves are drawn \[Hz\].
@@ -22,7 +25,8 @@ struct Course {
 
 impl Footage {
     /// Reads recorded motion. Vehicles that were seen at times of their own are put on common ones, with straight lines
-    /// between; one that has not been seen yet, or no longer, is not there. Separations are those at the common times.
+    /// between; one that has not been seen yet, or no longer, is not there. Separations, and violations of `delta_m`
+    /// \[m\], are those of the straight lines.
     ///
     /// The result may be without instants.
     ///
@@ -49,29 +53,47 @@ impl Footage {
             .map(|k| tracks.vehicles().get(k).cloned().unwrap_or_else(|| format!("{}", k + 1)))
             .collect();
         footage.radius_m = courses.iter().map(|course| course.radius_m.unwrap_or(UNKNOWN_RADIUS_M)).collect();
-        let mut places = vec![0; courses.len()];
+        if courses.iter().any(|course| course.radius_m.is_none()) {
+            footage.notes.push(format!("vehicles of unknown radius are drawn with {UNKNOWN_RADIUS_M} m"));
+        }
+        let (mut places, mut last) = (vec![0; courses.len()], BTreeMap::new());
         for time_s in common_times(&courses) {
             let mut positions_m = Rows::zeros(courses.len());
             for (k, course) in courses.iter().enumerate() {
                 set_row(&mut positions_m, k, course.at(time_s, &mut places[k]));
             }
-            footage.see(time_s, positions_m);
+            footage.see(time_s, positions_m, &mut last);
         }
+        footage.spans.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        footage.notes.extend_from_slice(tracks.notes());
         Ok(footage)
     }
 
-    fn see(&mut self, time_s: f64, positions_m: Rows) {
-        let here =
-            nearest_present(&positions_m).map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s });
-        let inside = here.filter(|here| self.delta_m.is_some_and(|delta_m| here.separation_m < delta_m));
-        match (self.spans.last_mut().filter(|span| span.to_s.is_infinite()), inside) {
-            (Some(span), Some(here)) if span.pair == here.pair => {}
-            (open, inside) => {
-                if let Some(span) = open {
-                    span.to_s = time_s;
+    /// Takes the next instant, with the last violation of every pair that lasted at the one before.
+    fn see(&mut self, time_s: f64, positions_m: Rows, last: &mut BTreeMap<Pair, usize>) {
+        let before = self.instants.last();
+        let stretch = Stretch {
+            times_s: [before.map_or(time_s, |before| before.time_s), time_s],
+            positions_m: [before.map_or(&positions_m, |before| &before.positions_m), &positions_m],
+        };
+        // Nothing came nearer than the nearest now, unless it did on the way.
+        let now_m = nearest_present(&positions_m).map_or(0.0, |(_, distance_m)| distance_m);
+        let reach_m = now_m.max(self.delta_m.unwrap_or(0.0));
+        // A little more, for rounding.
+        let near = stretch.near(reach_m * (1.0 + 4.0 * f64::EPSILON));
+        let here = near.iter().map(|&pair| stretch.approach(pair)).fold(None, nearer);
+        if let Some(delta_m) = self.delta_m {
+            for (pair, [from_s, to_s]) in near.iter().filter_map(|&pair| Some((pair, stretch.inside_s(pair, delta_m)?)))
+            {
+                match last.get(&pair).map(|&k| &mut self.spans[k]) {
+                    Some(span) if span.to_s >= from_s => span.to_s = to_s,
+                    _ => {
+                        last.insert(pair, self.spans.len());
+                        self.spans.push(Span { pair, from_s, to_s });
+                    }
                 }
-                self.spans.extend(inside.map(|here| Span { pair: here.pair, from_s: time_s, to_s: f64::INFINITY }));
             }
+            last.retain(|_, k| self.spans[*k].to_s >= time_s);
         }
         self.push(Instant { time_s, positions_m, control_m_s2: None, here, so_far: None });
     }

@@ -30,9 +30,8 @@ impl FromStr for AdapterChoice {
     }
 }
 
-/// Ways to speak to adapters, the better ones first. OpenGL is asked last: on machines without a screen it complains on
-/// standard error.
-const BACKENDS: [wgpu::Backends; 2] = [wgpu::Backends::PRIMARY, wgpu::Backends::GL];
+/// Ways to speak to adapters. OpenGL is none of them: it cannot say which samples of a pixel a ball covers.
+pub(crate) const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 
 /// Why nothing can be drawn.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -93,23 +92,15 @@ pub(crate) struct Gpu {
     pub(crate) largest_px: u32,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    /// Whether a texture may be seen in another format than its own.
-    pub(crate) other_views: bool,
     /// The first error that nobody asked for.
     trouble: Arc<Mutex<Option<String>>>,
 }
 
 impl Gpu {
     pub(super) fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
-        let mut found = Vec::new();
-        for backends in BACKENDS {
-            let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-            descriptor.backends = backends;
-            if let Some(adapter) = pick(&wgpu::Instance::new(descriptor), choice, None, &mut found) {
-                return Self::start(&adapter);
-            }
-        }
-        Err(not_found(choice, &found))
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = BACKENDS;
+        Self::start(&pick(&wgpu::Instance::new(descriptor), choice, None)?)
     }
 
     /// An adapter that can show what it draws on a surface.
@@ -118,8 +109,7 @@ impl Gpu {
         surface: &wgpu::Surface<'_>,
         choice: &AdapterChoice,
     ) -> Result<(Self, wgpu::SurfaceCapabilities), GpuError> {
-        let mut found = Vec::new();
-        let adapter = pick(instance, choice, Some(surface), &mut found).ok_or_else(|| not_found(choice, &found))?;
+        let adapter = pick(instance, choice, Some(surface))?;
         let capabilities = surface.get_capabilities(&adapter);
         Ok((Self::start(&adapter)?, capabilities))
     }
@@ -127,7 +117,6 @@ impl Gpu {
     fn start(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
         let name = name(adapter);
         let limits = adapter.limits();
-        let downlevel = adapter.get_downlevel_capabilities();
         // The limits of the adapter itself would forbid another one to do the same; a picture needs few of them.
         let required_limits = wgpu::Limits {
             max_texture_dimension_2d: limits.max_texture_dimension_2d,
@@ -147,8 +136,7 @@ impl Gpu {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             kept.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
         }));
-        let other_views = downlevel.flags.contains(wgpu::DownlevelFlags::VIEW_FORMATS);
-        Ok(Self { name, largest_px, device, queue, other_views, trouble })
+        Ok(Self { name, largest_px, device, queue, trouble })
     }
 
     pub(crate) fn check_size(&self, [width, height]: [u32; 2]) -> Result<(), GpuError> {
@@ -171,18 +159,17 @@ fn name(adapter: &wgpu::Adapter) -> String {
     format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend)
 }
 
-/// The first adapter of a choice, the best first; the names of all others are added to `found`.
+/// The first adapter of a choice, the best first.
 fn pick(
     instance: &wgpu::Instance,
     choice: &AdapterChoice,
     surface: Option<&wgpu::Surface<'_>>,
-    found: &mut Vec<String>,
-) -> Option<wgpu::Adapter> {
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+) -> Result<wgpu::Adapter, GpuError> {
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
     adapters.retain(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)));
     adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
-    found.extend(adapters.iter().map(name));
-    adapters.into_iter().find(|adapter| {
+    let found: Vec<String> = adapters.iter().map(name).collect();
+    let chosen = adapters.into_iter().find(|adapter| {
         let is_software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         match choice {
             AdapterChoice::Best => true,
@@ -190,7 +177,8 @@ fn pick(
             AdapterChoice::Software => is_software,
             AdapterChoice::Named(wanted) => name(adapter).to_lowercase().contains(&wanted.to_lowercase()),
         }
-    })
+    });
+    chosen.ok_or_else(|| not_found(choice, &found))
 }
 
 fn not_found(choice: &AdapterChoice, found: &[String]) -> GpuError {

@@ -13,7 +13,7 @@ mod target;
 
 pub use adapter::{AdapterChoice, GpuError};
 
-pub(crate) use adapter::Gpu;
+pub(crate) use adapter::{BACKENDS, Gpu};
 pub(crate) use overlay::paint;
 
 use super::picture::Picture;
@@ -69,6 +69,14 @@ impl Renderer {
     #[must_use]
     pub fn largest_px(&self) -> u32 {
         self.gpu.largest_px
+    }
+
+    /// Whether pictures of this width and height \[pixels\] can be drawn.
+    ///
+    /// # Errors
+    /// [`GpuError::Size`] when a side is not between 1 and [`Renderer::largest_px`].
+    pub fn check_size(&self, size_px: [u32; 2]) -> Result<(), GpuError> {
+        self.gpu.check_size(size_px)
     }
 
     pub(crate) fn gpu(&self) -> &Gpu {

@@ -5,27 +5,20 @@ use egui::{Color32, FontId, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2, pos2};
 use egui_wgpu::ScreenDescriptor;
 
 use super::Gpu;
-use super::target::{LIGHT_FORMAT, Target, WORDS_FORMAT};
+use super::target::{Target, WORDS_FORMAT};
 use crate::render::scene::{Colour, Mark};
 
 /// Lays marks over pictures.
 pub(super) struct Overlay {
     context: egui::Context,
-    /// For pictures seen as bytes, and for those that cannot be.
-    renderers: [egui_wgpu::Renderer; 2],
+    renderer: egui_wgpu::Renderer,
 }
 
 impl Overlay {
     pub(super) fn new(device: &wgpu::Device) -> Self {
-        let context = egui::Context::default();
-        let renderer = |format| {
-            egui_wgpu::Renderer::new(
-                device,
-                format,
-                egui_wgpu::RendererOptions { dithering: false, ..egui_wgpu::RendererOptions::PREDICTABLE },
-            )
-        };
-        Self { context, renderers: [WORDS_FORMAT, LIGHT_FORMAT].map(renderer) }
+        let options = egui_wgpu::RendererOptions { dithering: false, ..egui_wgpu::RendererOptions::PREDICTABLE };
+        let renderer = egui_wgpu::Renderer::new(device, WORDS_FORMAT, options);
+        Self { context: egui::Context::default(), renderer }
     }
 
     pub(super) fn draw(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, target: &Target, marks: &[Mark]) {
@@ -44,15 +37,12 @@ impl Overlay {
         });
         let primitives: Vec<ClippedPrimitive> = self.context.tessellate(std::mem::take(&mut output.shapes), 1.0);
         let screen = ScreenDescriptor { size_in_pixels: target.size_px, pixels_per_point: 1.0 };
-        for renderer in &mut self.renderers {
-            for (id, deltas) in &output.textures_delta.set {
-                for delta in deltas {
-                    renderer.update_texture(&gpu.device, &gpu.queue, *id, delta);
-                }
+        for (id, deltas) in &output.textures_delta.set {
+            for delta in deltas {
+                self.renderer.update_texture(&gpu.device, &gpu.queue, *id, delta);
             }
         }
-        let renderer = &mut self.renderers[usize::from(!gpu.other_views)];
-        renderer.update_buffers(&gpu.device, &gpu.queue, encoder, &primitives, &screen);
+        self.renderer.update_buffers(&gpu.device, &gpu.queue, encoder, &primitives, &screen);
         let mut pass = encoder
             .begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("words"),
@@ -65,12 +55,10 @@ impl Overlay {
                 ..wgpu::RenderPassDescriptor::default()
             })
             .forget_lifetime();
-        renderer.render(&mut pass, &primitives, &screen);
+        self.renderer.render(&mut pass, &primitives, &screen);
         drop(pass);
-        for renderer in &mut self.renderers {
-            for id in &output.textures_delta.free {
-                renderer.free_texture(id);
-            }
+        for id in &output.textures_delta.free {
+            self.renderer.free_texture(id);
         }
         output.textures_delta.clear();
     }
@@ -132,4 +120,32 @@ fn gradient(area: Rect, colours: &[Colour]) -> Mesh {
 fn colour32(colour: Colour) -> Color32 {
     let [red, green, blue, opacity] = colour.rgba;
     Color32::from_rgba_unmultiplied(red, green, blue, opacity)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::scene::width;
+
+    /// Letters are put on quarters of a pixel, or on whole ones.
+    const ROUNDING_PX: f32 = 0.5;
+
+    #[test]
+    fn words_are_as_wide_as_the_scene_takes_them_to_be() {
+        let context = egui::Context::default();
+        let mut most = 0.0_f32;
+        let mut output = context.run_pass(egui::RawInput::default(), |context| {
+            let painter = context.layer_painter(egui::LayerId::background());
+            for text in
+                ["closest so far 2.460 m, vehicles 1-3 at 2.15 s", "WWW", "iii", "keep-out shell, radius delta/2"]
+            {
+                for size_px in [9.0, 17.0, 40.0] {
+                    let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(size_px), Color32::WHITE);
+                    most = most.max((galley.size().x - width(size_px, text)).abs() / text.len() as f32);
+                }
+            }
+        });
+        output.textures_delta.clear();
+        assert!(most <= ROUNDING_PX, "{most} pixels a letter");
+    }
 }

@@ -183,7 +183,7 @@ impl Pipelines {
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH_FORMAT,
                     depth_write_enabled: Some(writes_depth),
-                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    depth_compare: Some(wgpu::CompareFunction::Greater),
                     stencil: wgpu::StencilState::default(),
                     bias: wgpu::DepthBiasState::default(),
                 }),
@@ -205,7 +205,7 @@ impl Pipelines {
         let (ball_bytes, line_bytes) = (size_of::<BallInstance>(), size_of::<LineInstance>());
         Self {
             solid: pipeline("solid", &ball_shader, &ball_attributes, ball_bytes, "solid", true),
-            line: pipeline("line", &line_shader, &line_attributes, line_bytes, "stroke", true),
+            line: pipeline("line", &line_shader, &line_attributes, line_bytes, "stroke", false),
             shell: pipeline("shell", &ball_shader, &ball_attributes, ball_bytes, "shell", false),
             balls: Instances::new(device, "balls", FIRST_INSTANCES * ball_bytes),
             lines: Instances::new(device, "lines", FIRST_INSTANCES * line_bytes),
@@ -223,7 +223,8 @@ impl Pipelines {
         self.lines.upload(device, queue, &scene.lines.iter().map(LineInstance::from).collect::<Vec<_>>());
     }
 
-    /// Draws what was uploaded last: solid things first, then what lets light through.
+    /// Draws what was uploaded last: solid things first, then what lets light through. Lines hide nothing: of two on one
+    /// another, the later one is seen.
     pub(super) fn draw(&self, encoder: &mut wgpu::CommandEncoder, target: &Target, scene: &Scene) {
         let [red, green, blue, _] = scene.background.linear().map(f64::from);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -239,7 +240,7 @@ impl Pipelines {
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &target.depth_view,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store: wgpu::StoreOp::Discard }),
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Discard }),
                 stencil_ops: None,
             }),
             ..wgpu::RenderPassDescriptor::default()

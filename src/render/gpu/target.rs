@@ -40,8 +40,7 @@ impl Target {
         };
         let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let usage = attachment | wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
-        let other_views: &[_] = if gpu.other_views { &[WORDS_FORMAT] } else { &[] };
-        let texture = make("picture", LIGHT_FORMAT, 1, usage, other_views);
+        let texture = make("picture", LIGHT_FORMAT, 1, usage, &[WORDS_FORMAT]);
         let samples = make("samples", LIGHT_FORMAT, SAMPLES, attachment, &[]);
         let depth = make("depth", DEPTH_FORMAT, SAMPLES, attachment, &[]);
         let view = |texture: &wgpu::Texture, format| {
@@ -50,7 +49,7 @@ impl Target {
         let target = Self {
             size_px,
             light_view: view(&texture, None),
-            words_view: view(&texture, gpu.other_views.then_some(WORDS_FORMAT)),
+            words_view: view(&texture, Some(WORDS_FORMAT)),
             samples_view: view(&samples, None),
             depth_view: view(&depth, None),
             texture,

@@ -7,12 +7,16 @@ use crate::swarm::Pair;
 
 /// Most vehicles whose names are written on them.
 const NAMED: usize = 64;
+/// Most pairs closer than delta whose distance is written beside them: the worst ones.
+const LABELLED: usize = 3;
 /// Colours of the scale in the legend.
 const SHADES: i16 = 16;
 /// Widest picture \[pixels\] that has no room for a legend, and lowest.
 const NO_LEGEND_PX: [u32; 2] = [420, 260];
 /// Longest name that is written in full.
 const LONGEST_NAME: usize = 40;
+/// Fewest letters of a name that are worth writing.
+const FEWEST_LETTERS: usize = 4;
 /// Opacity of what is behind words.
 const BACKING: f32 = 0.72;
 const WHITE: Colour = Colour::hex(0xFF_FF_FF);
@@ -47,41 +51,49 @@ impl Painting<'_> {
         let mut y = self.banner(placing);
         let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
         let (bottom, taken) = placing.placed();
-        let name = shortened(&self.footage.name);
-        placing.write([margin, y], [0.0, 0.0], 1.35 * size_px, theme.ink(), &name);
-        placing.back(taken, bottom, ground, room_px);
-        let (_, taken) = placing.placed();
+        // What has no room is left out: first the closest approach, then the name, then the verdict, then the time.
+        let large_px = 1.35 * size_px;
         let time = format!("t = {:.2} s", self.moment.time_s);
-        placing.write([width_px - margin, y], [1.0, 0.0], 1.35 * size_px, theme.ink(), &time);
-        y += 1.8 * size_px;
-        let (verdict, colour) = self.verdict();
-        let box_px = placing.write([width_px - margin, y], [1.0, 0.0], size_px, colour, &verdict);
+        let mut free_px = width_px - 2.0 * margin;
+        if width(large_px, &time) > free_px {
+            return;
+        }
+        free_px = placing.write([width_px - margin, y], [1.0, 0.0], large_px, theme.ink(), &time)[0][0] - 2.0 * margin;
+        let below = y + 1.8 * size_px;
+        let (verdicts, colour) = self.verdict();
+        let verdict = verdicts.iter().find(|text| width(size_px, text) <= width_px - 2.0 * margin);
+        let verdict_px =
+            verdict.map(|text| placing.write([width_px - margin, below], [1.0, 0.0], size_px, colour, text));
         placing.back(taken, bottom, ground, room_px);
         let (_, taken) = placing.placed();
-        let free_px = box_px[0][0] - margin;
-        for text in self.closest_so_far() {
-            if width(size_px, &text) <= free_px {
-                placing.write([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), &text);
-                placing.back(taken, bottom, ground, room_px);
-                break;
-            }
+        if let Some(name) = cut(&shortened(&self.footage.name), large_px, free_px) {
+            placing.write([margin, y], [0.0, 0.0], large_px, theme.ink(), &name);
+            placing.back(taken, bottom, ground, room_px);
+        }
+        y = below;
+        let (_, taken) = placing.placed();
+        let free_px = verdict_px.map_or(0.0, |corners_px| corners_px[0][0] - 2.0 * margin);
+        if let Some(text) = self.closest_so_far().iter().find(|text| width(size_px, text) <= free_px) {
+            placing.write([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
+            placing.back(taken, bottom, ground, room_px);
         }
     }
 
     /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
     fn banner(&self, placing: &mut Placing<'_>) -> f32 {
         let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
-        let violated: Vec<Pair> = self.violated_now().collect();
-        let (Some(&pair), Some(delta_m)) = (violated.first(), self.footage.delta_m) else { return self.margin() };
-        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
-        let distance = match (self.vehicle(pair.first()), self.vehicle(pair.second())) {
-            (Some(first), Some(second)) => format!(" {} apart", metres((second - first).norm())),
-            _ => String::new(),
+        let (Some(&(pair, distance_m)), Some(delta_m)) = (self.violated.first(), self.footage.delta_m) else {
+            return self.margin();
         };
-        let more = if violated.len() > 1 { format!(" and {} more", violated.len() - 1) } else { String::new() };
+        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
+        let (pair, distance) = (self.pair(pair), metres(distance_m));
+        let more = match self.violated.len() - 1 {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
         let texts = [
-            format!("VIOLATION  vehicles {}{distance}, delta {}{more}", self.pair(pair), metres(delta_m)),
-            format!("VIOLATION {}{distance}", self.pair(pair)),
+            format!("VIOLATION  vehicles {pair} {distance} apart, delta {}{more}", metres(delta_m)),
+            format!("VIOLATION {pair} {distance} apart"),
             "VIOLATION".to_owned(),
         ];
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
@@ -95,18 +107,20 @@ impl Painting<'_> {
         bottom + 0.6 * self.margin()
     }
 
-    /// What can be said up to now, in a few words.
-    fn verdict(&self) -> (String, Colour) {
+    /// What can be said up to now, in a few words and in fewer.
+    fn verdict(&self) -> (Vec<String>, Colour) {
         let theme = self.view.theme;
         if self.footage.delta_m.is_none() {
-            return ("not judged: no delta".to_owned(), theme.soft_ink());
+            return (vec!["not judged: no delta".to_owned(), "not judged".to_owned()], theme.soft_ink());
         }
         let began: Vec<_> = self.footage.violations().iter().filter(|span| span.from_s <= self.moment.time_s).collect();
         match began.first() {
-            None => ("clear so far".to_owned(), theme.good()),
+            None => (vec!["clear so far".to_owned()], theme.good()),
             Some(span) => {
                 let times = if began.len() == 1 { String::new() } else { format!(", {} times", began.len()) };
-                (format!("violated at {:.2} s by {}{times}", span.from_s, self.pair(span.pair)), theme.alarm())
+                let at = format!("violated at {:.2} s", span.from_s);
+                let texts = vec![format!("{at} by {}{times}", self.pair(span.pair)), at, "violated".to_owned()];
+                (texts, theme.alarm())
             }
         }
     }
@@ -194,20 +208,21 @@ impl Painting<'_> {
         }
     }
 
-    /// The distance of the closest pair, and of every pair closer than delta, beside the line that joins it.
+    /// The distance of the closest pair, and of the worst pairs closer than delta, beside the line that joins them; not
+    /// where that is outside the picture or has no room.
     fn distances(&self, placing: &mut Placing<'_>) {
-        let mut alarmed: Vec<Pair> = self.violated_now().collect();
-        alarmed.dedup();
-        let nearest = self.moment.nearest.map(|(pair, _)| pair).filter(|pair| !alarmed.contains(pair));
         let theme = self.view.theme;
         let size_px = self.view.text_px(1.0);
-        for (pair, alarm) in alarmed.into_iter().map(|pair| (pair, true)).chain(nearest.map(|pair| (pair, false))) {
+        let alarmed = self.violated.iter().take(LABELLED).map(|&(pair, distance_m)| (pair, distance_m, true));
+        let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
+        for (pair, distance_m, alarm) in alarmed.chain(nearest) {
             let (Some(first), Some(second)) = (self.vehicle(pair.first()), self.vehicle(pair.second())) else {
                 continue;
             };
             let Some(middle) = self.camera.project((first + second) / 2.0) else { continue };
-            let text = metres((second - first).norm());
-            let at = placing.find(middle.at_px, &[1.1 * size_px, 1.8 * size_px, 3.0 * size_px], size_px, &text);
+            let text = metres(distance_m);
+            let distances_px = [1.1 * size_px, 1.8 * size_px, 3.0 * size_px];
+            let Some(at) = placing.find(middle.at_px, &distances_px, size_px, &text) else { continue };
             let half = width(size_px, &text) / 2.0 + 0.25 * size_px;
             let corners_px = [[at[0] - half, at[1] - 0.68 * size_px], [at[0] + half, at[1] + 0.68 * size_px]];
             let (ground, ink) = if alarm {
@@ -230,23 +245,22 @@ impl Painting<'_> {
         for k in 0..self.footage.count() {
             let Some(place) = self.vehicle(k) else { continue };
             let Some(at) = self.camera.project(place).filter(|_| !self.is_hidden(k)) else { continue };
-            let name = &self.footage.vehicles[k];
+            let name = shortened(&self.footage.vehicles[k]);
             #[expect(clippy::cast_possible_truncation, reason = "pixels")]
             let ([x, y], radius) = (at.at_px.map(|v| v as f32), (self.footage.radius_m[k] * at.px_per_m) as f32);
-            let fitting = (1.5 * radius).min(1.7 * radius / (width(1.0, name)).max(0.4)).min(size_px);
+            let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
             if fitting >= 8.0 {
-                let text = name.clone();
                 placing.draw(Mark::Words {
                     at_px: [x, y],
                     anchor: [0.5, 0.5],
                     size_px: fitting,
                     colour: theme.background(),
-                    text,
+                    text: name,
                 });
             } else {
                 let offset = f64::from(radius + 0.2 * size_px);
                 let beside = [at.at_px[0] + offset, at.at_px[1] - offset];
-                placing.words_at(beside, [0.0, 1.0], 0.85 * size_px, self.colour(k), name);
+                placing.words_at(beside, [0.0, 1.0], 0.85 * size_px, self.colour(k), &name);
             }
         }
     }
@@ -275,9 +289,18 @@ impl Painting<'_> {
 }
 
 /// A length to the millimetre, rounded down: what is said to be clear is clear.
-fn metres(length_m: f64) -> String {
+pub(crate) fn metres(length_m: f64) -> String {
     // A little more, so that 2.46 stays 2.460.
     format!("{:.3} m", (length_m * 1e3 + 1e-6).floor() / 1e3)
+}
+
+/// As much of a name as has room, with an ellipsis where it is cut; none where even a few letters have none.
+fn cut(name: &str, size_px: f32, room_px: f32) -> Option<String> {
+    if width(size_px, name) <= room_px {
+        return Some(name.to_owned());
+    }
+    let start = |letters: usize| name.chars().take(letters).chain(['…']).collect::<String>();
+    (FEWEST_LETTERS..name.chars().count()).rev().map(start).find(|start| width(size_px, start) <= room_px)
 }
 
 fn shortened(name: &str) -> String {
@@ -295,5 +318,12 @@ mod tests {
     #[test]
     fn a_distance_is_never_shown_larger_than_it_is() {
         assert_eq!([1.999_999, 2.46, 2.0, 0.0].map(metres), ["1.999 m", "2.460 m", "2.000 m", "0.000 m"]);
+    }
+
+    #[test]
+    fn a_name_is_cut_to_its_room_or_left_out() {
+        assert_eq!(cut("pentagon", 10.0, 100.0).as_deref(), Some("pentagon"));
+        assert_eq!(cut("pentagon", 10.0, 40.0).as_deref(), Some("penta…"));
+        assert_eq!(cut("pentagon", 10.0, 20.0), None);
     }
 }

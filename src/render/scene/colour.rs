@@ -67,6 +67,8 @@ pub enum Theme {
     Paper,
 }
 
+/// From this many vehicles on all have one colour.
+const ONE_COLOUR: usize = 200;
 /// Vehicles in order, as in the charts: told apart by colour-blind people too.
 const VEHICLES_ON_LIGHT: [Colour; 6] = [
     Colour::hex(0x00_72_B2),
@@ -126,6 +128,12 @@ impl Theme {
     pub fn vehicle(self, k: usize) -> Colour {
         let palette = if self == Self::Dark { VEHICLES_ON_DARK } else { VEHICLES_ON_LIGHT };
         palette[k % palette.len()]
+    }
+
+    /// Vehicle `k` of so many: from 200 on all have one colour.
+    #[must_use]
+    pub fn vehicle_among(self, k: usize, count: usize) -> Colour {
+        self.vehicle(if count < ONE_COLOUR { k } else { 0 })
     }
 
     /// Keep-out shells.

@@ -7,6 +7,8 @@ use super::{Colour, Line, Painting, Scene, single};
 
 /// Most lines of the ground in each direction.
 const MOST_LINES: u32 = 60;
+/// Sine of the elevation below which the ground is seen as a line.
+const EDGE_ON: f64 = 0.05;
 /// Length of the axes in distances of lines of the ground.
 const AXIS: f64 = 1.0;
 /// Colours of x, y and z on dark and on light ground: the usual red, green and blue, none of them pure.
@@ -58,7 +60,7 @@ impl Painting<'_> {
             let other = 1 - axis;
             // Edge-on there is no edge to write along.
             if self.camera.back[axis].abs() > 0.97
-                || self.camera.back.z.abs() < 0.05 && axis == 1 && self.camera.back.y.abs() > 0.5
+                || self.camera.back.z.abs() < EDGE_ON && axis == 1 && self.camera.back.y.abs() > 0.5
             {
                 continue;
             }
@@ -72,15 +74,24 @@ impl Painting<'_> {
             });
             let Some(edge) = edge else { continue };
             let outwards = if edge > centre[other] { 1.0 } else { -1.0 };
-            let count = lines(high[axis] - low[axis], step);
-            for k in 0..=count {
+            // Seen along the ground the numbers are below the line that it is.
+            let (anchor, below_px) = if self.camera.back.z.abs() < EDGE_ON {
+                ([0.5, 0.0], 0.4 * f64::from(size_px))
+            } else {
+                ([0.5; 2], 0.0)
+            };
+            // The unit is that of the last number that has room.
+            let mut unit = " m";
+            for k in (0..=lines(high[axis] - low[axis], step)).rev() {
                 let mut point = low;
                 point[axis] += f64::from(k) * step;
                 point[other] = edge + outwards * 0.42 * step;
-                let metres = point[axis] + origin_m[axis];
-                let text = if k == count { format!("{} m", plain(metres, step)) } else { plain(metres, step) };
+                let text = format!("{}{unit}", plain(point[axis] + origin_m[axis], step));
                 if let Some(at) = self.camera.project(point) {
-                    placing.words_at(at.at_px, [0.5, 0.5], size_px, soft, &text);
+                    let [x, y] = at.at_px;
+                    if placing.words_at([x, y + below_px], anchor, size_px, soft, &text) {
+                        unit = "";
+                    }
                 }
             }
         }

@@ -13,12 +13,16 @@ mod stage;
 mod world;
 
 pub use camera::{Camera, CameraError, CameraSpec, Lens, Orbit, Projected};
+pub(crate) use caption::metres;
 pub use colour::{Colour, Theme};
+#[cfg(test)]
+pub(super) use placing::width;
 pub use stage::Stage;
 
 use nalgebra::Vector3;
 
-use super::footage::{Footage, Moment};
+use super::footage::{Footage, Moment, Span};
+use crate::swarm::Pair;
 
 /// A ball. A solid one is lit; a shell lets through what is within and behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +122,7 @@ pub struct Scene {
     pub balls: Vec<Ball>,
     /// Keep-out shells, in the order in which they must be drawn: see [`Scene::compose`].
     pub shells: Vec<Ball>,
-    /// Edges, trails, start marks, goal slots, ground.
+    /// Ground, trails, start marks, goal slots, edges, pairs: a later one is drawn over those before it.
     pub lines: Vec<Line>,
     /// Words and legends.
     pub marks: Vec<Mark>,
@@ -235,7 +239,7 @@ impl Scene {
     /// The draw list of a flight at a moment, seen by a camera whose size of picture is that of the view.
     #[must_use]
     pub fn seen_by(camera: Camera, footage: &Footage, stage: &Stage, moment: &Moment, view: &View) -> Self {
-        let painting = Painting { footage, stage, moment, view, camera };
+        let painting = Painting { footage, stage, moment, view, camera, violated: violated(footage, moment) };
         let mut scene = Self {
             camera,
             depth_m: stage.depth_m(&camera),
@@ -246,20 +250,20 @@ impl Scene {
             marks: Vec::new(),
         };
         painting.vehicles(&mut scene);
-        if view.layers.closest {
-            painting.pairs(&mut scene);
-        }
         if view.layers.ground {
             painting.ground(&mut scene);
-        }
-        if view.layers.marks {
-            painting.starts_and_goals(&mut scene);
         }
         if view.layers.trails {
             painting.trails(&mut scene);
         }
+        if view.layers.marks {
+            painting.starts_and_goals(&mut scene);
+        }
         if view.layers.edges {
             painting.edges(&mut scene);
+        }
+        if view.layers.closest {
+            painting.pairs(&mut scene);
         }
         painting.annotate(&mut scene);
         scene
@@ -273,6 +277,8 @@ struct Painting<'a> {
     moment: &'a Moment,
     view: &'a View,
     camera: Camera,
+    /// Pairs that are closer than delta at this moment and their distances \[m\], the nearest first.
+    violated: Vec<(Pair, f64)>,
 }
 
 impl Painting<'_> {
@@ -281,15 +287,21 @@ impl Painting<'_> {
         self.stage.place(&self.moment.positions_m, k)
     }
 
-    /// Violations that last at this moment.
-    fn violated_now(&self) -> impl Iterator<Item = crate::swarm::Pair> + '_ {
-        let now_s = self.moment.time_s;
-        self.footage
-            .violations()
-            .iter()
-            .filter(move |span| span.from_s <= now_s && now_s <= span.to_s)
-            .map(|span| span.pair)
+    /// The closest pair, where it is not closer than delta, and its distance \[m\].
+    fn clear_nearest(&self) -> Option<(Pair, f64)> {
+        self.moment.nearest.filter(|(nearest, _)| self.violated.iter().all(|(pair, _)| pair != nearest))
     }
+}
+
+fn violated(footage: &Footage, moment: &Moment) -> Vec<(Pair, f64)> {
+    let lasts = |span: &&Span| span.from_s <= moment.time_s && moment.time_s <= span.to_s;
+    let mut pairs: Vec<Pair> = footage.violations().iter().filter(lasts).map(|span| span.pair).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut violated: Vec<_> = pairs.into_iter().map(|pair| (pair, moment.distance_m(pair))).collect();
+    violated.retain(|(_, distance_m)| distance_m.is_finite());
+    violated.sort_by(|a, b| a.1.total_cmp(&b.1));
+    violated
 }
 
 /// A vector in single precision.

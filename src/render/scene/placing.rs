@@ -2,8 +2,17 @@
 
 use super::{Colour, Mark};
 
-/// Width of a letter over the height of a line, a little more than that of the widest usual words.
-const LETTER: f32 = 0.56;
+/// Widths of the letters from space to ~ in thousandths of the height of a line, as the overlay's font has them.
+#[rustfmt::skip]
+const LETTERS: [u16; 95] = [
+    228, 274, 392, 653, 564, 831, 648, 240, 310, 310, 472, 564, 246, 282, 246, 359, 564, 564, 564, 564,
+    564, 564, 564, 564, 564, 564, 246, 246, 564, 564, 564, 380, 940, 641, 630, 609, 702, 555, 520, 658,
+    692, 248, 487, 599, 502, 865, 709, 774, 592, 774, 618, 517, 548, 680, 624, 921, 608, 569, 560, 310,
+    359, 310, 564, 490, 376, 509, 583, 460, 583, 548, 376, 573, 569, 237, 237, 495, 255, 863, 569, 582,
+    583, 583, 374, 428, 387, 569, 480, 775, 499, 474, 455, 319, 262, 319, 564,
+];
+/// Width of any other letter.
+const OTHER: u16 = 996;
 /// Room around words over the height of a line.
 const PADDING: f32 = 0.12;
 
@@ -83,29 +92,31 @@ impl<'a> Placing<'a> {
         inside && self.taken.iter().all(clear)
     }
 
-    /// The nearest place around a point, at these distances from it, that has room for words; the last resort is above it
-    /// and within the picture.
-    pub(super) fn find(&self, at_px: [f64; 2], distances_px: &[f32], size_px: f32, text: &str) -> [f32; 2] {
+    /// The nearest place around a point of the picture, at these distances from it, that has room for words.
+    pub(super) fn find(&self, at_px: [f64; 2], distances_px: &[f32], size_px: f32, text: &str) -> Option<[f32; 2]> {
         #[expect(clippy::cast_possible_truncation, reason = "pixels")]
         let [x, y] = at_px.map(|x| x as f32);
+        let [width_px, height_px] = self.size_px;
+        if !((0.0..=width_px).contains(&x) && (0.0..=height_px).contains(&y)) {
+            return None;
+        }
         for &distance in distances_px {
             for [right, down] in [[0.0, -1.0], [0.0, 1.0], [1.0, 0.0], [-1.0, 0.0], [0.7, -0.7], [-0.7, -0.7]] {
                 let half = width(size_px, text) / 2.0;
                 let centre = [x + right * (distance + half), y + down * distance];
                 if self.has_room(area(centre, [0.5, 0.5], size_px, text)) {
-                    return centre;
+                    return Some(centre);
                 }
             }
         }
-        let (half, [width_px, height_px]) = (width(size_px, text) / 2.0, self.size_px);
-        let within = |x: f32, room: f32, size: f32| x.clamp(room.min(size / 2.0), (size - room).max(size / 2.0));
-        [within(x, half, width_px), within(y - 1.5 * size_px, size_px, height_px)]
+        None
     }
 }
 
-/// About how wide words are \[pixels\].
-pub(super) fn width(size_px: f32, text: &str) -> f32 {
-    text.chars().count() as f32 * LETTER * size_px
+/// How wide words are \[pixels\].
+pub(in crate::render) fn width(size_px: f32, text: &str) -> f32 {
+    let letter = |c: char| (c as usize).checked_sub(32).and_then(|k| LETTERS.get(k)).copied().unwrap_or(OTHER);
+    text.chars().map(|c| f32::from(letter(c))).sum::<f32>() * size_px / 1000.0
 }
 
 fn area(at_px: [f32; 2], anchor: [f32; 2], size_px: f32, text: &str) -> [f32; 4] {
@@ -126,8 +137,11 @@ mod tests {
         assert!(placing.words_at([50.0, 50.0], [0.5, 0.5], 10.0, ink, "first"));
         assert!(!placing.words_at([55.0, 52.0], [0.5, 0.5], 10.0, ink, "second"), "it would cover the first");
         assert!(!placing.words_at([195.0, 50.0], [0.0, 0.5], 10.0, ink, "third"), "it would stick out");
-        let found = placing.find([50.0, 50.0], &[20.0], 10.0, "fourth");
+        let found = placing.find([50.0, 50.0], &[20.0], 10.0, "fourth").expect("room");
         assert!(placing.words_at(found.map(f64::from), [0.5, 0.5], 10.0, ink, "fourth"), "{found:?}");
+        assert_eq!(placing.find([-50.0, 50.0], &[80.0], 10.0, "fifth"), None, "its point is outside the picture");
+        placing.take([[0.0, 0.0], [200.0, 100.0]]);
+        assert_eq!(placing.find([50.0, 50.0], &[20.0], 10.0, "sixth"), None, "everything is taken");
         assert_eq!(marks.len(), 2);
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::{Camera, CameraError, CameraSpec, Lens, Orbit, View};
 use crate::render::footage::{Footage, Moment};
-use crate::swarm::{Rows, row};
+use crate::swarm::{Pair, Rows, row};
 
 /// Most places of vehicles that framing looks at.
 const FRAMED_PLACES: usize = 200_000;
@@ -21,7 +21,8 @@ const FOLLOWED_DELTAS: f64 = 3.0;
 const FOLLOWED_RADII: f64 = 20.0;
 /// How far around the closest pair one sees, in units of its distance.
 const CLOSEST_DISTANCES: f64 = 1.1;
-
+/// Nearest that anything is drawn, in units of the farthest: centimetres in a flight of tens of kilometres.
+const NEAREST: f64 = 1e-6;
 /// Room around the ground for its scale, in distances of its lines.
 const SCALE_ROOM: f64 = 0.6;
 
@@ -132,22 +133,23 @@ impl Stage {
                     None => framing(&CameraSpec::Iso),
                 }
             }
-            CameraSpec::Closest => {
-                let pair = moment.nearest.map(|(pair, distance_m)| {
-                    let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&moment.positions_m, k));
-                    (first, second, distance_m)
-                });
-                match pair {
-                    Some((Some(first), Some(second), distance_m)) => {
-                        let keep_out_m = footage.delta_m.unwrap_or(distance_m);
-                        let around_m = CLOSEST_DISTANCES * distance_m.max(keep_out_m);
-                        Camera::close_up((first + second) / 2.0, around_m, view.size_px)
-                    }
-                    _ => framing(&CameraSpec::Iso),
-                }
-            }
+            CameraSpec::Closest => match moment.nearest {
+                Some((pair, _)) => self.close_up(footage, moment, pair, view.size_px),
+                None => framing(&CameraSpec::Iso),
+            },
             spec => framing(spec),
         })
+    }
+
+    /// A camera near a pair; one that frames the flight where one of the two is not there.
+    #[must_use]
+    pub fn close_up(&self, footage: &Footage, moment: &Moment, pair: Pair, size_px: [u32; 2]) -> Camera {
+        let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&moment.positions_m, k));
+        let (Some(first), Some(second)) = (first, second) else { return self.framing(&CameraSpec::Iso, size_px) };
+        let distance_m = (second - first).norm();
+        // Hulls of two at one place are seen too, whatever delta is.
+        let keep_out_m = 2.0 * keep_out_m(footage, pair.first()).max(keep_out_m(footage, pair.second()));
+        Camera::close_up((first + second) / 2.0, CLOSEST_DISTANCES * distance_m.max(keep_out_m), size_px)
     }
 
     fn framing(&self, spec: &CameraSpec, size_px: [u32; 2]) -> Camera {
@@ -193,7 +195,7 @@ impl Stage {
         let (centre, radius) = self.reach;
         let middle = -camera.seen(centre).z;
         let far = (middle + radius).max(1e-2);
-        [(middle - radius).max(1e-3 * far), far]
+        [(middle - radius).max(NEAREST * far), far]
     }
 }
 

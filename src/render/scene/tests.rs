@@ -187,3 +187,71 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
     });
     assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
 }
+
+#[test]
+fn the_worst_pair_is_named_first_and_few_are_labelled() {
+    let mut footage = footage();
+    for (i, j) in [(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+        footage.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
+    }
+    let scene = scene(&footage, 5.0, &View::default());
+    let banner = "VIOLATION  vehicles 1-2 2.500 m apart, delta 2.000 m and 5 more";
+    assert!(words(&scene).contains(&banner), "{:?}", words(&scene));
+    let labels = words(&scene).iter().filter(|text| text.ends_with(".000 m") || text.ends_with(".500 m")).count();
+    assert!((1..=3).contains(&labels), "{:?}", words(&scene));
+}
+
+#[test]
+fn in_a_small_picture_the_caption_gives_way_and_never_runs_over_itself() {
+    let mut footage = footage();
+    "an exceedingly long name of a flight".clone_into(&mut footage.name);
+    let said = |size_px| {
+        let scene = scene(&footage, 3.0, &View { size_px, ..View::default() });
+        let [name, time] = ["an ex", "t = "].map(|start| words(&scene).iter().any(|text| text.starts_with(start)));
+        (name, time)
+    };
+    assert_eq!(
+        [[1280, 720], [320, 240], [90, 60], [40, 30]].map(said),
+        [(true, true), (true, true), (false, true), (false, false)]
+    );
+}
+
+#[test]
+fn what_is_too_small_to_see_is_a_dot() {
+    let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 30e3, 0.0, 1.0]));
+    let mut footage = Footage::new("far", 2);
+    for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
+        swarm.positions_m[(1, 1)] = time_s;
+        let control = Rows::zeros(2);
+        footage.take(&Sample {
+            time_s,
+            step: step as u64,
+            swarm: &swarm,
+            control: &control,
+            separation: None,
+            energy: None,
+        });
+    }
+    let scene = scene(&footage, 0.0, &camera("top"));
+    let at = scene.camera.project(Vector3::zeros()).expect("ahead");
+    assert!(scene.balls.iter().all(|ball| f64::from(ball.radius_m) * at.px_per_m > 1.4), "{:?}", scene.balls);
+}
+
+#[test]
+fn seen_along_the_ground_its_scale_is_below_it_and_the_last_number_has_the_unit() {
+    let footage = footage();
+    for text in ["iso", "front", "side", "top"] {
+        let scene = scene(&footage, 2.0, &camera(text));
+        let unit = words(&scene).iter().filter(|text| text.ends_with(" m") && !text.contains('.')).count();
+        assert!((1..=2).contains(&unit), "{text}: {:?}", words(&scene));
+    }
+    let front = scene(&footage, 2.0, &camera("front"));
+    let ground = front.camera.project(Stage::of(&footage).ground_m[0]).expect("ahead").at_px[1];
+    let numbers = front.marks.iter().filter_map(|mark| match mark {
+        Mark::Words { at_px, anchor: [_, 0.0], text, .. } if text.trim_end_matches(" m").parse::<f64>().is_ok() => {
+            Some(at_px[1])
+        }
+        _ => None,
+    });
+    assert!(numbers.clone().count() > 2 && numbers.clone().all(|y| f64::from(y) > ground + 4.0));
+}

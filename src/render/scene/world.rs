@@ -8,8 +8,6 @@ use crate::swarm::{Pair, row};
 
 /// Most edges that are drawn: more hide what they join.
 pub(super) const MOST_EDGES: usize = 2100;
-/// From this many vehicles on all have one colour.
-const ONE_COLOUR: usize = 200;
 /// Most pieces of all trails together, and of one.
 const TRAIL_PIECES: usize = 60_000;
 const LONGEST_TRAIL: usize = 400;
@@ -23,25 +21,36 @@ const RING: u32 = 28;
 const SLOT: f64 = 1.45;
 /// Most vehicles that have start marks and goal slots.
 const MOST_MARKS: usize = 2000;
+/// Least radius of a vehicle, of the cross where it started and of its goal slot in a picture 720 pixels high \[pixels\].
+const LEAST_PX: [f32; 3] = [2.0, 3.0, 4.0];
 
 impl Painting<'_> {
     /// The colour of a vehicle.
     pub(super) fn colour(&self, k: usize) -> Colour {
-        self.view.theme.vehicle(if self.footage.count() < ONE_COLOUR { k } else { 0 })
+        self.view.theme.vehicle_among(k, self.footage.count())
+    }
+
+    /// A radius at a place \[m\], or what so many pixels are there, whichever is more.
+    fn at_least(&self, place: Vector3<f64>, radius_m: f64, least_px: f32) -> f64 {
+        let px_per_m = self.camera.project(place).map_or(f64::INFINITY, |at| at.px_per_m);
+        radius_m.max(f64::from(least_px * self.view.unit_px()) / px_per_m)
     }
 
     pub(super) fn vehicles(&self, scene: &mut Scene) {
-        let violated: Vec<Pair> = self.violated_now().collect();
-        let is_violated = |k: usize| violated.iter().any(|pair| pair.first() == k || pair.second() == k);
+        let mut alarmed = vec![false; self.footage.count()];
+        for (pair, _) in &self.violated {
+            (alarmed[pair.first()], alarmed[pair.second()]) = (true, true);
+        }
         let theme = self.view.theme;
         let mut shells = Vec::new();
-        for k in 0..self.footage.count() {
+        for (k, alarm) in alarmed.into_iter().enumerate() {
             let Some(place) = self.vehicle(k) else { continue };
-            let (centre_m, alarm) = (single(place), is_violated(k));
+            let centre_m = single(place);
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
             let metres = |length_m: f64| length_m as f32;
             let colour = if alarm { theme.alarm() } else { self.colour(k) };
-            scene.balls.push(Ball { centre_m, radius_m: metres(self.footage.radius_m[k]), colour });
+            let radius_m = metres(self.at_least(place, self.footage.radius_m[k], LEAST_PX[0]));
+            scene.balls.push(Ball { centre_m, radius_m, colour });
             if let Some(delta_m) = self.footage.delta_m.filter(|_| self.view.layers.shells || alarm) {
                 let radius_m = delta_m / 2.0;
                 let strength = if theme == Theme::Paper { 0.75 } else { 0.6 };
@@ -81,12 +90,11 @@ impl Painting<'_> {
 
     /// The pair that must be seen: the closest one, and every one that is closer than delta.
     pub(super) fn pairs(&self, scene: &mut Scene) {
-        let mut alarmed: Vec<Pair> = self.violated_now().collect();
-        let alarm = self.view.theme.alarm();
-        let nearest = self.moment.nearest.map(|(pair, _)| pair).filter(|pair| !alarmed.contains(pair));
-        alarmed.dedup();
-        let pairs = alarmed.into_iter().map(|pair| (pair, alarm, 5.0));
-        for (pair, colour, width) in pairs.chain(nearest.map(|pair| (pair, self.view.theme.ink(), 2.6))) {
+        let theme = self.view.theme;
+        // The worst one last, which is over the others.
+        let alarmed = self.violated.iter().rev().map(|(pair, _)| (*pair, theme.alarm(), 5.0));
+        let nearest = self.clear_nearest().map(|(pair, _)| (pair, theme.ink(), 2.6));
+        for (pair, colour, width) in nearest.into_iter().chain(alarmed) {
             if let (Some(from), Some(to)) = (self.vehicle(pair.first()), self.vehicle(pair.second())) {
                 let width_px = width * self.view.unit_px();
                 scene.lines.push(Line { ends_m: [single(from), single(to)], colours: [colour; 2], width_px });
@@ -141,9 +149,12 @@ impl Painting<'_> {
         let (_, start_m) = self.footage.instant(0);
         let (right, up) = (self.camera.right, self.camera.up);
         let width_px = 1.8 * self.view.unit_px();
+        // Many opaque ones would hide what they mark.
+        let opacity = (40.0 / count.max(1) as f32).clamp(0.05, 0.9);
         for k in 0..count {
             let Some(place) = self.stage.place(start_m, k) else { continue };
-            let (arm, colour) = (self.footage.radius_m[k] * 0.8, self.colour(k).at(0.9));
+            let (arm, colour) =
+                (self.at_least(place, self.footage.radius_m[k] * 0.8, LEAST_PX[1]), self.colour(k).at(opacity));
             for across in [(right + up) * arm, (right - up) * arm] {
                 scene.lines.push(Line {
                     ends_m: [single(place - across), single(place + across)],
@@ -156,7 +167,8 @@ impl Painting<'_> {
         let Some(motion) = best_rigid_motion(&self.moment.positions_m, &plan.formation) else { return };
         for k in 0..count {
             let centre = motion.apply(row(&plan.formation.slots_m, k)) - self.stage.origin_m();
-            let (radius, colour) = (self.footage.radius_m[k] * SLOT, self.colour(k).at(0.9));
+            let (radius, colour) =
+                (self.at_least(centre, self.footage.radius_m[k] * SLOT, LEAST_PX[2]), self.colour(k).at(opacity));
             let corner = |n: u32| {
                 let (sin, cos) = (f64::from(n % RING) / f64::from(RING) * std::f64::consts::TAU).sin_cos();
                 single(centre + (right * cos + up * sin) * radius)

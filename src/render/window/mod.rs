@@ -12,11 +12,12 @@ use std::time::{Duration, Instant};
 
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
+use winit::error::EventLoopError;
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::{Window, WindowId};
 
-use super::gpu::{AdapterChoice, Gpu, GpuError, Renderer};
+use super::gpu::{AdapterChoice, BACKENDS, Gpu, GpuError, Renderer};
 use super::scene::{Camera, Scene, Stage, View};
 use super::{Footage, Theme};
 use panels::{Desk, Shown, Wishes};
@@ -58,7 +59,7 @@ pub fn show(
     theme: Theme,
     adapter: AdapterChoice,
 ) -> Result<(), WindowError> {
-    let events = EventLoop::new().map_err(|error| WindowError::NoDisplay(error.to_string()))?;
+    let events = EventLoop::new().map_err(|error| WindowError::NoDisplay(reason(&error)))?;
     let mut shell = Shell {
         adapter,
         player: Player::new(footage, feed),
@@ -69,6 +70,15 @@ pub fn show(
     };
     events.run_app(&mut shell).map_err(|error| WindowError::Refused(error.to_string()))?;
     shell.failure.map_or(Ok(()), Err)
+}
+
+/// What the window system said, without the place in a library that noticed it.
+fn reason(error: &EventLoopError) -> String {
+    let text = error.to_string();
+    match text.strip_prefix("os error at ").and_then(|placed| placed.split_once(": ")) {
+        Some((_, reason)) => reason.to_owned(),
+        None => text,
+    }
 }
 
 /// The program between the window system and what is drawn.
@@ -154,19 +164,14 @@ impl Shell {
             .with_inner_size(LogicalSize::new(FIRST_SIZE[0], FIRST_SIZE[1]));
         let refused = |error: &dyn std::fmt::Display| WindowError::Refused(error.to_string());
         let window = Arc::new(events.create_window(attributes).map_err(|error| refused(&error))?);
-        let mut nothing = GpuError::NoAdapter;
-        for backends in [wgpu::Backends::PRIMARY, wgpu::Backends::GL] {
-            let display = Box::new(events.owned_display_handle());
-            let mut descriptor = wgpu::InstanceDescriptor::new_with_display_handle(display);
-            descriptor.backends = backends;
-            let instance = wgpu::Instance::new(descriptor);
-            let Ok(surface) = instance.create_surface(Arc::clone(&window)) else { continue };
-            match Gpu::open_for(&instance, &surface, &self.adapter) {
-                Ok((gpu, capabilities)) => return Open::new(window, surface, gpu, &capabilities, &self.player),
-                Err(error) => nothing = error,
-            }
-        }
-        Err(nothing.into())
+        let display = Box::new(events.owned_display_handle());
+        let mut descriptor = wgpu::InstanceDescriptor::new_with_display_handle(display);
+        descriptor.backends = BACKENDS;
+        let instance = wgpu::Instance::new(descriptor);
+        // Without any driver the instance has nothing to make a surface with.
+        let surface = instance.create_surface(Arc::clone(&window)).map_err(|_| GpuError::NoAdapter)?;
+        let (gpu, capabilities) = Gpu::open_for(&instance, &surface, &self.adapter)?;
+        Open::new(window, surface, gpu, &capabilities, &self.player)
     }
 
     /// Draws the picture, then the panels around it, in the order that what the person does is seen at once.

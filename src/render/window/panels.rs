@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 
 use super::player::Player;
 use crate::render::gpu::paint;
-use crate::render::scene::{Camera, Mark, Orbit, Stage};
+use crate::render::scene::{Camera, Mark, Orbit, Stage, metres};
 use crate::render::{CameraSpec, Layers, Moment, Theme};
-use crate::swarm::row;
+use crate::swarm::{Pair, row};
 
 /// Degrees that the camera turns for a point that the mouse is dragged.
 const TURN_DEG: f64 = 0.35;
@@ -15,6 +15,8 @@ const TURN_DEG: f64 = 0.35;
 const KEY_TURN_DEG: f64 = 5.0;
 /// Most neighbours of the picked vehicle that are listed.
 const LISTED: usize = 8;
+/// Room for the button of the help \[points\].
+const HELP_HEIGHT: f32 = 28.0;
 /// Most points of the plot.
 const PLOT_POINTS: usize = 600;
 
@@ -104,10 +106,10 @@ impl Desk {
             ("shells", &mut layers.shells),
             ("edges", &mut layers.edges),
             ("trails", &mut layers.trails),
-            ("start and goal", &mut layers.marks),
+            ("marks", &mut layers.marks),
             ("ground", &mut layers.ground),
             ("names", &mut layers.labels),
-            ("closest pair", &mut layers.closest),
+            ("closest", &mut layers.closest),
             ("caption", &mut layers.caption),
         ]
         .into_iter()
@@ -130,6 +132,10 @@ impl Desk {
             };
             input.events.iter().filter_map(pressed).collect()
         });
+        // What was said last is read by now.
+        if !pressed.is_empty() {
+            self.message = None;
+        }
         let mut wishes = Wishes::default();
         for key in pressed.into_iter().filter(|&key| !works_it(key)) {
             match key {
@@ -241,12 +247,13 @@ impl Desk {
         ui.label(RichText::new("Separation").strong());
         plot(ui, player);
         ui.separator();
-        match (self.picked, shown.moment) {
+        let height = (ui.available_height() - HELP_HEIGHT).max(0.0);
+        egui::ScrollArea::vertical().max_height(height).show(ui, |ui| match (self.picked, shown.moment) {
             (Some(picked), Some(moment)) if picked < player.footage.count() => vehicle(ui, player, moment, picked),
             _ => {
                 ui.label("Click a vehicle to see its distances and forces.");
             }
-        }
+        });
         ui.with_layout(egui::Layout::bottom_up(egui::Align::LEFT), |ui| {
             if ui.button("Help (H)").clicked() {
                 self.help = true;
@@ -346,8 +353,8 @@ fn plot(ui: &mut Ui, player: &Player) {
     let top = values().fold(0.0, f64::max) * 1.1;
     let bottom = (values().fold(f64::INFINITY, f64::min) * 0.9).min(top);
     #[expect(clippy::cast_possible_truncation, reason = "points of a plot")]
-    let at = |time_s: f64, metres: f64| {
-        let (x, y) = ((time_s - first_s) / span_s, (metres - bottom) / (top - bottom).max(1e-9));
+    let at = |time_s: f64, separation_m: f64| {
+        let (x, y) = ((time_s - first_s) / span_s, (separation_m - bottom) / (top - bottom).max(1e-9));
         pos2(area.left() + x as f32 * area.width(), area.bottom() - y as f32 * area.height())
     };
     if let Some(delta_m) = delta_m {
@@ -356,15 +363,22 @@ fn plot(ui: &mut Ui, player: &Player) {
         let font = egui::FontId::proportional(11.0);
         painter.text(at(last_s, delta_m), Align2::RIGHT_BOTTOM, format!("delta {delta_m} m "), font, stroke.color);
     }
-    let curve = points.iter().map(|&[time_s, metres]| at(time_s, metres)).collect();
+    let curve = points.iter().map(|&[time_s, separation_m]| at(time_s, separation_m)).collect();
     painter.add(egui::Shape::line(curve, Stroke::new(1.5, visuals.hyperlink_color)));
+    let ink = visuals.weak_text_color();
+    let number = |corner: egui::Pos2, anchor, text| {
+        painter.text(corner, anchor, text, egui::FontId::proportional(11.0), ink);
+    };
+    number(area.left_top(), Align2::LEFT_TOP, format!(" {top:.1} m"));
+    number(area.left_bottom(), Align2::LEFT_BOTTOM, format!(" {bottom:.1} m, {first_s:.0} s"));
+    number(area.right_bottom(), Align2::RIGHT_BOTTOM, format!("{last_s:.0} s "));
     let now = at(player.time_s, bottom).x;
     painter.vline(now, area.y_range(), Stroke::new(1.0, visuals.strong_text_color()));
     if let Some(pointer) = response.hover_pos() {
         let time_s = first_s + f64::from((pointer.x - area.left()) / area.width()) * span_s;
         let near = points.iter().min_by(|a, b| (a[0] - time_s).abs().total_cmp(&(b[0] - time_s).abs()));
-        if let Some([time_s, metres]) = near {
-            response.on_hover_text(format!("{metres:.3} m at {time_s:.2} s"));
+        if let Some([time_s, separation_m]) = near {
+            response.on_hover_text(format!("{} at {time_s:.2} s", metres(*separation_m)));
         }
     }
 }
@@ -382,7 +396,7 @@ fn vehicle(ui: &mut Ui, player: &Player, moment: &Moment, k: usize) {
     }
     let mut others: Vec<(f64, usize)> = (0..footage.count())
         .filter(|&other| other != k)
-        .map(|other| ((row(&moment.positions_m, other) - place).norm(), other))
+        .map(|other| (moment.distance_m(Pair::new(k, other)), other))
         .filter(|(distance_m, _)| distance_m.is_finite())
         .collect();
     others.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -393,16 +407,21 @@ fn vehicle(ui: &mut Ui, player: &Player, moment: &Moment, k: usize) {
         ui.end_row();
         for (distance_m, other) in others.into_iter().take(LISTED) {
             ui.label(&footage.vehicles[other]);
-            ui.label(format!("{distance_m:.3} m"));
-            let tension = footage.plan.as_ref().map(|plan| {
-                let tension = plan.tension(crate::swarm::Pair::new(k, other), distance_m);
-                let word = if tension < 0.0 { "push" } else { "pull" };
-                format!("{word} {:.2}", tension.abs())
-            });
+            ui.label(metres(distance_m));
+            let tension = footage.plan.as_ref().map(|plan| in_words(plan.tension(Pair::new(k, other), distance_m)));
             ui.label(tension.unwrap_or_default());
             ui.end_row();
         }
     });
+}
+
+/// How hard an edge pulls or pushes, to two digits.
+fn in_words(tension: f64) -> String {
+    match (tension * 100.0).round() {
+        hundredths if hundredths < 0.0 => format!("push {:.2}", -hundredths / 100.0),
+        hundredths if hundredths > 0.0 => format!("pull {:.2}", hundredths / 100.0),
+        _ => "rest".to_owned(),
+    }
 }
 
 fn help(context: &egui::Context, open: &mut bool) {
