@@ -11,7 +11,7 @@ use super::drawing;
 use super::{Exit, Failure};
 use crate::plant;
 use crate::read::ReadOptions;
-use crate::record::{Event, OwnedSample, RecordError, Recorder, Sample};
+use crate::record::{Event, RecordError, Recorder, Sample};
 use crate::render::{Fed, Footage, Theme, WindowError, show};
 use crate::scenario::{Override, Scenario, Source};
 use crate::sim;
@@ -111,14 +111,7 @@ impl Downlink {
 
 impl Recorder for Downlink {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
-        self.send(Fed::Sample(Box::new(OwnedSample {
-            time_s: sample.time_s,
-            step: sample.step,
-            swarm: sample.swarm.clone(),
-            control: sample.control.clone(),
-            separation: sample.separation,
-            energy: sample.energy,
-        })));
+        self.send(Fed::Sample(Box::new(sample.into())));
         self.result()
     }
 

@@ -349,16 +349,9 @@ impl Rows for Instants {
         Ok(rows.len() > before)
     }
 
-    /// Time only runs forwards here, so that the rows are read once.
-    fn rewind(&mut self) -> Result<(), ReadError> {
-        Ok(())
-    }
-
     fn vehicles(&self) -> &[String] {
         self.names.all()
     }
-
-    fn settle_names(&mut self) {}
 
     fn error(&self, fault: Fault) -> ReadError {
         self.source.error(fault)

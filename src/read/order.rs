@@ -27,14 +27,16 @@ pub(super) trait Rows {
     /// Appends some [`BATCH`] rows in the order of the file; `false` when there was none to append.
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
 
-    /// Starts again with the first row.
-    fn rewind(&mut self) -> Result<(), ReadError>;
+    /// Starts again with the first row. Nothing to do where time only runs forwards, so that rows are read once.
+    fn rewind(&mut self) -> Result<(), ReadError> {
+        Ok(())
+    }
 
     /// Names of the vehicles met so far.
     fn vehicles(&self) -> &[String];
 
     /// Puts the names in their final order, once all have been met.
-    fn settle_names(&mut self);
+    fn settle_names(&mut self) {}
 
     /// An error of the file.
     fn error(&self, fault: Fault) -> ReadError;

@@ -59,6 +59,19 @@ impl OwnedSample {
     }
 }
 
+impl From<&Sample<'_>> for OwnedSample {
+    fn from(sample: &Sample<'_>) -> Self {
+        Self {
+            time_s: sample.time_s,
+            step: sample.step,
+            swarm: sample.swarm.clone(),
+            control: sample.control.clone(),
+            separation: sample.separation,
+            energy: sample.energy,
+        }
+    }
+}
+
 /// Something that happened between samples.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {

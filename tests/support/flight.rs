@@ -23,14 +23,7 @@ pub(crate) struct Log {
 
 impl Recorder for Log {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
-        self.samples.push(OwnedSample {
-            time_s: sample.time_s,
-            step: sample.step,
-            swarm: sample.swarm.clone(),
-            control: sample.control.clone(),
-            separation: sample.separation,
-            energy: sample.energy,
-        });
+        self.samples.push(sample.into());
         Ok(())
     }
 

@@ -65,15 +65,9 @@ impl Rows for Run {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), ReadError> {
-        Ok(())
-    }
-
     fn vehicles(&self) -> &[String] {
         self.names.all()
     }
-
-    fn settle_names(&mut self) {}
 
     fn error(&self, fault: Fault) -> ReadError {
         self.source.error(fault)
@@ -213,15 +207,9 @@ impl Rows for Exported {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), ReadError> {
-        Ok(())
-    }
-
     fn vehicles(&self) -> &[String] {
         self.names.all()
     }
-
-    fn settle_names(&mut self) {}
 
     fn error(&self, fault: Fault) -> ReadError {
         self.source.error(fault)
