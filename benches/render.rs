@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use tautline::formation::Formation;
 use tautline::record::Sample;
 use tautline::render::scene::Stage;
-use tautline::render::{AdapterChoice, Footage, Renderer, Scene, View};
+use tautline::render::{AdapterChoice, CameraSpec, Footage, Renderer, Scene, View};
 use tautline::scenario::Scenario;
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, row, set_row};
 
@@ -54,6 +54,7 @@ fn benchmarks(criterion: &mut Criterion) {
         let stage = Stage::of(&footage);
         let moment = footage.at(15.0).expect("a moment");
         let list = || Scene::compose(&footage, &stage, &moment, &view).expect("a scene");
+        let near = View { camera: CameraSpec::Closest, ..View::default() };
         criterion.bench_with_input(BenchmarkId::new("moment", count), &footage, |bencher, footage| {
             bencher.iter(|| footage.at(black_box(15.03)));
         });
@@ -67,6 +68,10 @@ fn benchmarks(criterion: &mut Criterion) {
         group.sample_size(10);
         group.bench_function(BenchmarkId::new("with read-back", count), |bencher| {
             bencher.iter(|| renderer.paint(&scene).expect("a picture"));
+        });
+        let close_up = Scene::compose(&footage, &stage, &moment, &near).expect("a scene");
+        group.bench_function(BenchmarkId::new("with read-back, close up", count), |bencher| {
+            bencher.iter(|| renderer.paint(&close_up).expect("a picture"));
         });
         group.bench_function(BenchmarkId::new("PNG", count), |bencher| bencher.iter(|| picture.to_png()));
         group.finish();
