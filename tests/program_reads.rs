@@ -70,5 +70,5 @@ fn a_name_does_not_steer_the_terminal() {
 fn what_is_wrong_inside_a_recording_is_said_with_its_file() {
     let ran = audit("t,id,x,y,z,radius\n0,a,0,0,0,0.1\n1,a,0,0,0,0.2\n", &[]);
     assert_eq!(ran.exit, Some(2), "{ran:?}");
-    assert!(ran.err.contains("flight.csv: vehicle a at 1 s"), "{}", ran.err);
+    assert!(ran.err.contains("flight.csv: vehicle a at 1.0 s"), "{}", ran.err);
 }
