@@ -3,13 +3,14 @@
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
+use tautline::audit::Auditor;
 use tautline::formation::{Formation, largest_edge_error_m};
 use tautline::graph::Graph;
 use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, Law, LawError};
 use tautline::plant::PlantError;
 use tautline::plant::ideal::{self, IdealError, Solution, Tolerances};
 use tautline::scenario::{Override, PlantSpec, Scenario, Source};
-use tautline::sim::{self, Ending};
+use tautline::sim::{self, Breakdown, Ending};
 use tautline::swarm::{Pair, Rows, Swarm, row, set_row};
 
 /// The reference values are printed with 7 digits after the point.
@@ -289,6 +290,40 @@ fn the_ideal_plant_flies_the_same_solution_whatever_the_step() {
         assert!(gap_m < SOLVED_M, "dt = {dt}: {gap_m}");
         assert!(flight.engine_contacts.is_empty() && flight.ending == Ending::Completed);
     }
+}
+
+/// The baseline in steps of a second, in which vehicles 4 and 5 turn round between two of them.
+fn baseline_in_long_steps(max_halvings: u32) -> (sim::Flight, f64) {
+    let sets = ["plant.kind=ideal", "law.delta_m=1.6", "time.dt_s=1", "time.record_hz=1", "time.duration_s=10"];
+    let mut scenario = scenario("pentagon-laplacian", &sets);
+    scenario.time.max_halvings = max_halvings;
+    let (mut law, mut plant) = (scenario.law().expect("a law"), tautline::plant::for_scenario(&scenario));
+    let carry_on = &mut |_| ControlFlow::Continue(());
+    let flight = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut (), carry_on).expect("a flight");
+    let seconds: Vec<f64> = (0..=10_u32).map(f64::from).collect();
+    let solution = solve(&scenario, &seconds);
+    let mut chords = Auditor::new(scenario.count(), scenario.delta_m).expect("a judge");
+    chords.start(0.0, &solution.states[0].positions_m).expect("judged");
+    for (time_s, state) in seconds.iter().zip(&solution.states).skip(1) {
+        chords.step(*time_s, &state.positions_m).expect("judged");
+    }
+    (flight, chords.finish().closest.expect("pairs").separation_m)
+}
+
+#[test]
+fn a_step_on_which_paths_bend_is_flown_in_parts_so_that_the_audit_sees_what_its_chord_hides() {
+    let (flight, chords_m) = baseline_in_long_steps(16);
+    let closest = flight.audit.closest.expect("pairs");
+    assert!((closest.separation_m - 1.532_699).abs() < 1e-5, "{closest:?}");
+    assert_eq!((flight.ending, flight.audit.violations.len()), (Ending::Completed, 1));
+    assert!(chords_m > 1.6, "straight lines between whole seconds would have hidden it: {chords_m}");
+}
+
+#[test]
+fn a_bent_step_that_cannot_be_divided_ends_the_flight_and_says_so() {
+    let (flight, _) = baseline_in_long_steps(0);
+    assert!(matches!(flight.ending, Ending::BrokeDown(Breakdown::Bent { step: 1, bend_m }) if bend_m > 1e-5));
+    assert_eq!(flight.steps, 0, "what was not judged was not flown");
 }
 
 #[test]

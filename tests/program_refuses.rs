@@ -170,6 +170,9 @@ mod machine {
         assert_failed(run_into(folder.path(), "taken", &[]), "cannot write taken/run.mcap:");
         fs::create_dir_all(folder.path().join("kept/report.json/inside")).expect("a folder");
         assert_failed(run_into(folder.path(), "kept", &["--force"]), "cannot write kept/report.json:");
+        let validated = |out: &str| ran(folder.path(), &["validate", "--out", out]);
+        assert_failed(validated("file"), "cannot write file:");
+        assert_failed(validated("/proc"), "cannot write /proc:");
     }
 
     #[test]
