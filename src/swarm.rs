@@ -144,9 +144,39 @@ pub struct ClosestApproach {
     pub time_s: f64,
 }
 
+/// A length with so many decimals, rounded down: what is said to be "never closer than" this never is. In powers of ten
+/// where digits would fill a line.
+#[must_use]
+pub(crate) fn at_least(length_m: f64, decimals: u8) -> String {
+    const LONG_M: f64 = 1e15;
+    if !length_m.is_finite() || length_m.abs() >= LONG_M {
+        return format!("{length_m:e}");
+    }
+    let places = usize::from(decimals);
+    let shown = format!("{length_m:.places$}");
+    match shown.parse::<f64>() {
+        Ok(rounded) if rounded > length_m => format!("{:.places$}", rounded - 0.1_f64.powi(i32::from(decimals))),
+        _ => shown,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_length_is_never_shown_longer_than_it_is_and_less_than_a_digit_shorter() {
+        let lengths_m =
+            [1.999_999_9, 2.46, 1.001, 0.305_304_9, 0.1 + 0.2, 0.2 - 4.0 * f64::EPSILON, 0.0, -0.5, 123_456.789_9];
+        for (decimals, digit) in [(3, 1e-3), (6, 1e-6)] {
+            for length_m in lengths_m {
+                let shown: f64 = at_least(length_m, decimals).parse().expect("a number");
+                assert!(shown <= length_m && length_m - shown < digit * (1.0 + 1e-9), "{length_m:?}: {shown}");
+            }
+        }
+        assert_eq!([2.46, 1.001, 1.999_999].map(|length_m| at_least(length_m, 3)), ["2.460", "1.001", "1.999"]);
+        assert_eq!([1e300, f64::INFINITY].map(|length_m| at_least(length_m, 3)), ["1e300", "inf"]);
+    }
 
     #[test]
     fn disagreement_ignores_the_common_velocity() {

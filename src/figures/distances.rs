@@ -3,8 +3,8 @@
 use super::axis::{Axis, Scale};
 use super::chart::{Band, Chart, INK, Line, Mark, MarkShape, PALETTE, SOFT_INK, Stroke};
 use super::course::{Course, Span, pairs};
-use super::{Figure, FigureError, metres_at_least};
-use crate::swarm::{Pair, Rows, separation};
+use super::{Figure, FigureError};
+use crate::swarm::{Pair, Rows, at_least, separation};
 
 /// Distances computed for one figure, at most: some seconds of work for a thousand vehicles would be too many.
 pub(super) const DISTANCES: usize = 32_000_000;
@@ -46,11 +46,11 @@ pub fn distances(course: &Course, delta_m: f64, certified_m: Option<f64>, title:
     (chart.bands, chart.lines) = (curves.bands, curves.lines);
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
     if let Some(certified_m) = certified_m {
-        chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", metres_at_least(certified_m)));
+        chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", at_least(certified_m, 3)));
     }
     let mut closest_in_words = String::new();
     if let Some(closest) = closest {
-        let metres = metres_at_least(closest.separation_m);
+        let metres = at_least(closest.separation_m, 3);
         let words = format!("{metres} m, vehicles {} at {:.2} s", closest.pair, closest.time_s);
         closest_in_words = format!(" Closest: {words}.");
         let at = (closest.time_s, closest.separation_m);

@@ -144,8 +144,3 @@ impl FigureError {
         Self { figure: figure.to_owned(), reason: reason.to_string() }
     }
 }
-
-/// A length \[m\] rounded down to three decimals, so that "never closer than" stays true.
-fn metres_at_least(length_m: f64) -> String {
-    format!("{:.3}", (length_m * 1e3).floor() / 1e3)
-}

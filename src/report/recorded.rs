@@ -11,7 +11,7 @@ use super::words::{fixed, metres, metres_below, seconds};
 use super::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Status, Violation, finite};
 use crate::audit::recorded::{self, Approach, Outcome, Question, Who};
 use crate::figures::Figure;
-use crate::swarm::Pair;
+use crate::swarm::{Pair, at_least};
 
 /// Violations that are listed in words, and on the page.
 const LISTED_IN_WORDS: usize = 10;
@@ -304,7 +304,10 @@ impl RecordedReport {
                     |closest| {
                         let [first, second] = &closest.who;
                         let at = seconds(closest.time_s);
-                        format!("never closer than {}{unit}, {first} and {second} at {at}", at_least(closest.lower_m))
+                        format!(
+                            "never closer than {}{unit}, {first} and {second} at {at}",
+                            at_least(closest.lower_m, 6)
+                        )
                     },
                 );
                 format!("{closest} ({delta}, {})", self.motion)
@@ -351,7 +354,7 @@ impl RecordedReport {
                 self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
             return format!(
                 "{first} and {second} came to between {}{unit} and {}{unit} by {}{rate}",
-                at_least(u.lower_m),
+                at_least(u.lower_m, 6),
                 metres(u.upper_m),
                 seconds(u.to_s)
             );
@@ -520,11 +523,6 @@ fn span(from_s: f64, to_s: f64) -> String {
 pub fn interval(lower: f64, upper: f64) -> String {
     let (low, high) = (fixed(lower, 6), fixed(upper, 6));
     if upper - lower <= 2.0 * recorded::WIDTH_M || low == high { high } else { format!("{low} .. {high}") }
-}
-
-/// A length rounded down to six decimals, so that "never closer than" stays true.
-fn at_least(number: f64) -> String {
-    fixed((number * 1e6).floor() / 1e6, 6)
 }
 
 fn section(heading: &str, blocks: Vec<Block>) -> Section {

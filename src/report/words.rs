@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Report, Status};
+use crate::swarm::at_least;
 
 /// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or
 /// fill a line.
@@ -22,15 +23,6 @@ pub(super) fn metres_below(number: f64, limit_m: f64) -> String {
         .map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
 }
 
-/// A length \[m\] rounded down to three decimals, so that "never closer than" stays true.
-fn metres_at_least(number: f64) -> String {
-    let shown = format!("{number:.3}");
-    match shown.parse::<f64>() {
-        Ok(rounded) if rounded > number => format!("{:.3}", rounded - 0.001),
-        _ => shown,
-    }
-}
-
 /// A time with its unit.
 pub(super) fn seconds(time_s: f64) -> String {
     format!("{} s", fixed(time_s, 2))
@@ -46,7 +38,7 @@ impl Report {
         let delta = metres(self.separation.delta_m);
         match self.audit.status {
             Status::Clear => {
-                let closest = self.separation.min_m.map(metres_at_least);
+                let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
                 let broken = match (self.separation.min_m, self.separation.certified_m) {
                     (Some(min_m), Some(certified_m)) if min_m < certified_m => ", which breaks the certificate",

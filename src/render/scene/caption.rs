@@ -3,7 +3,7 @@
 use super::placing::{Placing, width};
 use super::world::MOST_EDGES;
 use super::{Colour, Mark, Painting, Scene, Theme};
-use crate::swarm::Pair;
+use crate::swarm::{Pair, at_least};
 
 /// Most vehicles whose names are written on them.
 const NAMED: usize = 64;
@@ -290,8 +290,7 @@ impl Painting<'_> {
 
 /// A length to the millimetre, rounded down: what is said to be clear is clear.
 pub(crate) fn metres(length_m: f64) -> String {
-    // A little more, so that 2.46 stays 2.460.
-    format!("{:.3} m", (length_m * 1e3 + 1e-6).floor() / 1e3)
+    format!("{} m", at_least(length_m, 3))
 }
 
 /// As much of a name as has room, with an ellipsis where it is cut; none where even a few letters have none.
