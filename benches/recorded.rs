@@ -3,20 +3,27 @@
 //! The show: vehicles stand on a grid 2.5 m apart, take off row by row, bend into half a cylinder that breathes, unroll into
 //! a wall that waves, and land again, on smooth paths seen at 10 Hz. Neighbours stay neighbours, most pairs are far apart.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
-use tautline::audit::recorded::{Question, Who, judge};
+use tautline::audit::recorded::{Approach, Question, Who, judge};
 use tautline::track::{Item, Sample};
 
+/// The show keeps this.
 const DELTA_M: f64 = 1.5;
+/// It does not keep this.
+const TOO_MUCH_M: f64 = 2.2;
 const COLUMNS: usize = 40;
 const SAMPLES: usize = 2000;
 const RATE_HZ: f64 = 10.0;
+/// An interval longer than this is a gap \[s\].
+const LONGEST_INTERVAL_S: f64 = 1.5 / RATE_HZ;
+/// Closest pairs that are listed.
+const KEPT: usize = 10;
 
 /// From 0 to 1 between two times, with no speed at either.
 fn smooth(time_s: f64, from_s: f64, to_s: f64) -> f64 {
@@ -53,34 +60,60 @@ fn show(vehicles: usize) -> Vec<Item> {
         .collect()
 }
 
-#[derive(Debug, PartialEq)]
+/// What both answer: the ten closest pairs, when pairs were below delta, and how often somebody was away.
+#[derive(Debug)]
 struct Answer {
-    min_m: f64,
-    violating: BTreeSet<(usize, usize)>,
+    gaps: usize,
+    closest: Vec<Closest>,
+    below: BTreeMap<(usize, usize), Vec<(f64, f64)>>,
 }
 
-fn ours(names: &[String], items: &[Item]) -> Answer {
-    let outcome = judge(names, items, Question::delta(DELTA_M)).expect("a show can be judged");
-    let violating = outcome.violations.iter().filter_map(|violation| match violation.who {
-        Who::Pair(pair) => Some((pair.first(), pair.second())),
-        Who::Obstacle { .. } => None,
-    });
-    Answer {
-        min_m: outcome.closest.first().map_or(f64::INFINITY, |closest| closest.lower_m),
-        violating: violating.collect(),
+#[derive(Clone, Copy, Debug)]
+struct Closest {
+    pair: (usize, usize),
+    distance_m: f64,
+    time_s: f64,
+}
+
+fn ours(names: &[String], items: &[Item], delta_m: f64) -> Answer {
+    let outcome = judge(names, items, Question::delta(delta_m)).expect("a show can be judged");
+    let pair = |who: Who| match who {
+        Who::Pair(pair) => (pair.first(), pair.second()),
+        Who::Obstacle { .. } => unreachable!("there are no obstacles"),
+    };
+    let mut below: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for violation in &outcome.violations {
+        below.entry(pair(violation.who)).or_default().push((violation.from_s, violation.to_s));
     }
+    let closest = |of: &Approach| Closest { pair: pair(of.who), distance_m: of.lower_m, time_s: of.time_s };
+    Answer { gaps: outcome.gaps.len(), closest: outcome.closest.iter().map(closest).collect(), below }
 }
 
-/// Every pair over every interval, nothing else: no second detector, no list of the closest.
-fn straightforward(vehicles: usize, items: &[Item]) -> Answer {
-    let mut table: Vec<Vector3<f64>> = Vec::with_capacity(items.len());
+/// Every pair over every interval, of vehicles that are in every sample; there is no second detector. Numbers must be
+/// finite and times increase, and gaps are counted: without that nothing is proved.
+fn straightforward(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
+    let mut places: Vec<Vector3<f64>> = Vec::with_capacity(items.len());
+    let mut times_s = Vec::with_capacity(items.len() / vehicles);
+    let mut last_s = vec![None; vehicles];
+    let mut gaps = 0;
     for item in items {
-        if let Item::Sample(sample) = item {
-            table.push(sample.position_m);
+        let Item::Sample(sample) = item else { panic!("the show is sampled") };
+        assert!(sample.position_m.iter().all(|x| x.is_finite()) && sample.time_s.is_finite());
+        if let Some(last_s) = last_s[sample.vehicle].replace(sample.time_s) {
+            assert!(sample.time_s > last_s);
+            gaps += usize::from(sample.time_s - last_s > LONGEST_INTERVAL_S);
         }
+        if sample.vehicle == 0 {
+            times_s.push(sample.time_s);
+        }
+        places.push(sample.position_m);
     }
-    let (mut least, mut violating) = (f64::INFINITY, BTreeSet::new());
-    for (from, to) in table.chunks_exact(vehicles).zip(table.chunks_exact(vehicles).skip(1)) {
+    let mut least = vec![(f64::INFINITY, 0.0); vehicles * (vehicles - 1) / 2];
+    let mut below: BTreeMap<_, Vec<(f64, f64)>> = BTreeMap::new();
+    let rows = places.chunks_exact(vehicles);
+    for ((from, to), times_s) in rows.clone().zip(rows.skip(1)).zip(times_s.windows(2)) {
+        let (from_s, length_s) = (times_s[0], times_s[1] - times_s[0]);
+        let mut pair = 0;
         for i in 0..vehicles {
             for j in i + 1..vehicles {
                 let start = from[j] - from[i];
@@ -88,20 +121,61 @@ fn straightforward(vehicles: usize, items: &[Item]) -> Answer {
                 let length = by.norm_squared();
                 let at = if length > 0.0 { (-start.dot(&by) / length).clamp(0.0, 1.0) } else { 0.0 };
                 let squared = (start + by * at).norm_squared();
-                if squared < least {
-                    least = squared;
+                if squared < least[pair].0 {
+                    least[pair] = (squared, from_s + length_s * at);
                 }
-                if squared < DELTA_M * DELTA_M {
-                    violating.insert((i, j));
+                if squared < delta_m * delta_m {
+                    // Both times at which the line through the interval is delta away.
+                    let foot = -start.dot(&by) / length;
+                    let half = ((delta_m * delta_m - (start + by * foot).norm_squared()) / length).sqrt();
+                    let span = [foot - half, foot + half].map(|u| from_s + length_s * u.clamp(0.0, 1.0));
+                    let spans = below.entry((i, j)).or_default();
+                    match spans.last_mut() {
+                        Some(last) if last.1 >= span[0] => last.1 = span[1],
+                        _ => spans.push((span[0], span[1])),
+                    }
                 }
+                pair += 1;
             }
         }
     }
-    Answer { min_m: least.sqrt(), violating }
+    let pairs = (0..vehicles).flat_map(|i| (i + 1..vehicles).map(move |j| (i, j)));
+    let closest = |(pair, (squared, time_s)): (_, (f64, f64))| Closest { pair, distance_m: squared.sqrt(), time_s };
+    let mut closest: Vec<_> = pairs.zip(least).map(closest).collect();
+    closest.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+    closest.truncate(KEPT);
+    Answer { gaps, closest, below }
 }
 
-/// Largest difference of the two minima: both are rounded in their own order.
-const ROUNDING_M: f64 = 1e-12;
+/// Largest difference of two distances \[m\] or two times \[s\]: both are rounded in their own order.
+const ROUNDING: f64 = 1e-9;
+
+/// Pairs that are equally close may be listed in any order, each at any of the times at which it is.
+fn agree(mine: &Answer, theirs: &Answer) {
+    assert_eq!(mine.gaps, theirs.gaps);
+    assert_eq!(mine.closest.len(), theirs.closest.len());
+    for (a, b) in mine.closest.iter().zip(&theirs.closest) {
+        assert!((a.distance_m - b.distance_m).abs() < ROUNDING, "{a:?} {b:?}");
+        for of in [a, b] {
+            assert!((of.distance_m - distance_m(of.pair, of.time_s)).abs() < ROUNDING, "{of:?}");
+        }
+    }
+    assert!(mine.below.keys().eq(theirs.below.keys()));
+    for (pair, mine) in &mine.below {
+        let theirs = &theirs.below[pair];
+        assert_eq!(mine.len(), theirs.len(), "{pair:?}");
+        for (a, b) in mine.iter().zip(theirs) {
+            assert!((a.0 - b.0).abs() < ROUNDING && (a.1 - b.1).abs() < ROUNDING, "{pair:?} {a:?} {b:?}");
+        }
+    }
+}
+
+/// How far apart two are at a time, on straight lines between samples.
+fn distance_m((i, j): (usize, usize), time_s: f64) -> f64 {
+    let from = (time_s * RATE_HZ).floor();
+    let apart_m = |k: f64| place(j, k / RATE_HZ) - place(i, k / RATE_HZ);
+    apart_m(from).lerp(&apart_m(from + 1.0), time_s * RATE_HZ - from).norm()
+}
 
 fn recorded(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("recorded show");
@@ -114,21 +188,24 @@ fn recorded(criterion: &mut Criterion) {
             let answer = work();
             (answer, start.elapsed().as_secs_f64())
         };
-        let (mine, mine_s) = timed(&|| ours(&names, &items));
-        let (theirs, theirs_s) = timed(&|| straightforward(vehicles, &items));
-        assert!((mine.min_m - theirs.min_m).abs() < ROUNDING_M, "{} {}", mine.min_m, theirs.min_m);
-        assert_eq!(mine.violating, theirs.violating);
+        let (mine, mine_s) = timed(&|| ours(&names, &items, DELTA_M));
+        let (theirs, theirs_s) = timed(&|| straightforward(vehicles, &items, DELTA_M));
+        agree(&mine, &theirs);
         println!(
-            "{vehicles} vehicles x {SAMPLES} samples: min {:.6} m, {} pairs violate; first run {:.1} times as fast",
-            mine.min_m,
-            mine.violating.len(),
+            "{vehicles} vehicles x {SAMPLES} samples: min {:.6} m, first run {:.1} times as fast",
+            mine.closest[0].distance_m,
             theirs_s / mine_s
         );
+        if vehicles <= 100 {
+            let too_close = ours(&names, &items, TOO_MUCH_M);
+            agree(&too_close, &straightforward(vehicles, &items, TOO_MUCH_M));
+            println!("{} pairs are below {TOO_MUCH_M} m", too_close.below.len());
+        }
         group.bench_function(BenchmarkId::new("judge", vehicles), |bencher| {
-            bencher.iter(|| black_box(ours(&names, black_box(&items))));
+            bencher.iter(|| black_box(ours(&names, black_box(&items), DELTA_M)));
         });
         group.bench_function(BenchmarkId::new("straightforward", vehicles), |bencher| {
-            bencher.iter(|| black_box(straightforward(vehicles, black_box(&items))));
+            bencher.iter(|| black_box(straightforward(vehicles, black_box(&items), DELTA_M)));
         });
     }
     group.finish();

@@ -85,13 +85,13 @@ impl History {
     pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
         for item in items {
             let of = self.vehicles.iter_mut().find(|(index, _)| *index == item.vehicle());
-            let Some((index, vehicle)) = of else { continue };
+            let Some((_, vehicle)) = of else { continue };
             match item {
-                Item::Sample(sample) => vehicle.sample(*index, sample)?,
-                Item::Piece(piece) => vehicle.piece(*index, piece)?,
+                Item::Sample(sample) => vehicle.sample(sample)?,
+                Item::Piece(piece) => vehicle.piece(piece)?,
             };
         }
-        let until_s = self.vehicles.iter().map(|(_, vehicle)| vehicle.known_s).fold(f64::INFINITY, f64::min);
+        let until_s = self.vehicles.iter().map(|(_, vehicle)| vehicle.known_s()).fold(f64::INFINITY, f64::min);
         self.follow(until_s);
         Ok(())
     }

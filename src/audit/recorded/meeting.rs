@@ -85,7 +85,7 @@ impl Meeting<'_> {
             }
             if pair && shared.first.curve.is_none() && shared.second.curve.is_none() {
                 swept += 1;
-                self.straight(&shared, &mut nearest, findings);
+                self.straight(shared, &mut nearest, findings);
             } else {
                 let (from_s, to_s) = (shared.from_s.max(window_s.0), shared.to_s.min(window_s.1));
                 if from_s <= to_s {
@@ -108,17 +108,22 @@ impl Meeting<'_> {
     }
 
     #[inline]
-    fn straight(&self, shared: &Shared<'_>, nearest: &mut Nearest, findings: &mut Findings) {
-        let motion = shared.straight();
-        let approach = motion.closest();
+    fn straight(&self, shared: Shared<'_>, nearest: &mut Nearest, findings: &mut Findings) {
+        let approach = shared.straight().closest();
         if approach.squared < nearest.squared {
             *nearest = Nearest { squared: approach.squared, from_s: shared.from_s, to_s: shared.to_s, at: approach.at };
         }
-        if !self.may_violate {
-            return;
+        if self.may_violate {
+            self.twice(&shared, findings);
         }
+    }
+
+    /// Judges a straight stretch by the sweep and by the cast.
+    #[inline(never)]
+    fn twice(&self, shared: &Shared<'_>, findings: &mut Findings) {
+        let motion = shared.straight();
         let cast = self.keep_out.cast(&motion);
-        if cast.is_some() || self.keep_out.is_near(&motion, approach) {
+        if cast.is_some() || self.keep_out.is_near(&motion, motion.closest()) {
             self.near(shared, &motion, cast, findings);
         }
     }
@@ -274,14 +279,24 @@ fn is_coarse(motion: &RelativeMotion, min_m: f64, limit: f64) -> bool {
 }
 
 impl Shared<'_> {
-    /// The relative motion of two straight stretches over the time that they share. Displacements are added to the
-    /// difference of two starting points, never positions to positions: far from the origin that loses nothing.
+    /// The relative motion of two straight stretches over the time that they share.
     #[inline]
     pub(super) fn straight(&self) -> RelativeMotion {
         let (a, b) = (self.first, self.second);
         if a.from_s == b.from_s && a.to_s == b.to_s {
-            return RelativeMotion::new(b.from - a.from, b.to - a.to);
+            RelativeMotion::new(b.from - a.from, b.to - a.to)
+        } else {
+            let (from, to) = self.cut();
+            RelativeMotion::new(from, to)
         }
+    }
+
+    /// The relative positions at both ends of the shared time, where the stretches are not over the same time.
+    /// Displacements are added to the difference of two starting points, never positions to positions: far from the
+    /// origin that loses nothing.
+    #[inline(never)]
+    fn cut(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let (a, b) = (self.first, self.second);
         let (start, by_a, by_b) = (b.from - a.from, a.to - a.from, b.to - b.from);
         let at = |time_s: f64, end: bool| {
             let share = |segment: &Segment| {
@@ -289,7 +304,7 @@ impl Shared<'_> {
             };
             start + (by_b * share(b) - by_a * share(a))
         };
-        RelativeMotion::new(at(self.from_s, false), at(self.to_s, true))
+        (at(self.from_s, false), at(self.to_s, true))
     }
 
     /// The relative position as a polynomial of the fraction of the time that is shared: at least one coefficient, the last

@@ -75,7 +75,7 @@ pub const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 const LEAST: f64 = 1e-70;
 const MOST: f64 = 1e70;
 /// Stretches of a vehicle in a window, about.
-const STRETCHES: usize = 12;
+const STRETCHES: usize = 16;
 /// Fewest items between two windows.
 const FEWEST_ITEMS: usize = 48;
 /// Names that an error lists.
@@ -147,7 +147,8 @@ impl Judge {
     /// [`RecordedError`] where an item is wrong; nothing more can be judged then.
     pub fn push(&mut self, names: &[String], items: &[Item]) -> Result<(), RecordedError> {
         if self.rates.is_none() && !items.is_empty() {
-            self.rates = Some(if self.question.max_gap_s.is_some() { Rates::default() } else { Rates::learn(items) });
+            let given = self.question.max_gap_s.is_some();
+            self.rates = Some(if given { Rates::default() } else { Rates::learn(items, names.len()) });
         }
         for name in names.iter().skip(self.vehicles.len()) {
             let usual = || self.rates.as_ref().map_or(f64::INFINITY, |rates| rates.max_gap_s(self.vehicles.len()));
@@ -155,15 +156,21 @@ impl Judge {
             self.vehicles.push(self.question.vehicle(name, max_gap_s));
         }
         for item in items {
-            self.take(item)?;
+            match item {
+                Item::Sample(sample) => self.take(sample.vehicle, sample.time_s, |vehicle| vehicle.sample(sample))?,
+                Item::Piece(piece) => self.take(piece.vehicle, piece.from_s, |vehicle| vehicle.piece(piece))?,
+            }
         }
         Ok(())
     }
 
     #[inline]
-    fn take(&mut self, item: &Item) -> Result<(), RecordedError> {
-        let index = item.vehicle();
-        let time_s = item.time_s();
+    fn take(
+        &mut self,
+        index: usize,
+        time_s: f64,
+        take: impl FnOnce(&mut Vehicle) -> Result<Option<Gap>, RecordedError>,
+    ) -> Result<(), RecordedError> {
         if time_s != self.now_s {
             self.turn_to(time_s, index)?;
         }
@@ -173,12 +180,9 @@ impl Judge {
         if !vehicle.asked_for {
             return Ok(());
         }
-        let first = vehicle.known_s == f64::NEG_INFINITY;
-        let gap = match item {
-            Item::Sample(sample) => vehicle.sample(index, sample)?,
-            Item::Piece(piece) => vehicle.piece(index, piece)?,
-        };
-        if first {
+        let unseen = vehicle.is_unseen();
+        let gap = take(vehicle)?;
+        if unseen {
             self.question.check_vehicle(vehicle)?;
         }
         if let Some(gap) = gap {
@@ -189,6 +193,7 @@ impl Judge {
     }
 
     /// A new instant: everything before it has been read.
+    #[inline(never)]
     fn turn_to(&mut self, time_s: f64, vehicle: usize) -> Result<(), RecordedError> {
         let name = || self.vehicles.get(vehicle).map(|vehicle| vehicle.name.clone()).unwrap_or_default();
         if !time_s.is_finite() || time_s.abs() > MOST {
@@ -209,9 +214,9 @@ impl Judge {
     /// Judges up to where every vehicle that may still be there is known.
     fn advance(&mut self) {
         let read_s = self.now_s + self.least_offset_s;
-        let seen = self.vehicles.iter().filter(|vehicle| vehicle.known_s > f64::NEG_INFINITY);
-        let there = seen.filter(|vehicle| read_s - vehicle.known_s <= vehicle.course.max_gap_s);
-        let until_s = there.map(|vehicle| vehicle.known_s).fold(self.before_s + self.least_offset_s, f64::min);
+        let seen = self.vehicles.iter().filter(|vehicle| !vehicle.is_unseen());
+        let there = seen.filter(|vehicle| read_s - vehicle.known_s() <= vehicle.course.max_gap_s);
+        let until_s = there.map(Vehicle::known_s).fold(self.before_s + self.least_offset_s, f64::min);
         if until_s > self.done_s {
             self.judge_until(until_s);
             self.pending = 0;
@@ -244,7 +249,7 @@ impl Judge {
     /// [`RecordedError::UnknownVehicle`] where the question names a vehicle that the recording does not have.
     pub fn finish(mut self) -> Result<Outcome, RecordedError> {
         self.check_names()?;
-        let end_s = self.vehicles.iter().map(|vehicle| vehicle.known_s).fold(self.done_s, f64::max);
+        let end_s = self.vehicles.iter().map(Vehicle::known_s).fold(self.done_s, f64::max);
         if end_s.is_finite() {
             self.judge_until(end_s);
         }

@@ -20,23 +20,26 @@ pub(super) struct Rates {
 }
 
 impl Rates {
-    /// Learns from the opening of a recording.
-    pub(super) fn learn(items: &[Item]) -> Self {
-        let items = &items[..items.len().min(OPENING)];
-        let count = items.iter().map(|item| item.vehicle() + 1).max().unwrap_or(0);
-        let mut last_s: Vec<Option<f64>> = vec![None; count];
-        let mut intervals_s: Vec<Vec<f64>> = vec![Vec::new(); count];
-        let mut curves = vec![false; count];
-        for item in items {
+    /// Learns from the opening of a recording of so many vehicles.
+    pub(super) fn learn(items: &[Item], vehicles: usize) -> Self {
+        let mut last_s: Vec<Option<f64>> = vec![None; vehicles];
+        let mut intervals_s: Vec<Vec<f64>> = vec![Vec::new(); vehicles];
+        let mut curves = vec![false; vehicles];
+        let mut known = 0;
+        for item in items.iter().take(OPENING) {
+            if known == vehicles {
+                break;
+            }
             let vehicle = item.vehicle();
-            let Item::Sample(sample) = item else {
-                curves[vehicle] = true;
-                continue;
-            };
-            if let Some(last_s) = last_s[vehicle].replace(sample.time_s)
-                && intervals_s[vehicle].len() < MOST_INTERVALS
-            {
-                intervals_s[vehicle].push(sample.time_s - last_s);
+            let Some(intervals_s) = intervals_s.get_mut(vehicle) else { continue };
+            match item {
+                Item::Piece(_) => curves[vehicle] = true,
+                Item::Sample(_) if intervals_s.len() == MOST_INTERVALS => {}
+                Item::Sample(sample) => {
+                    let last_s = last_s[vehicle].replace(sample.time_s);
+                    intervals_s.extend(last_s.map(|last_s| sample.time_s - last_s));
+                    known += usize::from(intervals_s.len() == MOST_INTERVALS);
+                }
             }
         }
         let mut all_s = intervals_s.concat();
@@ -80,9 +83,9 @@ mod tests {
         let mut items: Vec<_> = (0..20).map(|k| seen(0, 0.1 * f64::from(k))).collect();
         items.extend((0..5).map(|k| seen(1, f64::from(k))));
         items.extend([seen(2, 0.0), seen(2, 2.0)]);
-        let rates = Rates::learn(&items);
+        let rates = Rates::learn(&items, 3);
         let gaps: Vec<_> = (0..4).map(|vehicle| (rates.max_gap_s(vehicle) * 1e3).round()).collect();
         assert_eq!(gaps, [150.0, 1500.0, 150.0, 150.0]);
-        assert_eq!(Rates::learn(&[]).max_gap_s(0), f64::INFINITY);
+        assert_eq!(Rates::learn(&[], 0).max_gap_s(0), f64::INFINITY);
     }
 }

@@ -126,11 +126,6 @@ impl Segment {
         Self { from_s, to_s, from, to, grounded: false, curve: None }
     }
 
-    /// A place at an instant.
-    pub(super) fn point(time_s: f64, at: Vector3<f64>) -> Self {
-        Self::straight(time_s, time_s, at, at)
-    }
-
     /// A whole curve.
     pub(super) fn curved(curve: Curve) -> Self {
         let (from_s, to_s) = (curve.from_s, curve.to_s);

@@ -44,8 +44,7 @@ pub(super) struct Vehicle {
     pub(super) radius_recorded: bool,
     /// Stretches not yet done with, in order of time.
     pub(super) segments: Vec<Segment>,
-    /// Up to when the vehicle is known \[s\].
-    pub(super) known_s: f64,
+    /// When the vehicle was there, as far as it was forgotten.
     pub(super) presence: Option<Presence>,
     last: Option<Seen>,
     /// Speed over the last interval \[m/s\] and its length \[s\].
@@ -61,6 +60,13 @@ struct Seen {
     velocity_m_s: Option<Vector3<f64>>,
 }
 
+impl Seen {
+    #[inline]
+    fn new(time_s: f64, sample: &Sample) -> Self {
+        Self { time_s, position_m: sample.position_m, velocity_m_s: sample.velocity_m_s }
+    }
+}
+
 impl Vehicle {
     pub(super) fn new(name: String, asked_for: bool, course: Course, radius_m: Option<f64>) -> Self {
         Self {
@@ -70,7 +76,6 @@ impl Vehicle {
             radius_m,
             radius_recorded: radius_m.is_none(),
             segments: Vec::new(),
-            known_s: f64::NEG_INFINITY,
             presence: None,
             last: None,
             last_interval: None,
@@ -78,9 +83,19 @@ impl Vehicle {
         }
     }
 
+    #[inline]
+    pub(super) fn is_unseen(&self) -> bool {
+        self.last.is_none()
+    }
+
+    /// Up to when the vehicle is known \[s\].
+    pub(super) fn known_s(&self) -> f64 {
+        self.last.map_or(f64::NEG_INFINITY, |last| last.time_s)
+    }
+
     /// Takes a sample; returns the gap before it, if there is one.
     #[inline]
-    pub(super) fn sample(&mut self, index: usize, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
+    pub(super) fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
         let motion = self.course.motion.unwrap_or(Motion::Linear);
         if motion == Motion::Polynomial {
             return Err(RecordedError::NotACurve { vehicle: self.name.clone() });
@@ -99,24 +114,33 @@ impl Vehicle {
             }
             self.radius_m = sample.radius_m;
         }
-        let seen = Seen { time_s, position_m: sample.position_m, velocity_m_s: sample.velocity_m_s };
-        let last = self.last.replace(seen);
-        self.known_s = time_s;
         let mut gap = None;
-        match last {
-            Some(last) if time_s - last.time_s <= self.course.max_gap_s => self.interval(index, motion, &last, &seen),
-            _ => {
-                gap = last.map(|last| Gap { vehicle: index, from_s: last.time_s, to_s: time_s });
+        match &self.last {
+            Some(last) if time_s - last.time_s <= self.course.max_gap_s => {
+                let (from_s, from) = (last.time_s, self.scaled(last.position_m));
+                let to = self.scaled(sample.position_m);
+                match motion {
+                    Motion::Linear | Motion::Polynomial => self.keep_straight((from_s, time_s), from, to),
+                    Motion::Hold => {
+                        self.keep_straight((from_s, time_s), from, from);
+                        self.keep_straight((time_s, time_s), from, to);
+                    }
+                    Motion::Bounded => self.keep_bounded(sample.vehicle, *last, Seen::new(time_s, sample)),
+                }
+            }
+            last => {
+                gap = last.map(|last| Gap { vehicle: sample.vehicle, from_s: last.time_s, to_s: time_s });
                 self.last_interval = None;
-                let at = self.scaled(seen.position_m);
-                self.keep(Segment::point(time_s, at));
+                let at = self.scaled(sample.position_m);
+                self.keep_straight((time_s, time_s), at, at);
             }
         }
+        self.last = Some(Seen::new(time_s, sample));
         Ok(gap)
     }
 
     /// Takes a piece of a curve; returns the gap before it, if there is one.
-    pub(super) fn piece(&mut self, index: usize, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
+    pub(super) fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
         if !matches!(self.course.motion, None | Some(Motion::Polynomial)) {
             return Err(RecordedError::NotSamples { vehicle: self.name.clone() });
         }
@@ -137,13 +161,12 @@ impl Vehicle {
             Some(last) if from_s - last.time_s <= self.course.max_gap_s.max(SAME_INSTANT_S) => {
                 let rests = last.position_m == start && last.time_s == from_s;
                 if !rests {
-                    self.keep(Segment::straight(last.time_s.min(from_s), from_s, last.position_m, start));
+                    self.keep_straight((last.time_s.min(from_s), from_s), last.position_m, start);
                 }
             }
-            last => gap = last.map(|last| Gap { vehicle: index, from_s: last.time_s, to_s: from_s }),
+            last => gap = last.map(|last| Gap { vehicle: piece.vehicle, from_s: last.time_s, to_s: from_s }),
         }
-        self.known_s = to_s;
-        self.keep(segment);
+        self.keep(&segment);
         Ok(gap)
     }
 
@@ -163,23 +186,11 @@ impl Vehicle {
         Ok(Segment::curved(curve))
     }
 
-    /// The interval between two samples.
-    #[inline]
-    fn interval(&mut self, index: usize, motion: Motion, last: &Seen, seen: &Seen) {
-        let (from_s, to_s) = (last.time_s, seen.time_s);
-        let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
-        match motion {
-            Motion::Hold => {
-                self.keep(Segment::straight(from_s, to_s, from, from));
-                self.keep(Segment::straight(to_s, to_s, from, to));
-            }
-            Motion::Bounded => {
-                self.compare_with_bound(index, last, seen);
-                let segment = self.bounded(last, seen);
-                self.keep(segment);
-            }
-            Motion::Linear | Motion::Polynomial => self.keep(Segment::straight(from_s, to_s, from, to)),
-        }
+    #[inline(never)]
+    fn keep_bounded(&mut self, index: usize, last: Seen, seen: Seen) {
+        self.compare_with_bound(index, &last, &seen);
+        let segment = self.bounded(&last, &seen);
+        self.keep(&segment);
     }
 
     fn bounded(&self, last: &Seen, seen: &Seen) -> Segment {
@@ -229,23 +240,23 @@ impl Vehicle {
         }
     }
 
-    /// Keeps what is asked for of a stretch.
+    /// Keeps what is asked for of a straight stretch. Where that is all of it, it is written in place: it is what most
+    /// recordings consist of.
     #[inline]
-    fn keep(&mut self, segment: Segment) {
-        let (from_s, to_s) = self.course.window_s;
-        if segment.from_s < from_s || segment.to_s > to_s {
-            if let Some(part) = segment.clipped(from_s, to_s) {
-                self.keep_part(part);
-            }
+    fn keep_straight(&mut self, (from_s, to_s): (f64, f64), from: Vector3<f64>, to: Vector3<f64>) {
+        let (start_s, end_s) = self.course.window_s;
+        if start_s <= from_s && to_s <= end_s && self.course.above_m.is_none() {
+            self.segments.push(Segment::straight(from_s, to_s, from, to));
         } else {
-            self.keep_part(segment);
+            self.keep(&Segment::straight(from_s, to_s, from, to));
         }
     }
 
-    #[inline]
-    fn keep_part(&mut self, segment: Segment) {
-        let presence = self.presence.get_or_insert(Presence { from_s: segment.from_s, to_s: segment.to_s });
-        presence.to_s = presence.to_s.max(segment.to_s);
+    /// Keeps what is asked for of any stretch.
+    #[inline(never)]
+    fn keep(&mut self, segment: &Segment) {
+        let (from_s, to_s) = self.course.window_s;
+        let Some(segment) = segment.clipped(from_s, to_s) else { return };
         match self.course.above_m {
             None => self.segments.push(segment),
             Some(above_m) => {
@@ -263,24 +274,33 @@ impl Vehicle {
         }
     }
 
+    #[inline]
     fn check_sample(&self, sample: &Sample) -> Result<(), RecordedError> {
-        let near = |v: &Vector3<f64>| {
-            v.x.abs() <= MAX_COORDINATE_M && v.y.abs() <= MAX_COORDINATE_M && v.z.abs() <= MAX_COORDINATE_M
-        };
-        let what = if !sample.time_s.is_finite() {
-            "the time"
-        } else if !near(&sample.position_m) {
-            "the position"
-        } else if sample.velocity_m_s.is_some_and(|v| !near(&v)) {
-            "the velocity"
-        } else if sample.radius_m.is_some_and(|r| !(0.0..=MAX_COORDINATE_M).contains(&r)) {
-            "the radius, which must not be below 0 m,"
-        } else {
+        if sample.time_s.is_finite()
+            && is_near(&sample.position_m)
+            && sample.velocity_m_s.as_ref().is_none_or(is_near)
+            && sample.radius_m.is_none_or(is_radius)
+        {
             return Ok(());
-        };
-        Err(RecordedError::NotFinite { vehicle: self.name.clone(), time_s: sample.time_s, what })
+        }
+        Err(self.not_finite(sample))
     }
 
+    #[cold]
+    fn not_finite(&self, sample: &Sample) -> RecordedError {
+        let what = if !sample.time_s.is_finite() {
+            "the time"
+        } else if !is_near(&sample.position_m) {
+            "the position"
+        } else if sample.velocity_m_s.is_some_and(|v| !is_near(&v)) {
+            "the velocity"
+        } else {
+            "the radius, which must not be below 0 m,"
+        };
+        RecordedError::NotFinite { vehicle: self.name.clone(), time_s: sample.time_s, what }
+    }
+
+    #[cold]
     fn not_increasing(&self, time_s: f64) -> RecordedError {
         let previous_s = self.last.map_or(f64::NAN, |last| last.time_s);
         RecordedError::TimeNotIncreasing { vehicle: self.name.clone(), previous_s, time_s }
@@ -288,10 +308,22 @@ impl Vehicle {
 
     /// Forgets what ended by a time, and says how many stretches that were.
     pub(super) fn forget(&mut self, until_s: f64) -> usize {
-        let done = self.segments.partition_point(|segment| segment.to_s <= until_s);
+        let all = self.segments.last().is_none_or(|last| last.to_s <= until_s);
+        let done = if all { self.segments.len() } else { self.segments.partition_point(|part| part.to_s <= until_s) };
+        if let Some((first, last)) = self.segments[..done].first().zip(self.segments[..done].last()) {
+            self.presence.get_or_insert(Presence { from_s: first.from_s, to_s: first.to_s }).to_s = last.to_s;
+        }
         self.segments.drain(..done);
         done
     }
+}
+
+fn is_near(v: &Vector3<f64>) -> bool {
+    (v.x.abs() <= MAX_COORDINATE_M) & (v.y.abs() <= MAX_COORDINATE_M) & (v.z.abs() <= MAX_COORDINATE_M)
+}
+
+fn is_radius(radius_m: f64) -> bool {
+    (0.0..=MAX_COORDINATE_M).contains(&radius_m)
 }
 
 /// Splits a stretch where it passes a height and says which parts are on the ground. A jump is on the ground if both ends

@@ -28,7 +28,7 @@ const FEWEST_STRETCHES: usize = 4;
 /// A window is not halved more often than this.
 const MOST_HALVINGS: u32 = 12;
 /// Neighbours in the order of the sort that are compared first, so that the closest pairs are known roughly.
-const FIRST_NEIGHBOURS: usize = 12;
+const FIRST_NEIGHBOURS: u32 = 12;
 /// Rounding of a straight way, relative to the coordinates it joins: three operations on them, and two differences.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// A pair among the closest is looked at again only where it could come closer by more than this, relative to its
@@ -79,7 +79,34 @@ pub(super) struct Windows {
     /// Obstacles, each with its way.
     pub(super) obstacles: Vec<(Obstacle, Vec<Segment>)>,
     hulls: Vec<Hull>,
-    near: Vec<(u32, u32)>,
+    near: Vec<Near>,
+}
+
+/// Two hulls, and how close their straight ways come.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    first: u32,
+    second: u32,
+    /// Smallest distance of the ways, squared.
+    squared: f64,
+    /// What both stray.
+    stray: f64,
+}
+
+impl Near {
+    #[inline]
+    fn new(hulls: &[Hull], first: u32, second: u32) -> Self {
+        let (a, b) = (&hulls[first as usize], &hulls[second as usize]);
+        let squared = RelativeMotion::new(b.from - a.from, b.to - a.to).closest().squared;
+        Self { first, second, squared, stray: a.stray + b.stray }
+    }
+
+    /// Whether the two could come closer than a distance; what rounding adds lies within what they stray.
+    #[inline]
+    fn may_come_within(&self, distance: f64) -> bool {
+        let reach = distance + self.stray;
+        self.squared < reach * reach
+    }
 }
 
 impl Windows {
@@ -130,9 +157,8 @@ impl Windows {
                 self.halve(vehicles, (middle_s, window_s.1), halvings + 1, findings);
                 return;
             }
-            for k in 0..self.near.len() {
-                let (a, b) = self.near[k];
-                self.meet(vehicles, a as usize, b as usize, window_s, findings);
+            for near in &self.near {
+                self.meet(vehicles, near, window_s, findings);
             }
         }
         self.meet_obstacles(vehicles, window_s, findings);
@@ -140,13 +166,12 @@ impl Windows {
 
     /// Sorts by the lower end along the axis on which the swarm is longest.
     fn sort(&mut self) {
-        let extent = |axis: usize| {
-            let low = self.hulls.iter().map(|hull| hull.low[axis]).fold(f64::INFINITY, f64::min);
-            let high = self.hulls.iter().map(|hull| hull.low[axis]).fold(f64::NEG_INFINITY, f64::max);
-            high - low
-        };
-        let extents = [extent(0), extent(1), extent(2)];
-        let axis = (0..3).max_by(|&a, &b| extents[a].total_cmp(&extents[b])).unwrap_or(0);
+        let Some(first) = self.hulls.first() else { return };
+        let (mut low, mut high) = (first.low, first.low);
+        for hull in &self.hulls {
+            (low, high) = (low.inf(&hull.low), high.sup(&hull.low));
+        }
+        let axis = (high - low).imax();
         // The axis of the sort is the first one from here on.
         if axis != 0 {
             for hull in &mut self.hulls {
@@ -161,11 +186,12 @@ impl Windows {
     fn compare_neighbours(&self, vehicles: &[Vehicle], window_s: (f64, f64), closest: &mut Closest) {
         let mut rough = Findings { closest: mem::take(closest), ..Findings::default() };
         let count = self.hulls.len();
-        let mut neighbours = (1..=FIRST_NEIGHBOURS).flat_map(|apart| (apart..count).map(move |k| (k - apart, k)));
+        let pairs = |apart: u32| (0..).zip(apart..).take(count.saturating_sub(apart as usize));
+        let mut neighbours = (1..=FIRST_NEIGHBOURS).flat_map(pairs);
         while rough.closest.threshold() == f64::INFINITY
             && let Some((a, b)) = neighbours.next()
         {
-            self.meet(vehicles, a, b, window_s, &mut rough);
+            self.meet(vehicles, &Near::new(&self.hulls, a, b), window_s, &mut rough);
         }
         *closest = rough.closest;
     }
@@ -184,11 +210,11 @@ impl Windows {
                     .max(b.low[1] - a.high[1])
                     .max(a.low[2] - b.high[2])
                     .max(b.low[2] - a.high[2]);
-                if aside <= reach
-                    && !(a.grounded && b.grounded)
-                    && least(a, b) < threshold.max(limits.of_pair(a.radius, b.radius))
-                {
-                    near.push((k, l));
+                if aside <= reach && !(a.grounded && b.grounded) {
+                    let of_both = Near::new(hulls, k, l);
+                    if of_both.may_come_within(threshold.max(limits.of_pair(a.radius, b.radius))) {
+                        near.push(of_both);
+                    }
                 }
             }
             if near.len() > most {
@@ -198,16 +224,15 @@ impl Windows {
         true
     }
 
-    fn meet(&self, vehicles: &[Vehicle], a: usize, b: usize, window_s: (f64, f64), findings: &mut Findings) {
-        let (a, b) = if self.hulls[a].vehicle < self.hulls[b].vehicle { (a, b) } else { (b, a) };
-        let (a, b) = (&self.hulls[a], &self.hulls[b]);
+    fn meet(&self, vehicles: &[Vehicle], near: &Near, window_s: (f64, f64), findings: &mut Findings) {
+        let (a, b) = (&self.hulls[near.first as usize], &self.hulls[near.second as usize]);
+        let (a, b) = if a.vehicle < b.vehicle { (a, b) } else { (b, a) };
         let who = Who::Pair(Pair::new(a.vehicle, b.vehicle));
         let (limit, cutoff) = (self.limits.of_pair(a.radius, b.radius), findings.closest.cutoff(who));
-        let least = least(a, b);
-        if least >= limit.max(cutoff * (1.0 - TIE)) {
+        if !near.may_come_within(limit.max(cutoff * (1.0 - TIE))) {
             return;
         }
-        let may_violate = least < limit;
+        let may_violate = near.may_come_within(limit);
         let meeting = Meeting { who, target: Target::Origin, keep_out: KeepOut::new(limit), cutoff, may_violate };
         let first = &vehicles[a.vehicle].segments[a.first..a.end];
         let second = &vehicles[b.vehicle].segments[b.first..b.end];
@@ -241,10 +266,10 @@ impl Windows {
     }
 }
 
-/// What two vehicles stay apart at least.
+/// The larger of two finite numbers; cheaper than `f64::max`, which looks for NaN.
 #[inline]
-fn least(a: &Hull, b: &Hull) -> f64 {
-    RelativeMotion::new(b.from - a.from, b.to - a.to).closest().separation_m() - a.stray - b.stray
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 /// The straight way over a window, and how far from it stretches stray.
@@ -258,6 +283,7 @@ struct Straight {
 
 impl Straight {
     /// Of stretches that meet the window, at least one. Where there is none the last place is kept; that only widens.
+    #[inline]
     fn over(parts: &[Segment], (from_s, to_s): (f64, f64)) -> Self {
         let (Some(first), Some(last)) = (parts.first(), parts.last()) else {
             return Self { from: Vector3::zeros(), to: Vector3::zeros(), stray: f64::INFINITY, curved: false };
@@ -266,31 +292,50 @@ impl Straight {
         let by = to - from;
         let per_s = if to_s > from_s { 1.0 / (to_s - from_s) } else { 0.0 };
         let off = |time_s: f64, at: &Vector3<f64>| (at - (from + by * ((time_s - from_s) * per_s))).norm_squared();
-        let mut squared = 0.0_f64;
-        let mut beyond = 0.0_f64;
-        let mut curved = false;
+        let mut squared = 0.0;
+        // Where the stretch before ends, or the way begins: mostly where the next stretch begins.
+        let (mut end_s, mut end) = (from_s, from);
         for part in parts {
-            if part.from_s >= from_s {
-                squared = squared.max(off(part.from_s, &part.from));
+            let follows = part.from_s == end_s && part.from.x == end.x && part.from.y == end.y && part.from.z == end.z;
+            if !follows && part.from_s >= from_s {
+                squared = larger(squared, off(part.from_s, &part.from));
             }
             if part.to_s <= to_s {
-                squared = squared.max(off(part.to_s, &part.to));
+                squared = larger(squared, off(part.to_s, &part.to));
             }
-            if part.curve.is_some() {
-                let local = part.local(part.from_s.max(from_s), part.to_s.min(to_s));
-                curved = true;
-                beyond = beyond.max(stray(&local) + part.slack() + part.rounding());
-            }
+            (end_s, end) = (part.to_s, part.to);
         }
+        let curved = parts.iter().any(|part| part.curve.is_some());
+        let beyond = if curved { stray_of_curves(parts, (from_s, to_s)) } else { 0.0 };
         let rounding = ROUNDING * (from.amax() + to.amax());
         Self { from, to, stray: squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding, curved }
     }
 }
 
+/// How far curves stray from the chords of their corners, at most.
+#[cold]
+fn stray_of_curves(parts: &[Segment], (from_s, to_s): (f64, f64)) -> f64 {
+    let curves = parts.iter().filter(|part| part.curve.is_some());
+    let strays = curves.map(|part| {
+        let local = part.local(part.from_s.max(from_s), part.to_s.min(to_s));
+        stray(&local) + part.slack() + part.rounding()
+    });
+    strays.fold(0.0, larger)
+}
+
+/// The stretches that meet a window, from the first to before the last; mostly all of them.
+fn meeting_window(segments: &[Segment], (from_s, to_s): (f64, f64)) -> (usize, usize) {
+    let all_end_late = segments.first().is_none_or(|part| part.to_s >= from_s);
+    let first = if all_end_late { 0 } else { segments.partition_point(|part| part.to_s < from_s) };
+    let all_begin_early = segments.last().is_none_or(|part| part.from_s <= to_s);
+    let end = if all_begin_early { segments.len() } else { segments.partition_point(|part| part.from_s <= to_s) };
+    (first, end.max(first))
+}
+
+#[inline]
 fn hull(vehicle: usize, of: &Vehicle, window_s: (f64, f64)) -> Option<Hull> {
     let segments = &of.segments;
-    let first = segments.partition_point(|part| part.to_s < window_s.0);
-    let end = first + segments[first..].partition_point(|part| part.from_s <= window_s.1);
+    let (first, end) = meeting_window(segments, window_s);
     let parts = &segments[first..end];
     if parts.is_empty() {
         return None;
@@ -337,5 +382,26 @@ mod tests {
         let way = Straight::over(&late, (0.0, 2.0));
         assert_eq!(way.from, at(5.0, 0.0));
         assert!((way.stray - 0.5).abs() < 1e-12);
+        // One that was away strays where it appears again.
+        let away = [
+            Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.0)),
+            Segment::straight(3.0, 4.0, at(3.0, 2.0), at(4.0, 0.0)),
+        ];
+        assert!((Straight::over(&away, (0.0, 4.0)).stray - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn only_stretches_that_meet_a_window_are_looked_at() {
+        let parts = [0.0, 1.0, 2.0].map(|t| Segment::straight(t, t + 1.0, Vector3::zeros(), Vector3::zeros()));
+        for (window_s, expected) in [
+            ((0.0, 3.0), (0, 3)),
+            ((0.5, 1.5), (0, 2)),
+            ((1.0, 2.0), (0, 3)),
+            ((2.5, 9.0), (2, 3)),
+            ((4.0, 9.0), (3, 3)),
+        ] {
+            assert_eq!(meeting_window(&parts, window_s), expected, "{window_s:?}");
+        }
+        assert_eq!(meeting_window(&[], (0.0, 1.0)), (0, 0));
     }
 }
