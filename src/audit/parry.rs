@@ -1,7 +1,8 @@
 //! The second detector: parry's shape cast on keep-out balls, in double precision.
 
 use parry3d_f64::math::{Pose, Vector};
-use parry3d_f64::query::{ShapeCastOptions, cast_shapes};
+use parry3d_f64::query::ShapeCastOptions;
+use parry3d_f64::query::details::cast_shapes_ball_ball;
 use parry3d_f64::shape::Ball;
 
 use super::sweep::{Approach, RelativeMotion, Span};
@@ -43,10 +44,7 @@ impl KeepOut {
             ..ShapeCastOptions::default()
         };
         let other = Pose::from_translation(vector(motion.from));
-        match cast_shapes(&Pose::IDENTITY, Vector::ZERO, &self.ball, &other, by, &self.ball, options) {
-            Ok(hit) => hit.map(|hit| hit.time_of_impact),
-            Err(_) => Some(f64::NAN),
-        }
+        cast_shapes_ball_ball(&other, by, &self.ball, &self.ball, options).map(|hit| hit.time_of_impact)
     }
 
     /// Whether the closest approach is below delta or so little above it that it takes a closer look.

@@ -254,25 +254,27 @@ fn deepest(half_m: &Vector3<f64>, from: Vector3<f64>, to: Vector3<f64>) -> (f64,
     })
 }
 
+/// A shape of each kind.
+#[cfg(test)]
+pub(super) fn one_of_each() -> [Shape; 4] {
+    [
+        Shape::Ball { radius_m: 0.7 },
+        Shape::Box { half_m: Vector3::new(1.0, 0.5, 2.0), yaw_rad: 0.6 },
+        Shape::Capsule { from_m: Vector3::new(-1.0, 0.0, 0.0), to_m: Vector3::new(1.0, 1.0, 0.5), radius_m: 0.3 },
+        Shape::HalfSpace { normal: Vector3::new(0.0, 3.0, 4.0) },
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn shapes() -> [Shape; 4] {
-        [
-            Shape::Ball { radius_m: 0.7 },
-            Shape::Box { half_m: Vector3::new(1.0, 0.5, 2.0), yaw_rad: 0.6 },
-            Shape::Capsule { from_m: Vector3::new(-1.0, 0.0, 0.0), to_m: Vector3::new(1.0, 1.0, 0.5), radius_m: 0.3 },
-            Shape::HalfSpace { normal: Vector3::new(0.0, 3.0, 4.0) },
-        ]
-    }
 
     #[test]
     fn the_smallest_distance_of_a_straight_way_is_that_of_a_fine_walk() {
         const STEPS: u32 = 20_000;
         // A step moves less than 1e-3 m, and the distance is at most so much steeper than its minimum.
         const TOLERANCE_M: f64 = 1e-3;
-        for shape in shapes() {
+        for shape in one_of_each() {
             for k in 0..40_u32 {
                 let turn = f64::from(k) * 2.4;
                 let from = Vector3::new(3.0 * turn.cos(), 3.0 * turn.sin(), 0.1 * f64::from(k) - 2.0);

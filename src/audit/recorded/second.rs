@@ -101,20 +101,12 @@ fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::obstacle::one_of_each;
     use super::*;
-
-    fn shapes() -> [Shape; 4] {
-        [
-            Shape::Ball { radius_m: 0.7 },
-            Shape::Box { half_m: Vector3::new(1.0, 0.5, 2.0), yaw_rad: 0.6 },
-            Shape::Capsule { from_m: Vector3::new(-1.0, 0.0, 0.0), to_m: Vector3::new(1.0, 1.0, 0.5), radius_m: 0.3 },
-            Shape::HalfSpace { normal: Vector3::new(0.0, 3.0, 4.0) },
-        ]
-    }
 
     #[test]
     fn parry_measures_the_same_distances() {
-        for shape in shapes() {
+        for shape in one_of_each() {
             for k in 0..50_u32 {
                 let turn = f64::from(k) * 2.4;
                 let point = Vector3::new(3.0 * turn.cos(), 3.0 * turn.sin(), 0.1 * f64::from(k) - 2.0);
@@ -127,7 +119,7 @@ mod tests {
     #[test]
     fn a_minimum_that_is_wrong_is_a_disagreement() {
         let along = |u: f64| Vector3::new(6.0 * u - 3.0, 2.0, 0.0);
-        for shape in shapes() {
+        for shape in one_of_each() {
             let (lower, at) = shape.closest(along(0.0), along(1.0));
             let right = Minimum { lower, upper: lower, at };
             assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?}");
