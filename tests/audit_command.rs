@@ -51,6 +51,23 @@ fn the_first_line_says_it_and_so_does_the_exit_code() {
 }
 
 #[test]
+fn what_is_asked_in_seconds_does_not_rest_on_a_guessed_unit() {
+    let every_two = "t,id,x,y,z\n0,a,0,0,0\n0,b,1.5,0,0\n2,a,0,0,0\n2,b,1.5,0,0\n4,a,0,0,0\n4,b,1.5,0,0\n";
+    let folder = folder(&[("log.csv", every_two)]);
+    let bounded = ["log.csv", "--delta", "1", "--motion", "bounded", "--max-accel", "1"];
+    for asked in [&bounded[3..], &["--from", "0"], &["--to", "3"], &["--max-gap", "5"], &["--offset", "a=0"]] {
+        let ran = audit(folder.path(), &[&bounded[..3], asked].concat());
+        assert_eq!(ran.exit, Some(2), "{ran:?}");
+        assert!(ran.err.contains("log.csv") && ran.err.contains("say --time-unit ms, or --time-unit s"), "{ran:?}");
+    }
+    assert_eq!(audit(folder.path(), &bounded[..3]).exit, Some(0), "a straight way is the same in any unit");
+    for (unit, exit) in [("ms", 0), ("s", 1)] {
+        let ran = audit(folder.path(), &[&bounded[..], &["--time-unit", unit]].concat());
+        assert_eq!(ran.exit, Some(exit), "{ran:?}");
+    }
+}
+
+#[test]
 fn json_is_alone_on_standard_output_and_has_the_keys_of_a_report() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--json"]);

@@ -203,6 +203,23 @@ impl AuditArguments {
         outputs::check(&inputs, &outputs)
     }
 
+    /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording.
+    fn refuse_guessed_seconds(&self, unit: &str) -> Result<(), Failure> {
+        let asked = [
+            (matches!(self.motion, Some(MotionArgument::Bounded)), "--motion bounded"),
+            (self.from.is_some(), "--from"),
+            (self.to.is_some(), "--to"),
+            (self.max_gap.is_some(), "--max-gap"),
+            (!self.offset.is_empty(), "--offset"),
+        ];
+        let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
+        let path = self.reading.recording.display();
+        let message = format!(
+            "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
+        );
+        Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")))
+    }
+
     fn motion_in_words(&self, curves: bool) -> String {
         let most = |accel: &[Named]| {
             let listed = accel.iter().map(|(name, a)| match name {
@@ -282,6 +299,9 @@ fn judged(
         while more && (items.is_empty() || (first && items.len() < OPENING)) {
             more = recording.read(&mut items)?;
         }
+        if first && recording.clock().by_steps {
+            arguments.refuse_guessed_seconds(recording.clock().unit)?;
+        }
         first = false;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
         judge.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(path))?;
@@ -291,7 +311,8 @@ fn judged(
     progress.finish_and_clear();
     let clock = recording.clock();
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
-    Ok(Judged { outcome: judge.finish()?, clock, notes: recording.notes().to_vec(), curves })
+    let outcome = judge.finish().map_err(|error| Failure::from(error).of(path))?;
+    Ok(Judged { outcome, clock, notes: recording.notes().to_vec(), curves })
 }
 
 /// Reads the recording again for those who came closest.

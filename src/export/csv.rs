@@ -48,20 +48,32 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     Ok(lost.then(|| format!("times count from {} ns, which the table does not say", about.clock.epoch_ns)))
 }
 
-/// A time after an epoch in decimal digits: whole seconds are added exactly.
+/// A time from an epoch on in decimal digits: whole seconds are added exactly. An epoch lies after 1970.
 fn time_text(epoch_s: i64, time_s: f64) -> String {
     if epoch_s == 0 {
         return format!("{time_s:?}");
     }
-    if time_s < 0.0 {
-        return format!("{:?}", time_s + epoch_s as f64);
-    }
-    let digits = time_s.to_string();
+    let digits = time_s.abs().to_string();
     let (whole, fraction) = digits.split_once('.').unwrap_or((&digits, "0"));
-    match whole.parse::<i64>().ok().and_then(|whole| whole.checked_add(epoch_s)) {
-        Some(whole) => format!("{whole}.{fraction}"),
-        None => format!("{:?}", time_s + epoch_s as f64),
+    let whole = whole.parse::<i64>().ok();
+    let (whole, fraction) = if time_s >= 0.0 {
+        (whole.and_then(|whole| epoch_s.checked_add(whole)), fraction.to_owned())
+    } else {
+        let (lent_s, rest) = short_of_a_second(fraction);
+        (whole.and_then(|whole| epoch_s.checked_sub(whole + lent_s)), rest)
+    };
+    match whole {
+        Some(whole @ 0..) => format!("{whole}.{fraction}"),
+        _ => format!("{:?}", time_s + epoch_s as f64),
     }
+}
+
+/// What is left of a second without these decimals: 1, and the ten's complement of the digits; 0 where there are none.
+fn short_of_a_second(decimals: &str) -> (i64, String) {
+    let digits = decimals.trim_end_matches('0').as_bytes();
+    let Some((last, leading)) = digits.split_last() else { return (0, "0".to_owned()) };
+    let nines = leading.iter().map(|digit| char::from(b'0' + b'9' - digit));
+    (1, nines.chain([char::from(b'0' + (b'0' + 10 - last))]).collect())
 }
 
 /// A name as a field of a line.
@@ -84,6 +96,9 @@ mod tests {
         assert_eq!(time_text(1_700_000_000, 12.345_678_901), "1700000012.345678901");
         assert_eq!(time_text(1_700_000_000, 1e-7), "1700000000.0000001");
         assert_eq!(time_text(0, 0.1), "0.1");
+        assert_eq!(time_text(1_700_000_000, -2.123_456_789_012), "1699999997.876543210988");
+        assert_eq!(time_text(1_700_000_000, -5e-8), "1699999999.99999995");
+        assert_eq!(time_text(1_700_000_000, -3.0), "1699999997.0");
         assert_eq!(time_text(0, -0.0), "-0.0");
     }
 }

@@ -100,6 +100,9 @@ impl ExportError {
     pub fn help(&self) -> String {
         match self {
             Self::Read(error) => return error.help(),
+            Self::Write(error) if error.kind() == io::ErrorKind::NotSeekable => {
+                "write it to a file: this format goes back to what it has written"
+            }
             Self::Write(_) => "free some space or write to another folder",
             Self::Curves => "say how often curves are sampled with --sample-hz; between the samples they are lost",
             Self::NoCurves => "leave --sample-hz away",

@@ -4,7 +4,7 @@
 //! The recording is read once for each array, so that none of them is in memory.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 
 use nalgebra::Vector3;
 use zip::write::SimpleFileOptions;
@@ -18,7 +18,8 @@ const ALIGNMENT: usize = 64;
 
 pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
     let (times, vehicles) = (about.instants, about.names.len());
-    let mut archive = Archive { zip: ZipWriter::new(BufWriter::new(file)), source, vehicles };
+    let file = FailsOnce { inner: BufWriter::new(file), failed: false };
+    let mut archive = Archive { zip: ZipWriter::new(file), source, vehicles };
     archive.array("t", "<f8", &[times], |instant, _, out| {
         let time_s = instant.first().map_or(f64::NAN, |sample| sample.time_s);
         out.write_all(&time_s.to_le_bytes())
@@ -51,17 +52,54 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     if about.clock.epoch_ns != 0 {
         archive.begin("epoch_ns", "<i8", &[])?.write_all(&about.clock.epoch_ns.to_le_bytes())?;
     }
-    archive.zip.finish().map_err(std::io::Error::other)?.flush()?;
+    archive.zip.finish().map_err(io::Error::other)?.flush()?;
     Ok(())
 }
 
-fn vector(vector: Option<Vector3<f64>>, out: &mut dyn Write) -> std::io::Result<()> {
+fn vector(vector: Option<Vector3<f64>>, out: &mut dyn Write) -> io::Result<()> {
     let vector = vector.unwrap_or_else(|| Vector3::repeat(f64::NAN));
     vector.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))
 }
 
+/// A writer that swallows everything after its first failure, which its owner was told: an unfinished archive writes its
+/// end when it is dropped, and would complain where nobody can answer.
+struct FailsOnce<W> {
+    inner: W,
+    failed: bool,
+}
+
+impl<W> FailsOnce<W> {
+    fn attempt<T>(&mut self, swallowed: T, action: impl FnOnce(&mut W) -> io::Result<T>) -> io::Result<T> {
+        if self.failed {
+            return Ok(swallowed);
+        }
+        let done = action(&mut self.inner);
+        self.failed = done.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
+        done
+    }
+}
+
+impl<W: Write> Write for FailsOnce<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.attempt(bytes.len(), |inner| inner.write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.attempt((), Write::flush)
+    }
+}
+
+impl<W: Seek> Seek for FailsOnce<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.attempt(0, |inner| inner.seek(to))
+    }
+}
+
+/// The archive being written.
+type Zip<'a> = ZipWriter<FailsOnce<BufWriter<&'a mut File>>>;
+
 struct Archive<'a> {
-    zip: ZipWriter<BufWriter<&'a mut File>>,
+    zip: Zip<'a>,
     source: &'a Source<'a>,
     vehicles: usize,
 }
@@ -71,15 +109,10 @@ type Slots<'a> = [Option<&'a Sample>];
 
 impl<'a> Archive<'a> {
     /// Begins an array.
-    fn begin(
-        &mut self,
-        name: &str,
-        descr: &str,
-        shape: &[usize],
-    ) -> Result<&mut ZipWriter<BufWriter<&'a mut File>>, ExportError> {
+    fn begin(&mut self, name: &str, descr: &str, shape: &[usize]) -> Result<&mut Zip<'a>, ExportError> {
         // Times of files are the same always, so that the same recording gives the same bytes.
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);
-        self.zip.start_file(format!("{name}.npy"), options).map_err(std::io::Error::other)?;
+        self.zip.start_file(format!("{name}.npy"), options).map_err(io::Error::other)?;
         let shape: Vec<_> = shape.iter().map(|length| format!("{length},")).collect();
         let shape = shape.join(" ");
         let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({shape}), }}");
@@ -87,7 +120,7 @@ impl<'a> Archive<'a> {
         let filled = (head + header.len() + 1).next_multiple_of(ALIGNMENT);
         header.push_str(&" ".repeat(filled - head - header.len() - 1));
         header.push('\n');
-        let length = u16::try_from(header.len()).map_err(std::io::Error::other)?;
+        let length = u16::try_from(header.len()).map_err(io::Error::other)?;
         self.zip.write_all(b"\x93NUMPY\x01\x00")?;
         self.zip.write_all(&length.to_le_bytes())?;
         self.zip.write_all(header.as_bytes())?;
@@ -116,7 +149,7 @@ impl<'a> Archive<'a> {
         name: &str,
         descr: &str,
         shape: &[usize],
-        write: impl Fn(&[Sample], &Slots<'_>, &mut dyn Write) -> std::io::Result<()>,
+        write: impl Fn(&[Sample], &Slots<'_>, &mut dyn Write) -> io::Result<()>,
     ) -> Result<(), ExportError> {
         let (source, vehicles) = (self.source, self.vehicles);
         let zip = self.begin(name, descr, shape)?;

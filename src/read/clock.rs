@@ -12,6 +12,9 @@ const EPOCH_FROM_S: f64 = 1e6;
 /// which counts smaller units from somewhere else.
 const LONGEST_STEP_S: f64 = 1e3;
 
+/// Why whole numbers are taken as a unit shorter than a second.
+const BY_STEPS: &str = "because they are whole numbers with steps of that size";
+
 /// Decimals that a [`Stamp::Fixed`] keeps.
 const DECIMALS: usize = 18;
 
@@ -189,10 +192,11 @@ impl Probe {
         self.last = stamp;
     }
 
-    /// The unit that times of this size and step are most likely in.
+    /// The unit that times of this size and step are most likely in, and what speaks for it.
     ///
-    /// Times of day since 1970 tell by their size, unless their step is too long for it. Other whole numbers tell by their step: vehicles are recorded some
-    /// 1 to 1000 times a second. Everything else is in seconds.
+    /// Times of day since 1970 tell by their size, unless their step is too long for it. Other whole numbers tell by their
+    /// step: vehicles are recorded up to 500 times a second, and hardly ever every two seconds. Everything else is in
+    /// seconds.
     fn likely_unit(&self) -> (TimeUnit, &'static str) {
         let size = self.first.approximately();
         let by_size = TimeUnit::ALL.into_iter().find(|unit| {
@@ -203,12 +207,11 @@ impl Probe {
         if let Some(unit) = by_size {
             return (unit, "because they are of the size of times since 1970");
         }
-        let by_step = "because they are whole numbers with steps of that size";
         match self.step {
             step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "because nothing says otherwise"),
-            step if step >= 1e6 => (TimeUnit::Nanoseconds, by_step),
-            step if step >= 1e3 => (TimeUnit::Microseconds, by_step),
-            step if step >= 2.0 => (TimeUnit::Milliseconds, by_step),
+            step if step >= 1e6 => (TimeUnit::Nanoseconds, BY_STEPS),
+            step if step >= 1e3 => (TimeUnit::Microseconds, BY_STEPS),
+            step if step >= 2.0 => (TimeUnit::Milliseconds, BY_STEPS),
             _ => (TimeUnit::Seconds, "because nothing says otherwise"),
         }
     }
@@ -235,20 +238,22 @@ pub(super) struct Timing {
 impl Timing {
     /// A clock that fits what was seen, and a sentence where something was inferred.
     pub(super) fn settle(probe: &Probe, known: KnownUnit) -> (Self, Option<String>) {
-        let (unit, note) = match known {
+        let (unit, why) = match known {
             KnownUnit::Given(unit) => (unit, None),
             KnownUnit::Unsaid => {
                 let (unit, why) = probe.likely_unit();
-                let name = unit.name();
-                (unit, Some(format!("times carry no unit and are taken as {name}, {why} (--time-unit {name} says so)")))
+                (unit, Some(why))
             }
         };
+        let name = unit.name();
+        let note =
+            why.map(|why| format!("times carry no unit and are taken as {name}, {why} (--time-unit {name} says so)"));
         let per_second = unit.per_second();
         let seconds = probe.first.floor().map(|floor| floor.div_euclid(per_second));
         let seconds = seconds.filter(|&seconds| (seconds as f64).abs() >= EPOCH_FROM_S);
         let epoch = seconds.and_then(|s| Some((s.checked_mul(per_second)?, s.checked_mul(1_000_000_000)?)));
         let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
-        let clock = Clock { unit: unit.name(), inferred: note.is_some(), epoch_ns };
+        let clock = Clock { unit: name, inferred: why.is_some(), by_steps: why == Some(BY_STEPS), epoch_ns };
         (Self { clock, unit, epoch }, note)
     }
 
@@ -276,7 +281,10 @@ mod tests {
     #[test]
     fn a_clock_in_nanoseconds_loses_no_digit() {
         let (timing, note, seconds) = timing(&["1700000000123456789", "1700000000123456790"], KnownUnit::Unsaid);
-        assert_eq!(timing.clock, Clock { unit: "ns", inferred: true, epoch_ns: 1_700_000_000_000_000_000 });
+        assert_eq!(
+            timing.clock,
+            Clock { unit: "ns", inferred: true, by_steps: false, epoch_ns: 1_700_000_000_000_000_000 }
+        );
         assert_eq!(seconds, [0.123_456_789, 0.123_456_790]);
         assert!(note.is_some_and(|note| note.contains("taken as ns")));
     }
@@ -310,7 +318,9 @@ mod tests {
             (["200000000", "200010000"], "us"),
             (["500000000000", "500010000000"], "ns"),
         ] {
-            assert_eq!(timing(&texts, KnownUnit::Unsaid).0.clock.unit, unit, "{texts:?}");
+            let clock = timing(&texts, KnownUnit::Unsaid).0.clock;
+            let by_size = texts[0].starts_with("1700000000");
+            assert_eq!((clock.unit, clock.by_steps), (unit, unit != "s" && !by_size), "{texts:?}");
         }
     }
 

@@ -27,7 +27,7 @@ impl Curves {
         let mut items: Vec<_> = items.into_iter().flatten().collect();
         // Stable: at the same time, in the order of the vehicles.
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-        let clock = Clock { unit: "s", inferred: false, epoch_ns: 0 };
+        let clock = Clock { unit: "s", ..Clock::default() };
         Box::new(Self { vehicles, items: items.into_iter(), clock, notes })
     }
 }

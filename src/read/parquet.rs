@@ -191,8 +191,8 @@ impl Cells {
         }
     }
 
-    /// The next cells of a column.
-    fn read(column: &mut Column, count: usize) -> Result<Self, Fault> {
+    /// The next cells of the column of this name.
+    fn read(column: &mut Column, name: &str, count: usize) -> Result<Self, Fault> {
         let (present, unsigned) = (column.present, column.unsigned);
         match &mut column.reader {
             ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count).map(Self::Real),
@@ -209,17 +209,21 @@ impl Cells {
             }
             ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count).map(Self::Text),
             _ => Err(Fault::content(
-                "a column is neither of numbers nor of text",
+                format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
                 "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
             )),
         }
     }
 
-    fn number(&self, row: usize) -> Result<Option<f64>, ()> {
+    /// The number in a cell, or the text that is there instead.
+    fn number(&self, row: usize) -> Result<Option<f64>, String> {
         match self {
             Self::Real(cells) => Ok(cells[row]),
             Self::Whole(cells) => Ok(cells[row].map(|whole| whole as f64)),
-            Self::Text(_) => Err(()),
+            Self::Text(cells) => match &cells[row] {
+                Some(text) => Err(String::from_utf8_lossy(text.data()).into_owned()),
+                None => Ok(None),
+            },
         }
     }
 }
@@ -299,7 +303,7 @@ impl Table {
         }
         let count = self.rows_left.min(BATCH);
         for column in &mut self.columns {
-            column.cells = Cells::read(column, count)?;
+            column.cells = Cells::read(column, &self.header[column.number], count)?;
             if column.cells.len() != count {
                 let what = format!("column `{}` has fewer cells than its group has rows", self.header[column.number]);
                 return Err(Fault::Truncated { what });
@@ -316,12 +320,12 @@ impl Table {
 
     fn number(&self, column: usize, row: usize) -> Result<Option<f64>, Fault> {
         let name = || self.header[column].clone();
-        match self.cells(column).map_or(Err(()), |cells| cells.number(row)) {
+        match self.cells(column).map_or(Ok(None), |cells| cells.number(row)) {
             Ok(Some(number)) if !number.is_finite() => {
                 Err(Fault::NotFinite { column: name(), value: number.to_string() })
             }
             Ok(number) => Ok(number),
-            Err(()) => Err(Fault::NotANumber { column: name(), value: "text".to_owned() }),
+            Err(text) => Err(Fault::NotANumber { column: name(), value: text }),
         }
     }
 

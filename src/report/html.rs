@@ -2,9 +2,10 @@
 
 use super::page::{Badge, Block, Cell, Column, Page, Picture, Section, Table, Warning};
 use super::words::seconds;
-use super::{Performance, Report, Status};
+use super::{Performance, Report, Status, Violation};
 use crate::figures::Figure;
 use crate::scenario::{PlantSpec, Precision, Scenario};
+use crate::swarm::at_least;
 
 /// Most violations that are listed one by one.
 const LISTED_VIOLATIONS: usize = 50;
@@ -84,8 +85,8 @@ impl Report {
             "Separation",
             vec![
                 row("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
-                row("Smallest distance", with_unit(separation.min_m, "m"), &closest),
-                row("Certified distance", with_unit(separation.certified_m, "m"), &certificate),
+                row("Smallest distance", proved_m(separation.min_m), &closest),
+                row("Certified distance", proved_m(separation.certified_m), &certificate),
                 row("Audit", status.to_owned(), &sweep),
                 row("Violations", audit.violations.len().to_string(), "times that a pair was closer than δ"),
                 row("Disagreements", audit.parry.disagreements.to_string(), "of closed form and shape cast"),
@@ -141,9 +142,9 @@ impl Report {
         let rows = violations.iter().take(LISTED_VIOLATIONS).map(|violation| {
             let [first, second] = violation.pair;
             let mut row = vec![Cell::from(format!("{first}-{second}"))];
-            let numbers =
-                [(violation.from_s, "s"), (violation.to_s, "s"), (violation.min_m, "m"), (violation.min_at_s, "s")];
-            row.extend(numbers.map(|(number, unit)| Cell::from(with_unit(number, unit))));
+            let Violation { from_s, to_s, min_m, min_at_s, .. } = violation;
+            let time = |time_s: &Option<f64>| time_s.map_or(NOT_KNOWN.to_owned(), seconds);
+            row.extend([time(from_s), time(to_s), proved_m(*min_m), time(min_at_s)].map(Cell::from));
             row
         });
         let table = Table {
@@ -270,6 +271,11 @@ fn row(name: &str, value: String, remark: &str) -> Vec<Cell> {
 
 fn with_unit(number: Option<f64>, unit: &str) -> String {
     number.map_or(NOT_KNOWN.to_owned(), |number| format!("{} {unit}", short(number)).trim_end().to_owned())
+}
+
+/// A distance that is not larger than what was found.
+fn proved_m(distance_m: Option<f64>) -> String {
+    distance_m.map_or(NOT_KNOWN.to_owned(), |distance_m| format!("{} m", at_least(distance_m, 6)))
 }
 
 /// A number with six significant digits at most, without zeros at its end; very small and very large ones in powers of

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::page::{Badge, Block, Column, Page, Section, Table, Tone};
-use super::words::{fixed, metres, metres_below, seconds};
+use super::words::{counted, fixed, metres, metres_below, seconds};
 use super::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Status, Violation, finite};
 use crate::audit::recorded::{self, Approach, Outcome, Question, Who};
 use crate::figures::Figure;
@@ -381,10 +381,9 @@ impl RecordedReport {
         };
         let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
         line(format!(
-            "judged       {span}, {} vehicle{}, {} stretches of motion, {} swept",
-            self.judged,
-            if self.judged == 1 { "" } else { "s" },
-            self.audit.steps,
+            "judged       {span}, {}, {} of motion, {} swept",
+            counted(self.judged as u64, "vehicle", "vehicles"),
+            counted(self.audit.steps, "stretch", "stretches"),
             self.audit.pairs_checked
         ));
         for (heading, closest) in [("closest pairs", &self.closest), ("closest to obstacles", &self.obstacles.closest)]
@@ -518,11 +517,11 @@ fn span(from_s: f64, to_s: f64) -> String {
     format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
 }
 
-/// A number with six decimals, or an interval where they differ.
+/// A distance with six decimals, rounded down, or an interval where its bounds differ.
 #[must_use]
 pub fn interval(lower: f64, upper: f64) -> String {
-    let (low, high) = (fixed(lower, 6), fixed(upper, 6));
-    if upper - lower <= 2.0 * recorded::WIDTH_M || low == high { high } else { format!("{low} .. {high}") }
+    let (low, high) = (at_least(lower, 6), fixed(upper, 6));
+    if upper - lower <= 2.0 * recorded::WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
 }
 
 fn section(heading: &str, blocks: Vec<Block>) -> Section {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::verdict::breaks_certificate;
 use super::{Report, Status};
 use crate::swarm::at_least;
 
@@ -23,6 +24,11 @@ pub(super) fn metres_below(number: f64, limit_m: f64) -> String {
         .map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
 }
 
+/// So many of a thing.
+pub(super) fn counted(count: u64, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
 /// A time with its unit.
 pub(super) fn seconds(time_s: f64) -> String {
     format!("{} s", fixed(time_s, 2))
@@ -41,7 +47,9 @@ impl Report {
                 let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
                 let broken = match (self.separation.min_m, self.separation.certified_m) {
-                    (Some(min_m), Some(certified_m)) if min_m < certified_m => ", which breaks the certificate",
+                    (Some(min_m), Some(certified_m)) if breaks_certificate(min_m, certified_m) => {
+                        ", which breaks the certificate"
+                    }
                     _ => "",
                 };
                 format!("CLEAR: {closest} (delta {delta} m){broken}, {}", self.formation_in_words())
@@ -116,12 +124,12 @@ impl Report {
         let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         let certified = match separation.certified_m {
-            Some(certified_m) => format!("certified {certified_m:.6} m"),
+            Some(certified_m) => format!("certified {} m", at_least(certified_m, 6)),
             None => "not certified".to_owned(),
         };
         format!(
             "{} m{}{} (delta {} m, {certified})",
-            separation.min_m.map_or("-".to_owned(), |min_m| format!("{min_m:.6}")),
+            separation.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6)),
             at.unwrap_or_default(),
             pair.unwrap_or_default(),
             metres(separation.delta_m),
@@ -132,14 +140,17 @@ impl Report {
         let audit = &self.audit;
         let detectors = match audit.parry.disagreements {
             0 => "both detectors agree".to_owned(),
-            n => format!("{n} disagreements of the two detectors"),
+            n => format!("{} of the two detectors", counted(n, "disagreement", "disagreements")),
         };
-        let contacts = audit.rapier.contact_pairs.map(|pairs| format!(", {pairs} contact pairs seen by the engine"));
+        let contacts = audit
+            .rapier
+            .contact_pairs
+            .map(|pairs| format!(", {} seen by the engine", counted(pairs, "contact pair", "contact pairs")));
         format!(
-            "{} violations in {} steps, {} pairs swept; {detectors}{}",
-            audit.violations.len(),
-            audit.steps,
-            audit.pairs_checked,
+            "{} in {}, {} swept; {detectors}{}",
+            counted(audit.violations.len() as u64, "violation", "violations"),
+            counted(audit.steps, "step", "steps"),
+            counted(audit.pairs_checked, "pair", "pairs"),
             contacts.unwrap_or_default()
         )
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::WIDTH_M;
 use super::outcome::{Approach, Disagreement, Undecided, Violation, Who};
 
 /// Approaches that are kept.
@@ -27,9 +28,13 @@ impl Closest {
         self.threshold
     }
 
-    /// What this pair must come below to change anything.
+    /// What this pair must come below to change anything: where its distance is known by bounds that lie apart, the upper
+    /// one can still fall.
     pub(super) fn cutoff(&self, who: Who) -> f64 {
-        self.kept.iter().find(|kept| kept.who == who).map_or(self.threshold, |kept| kept.lower_m)
+        let known = self.kept.iter().find(|kept| kept.who == who);
+        known.map_or(self.threshold, |kept| {
+            if kept.upper_m - kept.lower_m > 2.0 * WIDTH_M { kept.upper_m } else { kept.lower_m }
+        })
     }
 
     /// Keeps the closer of two approaches of one pair, and the closest pairs.

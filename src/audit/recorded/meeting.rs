@@ -22,6 +22,8 @@ pub(super) struct Meeting<'a> {
     pub(super) cutoff: f64,
     /// Whether bounds on the motion leave it open that the distance falls below its limit: then it is judged twice.
     pub(super) may_violate: bool,
+    /// Height at or below which both are on the ground.
+    pub(super) above: Option<f64>,
 }
 
 /// The time that two stretches share.
@@ -80,7 +82,7 @@ impl Meeting<'_> {
         let pair = matches!(self.target, Target::Origin);
         let mut swept = 0;
         shared(first, second, |shared| {
-            if shared.first.grounded && shared.second.grounded {
+            if self.on_ground(shared.first, &shared) && self.on_ground(shared.second, &shared) {
                 return;
             }
             if pair && shared.first.curve.is_none() && shared.second.curve.is_none() {
@@ -100,6 +102,18 @@ impl Meeting<'_> {
             let time_s = time_at(nearest.from_s, nearest.to_s, nearest.at);
             self.offer(lower_m, lower_m, time_s, findings);
         }
+    }
+
+    /// Whether one of two is on the ground for all of the time that they share. A stretch that leaves the ground begins on
+    /// it, which matters where no more than that instant is shared.
+    #[inline]
+    fn on_ground(&self, of: &Segment, shared: &Shared<'_>) -> bool {
+        let starts_there = |above: f64| {
+            shared.from_s >= shared.to_s
+                && !of.jumps()
+                && of.position(shared.from_s).z + of.slack_at(shared.from_s) <= above
+        };
+        of.grounded || self.above.is_some_and(starts_there)
     }
 
     fn offer(&self, lower_m: f64, upper_m: f64, time_s: f64, findings: &mut Findings) {

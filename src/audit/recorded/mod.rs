@@ -123,7 +123,8 @@ impl Judge {
         question.check()?;
         let touching = question.ellipsoid_m.map_or(0.0, |_| TOUCHING_ELLIPSOIDS);
         let delta = question.delta_m.unwrap_or(touching);
-        let limits = Limits { delta, by_radii: question.ellipsoid_m.is_none() };
+        let above = question.above_m.map(|above_m| question.ellipsoid_m.map_or(above_m, |axes| above_m / axes.z));
+        let limits = Limits { delta, by_radii: question.ellipsoid_m.is_none(), above };
         let offsets_s = question.vehicles.values().map(|terms| terms.offset_s);
         Ok(Self {
             least_offset_s: offsets_s.fold(0.0, f64::min),

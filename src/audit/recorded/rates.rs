@@ -86,6 +86,10 @@ mod tests {
         let rates = Rates::learn(&items, 3);
         let gaps: Vec<_> = (0..4).map(|vehicle| (rates.max_gap_s(vehicle) * 1e3).round()).collect();
         assert_eq!(gaps, [150.0, 1500.0, 150.0, 150.0]);
+        // One that is known well leaves those still to be known.
+        items = (0..100).map(|k| seen(0, 0.1 * f64::from(k))).collect();
+        items.extend((0..5).map(|k| seen(1, 10.0 + f64::from(k))));
+        assert!((Rates::learn(&items, 2).max_gap_s(1) - 1.5).abs() < 1e-9);
         assert_eq!(Rates::learn(&[], 0).max_gap_s(0), f64::INFINITY);
     }
 }

@@ -15,6 +15,8 @@ const MAX_COORDINATE_M: f64 = 1e70;
 const SAME_INSTANT_S: f64 = 1e-6;
 /// Shortest part of a curve, as a fraction of it, that is looked at for when the ground is left.
 const SHORTEST_PART: f64 = 1e-12;
+/// Shortest interval between two samples of a vehicle \[s\]: it can be divided by, twice.
+const SHORTEST_INTERVAL_S: f64 = 1e-70;
 /// Relative excess over the assumed acceleration that rounding explains.
 const ROUNDING: f64 = 1e-9;
 
@@ -103,7 +105,7 @@ impl Vehicle {
         let time_s = sample.time_s + self.course.offset_s;
         self.check_sample(sample)?;
         if let Some(last) = &self.last
-            && time_s <= last.time_s
+            && time_s - last.time_s < SHORTEST_INTERVAL_S
         {
             return Err(self.not_increasing(time_s));
         }

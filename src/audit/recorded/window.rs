@@ -42,6 +42,8 @@ pub(super) struct Limits {
     pub(super) delta: f64,
     /// Whether the vehicles' radii count.
     pub(super) by_radii: bool,
+    /// Height at or below which two vehicles need not keep it, scaled like positions.
+    pub(super) above: Option<f64>,
 }
 
 impl Limits {
@@ -233,7 +235,8 @@ impl Windows {
             return;
         }
         let may_violate = near.may_come_within(limit);
-        let meeting = Meeting { who, target: Target::Origin, keep_out: KeepOut::new(limit), cutoff, may_violate };
+        let (target, keep_out, above) = (Target::Origin, KeepOut::new(limit), self.limits.above);
+        let meeting = Meeting { who, target, keep_out, cutoff, may_violate, above };
         let first = &vehicles[a.vehicle].segments[a.first..a.end];
         let second = &vehicles[b.vehicle].segments[b.first..b.end];
         meeting.judge(first, second, window_s, findings);
@@ -257,7 +260,8 @@ impl Windows {
                 if least < limit.max(cutoff * (1.0 - TIE)) {
                     let target = Target::Shape(shape);
                     let may_violate = least < limit;
-                    let meeting = Meeting { who, target, keep_out: KeepOut::new(limit), cutoff, may_violate };
+                    let (keep_out, above) = (KeepOut::new(limit), self.limits.above);
+                    let meeting = Meeting { who, target, keep_out, cutoff, may_violate, above };
                     let course = &vehicles[hull.vehicle].segments[hull.first..hull.end];
                     meeting.judge(way, course, window_s, findings);
                 }
@@ -308,7 +312,10 @@ impl Straight {
         let curved = parts.iter().any(|part| part.curve.is_some());
         let beyond = if curved { stray_of_curves(parts, (from_s, to_s)) } else { 0.0 };
         let rounding = ROUNDING * (from.amax() + to.amax());
-        Self { from, to, stray: squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding, curved }
+        // Over a time too short to divide by nothing is known of the way.
+        let stray =
+            if per_s.is_finite() { squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding } else { f64::INFINITY };
+        Self { from, to, stray, curved }
     }
 }
 

@@ -94,7 +94,7 @@ impl Tracks for Seen {
     }
 
     fn clock(&self) -> &Clock {
-        const CLOCK: Clock = Clock { unit: "s", inferred: false, epoch_ns: 0 };
+        const CLOCK: Clock = Clock { unit: "s", inferred: false, by_steps: false, epoch_ns: 0 };
         &CLOCK
     }
 
