@@ -169,7 +169,14 @@ impl Array {
     }
 
     fn not(&self, what: &str) -> Fault {
-        Fault::content(format!("its elements are no {what} but {:?}", self.kind), "save float64, int64 or text")
+        let found = match self.kind {
+            Kind::Float => "decimal numbers",
+            Kind::Signed | Kind::Unsigned => "whole numbers",
+            Kind::Bool => "truth values",
+            Kind::Time(_) => "times",
+            Kind::Unicode | Kind::Bytes => "text",
+        };
+        Fault::content(format!("its elements are no {what} but {found}"), "save float64, int64 or text")
     }
 }
 

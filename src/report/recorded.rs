@@ -300,7 +300,7 @@ impl RecordedReport {
             Status::Clear => {
                 let all = self.closest.iter().chain(&self.obstacles.closest);
                 let closest = all.min_by(|a, b| a.lower_m.total_cmp(&b.lower_m)).map_or_else(
-                    || "no two vehicles were there together".to_owned(),
+                    || "at no time were there two vehicles to keep apart".to_owned(),
                     |closest| {
                         let [first, second] = &closest.who;
                         let at = seconds(closest.time_s);

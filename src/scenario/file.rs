@@ -322,7 +322,8 @@ pub(super) struct TimeFile {
     pub(super) max_halvings: u32,
 }
 
-/// What counts as a reached formation: both limits hold to the end of the flight, and at least for `hold_s`.
+/// What counts as a reached formation: to the end of the flight, and at least for `hold_s`, both limits hold, and the
+/// vehicles are no more than `edge_error_m` (root mean square) from the formation laid over them.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct JudgeFile {
