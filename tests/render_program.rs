@@ -154,6 +154,9 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         (&["out/run.mcap", "--film", "film.mp4", "--size", "101x50"], WRONG_INPUT, "even sides"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "0"], WRONG_INPUT, "--speed: 0 is not a positive number"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "-3"], WRONG_INPUT, "--speed: -3 is not a positive number"),
+        (&["out/run.mcap", "--speed", "2"], WRONG_INPUT, "required arguments were not provided: --film <FILE>"),
+        (&["out/run.mcap", "--at", "end", "--fps", "10"], WRONG_INPUT, "not provided: --film <FILE>"),
+        (&["out/run.mcap", "--film", "film.mp4", "--speed", "nan"], WRONG_INPUT, "--speed: NaN is not a positive"),
         (&["out/run.mcap", "--film", "folder.mp4"], WRONG_INPUT, "folder.mp4 is a folder"),
         (&["out/run.mcap", "--out", "refused", "--camera", "follow:9"], WRONG_INPUT, "there is no vehicle `9`"),
         (&["out/run.mcap", "--out", "refused", "--size", "60000x9"], WRONG_INPUT, "pixels a side"),
@@ -174,6 +177,38 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
     }
     assert_eq!(names(&folder.path().join("out")), ["figures", "report.html", "report.json", "run.mcap"]);
     assert!(!folder.path().join("refused").exists(), "what is refused leaves no folder");
+}
+
+#[test]
+fn no_picture_and_no_film_replaces_another_or_the_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = "t,id,x,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,-2,1,0\n1,b,2,0,0\n";
+    let recordings = ["start.png", "sheet.png", "r.png"];
+    for name in recordings {
+        fs::write(folder.path().join(name), rows).expect("written");
+    }
+    let clashes: [(&[&str], &str); 6] = [
+        (&["r.png", "--film", "r.png"], "--film r.png would overwrite the recording"),
+        (&["r.png", "--film", "./new/../r.png"], "--film ./new/../r.png would overwrite the recording"),
+        (&["start.png", "--out", ".", "--at", "start"], "the picture ./start.png would overwrite the recording"),
+        (&["sheet.png", "--out", ".", "--sheet", "2x2"], "the sheet ./sheet.png would overwrite the recording"),
+        (&["r.png", "--out", "new", "--at", "closest", "--film", "new/closest.png"], "would overwrite the picture"),
+        (&["r.png", "--out", "new", "--sheet", "2x2", "--film", "new/sheet.png"], "would overwrite the sheet"),
+    ];
+    for (arguments, message) in clashes {
+        let Ran { exit, err, .. } = ran(folder.path(), &[&["render"], arguments].concat());
+        assert_eq!(exit, WRONG_INPUT, "{arguments:?}: {err}");
+        let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(text.contains(message), "{arguments:?}: {text}");
+    }
+    assert_eq!(names(folder.path()), ["r.png", "sheet.png", "start.png"], "nothing is made");
+    for name in recordings {
+        assert_eq!(fs::read_to_string(folder.path().join(name)).expect(name), rows);
+    }
+    let apart = ["render", "r.png", "--out", "new", "--at", "start", "--film", "new/film.png", "--size", "64x36"];
+    let Ran { exit, err, .. } = ran(folder.path(), &[&apart[..], &["--fps", "2"]].concat());
+    assert_eq!(exit, GOOD, "{err}");
+    assert_eq!(names(&folder.path().join("new")), ["film.png", "start.png"]);
 }
 
 #[test]
