@@ -117,9 +117,11 @@ impl Painting<'_> {
         match began.first() {
             None => (vec!["clear so far".to_owned()], theme.good()),
             Some(span) => {
-                let times = if began.len() == 1 { String::new() } else { format!(", {} times", began.len()) };
-                let at = format!("violated at {:.2} s", span.from_s);
-                let texts = vec![format!("{at} by {}{times}", self.pair(span.pair)), at, "violated".to_owned()];
+                let at = match began.len() {
+                    1 => format!("violated at {:.2} s", span.from_s),
+                    many => format!("{many} violations, the first at {:.2} s", span.from_s),
+                };
+                let texts = vec![format!("{at} by {}", self.pair(span.pair)), at, "violated".to_owned()];
                 (texts, theme.alarm())
             }
         }

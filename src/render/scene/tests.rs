@@ -107,6 +107,12 @@ fn a_violation_shows_while_it_lasts_and_is_remembered() {
     assert!(says(&before, "clear so far") && !says(&before, "VIOLATION"), "{:?}", words(&before));
     assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1-2"), "{:?}", words(&during));
     assert!(!says(&after, "VIOLATION") && says(&after, "violated at 4.00 s"), "{:?}", words(&after));
+    // Of several, their number is said, and which was the first.
+    let mut again = footage;
+    again.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 7.0 });
+    let twice = scene(&again, 8.0, &View::default());
+    assert!(says(&twice, "2 violations, the first at 4.00 s by 1-2"), "{:?}", words(&twice));
+    let footage = self::footage();
     // Even with every layer off, what is violated has its shell.
     let bare = scene(&footage, 5.0, &View { layers: Layers::NONE, ..View::default() });
     assert_eq!(bare.shells.len(), 2);
