@@ -149,7 +149,10 @@ impl From<FilmError> for Failure {
             }
             FilmError::Rate { .. } => Self::input(message, "give another rate with --fps"),
             FilmError::Size { .. } => Self::input(message, "give another size with --size, or another format"),
-            FilmError::Mixed | FilmError::Picture(_) | FilmError::Encoder { .. } => Self::machine(message),
+            FilmError::Write(_) => Self::machine(message).with_help("free some space or write to another folder"),
+            FilmError::Mixed | FilmError::Count { .. } | FilmError::Picture(_) | FilmError::Encoder { .. } => {
+                Self::machine(message)
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `tautline render`: pictures and films of a recording.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -14,9 +15,9 @@ use super::reading::{FormatArgument, ReadArguments};
 use super::{Exit, Failure};
 use crate::render::scene::Stage;
 use crate::render::{
-    CameraSpec, Film, FilmFormat, Footage, Picture, Renderer, Scene, ShootError, Theme, View, contact_sheet,
+    CameraSpec, Film, FilmError, FilmFormat, Footage, Picture, Renderer, Scene, ShootError, Theme, View, contact_sheet,
 };
-use crate::report::write_atomically;
+use crate::report::{write_atomically, write_atomically_with};
 
 /// Most pictures of one command.
 const MOST_PICTURES: f64 = 100_000.0;
@@ -112,7 +113,9 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         .collect();
     outputs::check(&[("the recording", recording)], &outputs)?;
     let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
-    let mut reel = film.map(|(_, format)| Film::new(format, view.size_px, arguments.fps.unwrap_or(FPS))).transpose()?;
+    if let Some((_, format)) = film {
+        format.check(view.size_px, arguments.fps.unwrap_or(FPS))?;
+    }
     let renderer = Renderer::open(&drawing::adapter(&arguments.adapter))?;
     renderer.check_size(view.size_px)?;
     let stage = Stage::of(&footage);
@@ -137,12 +140,12 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         let jobs: Vec<_> = stills[first..].iter().zip(pictures).collect();
         jobs.par_iter().map(|(still, picture)| write(&still.path, picture)).collect::<Result<(), Failure>>()
     })?;
-    if let Some(reel) = &mut reel {
-        studio.shoot(&frames, |_, pictures| Ok(reel.add(pictures)?))?;
-    }
     let mut written: Vec<PathBuf> = stills.into_iter().map(|still| still.path).collect();
-    if let (Some((path, _)), Some(reel)) = (film, reel) {
-        write_atomically(path, &reel.finish()?)?;
+    if let Some((path, format)) = film {
+        let fps = arguments.fps.unwrap_or(FPS);
+        write_atomically_with(path, |file| {
+            studio.film(file, format, fps, &frames).map_err(|failure| failure.of(path))
+        })?;
         written.push(path.to_owned());
     }
     if let (Some((times, size_px)), Some([columns, _])) = (sheet, arguments.sheet) {
@@ -187,6 +190,16 @@ impl Studio<'_> {
             waiting = drawn?;
         }
         take(first, &waiting)
+    }
+
+    /// Writes a film of pictures at these times.
+    fn film(&mut self, file: &mut File, format: FilmFormat, fps: u32, times_s: &[f64]) -> Result<(), Failure> {
+        let mut out = BufWriter::new(file);
+        let pictures = u32::try_from(times_s.len()).unwrap_or(u32::MAX);
+        let mut film = Film::new(&mut out, format, self.view.size_px, fps, pictures)?;
+        self.shoot(times_s, |_, pictures| Ok(film.add(pictures)?))?;
+        film.finish()?;
+        Ok(out.flush().map_err(FilmError::from)?)
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
