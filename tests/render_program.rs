@@ -143,6 +143,7 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         (&["out/run.mcap", "--every", "0"], WRONG_INPUT, "0 is not a positive number"),
         (&["out/run.mcap", "--every", "-1"], WRONG_INPUT, "--every: -1 is not a positive number"),
         (&["out/run.mcap", "--delta", "-1"], WRONG_INPUT, "--delta is -1"),
+        (&["out/run.mcap", "--delta", "1e300"], WRONG_INPUT, "--delta is 1e300"),
         (&["out/run.mcap", "--delta", "2.6"], WRONG_INPUT, "judged by its own delta, 2 m"),
         (&["out/run.mcap", "--scale", "0.001"], WRONG_INPUT, "says itself how it is read"),
         (&["out/run.mcap", "--every", "1e-9"], WRONG_INPUT, "more than 100000"),
@@ -177,6 +178,20 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
     }
     assert_eq!(names(&folder.path().join("out")), ["figures", "report.html", "report.json", "run.mcap"]);
     assert!(!folder.path().join("refused").exists(), "what is refused leaves no folder");
+}
+
+#[test]
+fn places_beyond_all_measure_are_refused_with_vehicle_value_and_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("far.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,1,0,0\n1,a,1e300,0,0\n1,b,-1e300,0,0\n")
+        .expect("written");
+    for more in [&[][..], &["--at", "closest"], &["--delta", "1"]] {
+        let Ran { exit, err, .. } = ran(folder.path(), &[&["render", "far.csv"], more].concat());
+        assert_eq!(exit, WRONG_INPUT, "{err}");
+        let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(text.contains("vehicle a has a coordinate of 1e300 m at 1 s; what is beyond 1e9 m"), "{text}");
+    }
+    assert_eq!(names(folder.path()), ["far.csv"]);
 }
 
 #[test]

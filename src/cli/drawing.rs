@@ -7,7 +7,8 @@ use super::console::Console;
 use crate::read::{self, Format, ReadOptions};
 use crate::record::mcap::McapRecording;
 use crate::render::{
-    AdapterChoice, CameraError, FilmError, Footage, FootageError, GpuError, PictureError, ShootError, Theme,
+    AdapterChoice, CameraError, FARTHEST_M, FilmError, Footage, FootageError, GpuError, PictureError, ShootError,
+    Theme, TracksError,
 };
 
 /// The names of the themes.
@@ -46,8 +47,9 @@ pub(super) fn footage(
     delta_m: Option<f64>,
     console: Console,
 ) -> Result<Footage, Failure> {
-    if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && delta_m.is_finite())) {
-        return Err(Failure::input(format!("--delta is {delta_m}"), "give a positive distance in metres"));
+    if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && *delta_m <= FARTHEST_M)) {
+        let help = format!("give a positive distance in metres, at most {FARTHEST_M:e}");
+        return Err(Failure::input(format!("--delta is {delta_m:?}"), help));
     }
     // Our own recordings know formation, graph and law too.
     let may_be_ours = reading.format.is_none_or(|format| format == Format::Mcap);
@@ -59,7 +61,10 @@ pub(super) fn footage(
         _ => {
             let mut tracks = read::open(recording, reading)?;
             let name = recording.file_stem().unwrap_or_default().to_string_lossy();
-            Footage::from_tracks(&name, tracks.as_mut(), delta_m)?
+            Footage::from_tracks(&name, tracks.as_mut(), delta_m).map_err(|error| match error {
+                TracksError::Read(error) => Failure::from(error),
+                TracksError::Footage(error) => error.into(),
+            })?
         }
     };
     if footage.instants() == 0 {
@@ -95,6 +100,9 @@ impl From<FootageError> for Failure {
     fn from(error: FootageError) -> Self {
         match error {
             FootageError::Record(error) => error.into(),
+            FootageError::TooFar { .. } => {
+                Self::input(error.to_string(), "mend the recording, or see whether its lengths are in metres")
+            }
             FootageError::Empty { .. } => Self::input(
                 error.to_string(),
                 "give a recording that holds at least one sample, such as a run's run.mcap",
