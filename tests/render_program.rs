@@ -252,6 +252,31 @@ fn a_recording_that_was_not_closed_is_drawn_and_said_to_be_unfinished() {
 }
 
 #[test]
+fn a_run_that_was_cut_off_at_once_is_told_from_one_that_can_be_drawn() {
+    let folder = flown("pentagon", &["--no-snapshots"]);
+    let whole = fs::read(folder.path().join("out/run.mcap")).expect("a recording");
+    for (bytes, more) in [(100, &[][..]), (4000, &[]), (4000, &["--allow-unfinished"])] {
+        fs::write(folder.path().join("cut.mcap"), &whole[..bytes]).expect("written");
+        let Ran { exit, err, .. } = ran(folder.path(), &[&["render", "cut.mcap"], more].concat());
+        assert_eq!(exit, WRONG_INPUT, "{err}");
+        assert!(err.contains("cut.mcap: the run was cut off before anything was written"), "{err}");
+    }
+}
+
+#[test]
+fn a_folder_is_said_to_have_been_taken_for_polynomials() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::create_dir(folder.path().join("some")).expect("a folder");
+    fs::write(folder.path().join("some/table.csv"), "a,b\n1,2\n").expect("written");
+    for command in ["view", "render"] {
+        let Ran { exit, err, .. } = ran(folder.path(), &[command, "some"]);
+        assert_eq!(exit, WRONG_INPUT, "{err}");
+        let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(text.contains("the folder was taken for one of Crazyflie polynomials"), "{text}");
+    }
+}
+
+#[test]
 fn a_window_without_a_display_ends_with_a_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
     let done = std::process::Command::new(TAUTLINE)
