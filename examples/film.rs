@@ -26,8 +26,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let view = View { size_px: [960, 540], ..View::default() };
     let (stage, [start_s, end_s]) = (Stage::of(&footage), footage.range_s());
     let mut renderer = Renderer::open(&AdapterChoice::Best)?;
-    let times: Vec<f64> =
-        (0..).map(|k| start_s + f64::from(k) * SPEED / f64::from(FPS)).take_while(|&time_s| time_s <= end_s).collect();
+    let times: Vec<f64> = (0..u16::MAX)
+        .map(|k| start_s + f64::from(k) * SPEED / f64::from(FPS))
+        .take_while(|&time_s| time_s <= end_s)
+        .collect();
     let mut out = BufWriter::new(File::create(path)?);
     let pictures = u32::try_from(times.len())?;
     let mut film = Film::new(&mut out, FilmFormat::of(path)?, view.size_px, FPS, pictures)?;

@@ -258,10 +258,7 @@ impl Footage {
         for entry in recording.by_ref() {
             match entry? {
                 Entry::Sample(sample) => {
-                    for (k, place) in sample.swarm.positions_m.row_iter().enumerate() {
-                        let name = || footage.vehicles[k].clone();
-                        FootageError::check(place.iter(), COORDINATE, sample.time_s, name)?;
-                    }
+                    footage.check(&sample.as_sample())?;
                     footage.take(&sample.as_sample());
                 }
                 Entry::Event(event) => footage.note(&event),
@@ -390,6 +387,15 @@ impl Footage {
     /// Whether both of a pair are vehicles of the flight: a file may say anything.
     fn has(&self, pair: Pair) -> bool {
         pair.second() < self.count()
+    }
+
+    /// Refuses a sample with a vehicle that is too far away to be drawn.
+    pub(super) fn check(&self, sample: &Sample<'_>) -> Result<(), FootageError> {
+        sample.swarm.positions_m.row_iter().enumerate().try_for_each(|(k, place)| {
+            FootageError::check(place.iter(), COORDINATE, sample.time_s, || {
+                self.vehicles.get(k).map_or_else(|| (k + 1).to_string(), Clone::clone)
+            })
+        })
     }
 
     /// Takes one sample, which must be later than the one before.

@@ -9,6 +9,9 @@ const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 /// How the area of a picture is left, and how it is put on the last one: neither cleared nor blended.
 const NEITHER: [u8; 2] = [0, 0];
 
+/// Name and data of a part of a PNG file.
+type Chunk<'a> = ([u8; 4], &'a [u8]);
+
 pub(super) struct Apng<W> {
     out: W,
     size_px: [u32; 2],
@@ -28,7 +31,7 @@ impl<W: Write> Apng<W> {
     /// Adds a picture given as PNG.
     pub(super) fn add(&mut self, png: &[u8]) -> Result<(), FilmError> {
         let chunks = chunks(png)?;
-        let pixels = |(name, _): &&([u8; 4], &[u8])| name == b"IDAT";
+        let pixels = |(name, _): &&Chunk<'_>| name == b"IDAT";
         if self.count == 0 {
             self.out.write_all(&SIGNATURE)?;
             for (name, data) in chunks.iter().filter(|(name, _)| !matches!(name, b"IDAT" | b"IEND")) {
@@ -63,8 +66,8 @@ impl<W: Write> Apng<W> {
     }
 }
 
-/// The chunks of a PNG file, each with its name.
-fn chunks(png: &[u8]) -> Result<Vec<([u8; 4], &[u8])>, FilmError> {
+/// The chunks of a PNG file in order.
+fn chunks(png: &[u8]) -> Result<Vec<Chunk<'_>>, FilmError> {
     let damaged = || FilmError::Encoder { format: NAME, reason: "a picture is not PNG".to_owned() };
     let mut rest = png.strip_prefix(&SIGNATURE).ok_or_else(damaged)?;
     let mut chunks = Vec::new();
