@@ -5,6 +5,7 @@
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use tautline::render::scene::{Camera, Stage};
@@ -19,13 +20,18 @@ struct Screen {
     display: String,
     /// Holds what is seen, in a file.
     memory: tempfile::TempDir,
+    /// One window at a time: time in a window is that of the clock only where it is drawn fast enough.
+    _turn: MutexGuard<'static, ()>,
 }
 
 impl Screen {
     fn new() -> Self {
+        static TURN: Mutex<()> = Mutex::new(());
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = tempfile::tempdir().expect("a folder");
+        // Without `-noreset` the server begins anew, and drops the window, when a client was the last one for a moment.
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1400x900x24", "-nolisten", "tcp", "-fbdir"])
+            .args(["-noreset", "-displayfd", "1", "-screen", "0", "1400x900x24", "-nolisten", "tcp", "-fbdir"])
             .arg(memory.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -34,7 +40,7 @@ impl Screen {
         let mut number = String::new();
         let out = server.stdout.take().expect("a pipe");
         BufReader::new(out).read_line(&mut number).expect("the number of the display");
-        Self { server, display: format!(":{}", number.trim()), memory }
+        Self { server, display: format!(":{}", number.trim()), memory, _turn: turn }
     }
 
     /// Runs `xdotool` and gives what it says.
