@@ -1,6 +1,8 @@
 //! A film of the built-in circle, flown and filmed without a file in between: `cargo run --release --example film`
 
 use std::error::Error;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -24,13 +26,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     let view = View { size_px: [960, 540], ..View::default() };
     let (stage, [start_s, end_s]) = (Stage::of(&footage), footage.range_s());
     let mut renderer = Renderer::open(&AdapterChoice::Best)?;
-    let mut film = Film::new(FilmFormat::of(path)?, view.size_px, FPS)?;
-    for time_s in (0..).map(|k| start_s + f64::from(k) * SPEED / f64::from(FPS)).take_while(|&time_s| time_s <= end_s) {
+    let times: Vec<f64> = (0..u16::MAX)
+        .map(|k| start_s + f64::from(k) * SPEED / f64::from(FPS))
+        .take_while(|&time_s| time_s <= end_s)
+        .collect();
+    let mut out = BufWriter::new(File::create(path)?);
+    let pictures = u32::try_from(times.len())?;
+    let mut film = Film::new(&mut out, FilmFormat::of(path)?, view.size_px, FPS, pictures)?;
+    for time_s in times {
         let Some(moment) = footage.at(time_s) else { break };
         let scene = Scene::compose(&footage, &stage, &moment, &view)?;
         film.add(&[renderer.paint(&scene)?])?;
     }
-    std::fs::write(path, film.finish()?)?;
+    film.finish()?;
+    out.flush()?;
     println!("{}, drawn by {}", path.display(), renderer.adapter());
     Ok(())
 }

@@ -143,6 +143,7 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         (&["out/run.mcap", "--every", "0"], WRONG_INPUT, "0 is not a positive number"),
         (&["out/run.mcap", "--every", "-1"], WRONG_INPUT, "--every: -1 is not a positive number"),
         (&["out/run.mcap", "--delta", "-1"], WRONG_INPUT, "--delta is -1"),
+        (&["out/run.mcap", "--delta", "1e300"], WRONG_INPUT, "--delta is 1e300"),
         (&["out/run.mcap", "--delta", "2.6"], WRONG_INPUT, "judged by its own delta, 2 m"),
         (&["out/run.mcap", "--scale", "0.001"], WRONG_INPUT, "says itself how it is read"),
         (&["out/run.mcap", "--every", "1e-9"], WRONG_INPUT, "more than 100000"),
@@ -154,6 +155,9 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         (&["out/run.mcap", "--film", "film.mp4", "--size", "101x50"], WRONG_INPUT, "even sides"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "0"], WRONG_INPUT, "--speed: 0 is not a positive number"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "-3"], WRONG_INPUT, "--speed: -3 is not a positive number"),
+        (&["out/run.mcap", "--speed", "2"], WRONG_INPUT, "required arguments were not provided: --film <FILE>"),
+        (&["out/run.mcap", "--at", "end", "--fps", "10"], WRONG_INPUT, "not provided: --film <FILE>"),
+        (&["out/run.mcap", "--film", "film.mp4", "--speed", "nan"], WRONG_INPUT, "--speed: NaN is not a positive"),
         (&["out/run.mcap", "--film", "folder.mp4"], WRONG_INPUT, "folder.mp4 is a folder"),
         (&["out/run.mcap", "--out", "refused", "--camera", "follow:9"], WRONG_INPUT, "there is no vehicle `9`"),
         (&["out/run.mcap", "--out", "refused", "--size", "60000x9"], WRONG_INPUT, "pixels a side"),
@@ -174,6 +178,52 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
     }
     assert_eq!(names(&folder.path().join("out")), ["figures", "report.html", "report.json", "run.mcap"]);
     assert!(!folder.path().join("refused").exists(), "what is refused leaves no folder");
+}
+
+#[test]
+fn places_beyond_all_measure_are_refused_with_vehicle_value_and_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("far.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,1,0,0\n1,a,1e300,0,0\n1,b,-1e300,0,0\n")
+        .expect("written");
+    for more in [&[][..], &["--at", "closest"], &["--delta", "1"]] {
+        let Ran { exit, err, .. } = ran(folder.path(), &[&["render", "far.csv"], more].concat());
+        assert_eq!(exit, WRONG_INPUT, "{err}");
+        let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(text.contains("vehicle a has a coordinate of 1e300 m at 1 s; what is beyond 1e9 m"), "{text}");
+    }
+    assert_eq!(names(folder.path()), ["far.csv"]);
+}
+
+#[test]
+fn no_picture_and_no_film_replaces_another_or_the_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = "t,id,x,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,-2,1,0\n1,b,2,0,0\n";
+    let recordings = ["start.png", "sheet.png", "r.png"];
+    for name in recordings {
+        fs::write(folder.path().join(name), rows).expect("written");
+    }
+    let clashes: [(&[&str], &str); 6] = [
+        (&["r.png", "--film", "r.png"], "--film r.png would overwrite the recording"),
+        (&["r.png", "--film", "./new/../r.png"], "--film ./new/../r.png would overwrite the recording"),
+        (&["start.png", "--out", ".", "--at", "start"], "the picture ./start.png would overwrite the recording"),
+        (&["sheet.png", "--out", ".", "--sheet", "2x2"], "the sheet ./sheet.png would overwrite the recording"),
+        (&["r.png", "--out", "new", "--at", "closest", "--film", "new/closest.png"], "would overwrite the picture"),
+        (&["r.png", "--out", "new", "--sheet", "2x2", "--film", "new/sheet.png"], "would overwrite the sheet"),
+    ];
+    for (arguments, message) in clashes {
+        let Ran { exit, err, .. } = ran(folder.path(), &[&["render"], arguments].concat());
+        assert_eq!(exit, WRONG_INPUT, "{arguments:?}: {err}");
+        let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(text.contains(message), "{arguments:?}: {text}");
+    }
+    assert_eq!(names(folder.path()), ["r.png", "sheet.png", "start.png"], "nothing is made");
+    for name in recordings {
+        assert_eq!(fs::read_to_string(folder.path().join(name)).expect(name), rows);
+    }
+    let apart = ["render", "r.png", "--out", "new", "--at", "start", "--film", "new/film.png", "--size", "64x36"];
+    let Ran { exit, err, .. } = ran(folder.path(), &[&apart[..], &["--fps", "2"]].concat());
+    assert_eq!(exit, GOOD, "{err}");
+    assert_eq!(names(&folder.path().join("new")), ["film.png", "start.png"]);
 }
 
 #[test]
@@ -199,6 +249,31 @@ fn a_recording_that_was_not_closed_is_drawn_and_said_to_be_unfinished() {
     let Ran { exit, err, .. } = ran(folder.path(), &["render", "cut.mcap", "--at", "start", "--size", "160x90"]);
     assert_eq!(exit, GOOD, "{err}");
     assert!(err.contains("the recording was not closed"), "{err}");
+}
+
+#[test]
+fn a_run_that_was_cut_off_at_once_is_told_from_one_that_can_be_drawn() {
+    let folder = flown("pentagon", &["--no-snapshots"]);
+    let whole = fs::read(folder.path().join("out/run.mcap")).expect("a recording");
+    for (bytes, more) in [(100, &[][..]), (4000, &[]), (4000, &["--allow-unfinished"])] {
+        fs::write(folder.path().join("cut.mcap"), &whole[..bytes]).expect("written");
+        let Ran { exit, err, .. } = ran(folder.path(), &[&["render", "cut.mcap"], more].concat());
+        assert_eq!(exit, WRONG_INPUT, "{err}");
+        assert!(err.contains("cut.mcap: the run was cut off before anything was written"), "{err}");
+    }
+}
+
+#[test]
+fn a_folder_is_said_to_have_been_taken_for_polynomials() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::create_dir(folder.path().join("some")).expect("a folder");
+    fs::write(folder.path().join("some/table.csv"), "a,b\n1,2\n").expect("written");
+    for command in ["view", "render"] {
+        let Ran { exit, err, .. } = ran(folder.path(), &[command, "some"]);
+        assert_eq!(exit, WRONG_INPUT, "{err}");
+        let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(text.contains("the folder was taken for one of Crazyflie polynomials"), "{text}");
+    }
 }
 
 #[test]

@@ -1,14 +1,20 @@
 //! What every command that draws has in common.
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::Path;
 
 use super::Failure;
 use super::console::Console;
-use crate::read::{self, Format, ReadOptions};
+use crate::read::{self, Fault, Format, ReadError, ReadOptions};
 use crate::record::mcap::McapRecording;
 use crate::render::{
-    AdapterChoice, CameraError, FilmError, Footage, FootageError, GpuError, PictureError, ShootError, Theme,
+    AdapterChoice, CameraError, FARTHEST_M, FilmError, Footage, FootageError, GpuError, PictureError, ShootError,
+    Theme, TracksError,
 };
+
+/// Bytes of an MCAP file that hold the name of what wrote it.
+const FIRST_BYTES: u64 = 64;
 
 /// The names of the themes.
 pub(super) fn theme(name: &str) -> Result<Theme, String> {
@@ -46,8 +52,9 @@ pub(super) fn footage(
     delta_m: Option<f64>,
     console: Console,
 ) -> Result<Footage, Failure> {
-    if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && delta_m.is_finite())) {
-        return Err(Failure::input(format!("--delta is {delta_m}"), "give a positive distance in metres"));
+    if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && *delta_m <= FARTHEST_M)) {
+        let help = format!("give a positive distance in metres, at most {FARTHEST_M:e}");
+        return Err(Failure::input(format!("--delta is {delta_m:?}"), help));
     }
     // Our own recordings know formation, graph and law too.
     let may_be_ours = reading.format.is_none_or(|format| format == Format::Mcap);
@@ -56,11 +63,7 @@ pub(super) fn footage(
             speaks_for_itself(&ours, reading, delta_m)?;
             Footage::read_mcap(recording)?
         }
-        _ => {
-            let mut tracks = read::open(recording, reading)?;
-            let name = recording.file_stem().unwrap_or_default().to_string_lossy();
-            Footage::from_tracks(&name, tracks.as_mut(), delta_m)?
-        }
+        _ => of_others(recording, reading, delta_m)?,
     };
     if footage.instants() == 0 {
         return Err(FootageError::Empty { name: recording.display().to_string() }.into());
@@ -72,6 +75,42 @@ pub(super) fn footage(
         console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", footage.every()));
     }
     Ok(footage)
+}
+
+/// Reads a recording that knows nothing but positions.
+fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> Result<Footage, Failure> {
+    let unreadable = |error: ReadError| {
+        let help = error.help();
+        let failure = Failure::from(error);
+        if !recording.is_dir() {
+            return failure;
+        }
+        failure.with_help(format!(
+            "the folder was taken for one of Crazyflie polynomials, a file for each vehicle: {help}"
+        ))
+    };
+    let mut tracks = match read::open(recording, reading) {
+        Err(_) if has_nothing_yet(recording, reading) => {
+            let message = format!("{}: the run was cut off before anything was written", recording.display());
+            return Err(Failure::input(message, "fly it again, or give the recording of another run"));
+        }
+        opened => opened.map_err(unreadable)?,
+    };
+    let name = recording.file_stem().unwrap_or_default().to_string_lossy();
+    Footage::from_tracks(&name, tracks.as_mut(), delta_m).map_err(|error| match error {
+        TracksError::Read(error) => unreadable(error),
+        TracksError::Footage(error) => error.into(),
+    })
+}
+
+/// Whether a file begins as a recording of ours and holds no channel, as when its writer was killed at once.
+fn has_nothing_yet(recording: &Path, reading: &ReadOptions) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(recording).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut start));
+    let ours = start.starts_with(b"\x89MCAP") && start.windows(9).any(|name| name == b"tautline ");
+    let accept = ReadOptions { allow_unfinished: true, ..reading.clone() };
+    let no_positions = |error: &ReadError| matches!(error.fault, Fault::Content { .. });
+    read.is_ok() && ours && read::open(recording, &accept).is_err_and(|error| no_positions(&error))
 }
 
 /// Refuses what has no effect on a recording of ours.
@@ -95,6 +134,9 @@ impl From<FootageError> for Failure {
     fn from(error: FootageError) -> Self {
         match error {
             FootageError::Record(error) => error.into(),
+            FootageError::TooFar { .. } => {
+                Self::input(error.to_string(), "mend the recording, or see whether its lengths are in metres")
+            }
             FootageError::Empty { .. } => Self::input(
                 error.to_string(),
                 "give a recording that holds at least one sample, such as a run's run.mcap",
@@ -149,7 +191,10 @@ impl From<FilmError> for Failure {
             }
             FilmError::Rate { .. } => Self::input(message, "give another rate with --fps"),
             FilmError::Size { .. } => Self::input(message, "give another size with --size, or another format"),
-            FilmError::Mixed | FilmError::Picture(_) | FilmError::Encoder { .. } => Self::machine(message),
+            FilmError::Write(_) => Self::machine(message).with_help("free some space or write to another folder"),
+            FilmError::Mixed | FilmError::Count { .. } | FilmError::Picture(_) | FilmError::Encoder { .. } => {
+                Self::machine(message)
+            }
         }
     }
 }

@@ -96,6 +96,10 @@ enum Command {
 fn quiet_guarded_panics() {
     let speak = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
+        #[cfg(feature = "viewer")]
+        if view::is_lost_display(panic) {
+            std::process::exit(view::lose_display() as i32);
+        }
         if !read::is_guarded() {
             speak(panic);
         }

@@ -1,7 +1,8 @@
 //! Files that a command writes, before it does: none may be what it reads, or another of them.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::Failure;
 
@@ -11,29 +12,85 @@ pub(super) type Called<'a> = (&'static str, &'a Path);
 /// Refuses outputs that would replace an input, become a part of an input that is a folder of CSV files, or replace each
 /// other.
 pub(super) fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(), Failure> {
-    let mut taken: Vec<_> = inputs.iter().filter_map(|&(called, path)| Some((called, place(path)?))).collect();
+    let mut taken: BTreeMap<_, _> = inputs.iter().filter_map(|&(called, path)| Some((place(path)?, called))).collect();
     for &(option, path) in outputs {
         let Some(place) = place(path) else { continue };
         let csv = place.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-        let clashes = |other: &Path| place == other || (csv && place.starts_with(other));
-        if let Some((called, _)) = taken.iter().find(|(_, other)| clashes(other)) {
+        let within = if csv { usize::MAX } else { 1 };
+        if let Some(called) = place.ancestors().take(within).find_map(|place| taken.get(place)) {
             let message = format!("{option} {} would overwrite {called}, or be part of it", path.display());
-            return Err(Failure::input(message, "write another file"));
+            return Err(Failure::input(message, "write another file, or into another folder"));
         }
-        taken.push((option, place));
+        taken.insert(place, option);
     }
     Ok(())
 }
 
-/// Where a file is or will be, through links. `None` for what is no file, such as a pipe or a device: nothing is replaced
-/// there.
+/// Where a file is or will be, through links and folders that are yet to be made. `None` for what is no file, such as a
+/// pipe or a device: nothing is replaced there.
 fn place(path: &Path) -> Option<PathBuf> {
     match fs::metadata(path) {
         Ok(there) if there.is_file() || there.is_dir() => fs::canonicalize(path).ok(),
         Ok(_) => None,
-        Err(_) => {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))
+        // A link that leads to nothing yet: what it names is what will be made.
+        Err(_) => yet_to_be(&fs::read_link(path).map_or_else(|_| path.to_owned(), |next| path.with_file_name(next))),
+    }
+}
+
+/// Where something that is not there will be.
+fn yet_to_be(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = fs::canonicalize(folder).ok().or_else(|| yet_to_be(folder).filter(|_| folder != Path::new(".")))?;
+    match path.components().next_back()? {
+        Component::Normal(name) => Some(folder.join(name)),
+        Component::ParentDir => folder.parent().map(Path::to_owned),
+        _ => Some(folder),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clash(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Option<String> {
+        check(inputs, outputs).err().map(|failure| failure.to_string())
+    }
+
+    #[test]
+    fn one_place_by_two_names_is_one_place_whether_it_is_there_or_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("flight.csv"), "").expect("written");
+        for (one, other) in [
+            ("flight.csv", "./flight.csv"),
+            ("new/end.png", "new/end.png"),
+            ("new/end.png", "new/../new/end.png"),
+            ("new/deep/end.png", "new/./deep//end.png"),
+        ] {
+            let (one, other) = (at(one), at(other));
+            let said = clash(&[], &[("the picture", &one), ("--film", &other)]).expect("they clash");
+            assert!(said.ends_with("would overwrite the picture, or be part of it"), "{said}");
         }
+        assert_eq!(clash(&[], &[("the picture", &at("new/end.png")), ("--film", &at("end.png"))]), None);
+    }
+
+    #[test]
+    fn a_csv_file_in_a_folder_that_is_read_becomes_a_part_of_it_and_a_picture_does_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [csv, png] = ["flights/new.csv", "flights/new.png"].map(|name| folder.path().join(name));
+        let read = [("the recording", folder.path())];
+        assert!(clash(&read, &[("--output", &csv)]).is_some());
+        assert_eq!(clash(&read, &[("--output", &png)]), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_what_is_yet_to_be_made_is_followed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [link, end, round] = ["link.png", "end.png", "round.png"].map(|name| folder.path().join(name));
+        std::os::unix::fs::symlink("end.png", &link).expect("a link");
+        std::os::unix::fs::symlink("round.png", &round).expect("a link");
+        assert!(clash(&[], &[("the picture", &end), ("--film", &link)]).is_some());
+        assert_eq!(clash(&[], &[("the picture", &end), ("--film", &round)]), None);
     }
 }

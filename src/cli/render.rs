@@ -1,6 +1,7 @@
 //! `tautline render`: pictures and films of a recording.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,16 +10,19 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use super::console::Console;
 use super::drawing;
+use super::outputs::{self, Called};
 use super::reading::{FormatArgument, ReadArguments};
 use super::{Exit, Failure};
 use crate::render::scene::Stage;
 use crate::render::{
-    CameraSpec, Film, FilmFormat, Footage, Picture, Renderer, Scene, ShootError, Theme, View, contact_sheet,
+    CameraSpec, Film, FilmError, FilmFormat, Footage, Picture, Renderer, Scene, ShootError, Theme, View, contact_sheet,
 };
-use crate::report::write_atomically;
+use crate::report::{write_atomically, write_atomically_with};
 
 /// Most pictures of one command.
 const MOST_PICTURES: f64 = 100_000.0;
+/// Pictures a second of a film, unless another number is asked for.
+const FPS: u32 = 30;
 /// A film at the default speed is not longer than this \[s\].
 const LONGEST_FILM_S: f64 = 20.0;
 /// Bytes of pictures that wait for their encoder at a time.
@@ -55,11 +59,11 @@ pub(super) struct RenderArguments {
     /// Width and height of a picture, or of the whole sheet, in pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = drawing::size)]
     size: [u32; 2],
-    /// Pictures a second of a film.
-    #[arg(long, value_name = "N", default_value_t = 30)]
-    fps: u32,
+    /// Pictures a second of the film [default: 30].
+    #[arg(long, value_name = "N", requires = "film")]
+    fps: Option<u32>,
     /// Seconds of the flight in a second of the film; by default 1, or more where the film would be longer than 20 s.
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "film")]
     speed: Option<f64>,
     /// Where to look from: iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and
     /// metres.
@@ -102,8 +106,16 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let stills = stills(arguments, &footage, &folder)?;
     let frames = film.map(|_| film_times(arguments, &footage)).transpose()?.unwrap_or_default();
     let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &footage)).transpose()?;
+    let sheet_path = folder.join("sheet.png");
+    let outputs: Vec<Called<'_>> = (stills.iter().map(|still| ("the picture", still.path.as_path())))
+        .chain(sheet.iter().map(|_| ("the sheet", sheet_path.as_path())))
+        .chain(film.map(|(path, _)| ("--film", path)))
+        .collect();
+    outputs::check(&[("the recording", recording)], &outputs)?;
     let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
-    let mut reel = film.map(|(_, format)| Film::new(format, view.size_px, arguments.fps)).transpose()?;
+    if let Some((_, format)) = film {
+        format.check(view.size_px, arguments.fps.unwrap_or(FPS))?;
+    }
     let renderer = Renderer::open(&drawing::adapter(&arguments.adapter))?;
     renderer.check_size(view.size_px)?;
     let stage = Stage::of(&footage);
@@ -128,12 +140,12 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         let jobs: Vec<_> = stills[first..].iter().zip(pictures).collect();
         jobs.par_iter().map(|(still, picture)| write(&still.path, picture)).collect::<Result<(), Failure>>()
     })?;
-    if let Some(reel) = &mut reel {
-        studio.shoot(&frames, |_, pictures| Ok(reel.add(pictures)?))?;
-    }
     let mut written: Vec<PathBuf> = stills.into_iter().map(|still| still.path).collect();
-    if let (Some((path, _)), Some(reel)) = (film, reel) {
-        write_atomically(path, &reel.finish()?)?;
+    if let Some((path, format)) = film {
+        let fps = arguments.fps.unwrap_or(FPS);
+        write_atomically_with(path, |file| {
+            studio.film(file, format, fps, &frames).map_err(|failure| failure.of(path))
+        })?;
         written.push(path.to_owned());
     }
     if let (Some((times, size_px)), Some([columns, _])) = (sheet, arguments.sheet) {
@@ -143,9 +155,8 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
             tiles.extend_from_slice(pictures);
             Ok(())
         })?;
-        let path = folder.join("sheet.png");
-        write(&path, &contact_sheet(&tiles, columns)?)?;
-        written.push(path);
+        write(&sheet_path, &contact_sheet(&tiles, columns)?)?;
+        written.push(sheet_path);
     }
     studio.progress.finish_and_clear();
     let names = match written.as_slice() {
@@ -179,6 +190,16 @@ impl Studio<'_> {
             waiting = drawn?;
         }
         take(first, &waiting)
+    }
+
+    /// Writes a film of pictures at these times.
+    fn film(&mut self, file: &mut File, format: FilmFormat, fps: u32, times_s: &[f64]) -> Result<(), Failure> {
+        let mut out = BufWriter::new(file);
+        let pictures = u32::try_from(times_s.len()).unwrap_or(u32::MAX);
+        let mut film = Film::new(&mut out, format, self.view.size_px, fps, pictures)?;
+        self.shoot(times_s, |_, pictures| Ok(film.add(pictures)?))?;
+        film.finish()?;
+        Ok(out.flush().map_err(FilmError::from)?)
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
@@ -292,7 +313,7 @@ fn positive(number: f64, option: &str) -> Result<f64, Failure> {
 
 fn film_times(arguments: &RenderArguments, footage: &Footage) -> Result<Vec<f64>, Failure> {
     let [start_s, end_s] = footage.range_s();
-    let fps = f64::from(arguments.fps.max(1));
+    let fps = f64::from(arguments.fps.unwrap_or(FPS).max(1));
     let speed = match arguments.speed {
         Some(speed) => positive(speed, "--speed")?,
         // The last picture lasts as long as the others.

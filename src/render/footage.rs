@@ -13,13 +13,19 @@ use crate::record::{Event, RecordError, Recorder, Sample};
 use crate::scenario::{LawSpec, Scenario, Source};
 use crate::swarm::{ClosestApproach, Pair, Rows, separation};
 use stretch::Stretch;
+pub use tracks::TracksError;
 
 /// Most memory that the instants of a flight take \[bytes\]; beyond it every second one is dropped.
 pub const BUDGET_BYTES: usize = 256 << 20;
 /// Most vehicles whose closest pair is sought anew at each instant that is drawn.
 const SEARCHED_VEHICLES: usize = 2000;
+/// Largest coordinate and radius that are drawn \[m\]: more than twice as far as the Moon. Pictures are made in single
+/// precision, where fourth powers of lengths must have room.
+pub const FARTHEST_M: f64 = 1e9;
 /// Radius of a vehicle of which nothing is known \[m\].
 const UNKNOWN_RADIUS_M: f64 = 0.1;
+/// What a part of a position is called.
+const COORDINATE: &str = "coordinate";
 
 /// A flight in memory: instants in order of time, and what is known about it.
 ///
@@ -108,12 +114,39 @@ pub enum FootageError {
     /// The recording cannot be read.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// A length is too large to be drawn.
+    #[error(
+        "vehicle {vehicle} has a {what} of {value_m:?} m at {time_s} s; what is beyond {FARTHEST_M:e} m cannot be drawn"
+    )]
+    TooFar {
+        /// The vehicle.
+        vehicle: String,
+        /// Which of its lengths.
+        what: &'static str,
+        /// The length \[m\].
+        value_m: f64,
+        /// When \[s\].
+        time_s: f64,
+    },
     /// It holds no instant.
     #[error("{name} holds no samples, so there is nothing to draw")]
     Empty {
         /// The recording.
         name: String,
     },
+}
+
+impl FootageError {
+    /// Refuses lengths that are too large to be drawn.
+    fn check<'a>(
+        lengths_m: impl IntoIterator<Item = &'a f64>,
+        what: &'static str,
+        time_s: f64,
+        vehicle: impl FnOnce() -> String,
+    ) -> Result<(), Self> {
+        let too_far = lengths_m.into_iter().find(|length_m| length_m.abs() > FARTHEST_M);
+        too_far.map_or(Ok(()), |&value_m| Err(Self::TooFar { vehicle: vehicle(), what, value_m, time_s }))
+    }
 }
 
 impl Moment {
@@ -150,14 +183,32 @@ impl Plan {
     /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: the stretch over the desired distance.
     #[must_use]
     pub fn tension(&self, pair: Pair, distance_m: f64) -> f64 {
-        let rest_m = self.formation.desired_distance(pair.first(), pair.second());
-        let spring = (distance_m - rest_m) / rest_m;
-        let tension = match self.law {
-            LawSpec::EdgeTension { alpha } => EdgeTension::new(alpha, self.delta_m, rest_m)
-                .map_or(spring, |tension| tension.derivative(distance_m) * tension.k_m() / alpha),
-            LawSpec::Laplacian { .. } => spring,
+        let tension = match self.edge_tension(pair) {
+            Some((alpha, edge)) => edge.derivative(distance_m) * edge.k_m() / alpha,
+            None => self.stretch(pair, distance_m),
         };
         tension.clamp(-1.0, 1.0)
+    }
+
+    /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l), above 0 where
+    /// it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
+    #[must_use]
+    pub fn pull_m_s2(&self, pair: Pair, distance_m: f64) -> Option<f64> {
+        self.edge_tension(pair).map(|(_, edge)| edge.derivative(distance_m))
+    }
+
+    /// How much longer a distance \[m\] is than the desired one, over that one.
+    #[must_use]
+    pub fn stretch(&self, pair: Pair, distance_m: f64) -> f64 {
+        let rest_m = self.formation.desired_distance(pair.first(), pair.second());
+        (distance_m - rest_m) / rest_m
+    }
+
+    /// Alpha \[m^2/s^2\] and the tension of an edge, where the law has one.
+    fn edge_tension(&self, pair: Pair) -> Option<(f64, EdgeTension)> {
+        let LawSpec::EdgeTension { alpha } = self.law else { return None };
+        let rest_m = self.formation.desired_distance(pair.first(), pair.second());
+        Some((alpha, EdgeTension::new(alpha, self.delta_m, rest_m).ok()?))
     }
 }
 
@@ -195,7 +246,7 @@ impl Footage {
     /// Reads a recording of this program. Where its scenario cannot be understood, formation and graph are not known.
     ///
     /// # Errors
-    /// [`FootageError`] when it cannot be read or holds no samples.
+    /// [`FootageError`] when it cannot be read, holds no samples, or a vehicle is beyond [`FARTHEST_M`].
     pub fn read_mcap(path: &Path) -> Result<Self, FootageError> {
         let mut recording = McapRecording::open(path)?;
         let header = recording.header().clone();
@@ -206,7 +257,10 @@ impl Footage {
         };
         for entry in recording.by_ref() {
             match entry? {
-                Entry::Sample(sample) => footage.take(&sample.as_sample()),
+                Entry::Sample(sample) => {
+                    footage.check(&sample.as_sample())?;
+                    footage.take(&sample.as_sample());
+                }
                 Entry::Event(event) => footage.note(&event),
             }
         }
@@ -333,6 +387,15 @@ impl Footage {
     /// Whether both of a pair are vehicles of the flight: a file may say anything.
     fn has(&self, pair: Pair) -> bool {
         pair.second() < self.count()
+    }
+
+    /// Refuses a sample with a vehicle that is too far away to be drawn.
+    pub(super) fn check(&self, sample: &Sample<'_>) -> Result<(), FootageError> {
+        sample.swarm.positions_m.row_iter().enumerate().try_for_each(|(k, place)| {
+            FootageError::check(place.iter(), COORDINATE, sample.time_s, || {
+                self.vehicles.get(k).map_or_else(|| (k + 1).to_string(), Clone::clone)
+            })
+        })
     }
 
     /// Takes one sample, which must be later than the one before.

@@ -25,7 +25,7 @@ mod snapshots;
 mod window;
 
 pub use film::{Film, FilmError, FilmFormat};
-pub use footage::{BUDGET_BYTES, Footage, FootageError, Moment, Plan, Span};
+pub use footage::{BUDGET_BYTES, FARTHEST_M, Footage, FootageError, Moment, Plan, Span, TracksError};
 pub use foxglove_scene::{FoxgloveScene, SCENE_HZ};
 pub use gpu::{AdapterChoice, GpuError, Renderer, ShootError};
 pub use picture::{Picture, PictureError, contact_sheet, data_uri};

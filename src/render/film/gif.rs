@@ -1,5 +1,7 @@
 //! GIF.
 
+use std::io::Write;
+
 use super::FilmError;
 use crate::render::picture::Picture;
 
@@ -10,8 +12,8 @@ pub(super) const MOST_FPS: u32 = 50;
 /// are off by 16 units or more as at 10, in twice the time.
 const SPEED: i32 = 3;
 
-pub(super) struct Gif {
-    encoder: gif::Encoder<Vec<u8>>,
+pub(super) struct Gif<W: Write> {
+    encoder: gif::Encoder<W>,
     fps: u32,
     pictures: u32,
 }
@@ -25,7 +27,7 @@ pub(super) fn prepare(picture: &Picture) -> Result<gif::Frame<'static>, FilmErro
     Ok(frame)
 }
 
-fn sides(size_px: [u32; 2]) -> Result<[u16; 2], FilmError> {
+pub(super) fn sides(size_px: [u32; 2]) -> Result<[u16; 2], FilmError> {
     let [width, height] = size_px;
     match (u16::try_from(width), u16::try_from(height)) {
         (Ok(width @ 1..), Ok(height @ 1..)) => Ok([width, height]),
@@ -33,15 +35,18 @@ fn sides(size_px: [u32; 2]) -> Result<[u16; 2], FilmError> {
     }
 }
 
-fn failed(error: &gif::EncodingError) -> FilmError {
-    FilmError::Encoder { format: NAME, reason: error.to_string() }
+fn failed(error: gif::EncodingError) -> FilmError {
+    match error {
+        gif::EncodingError::Io(error) => error.into(),
+        error => FilmError::Encoder { format: NAME, reason: error.to_string() },
+    }
 }
 
-impl Gif {
-    pub(super) fn new(size_px: [u32; 2], fps: u32) -> Result<Self, FilmError> {
+impl<W: Write> Gif<W> {
+    pub(super) fn new(out: W, size_px: [u32; 2], fps: u32) -> Result<Self, FilmError> {
         let [width, height] = sides(size_px)?;
-        let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(|error| failed(&error))?;
-        encoder.set_repeat(gif::Repeat::Infinite).map_err(|error| failed(&error))?;
+        let mut encoder = gif::Encoder::new(out, width, height, &[]).map_err(failed)?;
+        encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
         Ok(Self { encoder, fps, pictures: 0 })
     }
 
@@ -50,10 +55,10 @@ impl Gif {
         let until = |pictures: u32| u64::from(pictures) * 100 / u64::from(self.fps);
         frame.delay = u16::try_from(until(self.pictures + 1) - until(self.pictures)).unwrap_or(u16::MAX);
         self.pictures += 1;
-        self.encoder.write_lzw_pre_encoded_frame(&frame).map_err(|error| failed(&error))
+        self.encoder.write_lzw_pre_encoded_frame(&frame).map_err(failed)
     }
 
-    pub(super) fn finish(self) -> Result<Vec<u8>, FilmError> {
-        self.encoder.into_inner().map_err(|error| failed(&error))
+    pub(super) fn finish(self) -> Result<(), FilmError> {
+        self.encoder.into_inner().map(|_| ()).map_err(failed)
     }
 }

@@ -1,6 +1,8 @@
 //! H.264 in MP4.
 
-use muxide::api::{Muxer, MuxerBuilder, VideoCodec};
+use std::io::Write;
+
+use muxide::api::{Muxer, MuxerBuilder, MuxerError, VideoCodec};
 use openh264::OpenH264API;
 use openh264::encoder::{Encoder, EncoderConfig, FrameRate, FrameType, IntraFramePeriod, RateControlMode, VuiConfig};
 use openh264::formats::{RgbaSliceU8, YUVBuffer};
@@ -14,27 +16,13 @@ const LARGEST: [u32; 2] = [3840, 2160];
 /// Pictures from one that stands by itself to the next, in seconds of film.
 const KEY_EVERY_S: u32 = 4;
 
-pub(super) struct Mp4 {
+pub(super) struct Mp4<W> {
     encoder: Encoder,
-    muxer: Muxer<Shared>,
-    bytes: Shared,
+    muxer: Muxer<W>,
     fps: u32,
     pictures: u32,
-}
-
-/// Where the container is written: kept on this side of the library too.
-#[derive(Clone, Default)]
-struct Shared(std::sync::Arc<std::sync::Mutex<Vec<u8>>>);
-
-impl std::io::Write for Shared {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.lock().map_err(|_| std::io::Error::other("a writer failed before"))?.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
+    /// The first picture, until there is another.
+    alone: Option<YUVBuffer>,
 }
 
 fn failed(error: &dyn std::fmt::Display) -> FilmError {
@@ -47,16 +35,20 @@ pub(super) fn prepare(picture: &Picture) -> YUVBuffer {
     YUVBuffer::from_rgba8_source(RgbaSliceU8::new(&picture.rgba, (size[0], size[1])))
 }
 
-impl Mp4 {
-    pub(super) fn new(size_px: [u32; 2], fps: u32) -> Result<Self, FilmError> {
-        let [width, height] = size_px;
-        let size = |why| Err(FilmError::Size { format: NAME, width, height, why });
-        if width % 2 == 1 || height % 2 == 1 {
-            return size("H.264 needs even sides");
-        }
-        if width.min(height) < 16 || width.max(height) > LARGEST[0] || width.min(height) > LARGEST[1] {
-            return size("from 16 x 16 to 3840 x 2160");
-        }
+/// Whether the encoder takes pictures of this size.
+pub(super) fn check([width, height]: [u32; 2]) -> Result<(), FilmError> {
+    let size = |why| Err(FilmError::Size { format: NAME, width, height, why });
+    if width % 2 == 1 || height % 2 == 1 {
+        return size("H.264 needs even sides");
+    }
+    if width.min(height) < 16 || width.max(height) > LARGEST[0] || width.min(height) > LARGEST[1] {
+        return size("from 16 x 16 to 3840 x 2160");
+    }
+    Ok(())
+}
+
+impl<W: Write> Mp4<W> {
+    pub(super) fn new(out: W, [width, height]: [u32; 2], fps: u32) -> Result<Self, FilmError> {
         let config = EncoderConfig::new()
             .max_frame_rate(FrameRate::from_hz(fps as f32))
             .intra_frame_period(IntraFramePeriod::from_num_frames(KEY_EVERY_S * fps))
@@ -66,19 +58,23 @@ impl Mp4 {
             // What the library makes of red, green and blue.
             .vui(VuiConfig::bt601());
         let encoder = Encoder::with_api_config(OpenH264API::from_source(), config).map_err(|error| failed(&error))?;
-        let bytes = Shared::default();
-        let muxer = MuxerBuilder::new(bytes.clone())
+        let muxer = MuxerBuilder::new(out)
             .video(VideoCodec::H264, width, height, f64::from(fps))
             .build()
             .map_err(|error| failed(&error))?;
-        Ok(Self { encoder, muxer, bytes, fps, pictures: 0 })
+        Ok(Self { encoder, muxer, fps, pictures: 0, alone: None })
     }
 
-    pub(super) fn add(&mut self, picture: &YUVBuffer) -> Result<(), FilmError> {
+    pub(super) fn add(&mut self, picture: YUVBuffer) -> Result<(), FilmError> {
+        self.encode(&picture, f64::from(self.pictures) / f64::from(self.fps))?;
+        self.alone = (self.pictures == 0).then_some(picture);
+        self.pictures += 1;
+        Ok(())
+    }
+
+    fn encode(&mut self, picture: &YUVBuffer, time_s: f64) -> Result<(), FilmError> {
         let stream = self.encoder.encode(picture).map_err(|error| failed(&error))?;
         let is_key = matches!(stream.frame_type(), FrameType::IDR | FrameType::I);
-        let time_s = f64::from(self.pictures) / f64::from(self.fps);
-        self.pictures += 1;
         self.muxer.write_video(time_s, &stream.to_vec(), is_key).map_err(|error| failed(&error))
     }
 
@@ -87,12 +83,14 @@ impl Mp4 {
         Ok(self.encoder.encode(picture).map_err(|error| failed(&error))?.to_vec())
     }
 
-    pub(super) fn finish(self) -> Result<Vec<u8>, FilmError> {
-        if self.pictures == 0 {
-            return Err(failed(&"the film has no pictures"));
+    pub(super) fn finish(mut self) -> Result<(), FilmError> {
+        // The last picture lasts as long as the one before it: a single one is shown twice, half as long.
+        if let Some(picture) = self.alone.take() {
+            self.encode(&picture, 0.5 / f64::from(self.fps))?;
         }
-        self.muxer.finish().map_err(|error| failed(&error))?;
-        let mut bytes = self.bytes.0.lock().map_err(|error| failed(&error))?;
-        Ok(std::mem::take(&mut bytes))
+        self.muxer.finish().map_err(|error| match error {
+            MuxerError::Io(error) => error.into(),
+            error => failed(&error),
+        })
     }
 }

@@ -6,11 +6,14 @@ fn pictures(size_px: [u32; 2], count: u8) -> Vec<Picture> {
 }
 
 fn film(format: FilmFormat, fps: u32, pictures: &[Picture]) -> Vec<u8> {
-    let mut film = Film::new(format, pictures[0].size_px, fps).expect("a film");
+    let mut bytes = Vec::new();
+    let count = u32::try_from(pictures.len()).expect("few");
+    let mut film = Film::new(&mut bytes, format, pictures[0].size_px, fps, count).expect("a film");
     for few in pictures.chunks(2) {
         film.add(few).expect("room for pictures");
     }
-    film.finish().expect("bytes")
+    film.finish().expect("an end");
+    bytes
 }
 
 #[test]
@@ -53,7 +56,7 @@ fn an_mp4_holds_every_picture_in_its_colours() {
         assert!(bytes.windows(4).any(|window| window == name), "{name:?}");
     }
     // The stream itself is decoded again.
-    let mut mp4 = mp4::Mp4::new([64, 32], 20).expect("an encoder");
+    let mut mp4 = mp4::Mp4::new(Vec::new(), [64, 32], 20).expect("an encoder");
     let mut decoder = openh264::decoder::Decoder::new().expect("a decoder");
     let mut decoded = 0;
     for picture in &pictures {
@@ -74,15 +77,79 @@ fn an_mp4_holds_every_picture_in_its_colours() {
 
 #[test]
 fn what_a_format_does_not_allow_is_refused() {
-    assert!(matches!(Film::new(FilmFormat::Mp4, [63, 32], 20), Err(FilmError::Size { .. })));
-    assert!(matches!(Film::new(FilmFormat::Mp4, [8000, 4000], 20), Err(FilmError::Size { .. })));
-    assert!(matches!(Film::new(FilmFormat::Gif, [70_000, 10], 20), Err(FilmError::Size { .. })));
-    assert!(matches!(Film::new(FilmFormat::Gif, [10, 10], 60), Err(FilmError::Rate { most: 50, .. })));
-    assert!(matches!(Film::new(FilmFormat::Png, [10, 10], 0), Err(FilmError::Rate { .. })));
-    let mut film = Film::new(FilmFormat::Png, [10, 10], 10).expect("a film");
+    assert!(matches!(FilmFormat::Mp4.check([63, 32], 20), Err(FilmError::Size { .. })));
+    assert!(matches!(FilmFormat::Mp4.check([8000, 4000], 20), Err(FilmError::Size { .. })));
+    assert!(matches!(FilmFormat::Gif.check([70_000, 10], 20), Err(FilmError::Size { .. })));
+    assert!(matches!(FilmFormat::Gif.check([10, 10], 60), Err(FilmError::Rate { most: 50, .. })));
+    assert!(matches!(Film::new(Vec::new(), FilmFormat::Png, [10, 10], 0, 1), Err(FilmError::Rate { .. })));
+    assert!(Film::new(Vec::new(), FilmFormat::Png, [10, 10], 10, 0).is_err(), "a film without pictures is none");
+    let mut film = Film::new(Vec::new(), FilmFormat::Png, [10, 10], 10, 2).expect("a film");
     assert_eq!(film.add(&pictures([20, 10], 1)), Err(FilmError::Mixed));
-    assert!(film.finish().is_err(), "a film without pictures is none");
+    film.add(&pictures([10, 10], 1)).expect("a picture");
+    assert_eq!(film.finish(), Err(FilmError::Count { wanted: 2, given: 1 }));
     assert_eq!(FilmFormat::of(Path::new("a/film.MP4")), Ok(FilmFormat::Mp4));
     assert_eq!(FilmFormat::of(Path::new("film.avi")), Err(FilmError::UnknownFormat("film.avi".to_owned())));
     assert!(FilmFormat::of(Path::new("film")).is_err());
+}
+
+/// Takes so many bytes and then no more.
+struct Full<'a> {
+    room: usize,
+    most_at_once: &'a mut usize,
+}
+
+impl Write for Full<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        *self.most_at_once = bytes.len().max(*self.most_at_once);
+        self.room = self.room.checked_sub(bytes.len()).ok_or_else(|| io::Error::other("no room"))?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn what_cannot_be_written_is_an_error_wherever_it_happens() {
+    for format in [FilmFormat::Mp4, FilmFormat::Gif, FilmFormat::Png] {
+        let pictures = pictures([64, 32], 3);
+        let whole = film(format, 20, &pictures).len();
+        for room in [0, whole / 2, whole - 1] {
+            let mut most_at_once = 0;
+            let out = Full { room, most_at_once: &mut most_at_once };
+            let written = Film::new(out, format, [64, 32], 20, 3).and_then(|mut film| {
+                film.add(&pictures)?;
+                film.finish()
+            });
+            assert_eq!(written, Err(FilmError::Write("no room".to_owned())), "{format:?}, {room} bytes");
+        }
+    }
+}
+
+#[test]
+fn pictures_are_written_as_they_come() {
+    let pictures = pictures([64, 32], 3);
+    for format in [FilmFormat::Gif, FilmFormat::Png] {
+        let whole = film(format, 20, &pictures).len();
+        let mut out = Vec::new();
+        let mut film = Film::new(&mut out, format, [64, 32], 20, 3).expect("a film");
+        film.add(&pictures).expect("pictures");
+        // Not finished, so that nothing but the end is left to write.
+        std::mem::forget(film);
+        assert!(out.len() + 16 > whole, "{format:?}: {} of {whole} bytes", out.len());
+    }
+}
+
+#[test]
+fn every_film_lasts_as_long_as_its_pictures() {
+    for count in [1, 2, 5] {
+        let bytes = film(FilmFormat::Mp4, 20, &pictures([64, 32], count));
+        // The header of the media: version and flags, two dates, ticks a second, ticks.
+        let at = bytes.windows(4).position(|name| name == b"mdhd").expect("a header") + 4;
+        let [ticks_a_second, ticks] =
+            [12, 16].map(|after| u32::from_be_bytes(bytes[at + after..][..4].try_into().expect("four bytes")));
+        let lasts_s = f64::from(ticks) / f64::from(ticks_a_second);
+        assert!((lasts_s - f64::from(count) / 20.0).abs() < 1e-4, "{count} pictures last {lasts_s} s");
+    }
 }

@@ -105,7 +105,20 @@ impl Tracks for Seen {
 
 fn seen(samples: &[(usize, f64, f64, f64)], delta_m: f64) -> Footage {
     let mut tracks = Seen(samples.to_vec(), ["a", "b", "c", "d"].map(str::to_owned).to_vec());
-    Footage::from_tracks("seen", &mut tracks, Some(delta_m)).unwrap_or_else(|never| match never {})
+    Footage::from_tracks("seen", &mut tracks, Some(delta_m)).expect("it can be drawn")
+}
+
+#[test]
+fn what_single_precision_cannot_draw_is_refused_with_vehicle_value_and_time() {
+    let near = seen(&[(0, 0.0, -FARTHEST_M, 0.0), (1, 0.0, FARTHEST_M, 0.0)], 1.0);
+    assert_eq!(near.closest().map(|closest| closest.separation_m), Some(2.0 * FARTHEST_M));
+    let samples = vec![(0, 0.0, 0.0, 0.0), (1, 0.0, 1.0, 0.0), (1, 0.5, 1.0, -1e300)];
+    let mut tracks = Seen(samples, ["a", "b"].map(str::to_owned).to_vec());
+    let error = Footage::from_tracks("far", &mut tracks, None).expect_err("too far");
+    assert_eq!(
+        error.to_string(),
+        "vehicle b has a coordinate of -1e300 m at 0.5 s; what is beyond 1e9 m cannot be drawn"
+    );
 }
 
 #[test]

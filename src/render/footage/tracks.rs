@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::stretch::Stretch;
-use super::{BUDGET_BYTES, Footage, Instant, Span, UNKNOWN_RADIUS_M, nearer};
+use super::{BUDGET_BYTES, COORDINATE, Footage, FootageError, Instant, Span, UNKNOWN_RADIUS_M, nearer};
 use crate::formation::closest_pair;
 use crate::swarm::{Pair, Rows, row, set_row};
 use crate::track::{Item, Piece, Tracks};
@@ -14,6 +14,17 @@ use crate::track::{Item, Piece, Tracks};
 const CURVE_HZ: f64 = 30.0;
 /// Instants of vehicles that were seen at times of their own, over those of the one that was seen most often.
 const SHARED: usize = 2;
+
+/// Why recorded motion cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum TracksError<E> {
+    /// It cannot be read.
+    #[error("{0}")]
+    Read(E),
+    /// It can be read and not be drawn.
+    #[error(transparent)]
+    Footage(#[from] FootageError),
+}
 
 /// What is known of one vehicle.
 #[derive(Default)]
@@ -31,27 +42,31 @@ impl Footage {
     /// The result may be without instants.
     ///
     /// # Errors
-    /// When the recording cannot be read.
-    pub fn from_tracks<T: Tracks + ?Sized>(name: &str, tracks: &mut T, delta_m: Option<f64>) -> Result<Self, T::Error> {
+    /// [`TracksError`] when the recording cannot be read, or a vehicle is beyond [`FARTHEST_M`](super::FARTHEST_M).
+    pub fn from_tracks<T: Tracks + ?Sized>(
+        name: &str,
+        tracks: &mut T,
+        delta_m: Option<f64>,
+    ) -> Result<Self, TracksError<T::Error>> {
         let (mut courses, mut items): (Vec<Course>, _) = (Vec::new(), Vec::new());
-        while tracks.read(&mut items)? {
+        let mut more = true;
+        while more {
+            more = tracks.read(&mut items).map_err(TracksError::Read)?;
             for item in items.drain(..) {
-                if courses.len() <= item.vehicle() {
-                    courses.resize_with(item.vehicle() + 1, Course::default);
+                let k = item.vehicle();
+                if let Item::Sample(sample) = &item {
+                    let name = || vehicle(tracks, k);
+                    FootageError::check(sample.position_m.iter(), COORDINATE, sample.time_s, name)?;
+                    FootageError::check(&sample.radius_m, "radius", sample.time_s, name)?;
                 }
-                courses[item.vehicle()].take(item);
+                if courses.len() <= k {
+                    courses.resize_with(k + 1, Course::default);
+                }
+                courses[k].take(item);
             }
-        }
-        for item in items.drain(..) {
-            if courses.len() <= item.vehicle() {
-                courses.resize_with(item.vehicle() + 1, Course::default);
-            }
-            courses[item.vehicle()].take(item);
         }
         let mut footage = Self { delta_m, ..Self::new(name, courses.len()) };
-        footage.vehicles = (0..courses.len())
-            .map(|k| tracks.vehicles().get(k).cloned().unwrap_or_else(|| format!("{}", k + 1)))
-            .collect();
+        footage.vehicles = (0..courses.len()).map(|k| vehicle(tracks, k)).collect();
         footage.radius_m = courses.iter().map(|course| course.radius_m.unwrap_or(UNKNOWN_RADIUS_M)).collect();
         if courses.iter().any(|course| course.radius_m.is_none()) {
             footage.notes.push(format!("vehicles of unknown radius are drawn with {UNKNOWN_RADIUS_M} m"));
@@ -60,7 +75,10 @@ impl Footage {
         for time_s in common_times(&courses) {
             let mut positions_m = Rows::zeros(courses.len());
             for (k, course) in courses.iter().enumerate() {
-                set_row(&mut positions_m, k, course.at(time_s, &mut places[k]));
+                let place = course.at(time_s, &mut places[k]);
+                // Curves may go far between times that do not.
+                FootageError::check(place.iter(), COORDINATE, time_s, || footage.vehicles[k].clone())?;
+                set_row(&mut positions_m, k, place);
             }
             footage.see(time_s, positions_m, &mut last);
         }
@@ -97,6 +115,11 @@ impl Footage {
         }
         self.push(Instant { time_s, positions_m, control_m_s2: None, here, so_far: None });
     }
+}
+
+/// The name of a vehicle; its number where it has none.
+fn vehicle<T: Tracks + ?Sized>(tracks: &T, k: usize) -> String {
+    tracks.vehicles().get(k).cloned().unwrap_or_else(|| (k + 1).to_string())
 }
 
 impl Course {

@@ -5,7 +5,7 @@ use super::world::MOST_EDGES;
 use super::{Colour, Mark, Painting, Scene, Theme};
 use crate::swarm::{Pair, at_least};
 
-/// Most vehicles whose names are written on them.
+/// Most vehicles whose names are written on them; of more, those that are closer than delta to another are named.
 const NAMED: usize = 64;
 /// Most pairs closer than delta whose distance is written beside them: the worst ones.
 const LABELLED: usize = 3;
@@ -117,9 +117,11 @@ impl Painting<'_> {
         match began.first() {
             None => (vec!["clear so far".to_owned()], theme.good()),
             Some(span) => {
-                let times = if began.len() == 1 { String::new() } else { format!(", {} times", began.len()) };
-                let at = format!("violated at {:.2} s", span.from_s);
-                let texts = vec![format!("{at} by {}{times}", self.pair(span.pair)), at, "violated".to_owned()];
+                let at = match began.len() {
+                    1 => format!("violated at {:.2} s", span.from_s),
+                    many => format!("{many} violations, the first at {:.2} s", span.from_s),
+                };
+                let texts = vec![format!("{at} by {}", self.pair(span.pair)), at, "violated".to_owned()];
                 (texts, theme.alarm())
             }
         }
@@ -195,10 +197,7 @@ impl Painting<'_> {
 
     /// Keeps words off the vehicles that have names.
     fn keep_off_vehicles(&self, placing: &mut Placing<'_>) {
-        if self.footage.count() > NAMED {
-            return;
-        }
-        for k in 0..self.footage.count() {
+        for k in self.named() {
             if let Some(at) = self.vehicle(k).and_then(|place| self.camera.project(place)) {
                 #[expect(clippy::cast_possible_truncation, reason = "pixels")]
                 let [x, y, radius] =
@@ -236,20 +235,35 @@ impl Painting<'_> {
         }
     }
 
+    /// The vehicles that have names: all of few, else those of the worst violations.
+    fn named(&self) -> Vec<usize> {
+        if self.footage.count() <= NAMED {
+            return (0..self.footage.count()).collect();
+        }
+        let mut named = Vec::new();
+        for k in self.violated.iter().flat_map(|(pair, _)| [pair.first(), pair.second()]) {
+            if named.len() < NAMED && !named.contains(&k) {
+                named.push(k);
+            }
+        }
+        named
+    }
+
     /// The names of the vehicles, on those that are large enough and beside the others.
     fn names(&self, placing: &mut Placing<'_>) {
-        if self.footage.count() > NAMED {
-            return;
-        }
-        let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
-        for k in 0..self.footage.count() {
-            let Some(place) = self.vehicle(k) else { continue };
-            let Some(at) = self.camera.project(place).filter(|_| !self.is_hidden(k)) else { continue };
+        let (theme, size_px, alarmed) = (self.view.theme, self.view.text_px(0.85), self.alarmed());
+        for k in self.named() {
+            let Some(at) = self.vehicle(k).and_then(|place| self.camera.project(place)) else { continue };
+            // One that is too close to another is often behind it.
+            let is_hidden = self.is_hidden(k);
+            if is_hidden && !alarmed[k] {
+                continue;
+            }
             let name = shortened(&self.footage.vehicles[k]);
             #[expect(clippy::cast_possible_truncation, reason = "pixels")]
             let ([x, y], radius) = (at.at_px.map(|v| v as f32), (self.footage.radius_m[k] * at.px_per_m) as f32);
             let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
-            if fitting >= 8.0 {
+            if fitting >= 8.0 && !is_hidden {
                 placing.draw(Mark::Words {
                     at_px: [x, y],
                     anchor: [0.5, 0.5],
@@ -257,10 +271,19 @@ impl Painting<'_> {
                     colour: theme.background(),
                     text: name,
                 });
-            } else {
-                let offset = f64::from(radius + 0.2 * size_px);
-                let beside = [at.at_px[0] + offset, at.at_px[1] - offset];
-                placing.words_at(beside, [0.0, 1.0], 0.85 * size_px, self.colour(k), &name);
+                continue;
+            }
+            let offset = f64::from(radius + 0.2 * size_px);
+            let colour = if alarmed[k] { theme.alarm() } else { self.colour(k) };
+            // Above to the right, above to the left, below to the right, below to the left: where there is room.
+            for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {
+                let beside = [
+                    at.at_px[0] + offset * (1.0 - 2.0 * f64::from(left)),
+                    at.at_px[1] + offset * (1.0 - 2.0 * f64::from(above)),
+                ];
+                if placing.words_at(beside, [left, above], 0.85 * size_px, colour, &name) {
+                    break;
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::placing::Placing;
+use super::placing::{Placing, width};
 use super::{Colour, Line, Painting, Scene, single};
 
 /// Most lines of the ground in each direction.
@@ -55,6 +55,14 @@ impl Painting<'_> {
                 placing.words_at(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
             }
         }
+        // A number over a ball would be taken for its name.
+        let covered_px = self.covered_px();
+        let is_covered = |[x, y]: [f64; 2], text: &str| {
+            let half = [width(size_px, text), size_px].map(|side| f64::from(side) / 2.0);
+            covered_px.iter().any(|([at_x, at_y], radius)| {
+                ((x - at_x).abs() - half[0]).max(0.0).hypot(((y - at_y).abs() - half[1]).max(0.0)) < *radius
+            })
+        };
         let centre = (low + high) / 2.0;
         for axis in 0..2 {
             let other = 1 - axis;
@@ -89,6 +97,10 @@ impl Painting<'_> {
                 let text = format!("{}{unit}", plain(point[axis] + origin_m[axis], step));
                 if let Some(at) = self.camera.project(point) {
                     let [x, y] = at.at_px;
+                    let middle = [x, y + below_px + (0.5 - f64::from(anchor[1])) * f64::from(size_px)];
+                    if is_covered(middle, &text) {
+                        continue;
+                    }
                     if placing.words_at([x, y + below_px], anchor, size_px, soft, &text) {
                         unit = "";
                     }

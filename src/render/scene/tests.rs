@@ -107,6 +107,12 @@ fn a_violation_shows_while_it_lasts_and_is_remembered() {
     assert!(says(&before, "clear so far") && !says(&before, "VIOLATION"), "{:?}", words(&before));
     assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1-2"), "{:?}", words(&during));
     assert!(!says(&after, "VIOLATION") && says(&after, "violated at 4.00 s"), "{:?}", words(&after));
+    // Of several, their number is said, and which was the first.
+    let mut again = footage;
+    again.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 7.0 });
+    let twice = scene(&again, 8.0, &View::default());
+    assert!(says(&twice, "2 violations, the first at 4.00 s by 1-2"), "{:?}", words(&twice));
+    let footage = self::footage();
     // Even with every layer off, what is violated has its shell.
     let bare = scene(&footage, 5.0, &View { layers: Layers::NONE, ..View::default() });
     assert_eq!(bare.shells.len(), 2);
@@ -254,4 +260,66 @@ fn seen_along_the_ground_its_scale_is_below_it_and_the_last_number_has_the_unit(
         _ => None,
     });
     assert!(numbers.clone().count() > 2 && numbers.clone().all(|y| f64::from(y) > ground + 4.0));
+}
+
+#[test]
+fn of_many_vehicles_those_that_are_too_close_are_named() {
+    let places: Vec<f64> = (0..100_u32).flat_map(|k| [f64::from(k % 10) * 4.0, f64::from(k / 10) * 4.0, 5.0]).collect();
+    let mut swarm = Swarm::at_rest(Rows::from_row_slice(&places));
+    swarm.positions_m[(99, 0)] = swarm.positions_m[(98, 0)] + 0.5;
+    let mut footage = Footage::new("many", 100);
+    footage.delta_m = Some(1.0);
+    let control = Rows::zeros(100);
+    for time_s in [0.0, 1.0] {
+        footage.take(&Sample { time_s, step: 0, swarm: &swarm, control: &control, separation: None, energy: None });
+    }
+    footage.note(&Event::ViolationBegan { pair: Pair::new(98, 99), time_s: 0.5 });
+    let named = |time_s| {
+        let layers = Layers { labels: true, ..Layers::NONE };
+        let scene = scene(&footage, time_s, &View { layers, ..camera("top") });
+        words(&scene).into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(named(0.0), Vec::<String>::new());
+    assert_eq!(named(1.0), ["99", "100"]);
+}
+
+#[test]
+fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
+    // One on the ground and three high above its edges, which are seen over them from above.
+    let places = [0.0, 0.0, 0.5, 6.0, 0.0, 9.0, 0.0, 6.0, 9.0, -6.0, -6.0, 9.0];
+    let swarm = Swarm::at_rest(Rows::from_row_slice(&places));
+    let mut footage = Footage::new("tower", 4);
+    footage.delta_m = Some(2.0);
+    let control = Rows::zeros(4);
+    footage.take(&Sample { time_s: 0.0, step: 0, swarm: &swarm, control: &control, separation: None, energy: None });
+    let numbers = |view: &View| {
+        let scene = scene(&footage, 0.0, view);
+        let number = |text: &str| text.trim_end_matches(" m").parse::<f64>().is_ok();
+        let at = |mark: &Mark| match mark {
+            Mark::Words { at_px, text, .. } if number(text) => Some(*at_px),
+            _ => None,
+        };
+        (scene.camera, scene.marks.iter().filter_map(at).collect::<Vec<_>>())
+    };
+    let mut dropped = 0;
+    let sides = (0..360).step_by(20).flat_map(|azimuth| [5, 30, 60, 80].map(|elevation| (azimuth, elevation)));
+    for (azimuth, elevation) in sides {
+        let view = |shells| View {
+            layers: Layers { ground: true, shells, ..Layers::NONE },
+            ..camera(&format!("{azimuth},{elevation},18"))
+        };
+        let (camera, with) = numbers(&view(true));
+        let (_, without) = numbers(&view(false));
+        dropped += without.len() - with.len().min(without.len());
+        for k in 0..4 {
+            let place = Stage::of(&footage).place(&footage.at(0.0).expect("a moment").positions_m, k).expect("there");
+            let Some(ball) = camera.project(place) else { continue };
+            let clear = |at: &[f32; 2]| {
+                let [x, y] = [0, 1].map(|axis| f64::from(at[axis]) - ball.at_px[axis]);
+                x.hypot(y) > 1.0 * ball.px_per_m
+            };
+            assert!(with.iter().all(clear), "{azimuth}, {elevation} degrees");
+        }
+    }
+    assert!(dropped > 0, "shells cover numbers from some side");
 }

@@ -36,14 +36,32 @@ impl Painting<'_> {
         radius_m.max(f64::from(least_px * self.view.unit_px()) / px_per_m)
     }
 
-    pub(super) fn vehicles(&self, scene: &mut Scene) {
+    /// Which vehicles are closer than delta to another one.
+    pub(super) fn alarmed(&self) -> Vec<bool> {
         let mut alarmed = vec![false; self.footage.count()];
         for (pair, _) in &self.violated {
             (alarmed[pair.first()], alarmed[pair.second()]) = (true, true);
         }
+        alarmed
+    }
+
+    /// What the vehicles, and those of their shells that are shown, cover of the picture: middles and radii \[pixels\].
+    pub(super) fn covered_px(&self) -> Vec<([f64; 2], f64)> {
+        let mut covered = Vec::new();
+        for (k, alarm) in self.alarmed().into_iter().enumerate() {
+            let Some(place) = self.vehicle(k) else { continue };
+            let Some(at) = self.camera.project(place) else { continue };
+            let shell_m = self.footage.delta_m.filter(|_| self.view.layers.shells || alarm).map_or(0.0, |d| d / 2.0);
+            let radius_m = self.at_least(place, self.footage.radius_m[k], LEAST_PX[0]).max(shell_m);
+            covered.push((at.at_px, radius_m * at.px_per_m));
+        }
+        covered
+    }
+
+    pub(super) fn vehicles(&self, scene: &mut Scene) {
         let theme = self.view.theme;
         let mut shells = Vec::new();
-        for (k, alarm) in alarmed.into_iter().enumerate() {
+        for (k, alarm) in self.alarmed().into_iter().enumerate() {
             let Some(place) = self.vehicle(k) else { continue };
             let centre_m = single(place);
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::player::Player;
 use crate::render::gpu::paint;
 use crate::render::scene::{Camera, Mark, Orbit, Stage, metres};
-use crate::render::{CameraSpec, Layers, Moment, Theme};
+use crate::render::{CameraSpec, Layers, Moment, Plan, Theme};
 use crate::swarm::{Pair, row};
 
 /// Degrees that the camera turns for a point that the mouse is dragged.
@@ -325,9 +325,8 @@ fn controls(ui: &mut Ui, player: &mut Player, message: Option<&str>) {
             ui.label(RichText::new("live").strong());
         }
     });
-    if let Some(text) = player.said.as_deref().or(message) {
-        ui.label(text);
-    }
+    // Its line is always there, so that the picture keeps its size.
+    ui.add(egui::Label::new(player.said.as_deref().or(message).unwrap_or(" ")).truncate());
     ui.add_space(2.0);
 }
 
@@ -365,7 +364,7 @@ fn plot(ui: &mut Ui, player: &Player) {
     }
     let curve = points.iter().map(|&[time_s, separation_m]| at(time_s, separation_m)).collect();
     painter.add(egui::Shape::line(curve, Stroke::new(1.5, visuals.hyperlink_color)));
-    let ink = visuals.weak_text_color();
+    let ink = plot_ink(visuals);
     let number = |corner: egui::Pos2, anchor, text| {
         painter.text(corner, anchor, text, egui::FontId::proportional(11.0), ink);
     };
@@ -381,6 +380,11 @@ fn plot(ui: &mut Ui, player: &Player) {
             response.on_hover_text(format!("{} at {time_s:.2} s", metres(*separation_m)));
         }
     }
+}
+
+/// The colour of the numbers of the plot.
+fn plot_ink(visuals: &egui::Visuals) -> Color32 {
+    visuals.text_color()
 }
 
 /// What is known of a vehicle at a moment.
@@ -408,19 +412,28 @@ fn vehicle(ui: &mut Ui, player: &Player, moment: &Moment, k: usize) {
         for (distance_m, other) in others.into_iter().take(LISTED) {
             ui.label(&footage.vehicles[other]);
             ui.label(metres(distance_m));
-            let tension = footage.plan.as_ref().map(|plan| in_words(plan.tension(Pair::new(k, other), distance_m)));
-            ui.label(tension.unwrap_or_default());
+            ui.label(
+                footage.plan.as_ref().map_or_else(String::new, |plan| in_words(plan, Pair::new(k, other), distance_m)),
+            );
             ui.end_row();
         }
     });
 }
 
-/// How hard an edge pulls or pushes, to two digits.
-fn in_words(tension: f64) -> String {
-    match (tension * 100.0).round() {
-        hundredths if hundredths < 0.0 => format!("push {:.2}", -hundredths / 100.0),
-        hundredths if hundredths > 0.0 => format!("pull {:.2}", hundredths / 100.0),
-        _ => "rest".to_owned(),
+/// How hard an edge pulls or pushes, or by how much it is too long where the law has no tension.
+fn in_words(plan: &Plan, pair: Pair, distance_m: f64) -> String {
+    if plan.graph.later_neighbours(pair.first()).all(|other| other != pair.second()) {
+        return "no edge".to_owned();
+    }
+    match plan.pull_m_s2(pair, distance_m) {
+        Some(pull) if pull == f64::NEG_INFINITY => "inside delta".to_owned(),
+        Some(pull) if pull.abs() < 0.005 => "rest".to_owned(),
+        Some(pull) if pull < 0.0 => format!("push {:.2} m/s\u{b2}", -pull),
+        Some(pull) => format!("pull {pull:.2} m/s\u{b2}"),
+        None => {
+            let stretch = plan.stretch(pair, distance_m);
+            format!("{:.0} % too {}", 100.0 * stretch.abs(), if stretch < 0.0 { "short" } else { "long" })
+        }
     }
 }
 
@@ -434,4 +447,54 @@ fn help(context: &egui::Context, open: &mut bool) {
             }
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::Graph;
+    use crate::scenario::{Scenario, Source};
+
+    fn plan(name: &str) -> Plan {
+        Plan::of(&Scenario::read(&Source::Builtin(name.to_owned()), &[]).expect("built in"))
+    }
+
+    #[test]
+    fn the_table_gives_the_acceleration_of_an_edge_and_no_share_of_a_limit() {
+        let (plan, pair) = (plan("pentagon"), Pair::new(0, 1));
+        let pushed = plan.pull_m_s2(pair, 2.001).expect("a tension");
+        assert!(
+            pushed < -10.0 && plan.tension(pair, 2.001) == -1.0,
+            "{pushed} m/s^2, far below the limit of the colour"
+        );
+        assert_eq!(in_words(&plan, pair, 2.001), format!("push {:.2} m/s\u{b2}", -pushed));
+        let pulled = plan.pull_m_s2(pair, 9.0).expect("a tension");
+        assert_eq!(in_words(&plan, pair, 9.0), format!("pull {pulled:.2} m/s\u{b2}"));
+        let rest_m = plan.formation.desired_distance(0, 1);
+        assert_eq!(in_words(&plan, pair, rest_m), "rest");
+        assert_eq!(in_words(&plan, pair, 2.0), "inside delta");
+    }
+
+    #[test]
+    fn the_numbers_of_the_plot_stand_out_from_its_ground() {
+        for visuals in [egui::Visuals::dark(), egui::Visuals::light()] {
+            let luminance = |colour: Color32| {
+                let [red, green, blue, _] = egui::Rgba::from(colour).to_array();
+                0.2126 * red + 0.7152 * green + 0.0722 * blue
+            };
+            let [ink, ground] = [plot_ink(&visuals), visuals.extreme_bg_color].map(luminance);
+            // WCAG 2.2, level AA.
+            assert!((ink.max(ground) + 0.05) / (ink.min(ground) + 0.05) >= 4.5, "{ink} on {ground}");
+        }
+    }
+
+    #[test]
+    fn two_without_an_edge_have_no_tension_and_springs_are_long_or_short() {
+        let mut ring = plan("pentagon");
+        ring.graph = Graph::ring(5);
+        assert_eq!(in_words(&ring, Pair::new(0, 2), 3.0), "no edge");
+        let springs = plan("pentagon-laplacian");
+        let rest_m = springs.formation.desired_distance(0, 1);
+        assert_eq!(in_words(&springs, Pair::new(0, 1), 1.5 * rest_m), "50 % too long");
+    }
 }

@@ -48,7 +48,14 @@ impl Player {
         let Some(feed) = &self.feed else { return false };
         for taken in 0..TAKEN_AT_ONCE {
             match feed.try_recv() {
-                Ok(Fed::Sample(sample)) => self.footage.take(&sample.as_sample()),
+                Ok(Fed::Sample(sample)) => {
+                    if let Err(error) = self.footage.check(&sample.as_sample()) {
+                        self.said = Some(error.to_string());
+                        self.feed = None;
+                        return true;
+                    }
+                    self.footage.take(&sample.as_sample());
+                }
                 Ok(Fed::Event(event)) => self.footage.note(&event),
                 Ok(Fed::Ended(said)) => {
                     self.said = said;
@@ -159,6 +166,21 @@ mod tests {
         assert_eq!((player.time_s, player.playing), (0.0, false));
         player.step(100);
         assert_eq!(player.time_s, 2.0);
+    }
+
+    #[test]
+    fn a_flight_in_the_air_that_leaves_all_measure_is_watched_no_further() {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let mut player = Player::new(Footage::new("one", 1), Some(receiver));
+        let mut gone = sample(1.0);
+        gone.swarm.positions_m[(0, 2)] = -1e10;
+        for sample in [sample(0.0), gone] {
+            sender.send(Fed::Sample(Box::new(sample))).expect("sent");
+        }
+        assert!(player.receive() && !player.is_live());
+        assert_eq!(player.footage.range_s(), [0.0, 0.0]);
+        let said = player.said.expect("a sentence");
+        assert!(said.starts_with("vehicle 1 has a coordinate of -10000000000.0 m at 1 s"), "{said}");
     }
 
     #[test]
