@@ -333,18 +333,6 @@ fn one_who_begins_to_climb_at_the_instant_another_ends_was_on_the_ground_with_it
 }
 
 #[test]
-fn a_vehicle_is_there_from_its_first_to_its_last_sample_however_long_the_recording() {
-    let flown = (0..2000).flat_map(|k| {
-        let time_s = 0.1 * f64::from(k);
-        let second = (500..1500).contains(&k).then(|| seen(1, time_s, [9.0, 0.0, 0.0]));
-        [Some(seen(0, time_s, [0.0; 3])), second].into_iter().flatten()
-    });
-    let outcome = asked(&flown.collect::<Vec<_>>(), Question::delta(1.0));
-    let there: Vec<_> = outcome.presence.iter().flatten().map(|there| (there.from_s, there.to_s)).collect();
-    assert_eq!(there, [(0.0, 0.1 * 1999.0), (50.0, 0.1 * 1499.0)]);
-}
-
-#[test]
 fn no_interval_is_too_short_to_be_judged() {
     let items = |step_s: f64| {
         let b = |k: i32, x| seen(1, f64::from(k) * step_s, [x, 0.0, 0.0]);
@@ -356,24 +344,6 @@ fn no_interval_is_too_short_to_be_judged() {
     assert_ne!(status(&items(1e-60), bounded), Status::Clear);
     let refused = judge(&names(2), &items(3e-310), Question::delta(1.0));
     assert!(matches!(refused, Err(RecordedError::TimeNotIncreasing { .. })), "{refused:?}");
-}
-
-#[test]
-fn a_sample_of_both_bounds_what_is_listed_from_above() {
-    // A long interval, in which anything may happen, and then the two in one sample 4.5 m apart.
-    let items = [
-        seen(0, 0.0, [0.0; 3]),
-        seen(1, 0.0, [5.0, 0.0, 0.0]),
-        seen(0, 2.0, [0.0; 3]),
-        seen(1, 2.0, [5.0, 0.0, 0.0]),
-        seen(0, 2.5, [0.0; 3]),
-        seen(1, 2.5, [4.5, 0.0, 0.0]),
-        seen(0, 3.0, [0.0; 3]),
-        seen(1, 3.0, [5.0, 0.0, 0.0]),
-    ];
-    let question = Question { max_gap_s: Some(5.0), ..bounded(4.6, 1.0) };
-    let closest = asked(&items, question).closest[0];
-    assert_eq!((closest.lower_m, closest.upper_m), (4.0, 4.5));
 }
 
 #[test]

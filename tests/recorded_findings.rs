@@ -69,3 +69,38 @@ fn each_dip_of_one_curve_has_its_own_smallest_distance() {
     }
     assert_eq!(asked(&[curve(0, &[0.0]), curve(1, &x)], Question::delta(0.3)).violations.len(), 1);
 }
+
+#[test]
+fn a_vehicle_is_there_from_its_first_to_its_last_sample_however_long_the_recording() {
+    let flown = (0..2000).flat_map(|k| {
+        let time_s = 0.1 * f64::from(k);
+        let second = (500..1500).contains(&k).then(|| seen(1, time_s, [9.0, 0.0, 0.0]));
+        [Some(seen(0, time_s, [0.0; 3])), second].into_iter().flatten()
+    });
+    let outcome = asked(&flown.collect::<Vec<_>>(), Question::delta(1.0));
+    let there: Vec<_> = outcome.presence.iter().flatten().map(|there| (there.from_s, there.to_s)).collect();
+    assert_eq!(there, [(0.0, 0.1 * 1999.0), (50.0, 0.1 * 1499.0)]);
+}
+
+#[test]
+fn a_sample_of_both_bounds_what_is_listed_from_above() {
+    // A long interval, in which anything may happen, and then the two in one sample 4.5 m apart.
+    let items = [
+        seen(0, 0.0, [0.0; 3]),
+        seen(1, 0.0, [5.0, 0.0, 0.0]),
+        seen(0, 2.0, [0.0; 3]),
+        seen(1, 2.0, [5.0, 0.0, 0.0]),
+        seen(0, 2.5, [0.0; 3]),
+        seen(1, 2.5, [4.5, 0.0, 0.0]),
+        seen(0, 3.0, [0.0; 3]),
+        seen(1, 3.0, [5.0, 0.0, 0.0]),
+    ];
+    let question = Question {
+        max_gap_s: Some(5.0),
+        motion: Some(Motion::Bounded),
+        max_accel_m_s2: Some(1.0),
+        ..Question::delta(4.6)
+    };
+    let closest = asked(&items, question).closest[0];
+    assert_eq!((closest.lower_m, closest.upper_m), (4.0, 4.5));
+}
