@@ -82,7 +82,16 @@ struct Watched<'a> {
     folder: &'a Path,
 }
 
-impl Watched<'_> {
+impl<'a> Watched<'a> {
+    /// A window on the end of a recording that is flown first.
+    fn at_the_end(screen: &'a Screen, folder: &'a Path) -> (Child, Self) {
+        flown(folder);
+        let (program, window) = screen.open(folder, &["out/run.mcap"]);
+        let watched = Self { screen, window, folder };
+        watched.key("End");
+        (program, watched)
+    }
+
     /// Presses a key.
     fn key(&self, key: &str) {
         self.screen.tell(&["key", "--window", &self.window, key]);
@@ -210,12 +219,8 @@ fn flown(folder: &Path) {
 
 #[test]
 fn every_layer_theme_and_turn_changes_the_picture_and_back_again() {
-    let folder = tempfile::tempdir().expect("a folder");
-    flown(folder.path());
-    let screen = Screen::new();
-    let (program, window) = screen.open(folder.path(), &["out/run.mcap"]);
-    let watched = Watched { screen: &screen, window, folder: folder.path() };
-    watched.key("End");
+    let (folder, screen) = (tempfile::tempdir().expect("a folder"), Screen::new());
+    let (program, watched) = Watched::at_the_end(&screen, folder.path());
     // The first picture may be of a window that is not as large as it will be.
     watched.picture();
     let whole = watched.picture();
@@ -278,12 +283,8 @@ fn first_vehicle(recording: &Path, size_px: [u32; 2]) -> [u32; 2] {
 
 #[test]
 fn help_and_what_is_picked_are_shown_and_taken_away() {
-    let folder = tempfile::tempdir().expect("a folder");
-    flown(folder.path());
-    let screen = Screen::new();
-    let (program, window) = screen.open(folder.path(), &["out/run.mcap"]);
-    let watched = Watched { screen: &screen, window, folder: folder.path() };
-    watched.key("End");
+    let (folder, screen) = (tempfile::tempdir().expect("a folder"), Screen::new());
+    let (program, watched) = Watched::at_the_end(&screen, folder.path());
     // Where nothing is that a pointer would change.
     watched.mouse(5, 5, &[]);
     watched.picture();

@@ -40,7 +40,12 @@ fn place(path: &Path) -> Option<PathBuf> {
 /// Where something that is not there will be.
 fn yet_to_be(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let folder = fs::canonicalize(folder).ok().or_else(|| yet_to_be(folder).filter(|_| folder != Path::new(".")))?;
+    let folder = match fs::canonicalize(folder) {
+        Ok(folder) => folder,
+        // The folder that the program was started in is gone.
+        Err(_) if folder == Path::new(".") => return None,
+        Err(_) => yet_to_be(folder)?,
+    };
     match path.components().next_back()? {
         Component::Normal(name) => Some(folder.join(name)),
         Component::ParentDir => folder.parent().map(Path::to_owned),
