@@ -68,6 +68,22 @@ fn what_is_asked_in_seconds_does_not_rest_on_a_guessed_unit() {
 }
 
 #[test]
+fn a_recording_of_ours_is_judged_by_its_own_delta_unless_another_is_given() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    let fly = ["run", "circle", "--out", "out", "--set", "time.duration_s=1", "--no-snapshots", "--no-figures"];
+    ran_by(TAUTLINE, folder.path(), &fly);
+    let own = audit(folder.path(), &["out/run.mcap"]);
+    assert_eq!(own.exit, Some(0), "{own:?}");
+    assert!(own.out.contains("(delta 1.000 m,"), "{own:?}");
+    assert!(own.err.contains("note: the safety distance is the recording's own, 1.0 m"), "{own:?}");
+    let another = audit(folder.path(), &["out/run.mcap", "--delta", "1.5"]);
+    assert!(another.out.contains("(delta 1.500 m,") && !another.err.contains("own"), "{another:?}");
+    let of_others = audit(folder.path(), &["pass.csv"]);
+    assert_eq!(of_others.exit, Some(2), "{of_others:?}");
+    assert!(of_others.err.contains("there is no delta"), "{of_others:?}");
+}
+
+#[test]
 fn json_is_alone_on_standard_output_and_has_the_keys_of_a_report() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--json"]);

@@ -14,7 +14,8 @@ use super::reading::{FormatArgument, ReadArguments};
 use super::{Exit, Failure};
 use crate::audit::recorded::{Approach, History, Judge, Motion, Outcome, Question, RecordedError, Terms, Who};
 use crate::figures::{self, Encounter, Figure};
-use crate::read::{self, ReadOptions};
+use crate::read::{self, Format, ReadOptions};
+use crate::record::mcap::McapRecording;
 use crate::report::recorded::{Clock, RecordedReport, Source, interval};
 use crate::report::{Status, write_atomically};
 use crate::track::Item;
@@ -37,7 +38,8 @@ pub(super) struct AuditArguments {
     #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
     format: Option<FormatArgument>,
 
-    /// Safety distance between two centres [m]; with --ellipsoid a scaled distance, by default 2.
+    /// Safety distance between two centres [m], by default that of a recording of tautline; with --ellipsoid a scaled
+    /// distance, by default 2.
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Question")]
     delta: Option<f64>,
     /// What happens between samples [default: linear for samples, polynomial for curves].
@@ -203,6 +205,15 @@ impl AuditArguments {
         outputs::check(&inputs, &outputs)
     }
 
+    /// Delta of a recording of ours where nothing else says how close vehicles may come \[m\].
+    fn own_delta_m(&self) -> Option<f64> {
+        let path = &self.reading.recording;
+        let silent = self.delta.is_none() && self.radius.is_empty() && self.ellipsoid.is_none();
+        let may_be_ours = path.is_file() && self.format.is_none_or(|format| format.format() == Format::Mcap);
+        let ours = if silent && may_be_ours { McapRecording::open(path).ok()? } else { return None };
+        Some(ours.header().delta_m)
+    }
+
     /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording.
     fn refuse_guessed_seconds(&self, unit: &str) -> Result<(), Failure> {
         let asked = [
@@ -240,11 +251,14 @@ impl AuditArguments {
 pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     arguments.check_outputs()?;
-    let question = arguments.question()?;
+    let mut question = arguments.question()?;
     let options = arguments.reading.options(arguments.format)?;
     let path = &arguments.reading.recording;
+    let own_delta_m = arguments.own_delta_m();
+    question.delta_m = question.delta_m.or(own_delta_m);
     let judge = Judge::new(question.clone())?;
-    let Judged { outcome, clock, notes, curves } = judged(judge, arguments, &options, console)?;
+    let Judged { outcome, clock, mut notes, curves } = judged(judge, arguments, &options, console)?;
+    notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
     for note in &notes {
         console.warn(&format!("note: {note}"));
     }

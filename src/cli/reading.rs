@@ -122,7 +122,7 @@ pub(super) enum FormatArgument {
 }
 
 impl FormatArgument {
-    fn format(self) -> Format {
+    pub(super) fn format(self) -> Format {
         match self {
             Self::Csv => Format::Csv,
             Self::Text => Format::Text,
