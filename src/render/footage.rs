@@ -190,11 +190,12 @@ impl Plan {
         tension.clamp(-1.0, 1.0)
     }
 
-    /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l), above 0 where
-    /// it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
+    /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
+    /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
     #[must_use]
     pub fn pull_m_s2(&self, pair: Pair, distance_m: f64) -> Option<f64> {
-        self.edge_tension(pair).map(|(_, edge)| edge.derivative(distance_m))
+        let vehicles = self.formation.slots_m.nrows() as f64;
+        self.edge_tension(pair).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
     }
 
     /// How much longer a distance \[m\] is than the desired one, over that one.

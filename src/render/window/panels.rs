@@ -451,9 +451,12 @@ fn help(context: &egui::Context, open: &mut bool) {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::graph::Graph;
     use crate::scenario::{Scenario, Source};
+    use crate::swarm::{Rows, Swarm, row};
 
     fn plan(name: &str) -> Plan {
         Plan::of(&Scenario::read(&Source::Builtin(name.to_owned()), &[]).expect("built in"))
@@ -473,6 +476,22 @@ mod tests {
         let rest_m = plan.formation.desired_distance(0, 1);
         assert_eq!(in_words(&plan, pair, rest_m), "rest");
         assert_eq!(in_words(&plan, pair, 2.0), "inside delta");
+    }
+
+    #[test]
+    fn the_accelerations_of_its_edges_add_up_to_what_the_law_commands() {
+        let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
+        let (plan, swarm) = (Plan::of(&scenario), Swarm::at_rest(scenario.start.positions_m.clone()));
+        let mut control = Rows::zeros(swarm.count());
+        scenario.law().expect("a law").control(&swarm, &mut control).expect("a command");
+        for i in 0..swarm.count() {
+            let others = (0..swarm.count()).filter(|&j| j != i);
+            let pulls = others.map(|j| {
+                let to_other = row(&swarm.positions_m, j) - row(&swarm.positions_m, i);
+                to_other.normalize() * plan.pull_m_s2(Pair::new(i, j), to_other.norm()).expect("a tension")
+            });
+            assert!((pulls.sum::<Vector3<f64>>() - row(&control, i)).norm() < 1e-12, "vehicle {}", i + 1);
+        }
     }
 
     #[test]
