@@ -65,6 +65,19 @@ fn a_file_that_exists_is_overwritten_only_by_force() {
     assert!(fs::read_to_string(folder.path().join("cf1.csv")).expect("read").starts_with("t_s,id,x,y,z"));
 }
 
+/// `/dev/full` refuses every write.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_written_is_said_once_and_by_us_alone() {
+    let folder = folder();
+    for format in ["csv", "parquet", "npz", "mcap"] {
+        let failed = ran(folder.path(), &["export", "flight.csv", "-o", "/dev/full", "--format", format, "--force"]);
+        assert_eq!(failed.exit, Some(3), "{format}: {}", said(&failed));
+        assert!(failed.err.contains("No space left on device"), "{format}: {}", said(&failed));
+        assert!(!said(&failed).contains("ZipWriter"), "{format}: {}", said(&failed));
+    }
+}
+
 #[test]
 fn curves_need_a_rate() {
     let folder = folder();

@@ -229,6 +229,16 @@ fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
 }
 
 #[test]
+fn rounding_breaks_no_certificate() {
+    // A swarm that starts in its own formation certifies its own distances, and flies in single precision.
+    let certificate = Certificate { certified_m: Some(3.0), energy_initial: Some(0.0), void: vec![] };
+    let case = Case { audit: passing(2.999_999_88), certificate: certificate.clone(), ..Case::good() };
+    assert!(case.report().verdict.pass && !case.report().headline().contains("breaks"), "{:?}", case.report().verdict);
+    let case = Case { audit: passing(2.999), certificate, ..Case::good() };
+    assert!(!case.report().verdict.pass && case.report().headline().contains("breaks the certificate"));
+}
+
+#[test]
 fn a_flight_below_its_certificate_does_not_pass_even_where_it_is_clear() {
     let case = Case { audit: passing(2.04), ..Case::good() };
     assert_eq!(
