@@ -395,6 +395,9 @@ mod tests {
             Segment::straight(3.0, 4.0, at(3.0, 2.0), at(4.0, 0.0)),
         ];
         assert!((Straight::over(&away, (0.0, 4.0)).stray - 2.0).abs() < 1e-12);
+        // Over a time that cannot be divided by, a vehicle may be anywhere.
+        let instant = [Segment::straight(0.0, 3e-310, at(0.0, 0.0), at(1.0, 0.0))];
+        assert_eq!(Straight::over(&instant, (0.0, 3e-310)).stray, f64::INFINITY);
     }
 
     #[test]
