@@ -5,7 +5,7 @@ cd "$(dirname "$0")/.."
 
 sh tests/setup.sh
 
-# The library core alone, then everything. Debug and release builds must fly the same bits: tests/determinism.rs
+# The library core alone, then everything. Debug and release builds must fly the same bits: tests/program/determinism.rs
 # compares the release program with its own debug build.
 cargo check --lib --no-default-features
 cargo build --release

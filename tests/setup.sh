@@ -10,21 +10,21 @@ if ! command -v cc >/dev/null 2>&1 || ! command -v c++ >/dev/null 2>&1; then
     $sudo apt-get install -y --no-install-recommends gcc g++ libc6-dev
 fi
 
-# The browser that tests/browser.rs opens reports in.
+# The browser that tests/reports opens reports in.
 if ! command -v chromium >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends chromium fonts-dejavu-core
 fi
 
-# A driver in software where no graphics driver is installed: tests/pictures.rs fails without one.
+# A driver in software where no graphics driver is installed: tests/viewer fails without one.
 if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
 fi
 
-# The screen, the hand and the libraries of windows that tests/window.rs needs.
+# The screen, the hand and the libraries of windows that tests/window needs.
 if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update

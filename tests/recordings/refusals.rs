@@ -9,10 +9,7 @@ use tautline::read::{self, AxisOrder, Fault, Format, Place, ReadError, ReadOptio
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
-#[path = "support/recording.rs"]
-mod recording;
-
-use recording::Whole;
+use crate::recording::Whole;
 
 fn written(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGE: &str = include_str!("../ARCHITECTURE.md");
+const PAGE: &str = include_str!("../../ARCHITECTURE.md");
 
 /// Rows of the table whose header starts with `header`: first cell -> names between backticks in the last cell.
 fn table(header: &str) -> BTreeMap<String, BTreeSet<String>> {

@@ -1,19 +1,15 @@
 //! The loop takes no memory per step: a flight of 300 steps allocates as often as one of 20.
-//!
-//! One test, because the counter is one for the whole process.
 
-use std::alloc::System;
 use std::ops::ControlFlow;
 
-use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+use stats_alloc::Region;
 use tautline::law::{Law, LawError};
 use tautline::plant::{self, Plant, PlantError};
 use tautline::scenario::{Override, Scenario, Source};
 use tautline::sim;
 use tautline::swarm::{Rows, Swarm};
 
-#[global_allocator]
-static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+use crate::ALLOCATOR;
 
 const FEW: u32 = 20;
 const MANY: u32 = 300;
@@ -82,8 +78,7 @@ fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, plant: impl Fn() 
     many.checked_sub(few).expect("more steps take no less memory")
 }
 
-#[test]
-fn the_loop_allocates_nothing_per_step() {
+pub(crate) fn the_loop_allocates_nothing_per_step() {
     let pentagon = builtin("pentagon", &[]);
     let crowd = builtin(
         "circle",

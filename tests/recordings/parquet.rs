@@ -11,10 +11,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::parser::parse_message_type;
 use tautline::read::{ReadError, ReadOptions};
 
-#[path = "support/recording.rs"]
-mod recording;
-
-use recording::Whole;
+use crate::recording::Whole;
 
 /// The cells of a column.
 enum Cells {

@@ -7,10 +7,7 @@ use tautline::read::{ReadOptions, TimeUnit};
 use tautline::track::Item;
 use tempfile::TempDir;
 
-#[path = "support/recording.rs"]
-mod recording;
-
-use recording::Whole;
+use crate::recording::Whole;
 
 /// A file of a folder that lives as long as the test.
 struct File {

@@ -8,10 +8,7 @@ use tautline::read::{self, ReadOptions};
 use tautline::track::{Item, Sample};
 use tempfile::TempDir;
 
-#[path = "support/recording.rs"]
-mod recording;
-
-use recording::Whole;
+use crate::recording::Whole;
 
 fn export(from: &Path, to: &Path, format: Format, options: &ExportOptions) -> Result<(), ExportError> {
     let open = || read::open(from, &ReadOptions::default());

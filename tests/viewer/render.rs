@@ -2,13 +2,10 @@
 //!
 //! Needs a graphics adapter, or a driver in software; `tests/run.sh` installs one.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::Path;
 
-use program::{Ran, TAUTLINE, ran_by};
+use crate::program::{Ran, TAUTLINE, ran_by};
 use tautline::record::mcap::{Header, McapRecorder};
 use tempfile::TempDir;
 

@@ -1,11 +1,8 @@
 //! `tautline check` and the warnings of `tautline run`, through the program.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::path::Path;
 
-use program::{TAUTLINE, ran_by};
+use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
 
 fn tautline(arguments: &[&str]) -> (i32, String, String) {

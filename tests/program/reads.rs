@@ -4,10 +4,7 @@ use std::fs;
 
 use assert_cmd::Command;
 
-#[path = "support/program.rs"]
-mod program;
-
-use program::{Ran, TAUTLINE, ran_by};
+use crate::program::{Ran, TAUTLINE, ran_by};
 
 fn audit(text: &str, arguments: &[&str]) -> Ran {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,13 +1,10 @@
 //! Wrong input ends with exit code 2, a message that names the place and the remedy, and nothing written. A machine that
 //! fails ends with exit code 3 and the name of the file. Nothing ends in a panic.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs::{self, File};
 use std::path::Path;
 
-use program::{Ran, TAUTLINE, ran_by};
+use crate::program::{Ran, TAUTLINE, ran_by};
 use tempfile::TempDir;
 
 const BAD: Option<i32> = Some(1);

@@ -5,10 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-#[path = "support/program.rs"]
-mod program;
-
-use program::{Ran, TAUTLINE, ran_by};
+use crate::program::{Ran, TAUTLINE, ran_by};
 
 const LONG: &str = "t,id,x,y,z\n0,1,1,2,3\n0,2,4,5,6\n0.5,1,1,2,3.5\n0.5,2,4,5,6\n";
 const CURVE: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1\n1,0,1,0,0,1,0\n";

@@ -1,10 +1,7 @@
 //! The rigid bodies of the physics engine are the double integrators of equation (1): free motion is exact, masses,
 //! keep-out balls and the third axis of a plane do not matter, and hulls are solid.
 
-#[path = "support/flight.rs"]
-mod flight;
-
-use flight::{builtin, fly};
+use crate::flight::{builtin, fly};
 use nalgebra::Vector3;
 use tautline::formation::Formation;
 use tautline::law::{Law, LawError};

@@ -1,13 +1,10 @@
 //! `report.html` in a real browser.
 
-#[path = "support/browser.rs"]
-mod browser;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use browser::{check, open, probe};
+use crate::browser::{check, open, probe};
 
 /// Flies a built-in scenario and gives the path of its page.
 fn flown(folder: &Path, arguments: &[&str]) -> PathBuf {

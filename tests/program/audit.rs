@@ -6,10 +6,7 @@ use std::path::Path;
 
 use tempfile::TempDir;
 
-#[path = "support/program.rs"]
-mod program;
-
-use program::{Ran, TAUTLINE, ran_by};
+use crate::program::{Ran, TAUTLINE, ran_by};
 
 /// Two vehicles pass each other within a second, 1 m apart in the middle and far apart in every sample.
 const PASS: &str = "t,id,x,y,z\n0,alpha,-5,0,0\n0,bravo,5,1,0\n1,alpha,5,0,0\n1,bravo,-5,1,0\n";

@@ -2,15 +2,12 @@
 //! when it is asked to stop.
 #![cfg(unix)]
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use program::{Ran, TAUTLINE, ran_by};
+use crate::program::{Ran, TAUTLINE, ran_by};
 use serde_json::Value;
 use tautline::record::mcap::McapRecording;
 use tautline::record::{Event, OwnedSample};

@@ -1,18 +1,14 @@
 //! A step of a law and a look at the formation take no memory.
 
-use std::alloc::System;
-
-use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+use stats_alloc::Region;
 use tautline::formation::{Formation, best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use tautline::graph::Graph;
 use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law};
 use tautline::swarm::{Rows, Swarm};
 
-#[global_allocator]
-static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+use crate::ALLOCATOR;
 
-#[test]
-fn control_energy_and_errors_of_the_shape_allocate_nothing() {
+pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
     let parameters = EdgeTensionParameters { alpha: 1.0, delta_m: 0.1, a22_per_s: 0.1 };
     for count in [5, 40, 300] {
         let formation = Formation::sphere(count, 10.0);

@@ -1,13 +1,10 @@
 //! Same scenario, same bits: over runs, thread counts, ways to talk, and builds.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use program::{TAUTLINE, ran_by};
+use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
 use tempfile::TempDir;
 

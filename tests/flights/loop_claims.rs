@@ -1,12 +1,9 @@
 //! What the loop of sense, law, plant and judge keeps: no step jumps a barrier, nothing passes unseen, energy is not
 //! made, symmetries hold, and a flight that cannot go on ends with a name and with what was recorded.
 
-#[path = "support/flight.rs"]
-mod flight;
-
 use std::ops::ControlFlow;
 
-use flight::{Log, builtin, fly, fly_with};
+use crate::flight::{Log, builtin, fly, fly_with};
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 use tautline::audit::Status;

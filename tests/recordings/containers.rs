@@ -12,10 +12,7 @@ use tautline::read::{AxisOrder, ReadError, ReadOptions};
 use tautline::track::{Item, Piece};
 use zip::write::SimpleFileOptions;
 
-#[path = "support/recording.rs"]
-mod recording;
-
-use recording::Whole;
+use crate::recording::Whole;
 
 fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Whole, ReadError> {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,13 +1,10 @@
 //! The step of the audit takes no memory once its lists have grown to the swarm.
 
-use std::alloc::System;
-
-use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+use stats_alloc::Region;
 use tautline::audit::Auditor;
 use tautline::swarm::Rows;
 
-#[global_allocator]
-static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+use crate::ALLOCATOR;
 
 const DELTA_M: f64 = 2.0;
 const SPACING_M: f64 = 5.0;
@@ -24,8 +21,7 @@ fn lattice(n: usize, phase: f64) -> Rows {
     })
 }
 
-#[test]
-fn a_step_of_a_warm_auditor_allocates_nothing() {
+pub(crate) fn a_step_of_a_warm_auditor_allocates_nothing() {
     for n in [5, 100, 900] {
         let flight: Vec<Rows> = (0..=STEPS).map(|k| lattice(n, f64::from(k) / f64::from(STEPS))).collect();
         let mut auditor = Auditor::new(n, DELTA_M).unwrap();

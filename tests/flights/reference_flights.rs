@@ -1,10 +1,7 @@
 //! The built-in scenarios, flown in Rapier, agree with the reference solution of the ODE (an 8th-order Runge-Kutta
 //! integration at a relative tolerance of 1e-10), and their error vanishes in proportion to the step.
 
-#[path = "support/flight.rs"]
-mod flight;
-
-use flight::{Log, builtin, fly};
+use crate::flight::{Log, builtin, fly};
 use nalgebra::Vector3;
 use tautline::audit::Status;
 use tautline::formation::affine_dimension;

@@ -1,13 +1,10 @@
 //! The program does what its help says: commands, options, texts, JSON and exit codes.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use program::{Ran, TAUTLINE, ran_by};
+use crate::program::{Ran, TAUTLINE, ran_by};
 use serde_json::Value;
 use tautline::record::mcap::McapRecording;
 use tautline::scenario::builtin;
@@ -62,7 +59,7 @@ fn the_pentagon_as_json_is_the_reference_flight() {
         let found = number(pointer);
         assert!((found - expected).abs() <= tolerance, "{pointer}: {found}, expected {expected}");
     };
-    // The reference values, and how far a step of 1/240 s may be from them, are those of tests/reference_flights.rs.
+    // The reference values, and how far a step of 1/240 s may be from them, are those of tests/flights/reference_flights.rs.
     near("/separation/min_m", 2.460_353, 0.002);
     near("/separation/min_at_s", 2.151, 0.02);
     near("/separation/certified_m", 2.055_307, 1e-5);
@@ -128,7 +125,7 @@ fn a_person_reads_the_verdict_first_and_where_the_files_are_last() {
 
 #[test]
 fn the_readme_shows_what_the_program_prints() {
-    let readme = include_str!("../README.md");
+    let readme = include_str!("../../README.md");
     let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a transcript");
     let printed = run(folder().path(), &[]).out;
     assert!(printed.starts_with(shown), "the README shows\n{shown}\nand the program prints\n{printed}");

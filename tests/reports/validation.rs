@@ -1,18 +1,13 @@
 //! `docs/validation.md` says what `tautline validate` measures, every claim comes out as expected, and the page that it
 //! leaves can be read on any screen.
 
-#[path = "support/browser.rs"]
-mod browser;
-#[path = "support/release.rs"]
-mod release;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
-const PAGE: &str = include_str!("../docs/validation.md");
+const PAGE: &str = include_str!("../../docs/validation.md");
 const BEGIN: &str = "<!-- begin: tautline validate --markdown -->\n";
 const END: &str = "<!-- end: tautline validate --markdown -->\n";
 
@@ -34,7 +29,7 @@ fn differences(page: &str, program: &str) -> String {
 fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |arguments: &[&str]| {
-        Command::new(release::program()).arg("validate").args(arguments).current_dir(folder.path()).output()
+        Command::new(crate::release::program()).arg("validate").args(arguments).current_dir(folder.path()).output()
     };
     let done = run(&["--markdown", "--quiet"]).expect("the program");
     let out = folder.path().join("out/validate");
@@ -62,7 +57,7 @@ fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
         assert!(svg.starts_with("<svg") && html.contains(&svg), "{figure}");
     }
     assert!(out.join("figures/convergence.svg").is_file());
-    browser::check(folder.path(), &out.join("validate.html"), "Validation", "valid: all", 9);
+    crate::browser::check(folder.path(), &out.join("validate.html"), "Validation", "valid: all", 9);
     let ids = result["groups"].to_string();
     for finding in 1..=7 {
         assert!(ids.contains(&format!("\"finding\":\"F{finding}\"")), "F{finding} is measured");

@@ -1,0 +1,21 @@
+//! What runs at every step takes no memory.
+//!
+//! One test, because the counter is one for the whole process.
+
+mod audit;
+mod laws;
+mod step_loop;
+
+use std::alloc::System;
+
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
+
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+#[test]
+fn a_step_allocates_nothing() {
+    laws::control_energy_and_errors_of_the_shape_allocate_nothing();
+    audit::a_step_of_a_warm_auditor_allocates_nothing();
+    step_loop::the_loop_allocates_nothing_per_step();
+}

@@ -1,0 +1,11 @@
+//! Scenarios, laws, plants and the loop that flies them.
+
+#[path = "../support/flight.rs"]
+mod flight;
+
+mod ideal_plant;
+mod law_properties;
+mod loop_claims;
+mod plant_claims;
+mod reference_flights;
+mod scenario_files;

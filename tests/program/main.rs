@@ -1,0 +1,13 @@
+//! The program, run as a user runs it.
+
+#[path = "../support/program.rs"]
+mod program;
+
+mod audit;
+mod check;
+mod determinism;
+mod exports;
+mod interruption;
+mod reads;
+mod refuses;
+mod runs;

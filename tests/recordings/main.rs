@@ -1,0 +1,12 @@
+//! Recordings of any origin read, written and exported.
+
+#[path = "../support/recording.rs"]
+mod recording;
+
+mod any_bytes;
+mod containers;
+mod exports;
+mod formats;
+mod own;
+mod parquet;
+mod refusals;
