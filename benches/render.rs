@@ -38,6 +38,7 @@ fn footage(count: usize) -> Footage {
             control: &control,
             separation,
             energy: None,
+            channels: &[],
         });
     }
     footage

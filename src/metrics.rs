@@ -223,6 +223,7 @@ mod tests {
                 control: &control,
                 separation: None,
                 energy: None,
+                channels: &[],
             });
         }
         metrics.finish()
@@ -273,6 +274,7 @@ mod tests {
                 control: &control,
                 separation: None,
                 energy: None,
+                channels: &[],
             });
         }
         assert_eq!(metrics.finish().reached_at_s, Some(9.0_f64.next_up()));
@@ -309,6 +311,7 @@ mod tests {
                 control: &control,
                 separation: None,
                 energy: Some(energy),
+                channels: &[],
             });
         }
         assert!((metrics.edge_error_m() - 0.5).abs() < ROUNDING);
@@ -341,6 +344,7 @@ mod tests {
             control: &control,
             separation: None,
             energy: Some(0.0),
+            channels: &[],
         });
         assert_eq!(metrics.finish().energy_max_over_initial, None);
     }

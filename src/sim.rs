@@ -401,6 +401,7 @@ impl<'a> Cockpit<'a> {
             control: &self.control,
             separation: self.closest.take(),
             energy: self.law.energy(&self.state),
+            channels: &[],
         })?;
         self.performance.record += began.elapsed();
         Ok(())

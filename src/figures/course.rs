@@ -271,6 +271,7 @@ mod tests {
                 control: &control,
                 separation: Some(separation),
                 energy: Some(value),
+                channels: &[],
             });
         }
         course
@@ -324,6 +325,7 @@ mod tests {
             control: &control,
             separation: None,
             energy: None,
+            channels: &[],
         });
         assert_eq!((course.samples(), course.end_s()), (3, 0.02));
         assert_eq!(course.closest().map(|closest| closest.separation_m), Some(3.0));

@@ -8,7 +8,35 @@ pub mod mcap;
 
 pub use hash::{StateHash, sha256_hex};
 
+use std::sync::Arc;
+
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
+
+/// Numbers of every vehicle beside its position and velocity at one instant, such as its attitude or the wind.
+///
+/// Its source makes it once, writes new values into it before each sample, and names it nowhere else: what receives
+/// samples takes every channel alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// What it is called; one word of the letters that topics are made of.
+    pub name: Arc<str>,
+    /// What each column holds, with its unit, such as `wind_x_m_s`.
+    pub columns: Arc<[String]>,
+    /// A row for each vehicle, one after the other, with a number for each column.
+    pub values: Vec<f64>,
+}
+
+impl Channel {
+    /// A channel without values yet.
+    #[must_use]
+    pub fn new(name: &str, columns: &[&str]) -> Self {
+        Self {
+            name: name.into(),
+            columns: columns.iter().map(|&column| column.to_owned()).collect(),
+            values: Vec::new(),
+        }
+    }
+}
 
 /// One recorded instant.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +53,8 @@ pub struct Sample<'a> {
     pub separation: Option<ClosestApproach>,
     /// The law's energy E \[m^2/s^2\] where it has one.
     pub energy: Option<f64>,
+    /// What else is known of every vehicle, each under another name.
+    pub channels: &'a [Channel],
 }
 
 /// A [`Sample`] that owns its state, as a recording gives it back.
@@ -42,6 +72,8 @@ pub struct OwnedSample {
     pub separation: Option<ClosestApproach>,
     /// The law's energy E \[m^2/s^2\] where it has one.
     pub energy: Option<f64>,
+    /// What else is known of every vehicle.
+    pub channels: Vec<Channel>,
 }
 
 impl OwnedSample {
@@ -55,6 +87,7 @@ impl OwnedSample {
             control: &self.control,
             separation: self.separation,
             energy: self.energy,
+            channels: &self.channels,
         }
     }
 }
@@ -68,6 +101,7 @@ impl From<&Sample<'_>> for OwnedSample {
             control: sample.control.clone(),
             separation: sample.separation,
             energy: sample.energy,
+            channels: sample.channels.to_vec(),
         }
     }
 }

@@ -125,6 +125,7 @@ fn samples(count: usize, rise_m_s: f64, near_m: f64, take: &mut dyn FnMut(&Sampl
             control: &control,
             separation: closest,
             energy: Some(4.0 - 0.3 * time_s),
+            channels: &[],
         });
     }
 }

@@ -132,6 +132,7 @@ fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
             control: &control,
             separation: None,
             energy: None,
+            channels: &[],
         });
     }
     let view = View {
@@ -246,6 +247,7 @@ fn crossing() -> Footage {
             control: &control,
             separation,
             energy: None,
+            channels: &[],
         });
     }
     footage.note(&Event::ViolationBegan { pair: Pair::new(0, 2), time_s: 2.0 });

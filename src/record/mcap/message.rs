@@ -168,6 +168,7 @@ impl SwarmMessage<Vec<f64>> {
             control: Rows::from_row_slice(&self.controls_m_s2),
             separation: summary.map(SummaryMessage::separation).transpose()?.flatten(),
             energy: summary.map(|summary| summary.energy_m2_s2).filter(|energy| !energy.is_nan()),
+            channels: Vec::new(),
         })
     }
 }

@@ -10,7 +10,15 @@ fn sample(footage: &mut Footage, time_s: f64, x: f64, separation_m: f64) {
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, x, 0.0, 0.0]));
     let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s: time_s - 0.5 });
     let control = Rows::zeros(2);
-    footage.take(&Sample { time_s, step: 0, swarm: &swarm, control: &control, separation, energy: None });
+    footage.take(&Sample {
+        time_s,
+        step: 0,
+        swarm: &swarm,
+        control: &control,
+        separation,
+        energy: None,
+        channels: &[],
+    });
 }
 
 #[test]
@@ -165,7 +173,15 @@ fn pairs_that_the_flight_does_not_have_are_passed_over() {
     let swarm = Swarm::at_rest(Rows::zeros(1));
     let (pair, time_s) = (Pair::new(3, 9), 0.0);
     let separation = Some(ClosestApproach { pair, separation_m: 1.0, time_s });
-    footage.take(&Sample { time_s, step: 0, swarm: &swarm, control: &Rows::zeros(1), separation, energy: None });
+    footage.take(&Sample {
+        time_s,
+        step: 0,
+        swarm: &swarm,
+        control: &Rows::zeros(1),
+        separation,
+        energy: None,
+        channels: &[],
+    });
     footage.note(&Event::ViolationBegan { pair, time_s });
     assert_eq!((footage.closest(), footage.violations().len()), (None, 0));
     assert!(footage.at(0.0).expect("a moment").nearest.is_none());

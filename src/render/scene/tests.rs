@@ -24,6 +24,7 @@ fn footage() -> Footage {
             control: &control,
             separation,
             energy: None,
+            channels: &[],
         });
     }
     footage.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 4.0 });
@@ -179,6 +180,7 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
         control: &Rows::zeros(1),
         separation: None,
         energy: None,
+        channels: &[],
     });
     assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
     let far = Swarm::at_rest(Rows::from_row_slice(&[5e6, 4e6, 100.0]));
@@ -190,6 +192,7 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
         control: &Rows::zeros(1),
         separation: None,
         energy: None,
+        channels: &[],
     });
     assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
 }
@@ -236,6 +239,7 @@ fn what_is_too_small_to_see_is_a_dot() {
             control: &control,
             separation: None,
             energy: None,
+            channels: &[],
         });
     }
     let scene = scene(&footage, 0.0, &camera("top"));
@@ -271,7 +275,15 @@ fn of_many_vehicles_those_that_are_too_close_are_named() {
     footage.delta_m = Some(1.0);
     let control = Rows::zeros(100);
     for time_s in [0.0, 1.0] {
-        footage.take(&Sample { time_s, step: 0, swarm: &swarm, control: &control, separation: None, energy: None });
+        footage.take(&Sample {
+            time_s,
+            step: 0,
+            swarm: &swarm,
+            control: &control,
+            separation: None,
+            energy: None,
+            channels: &[],
+        });
     }
     footage.note(&Event::ViolationBegan { pair: Pair::new(98, 99), time_s: 0.5 });
     let named = |time_s| {
@@ -291,7 +303,15 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
     let mut footage = Footage::new("tower", 4);
     footage.delta_m = Some(2.0);
     let control = Rows::zeros(4);
-    footage.take(&Sample { time_s: 0.0, step: 0, swarm: &swarm, control: &control, separation: None, energy: None });
+    footage.take(&Sample {
+        time_s: 0.0,
+        step: 0,
+        swarm: &swarm,
+        control: &control,
+        separation: None,
+        energy: None,
+        channels: &[],
+    });
     let numbers = |view: &View| {
         let scene = scene(&footage, 0.0, view);
         let number = |text: &str| text.trim_end_matches(" m").parse::<f64>().is_ok();

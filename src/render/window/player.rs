@@ -130,7 +130,15 @@ mod tests {
 
     fn sample(time_s: f64) -> OwnedSample {
         let swarm = Swarm::at_rest(Rows::zeros(1));
-        OwnedSample { time_s, step: 0, swarm, control: Rows::zeros(1), separation: None, energy: None }
+        OwnedSample {
+            time_s,
+            step: 0,
+            swarm,
+            control: Rows::zeros(1),
+            separation: None,
+            energy: None,
+            channels: Vec::new(),
+        }
     }
 
     fn player() -> Player {
