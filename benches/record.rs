@@ -5,7 +5,7 @@ use std::path::Path;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use tautline::record::mcap::{Header, McapRecorder, McapRecording};
-use tautline::record::{Recorder, Sample, StateHash};
+use tautline::record::{Sample, Sink, StateHash};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 const RECORD_HZ: f64 = 60.0;

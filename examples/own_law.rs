@@ -40,7 +40,7 @@ impl Law for SpringsAndRepulsion {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let mut law = SpringsAndRepulsion { formation: scenario.formation.clone() };
+    let mut law = SpringsAndRepulsion { formation: scenario.formation().clone() };
     let mut plant = plant::for_scenario(&scenario);
     let flight = sim::fly(&scenario, &mut law, plant.as_mut(), &mut (), &mut |_step| ControlFlow::Continue(()))?;
     println!("{}: {:?}", law.name(), flight.audit.status);

@@ -37,12 +37,15 @@
 pub mod audit;
 #[cfg(feature = "program")]
 pub mod cli;
+pub mod continuous;
 pub mod export;
 pub mod figures;
 pub mod formation;
 pub mod graph;
 pub mod law;
+pub mod link;
 pub mod metrics;
+pub mod observation;
 pub mod plant;
 pub mod preflight;
 pub mod read;
@@ -50,8 +53,11 @@ pub mod record;
 #[cfg(feature = "viewer")]
 pub mod render;
 pub mod report;
+pub mod run;
 pub mod scenario;
 pub mod sim;
+pub mod space;
 pub mod swarm;
+pub mod target;
 pub mod track;
 pub mod validate;

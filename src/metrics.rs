@@ -3,28 +3,24 @@
 //! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. What it knows
 //! of the time between samples is nothing; peaks are those of the samples.
 
-use crate::formation::{Formation, largest_edge_error_m, procrustes_rms_m};
 use crate::graph::Graph;
-use crate::record::{Event, RecordError, Recorder, Sample};
-use crate::scenario::JudgeSpec;
+use crate::record::{Event, RecordError, Sample, Sink};
 use crate::swarm::{Rows, row};
-
-/// Times are sums and products of steps: this much shorter than `hold_s` still counts as held \[s\].
-const TIME_ROUNDING_S: f64 = 1e-9;
+use crate::target::{Arrival, Begins, Distance, Leg};
 
 /// Folds samples, in the order of time, into a [`Summary`].
 #[derive(Clone, Debug)]
 pub struct Metrics<'a> {
-    formation: &'a Formation,
+    legs: &'a [Leg],
     graph: &'a Graph,
-    judge: JudgeSpec,
+    arrival: Arrival,
+    /// Legs that have ended.
+    ended: Vec<LegSummary>,
     samples: u64,
-    /// First instant from which everything was within the judge's tolerances up to now \[s\].
+    /// First instant of the leg from which everything was within the limits up to now \[s\].
     good_since_s: Option<f64>,
     last_s: f64,
-    rms_position_error_m: f64,
-    max_edge_error_m: f64,
-    disagreement_m_s: f64,
+    distance: Distance,
     common_m_s: f64,
     peak_control_m_s2: f64,
     final_control_m_s2: f64,
@@ -73,20 +69,28 @@ pub struct Summary {
     pub energy_max_over_initial: Option<f64>,
 }
 
+/// A leg that was followed by another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegSummary {
+    /// When the next one began \[s\].
+    pub ended_at_s: f64,
+    /// When its formation was reached for good, if it was \[s\].
+    pub reached_at_s: Option<f64>,
+}
+
 impl<'a> Metrics<'a> {
-    /// No samples yet of a run towards `formation` by the tolerances of `judge`.
+    /// No samples yet of a run through these legs by the limits of `arrival`.
     #[must_use]
-    pub fn new(formation: &'a Formation, graph: &'a Graph, judge: JudgeSpec) -> Self {
+    pub fn new(legs: &'a [Leg], graph: &'a Graph, arrival: Arrival) -> Self {
         Self {
-            formation,
+            legs,
             graph,
-            judge,
+            arrival,
+            ended: Vec::new(),
             samples: 0,
             good_since_s: None,
             last_s: 0.0,
-            rms_position_error_m: f64::NAN,
-            max_edge_error_m: f64::NAN,
-            disagreement_m_s: f64::NAN,
+            distance: Distance::unknown(),
             common_m_s: f64::NAN,
             peak_control_m_s2: 0.0,
             final_control_m_s2: 0.0,
@@ -96,20 +100,31 @@ impl<'a> Metrics<'a> {
 
     /// Takes one sample: O(edges), and no allocation after the first.
     pub fn observe(&mut self, sample: &Sample<'_>) {
-        let positions_m = &sample.swarm.positions_m;
         self.samples += 1;
         self.last_s = sample.time_s;
-        self.rms_position_error_m = procrustes_rms_m(positions_m, self.formation);
-        self.max_edge_error_m = largest_edge_error_m(positions_m, self.formation, self.graph);
-        self.disagreement_m_s = sample.swarm.disagreement_m_s();
+        if let Some(leg) = self.legs.get(self.ended.len()) {
+            self.distance = Distance::of(sample.swarm, &leg.formation, self.graph);
+        }
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
         self.observe_energy(sample.energy);
-        let good = self.max_edge_error_m <= self.judge.edge_error_m
-            && self.rms_position_error_m <= self.judge.edge_error_m
-            && self.disagreement_m_s <= self.judge.disagreement_m_s
-            && sample.swarm.first_not_finite().is_none();
+        let good = self.arrival.is_within(&self.distance) && sample.swarm.first_not_finite().is_none();
         self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
+    }
+
+    /// Ends the present leg. One that ended because it was reached has been, whatever the samples show.
+    fn begin_leg(&mut self, leg: usize, time_s: f64) {
+        let held_since_s = self.good_since_s.filter(|&since_s| self.arrival.is_held(since_s, self.last_s));
+        let by_event = self.legs.get(leg).is_some_and(|next| next.begins == Begins::Reached);
+        let told_s = by_event.then(|| self.good_since_s.unwrap_or(time_s - self.arrival.hold_s));
+        self.ended.push(LegSummary { ended_at_s: time_s, reached_at_s: held_since_s.or(told_s) });
+        self.good_since_s = None;
+    }
+
+    /// The legs that have ended, in order. [`Metrics::finish`] is about the one after them.
+    #[must_use]
+    pub fn ended_legs(&self) -> &[LegSummary] {
+        &self.ended
     }
 
     /// A sample without a command has none at the end either.
@@ -138,27 +153,27 @@ impl<'a> Metrics<'a> {
     /// Largest error of a desired distance at the last sample \[m\].
     #[must_use]
     pub fn edge_error_m(&self) -> f64 {
-        self.max_edge_error_m
+        self.distance.max_edge_error_m
     }
 
     /// The numbers of everything seen.
     ///
     /// The formation counts as reached at the time of the first sample from which on every sample, to the last, had an
-    /// edge error and a disagreement of at most the judge's, provided that this lasted at least `hold_s` up to the last
+    /// edge error and a disagreement within the limits, provided that this lasted at least `hold_s` up to the last
     /// sample. A formation that was held for long and lost again is not reached; one that was regained counts from when
     /// it was regained.
     #[must_use]
     pub fn finish(&self) -> Summary {
         let held_s = self.good_since_s.map(|since| self.last_s - since);
-        let reached = held_s.is_some_and(|held| held >= self.judge.hold_s - TIME_ROUNDING_S);
+        let reached = self.good_since_s.is_some_and(|since_s| self.arrival.is_held(since_s, self.last_s));
         Summary {
             samples: self.samples,
             end_s: self.last_s,
             reached_at_s: self.good_since_s.filter(|_| reached),
             held_s,
-            max_edge_error_m: self.max_edge_error_m,
-            rms_position_error_m: self.rms_position_error_m,
-            disagreement_m_s: self.disagreement_m_s,
+            max_edge_error_m: self.distance.max_edge_error_m,
+            rms_position_error_m: self.distance.rms_position_error_m,
+            disagreement_m_s: self.distance.disagreement_m_s,
             common_m_s: self.common_m_s,
             peak_control_m_s2: self.peak_control_m_s2,
             final_control_m_s2: self.final_control_m_s2,
@@ -173,13 +188,16 @@ impl<'a> Metrics<'a> {
     }
 }
 
-impl Recorder for Metrics<'_> {
+impl Sink for Metrics<'_> {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.observe(sample);
         Ok(())
     }
 
-    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        if let &Event::LegBegan { leg, time_s } = event {
+            self.begin_leg(leg, time_s);
+        }
         Ok(())
     }
 }
@@ -197,20 +215,21 @@ fn larger(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formation::Formation;
     use crate::swarm::Swarm;
 
     /// Sums of a few numbers of order 1 are right to some 1e-15.
     const ROUNDING: f64 = 1e-12;
-    const JUDGE: JudgeSpec = JudgeSpec { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
+    const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
 
-    fn pair_of_vehicles() -> (Formation, Graph) {
-        (Formation::line(2, 3.0), Graph::complete(2))
+    fn pair_of_vehicles() -> (Vec<Leg>, Graph) {
+        (vec![Leg::first(Formation::line(2, 3.0))], Graph::complete(2))
     }
 
     /// Two vehicles `error_m` too far apart, parting at `relative_m_s`, sampled every 0.25 s.
-    fn summary(course: &[(f64, f64)], judge: JudgeSpec) -> Summary {
-        let (formation, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&formation, &graph, judge);
+    fn summary(course: &[(f64, f64)], judge: Arrival) -> Summary {
+        let (legs, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&legs, &graph, judge);
         let control = Rows::zeros(2);
         for (k, (error_m, relative_m_s)) in course.iter().enumerate() {
             let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0 + error_m, 0.0, 0.0]));
@@ -244,7 +263,7 @@ mod tests {
     fn a_formation_held_shorter_than_asked_is_not_reached() {
         let s = summary(&[FAR, FAR, FAR, GOOD, GOOD, GOOD, GOOD], JUDGE);
         assert_eq!((s.reached_at_s, s.held_s), (None, Some(0.75)));
-        let patient = JudgeSpec { hold_s: 0.75, ..JUDGE };
+        let patient = Arrival { hold_s: 0.75, ..JUDGE };
         assert_eq!(summary(&[FAR, FAR, FAR, GOOD, GOOD, GOOD, GOOD], patient).reached_at_s, Some(0.75));
     }
 
@@ -262,8 +281,8 @@ mod tests {
 
     #[test]
     fn rounding_of_times_does_not_cost_the_hold() {
-        let (formation, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&formation, &graph, JUDGE);
+        let (legs, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&legs, &graph, JUDGE);
         let swarm = Swarm::at_rest(formation.slots_m.clone());
         for time_s in [9.0_f64.next_up(), 10.0] {
             let control = Rows::zeros(2);
@@ -293,13 +312,13 @@ mod tests {
     fn no_samples_reach_nothing() {
         let s = summary(&[], JUDGE);
         assert_eq!((s.samples, s.reached_at_s, s.energy_initial), (0, None, None));
-        assert_eq!(summary(&[], JudgeSpec { hold_s: 0.0, ..JUDGE }).reached_at_s, None);
+        assert_eq!(summary(&[], Arrival { hold_s: 0.0, ..JUDGE }).reached_at_s, None);
     }
 
     #[test]
     fn the_numbers_are_those_of_the_samples() {
-        let (formation, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&formation, &graph, JUDGE);
+        let (legs, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&legs, &graph, JUDGE);
         let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.5, 0.0, 0.0]));
         swarm.velocities_m_s = Rows::from_row_slice(&[3.0, 4.0, 0.0, 3.0, 4.2, 0.0]);
         for (k, (energy, u)) in [(2.0, 0.5), (3.0, 2.0), (1.0, 1.0)].into_iter().enumerate() {
@@ -334,8 +353,8 @@ mod tests {
 
     #[test]
     fn a_start_without_energy_has_no_ratio() {
-        let (formation, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&formation, &graph, JUDGE);
+        let (legs, graph) = pair_of_vehicles();
+        let mut metrics = Metrics::new(&legs, &graph, JUDGE);
         let (swarm, control) = (Swarm::at_rest(formation.slots_m.clone()), Rows::zeros(2));
         metrics.observe(&Sample {
             time_s: 0.0,

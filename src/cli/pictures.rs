@@ -44,9 +44,9 @@ impl Pictures<'_> {
         let yardsticks = Yardsticks {
             delta_m: self.scenario.delta_m,
             certified_m: report.separation.certified_m,
-            shape: Some((&self.scenario.formation, &self.scenario.graph)),
-            edge_error_m: Some(self.scenario.judge.edge_error_m),
-            disagreement_m_s: Some(self.scenario.judge.disagreement_m_s),
+            shape: Some((&self.scenario.formation(), &self.scenario.graph)),
+            edge_error_m: Some(self.scenario.arrival.edge_error_m),
+            disagreement_m_s: Some(self.scenario.arrival.disagreement_m_s),
         };
         figures::of_run(course, &yardsticks).map_err(|error| Failure::machine(error.to_string()))
     }

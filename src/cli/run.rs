@@ -13,15 +13,12 @@ use super::pictures::Pictures;
 use super::snapshots::Watched;
 use super::{Exit, Failure};
 use crate::figures::Course;
-use crate::metrics::Metrics;
-use crate::plant;
 use crate::preflight::Preflight;
+use crate::record::Sink;
 use crate::record::mcap::{Header, McapRecorder};
-use crate::record::{Recorder, StateHash};
-use crate::report::page;
-use crate::report::{EndedEarly, Findings, Performance, Report, Run};
-use crate::scenario::{Override, PlantSpec, Scenario, Source};
-use crate::sim::{self, Ending, Flight};
+use crate::report::{Report, page};
+use crate::run::run_while;
+use crate::scenario::{Override, Scenario, Source};
 
 /// Exit code of a second Ctrl-C, as shells give it.
 const INTERRUPTED_TWICE: i32 = 130;
@@ -169,7 +166,7 @@ fn fly(
     folder: &OutFolder,
     console: Console,
     interrupted: &AtomicBool,
-    watchers: &mut dyn Recorder,
+    watchers: &mut dyn Sink,
 ) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
@@ -177,9 +174,6 @@ fn fly(
     {
         recording = recording.with(Box::new(crate::render::FoxgloveScene::of(scenario)))?;
     }
-    let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
-    let mut state_hash = StateHash::new();
-
     let progress = console.progress(scenario.time.steps(), scenario.name.clone());
     let mut carry_on = |step: u64| {
         if step.is_multiple_of(PROGRESS_EVERY) {
@@ -187,59 +181,12 @@ fn fly(
         }
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(scenario));
-    let mut recorders = (&mut recording, (&mut metrics, (&mut state_hash, watchers)));
-    let flown = sim::fly(scenario, law.as_mut(), plant.as_mut(), &mut recorders, &mut carry_on);
+    let flown = run_while(scenario, preflight, &mut (&mut recording, watchers), &mut carry_on);
     progress.finish_and_clear();
     let closed = recording.finish();
-    let flight = flown?;
+    let report = flown?;
     closed?;
-    Ok(report(scenario, preflight, &header, &flight, &metrics, state_hash.finish()))
-}
-
-fn report(
-    scenario: &Scenario,
-    preflight: &Preflight,
-    header: &Header,
-    flight: &Flight,
-    metrics: &Metrics<'_>,
-    state_hash: String,
-) -> Report {
-    let reason = match &flight.ending {
-        Ending::Completed => None,
-        Ending::Interrupted => Some("interrupted".to_owned()),
-        Ending::LawUndefined(why) => Some(format!("the law is undefined: {why}")),
-        Ending::BrokeDown(why) => Some(format!("{why}; shorten time.dt_s, or look for speeds and gains that grow")),
-    };
-    let wall_s = flight.performance.wall.as_secs_f64();
-    Report::new(&Findings {
-        scenario_name: &scenario.name,
-        scenario_sha256: &header.scenario_sha256,
-        delta_m: scenario.delta_m,
-        judge: scenario.judge,
-        trap_dimension: preflight.trap_dimension(),
-        formation_dimension: preflight.formation_dimension,
-        certificate: &flight.certificate,
-        audit: &flight.audit,
-        engine_contact_pairs: (scenario.plant != PlantSpec::Ideal).then_some(flight.engine_contacts.len() as u64),
-        summary: &metrics.finish(),
-        run: &Run {
-            duration_s: flight.duration_s,
-            dt_s: scenario.time.dt_s,
-            steps: flight.steps,
-            vehicles: scenario.count(),
-            state_hash,
-        },
-        performance: Performance {
-            wall_s: Some(wall_s),
-            real_time_factor: Some(flight.duration_s / wall_s),
-            law_s: Some(flight.performance.law.as_secs_f64()),
-            physics_s: Some(flight.performance.physics.as_secs_f64()),
-            audit_s: Some(flight.performance.audit.as_secs_f64()),
-            record_s: Some(flight.performance.record.as_secs_f64()),
-        },
-        ended_early: reason.as_deref().map(|reason| EndedEarly { time_s: flight.duration_s, reason }),
-    })
+    Ok(report)
 }
 
 impl Watched {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::Failure;
 use super::console::Console;
-use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::record::{Event, RecordError, Sample, Sink};
 use crate::report::page::Picture;
 
 /// A flight as it is watched to take pictures of it.
@@ -36,7 +36,7 @@ impl Watched {
     }
 }
 
-impl Recorder for Watched {
+impl Sink for Watched {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         #[cfg(feature = "viewer")]
         if let Some(camera) = &mut self.camera {

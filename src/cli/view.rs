@@ -10,12 +10,11 @@ use clap::Args;
 use super::console::Console;
 use super::drawing;
 use super::{Exit, Failure};
-use crate::plant;
 use crate::read::ReadOptions;
-use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::record::{Event, RecordError, Sample, Sink};
 use crate::render::{Fed, Footage, Theme, WindowError, show};
 use crate::scenario::{Override, Scenario, Source};
-use crate::sim;
+use crate::sim::{self, Parts};
 
 /// Samples of a flight in the air that wait for the window.
 const WAITING: usize = 256;
@@ -72,13 +71,12 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
 /// Starts a flight in a thread of its own. It waits for the window where that is slower, and ends when the window is
 /// closed.
 fn take_off(scenario: Scenario) -> Result<Receiver<Fed>, Failure> {
-    let mut law = scenario.law()?;
+    let parts = Parts::of(&scenario)?;
     let (sender, receiver) = sync_channel(WAITING);
     std::thread::spawn(move || {
-        let mut plant = plant::for_scenario(&scenario);
         let mut downlink = Downlink { sender, cut: false };
         let mut carry_on = |_| ControlFlow::Continue(());
-        let flown = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut downlink, &mut carry_on);
+        let flown = sim::fly(&scenario, parts, &mut downlink, &mut carry_on);
         let said = match flown {
             Ok(flight) => match flight.ending {
                 sim::Ending::LawUndefined(why) => Some(format!("the flight ended: the law is undefined: {why}")),
@@ -113,7 +111,7 @@ impl Downlink {
     }
 }
 
-impl Recorder for Downlink {
+impl Sink for Downlink {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.send(Fed::Sample(Box::new(sample.into())));
         self.result()

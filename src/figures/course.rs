@@ -1,7 +1,7 @@
 //! A run thinned to what a figure can show.
 
 use crate::record::mcap::Entry;
-use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::record::{Event, RecordError, Sample, Sink};
 use crate::swarm::{ClosestApproach, Rows, row, separation};
 
 /// Most spans of time that are kept: some four for each pixel of a figure's width.
@@ -23,7 +23,7 @@ pub(super) const FEW_VEHICLES: usize = 12;
 /// disagreement. So what a figure must show, the extreme, is never thinned out. Memory is at most some 32 MiB for up
 /// to 16 000 vehicles, whatever the length of the run.
 ///
-/// A course is a [`Recorder`]: it can watch a run as it is flown, or [`Course::read`] a recording.
+/// A course is a [`Sink`]: it can watch a run as it is flown, or [`Course::read`] a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Course {
     vehicles: usize,
@@ -188,7 +188,7 @@ impl Course {
     }
 }
 
-impl Recorder for Course {
+impl Sink for Course {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.observe(sample);
         Ok(())

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::LawError;
+use super::error::LawError;
 
 /// The separation that a law guarantees from a given start, or why it guarantees none.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,15 +1,55 @@
 //! The edge-tension law (8): vehicles joined by an edge are pulled to their desired distance and never let closer than
 //! delta.
 
+use serde::{Deserialize, Serialize};
+
 use super::certificate::{Certificate, Void};
-use super::kernel::Kernel;
-use super::{
-    EdgeTension, Law, LawError, ParameterError, add_laplacian_product, check_count, check_range, check_state,
+use super::consensus::{
+    add_heard, add_laplacian_product, check_count, check_observation, check_range, check_state, consensus_margin,
     relative_kinetic_energy,
 };
+use super::error::{LawError, ParameterError};
+use super::interface::{Controls, Law, VelocityMargin};
+use super::kernel::Kernel;
+use super::setting::{Gain, Setting};
+use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Graph;
+use crate::observation::Observation;
 use crate::swarm::{Pair, Rows, Swarm, separation};
+
+/// Keys of `[law]` with `kind = "edge-tension"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EdgeTensionKeys {
+    /// Scale of the tension in m^2/s^2.
+    #[serde(default = "one")]
+    pub alpha: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Default for EdgeTensionKeys {
+    fn default() -> Self {
+        Self { alpha: one() }
+    }
+}
+
+impl EdgeTensionKeys {
+    /// No key follows from others.
+    pub(super) fn complete(&mut self, _a22_per_s: f64) {}
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        vec![Gain::positive("law.alpha", "alpha", self.alpha)]
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<EdgeTensionLaw, ParameterError> {
+        let &Setting { links, formation, delta_m, a22_per_s } = setting;
+        EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })
+    }
+}
 
 /// Parameters of [`EdgeTensionLaw`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +90,8 @@ pub struct EdgeTensionLaw {
     kernel: Kernel,
     /// The tension of the edge with the smallest desired distance.
     tightest: Option<EdgeTension>,
+    /// That of the target whose distances are desired.
+    revision: u64,
 }
 
 impl EdgeTensionLaw {
@@ -67,26 +109,72 @@ impl EdgeTensionLaw {
         let mut inverse_k_per_m = Vec::new();
         let edges = graph.edge_count();
         inverse_k_per_m.try_reserve_exact(edges).map_err(|_| ParameterError::Memory { edges })?;
-        let mut tightest: Option<EdgeTension> = None;
-        for (i, j) in graph.edges() {
-            let tension = EdgeTension::new(parameters.alpha, parameters.delta_m, formation.desired_distance(i, j))
-                .map_err(|source| ParameterError::Tension { pair: Pair::new(i, j), source })?;
-            inverse_k_per_m.push(1.0 / tension.k_m());
-            if tightest.is_none_or(|best| tension.rest_m() < best.rest_m()) {
-                tightest = Some(tension);
+        inverse_k_per_m.resize(edges, f64::NAN);
+        let mut law = Self {
+            graph: graph.clone(),
+            formation: formation.clone(),
+            parameters,
+            kernel: Kernel::new(graph, parameters.delta_m, inverse_k_per_m),
+            tightest: None,
+            revision: 0,
+        };
+        law.set_rest_lengths().map_err(|(pair, source)| ParameterError::Tension { pair, source })?;
+        Ok(law)
+    }
+
+    /// Takes the tension of each edge from the formation; the first edge that has none is the error.
+    fn set_rest_lengths(&mut self) -> Result<(), (Pair, TensionError)> {
+        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        self.tightest = None;
+        for ((i, j), inverse_k_per_m) in self.graph.edges().zip(self.kernel.inverse_k_per_m_mut()) {
+            let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))
+                .map_err(|source| (Pair::new(i, j), source))?;
+            *inverse_k_per_m = 1.0 / tension.k_m();
+            if self.tightest.is_none_or(|best| tension.rest_m() < best.rest_m()) {
+                self.tightest = Some(tension);
             }
         }
-        let kernel = Kernel::new(graph, parameters.delta_m, inverse_k_per_m);
-        Ok(Self { graph: graph.clone(), formation: formation.clone(), parameters, kernel, tightest })
+        Ok(())
+    }
+
+    /// Follows a target whose distances have changed: O(edges), and nothing where they have not.
+    fn follow(&mut self, at: &Observation<'_>) -> Result<(), LawError> {
+        if at.target.revision == self.revision {
+            return Ok(());
+        }
+        check_count(self.graph.count(), at.target.formation.count())?;
+        self.formation.slots_m.copy_from(&at.target.formation.slots_m);
+        self.set_rest_lengths().map_err(|(pair, _)| LawError::Target {
+            pair,
+            distance_m: self.formation.desired_distance(pair.first(), pair.second()),
+            delta_m: self.parameters.delta_m,
+        })?;
+        self.revision = at.target.revision;
+        Ok(())
+    }
+
+    /// Adds `w_ij (p_i - p_j) / alpha` over what each vehicle heard of its neighbours.
+    fn add_heard_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        add_heard(at, command, |i, own, j, heard| {
+            let edge_m = own.position_m - heard.position_m;
+            let separation_m = edge_m.norm();
+            if separation_m <= delta_m {
+                return Err(LawError::Collision { pair: Pair::new(i, j), separation_m, delta_m });
+            }
+            let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j));
+            let slope = tension.map_or(f64::NAN, |tension| tension.derivative(separation_m));
+            Ok(edge_m * (slope / (alpha * separation_m)))
+        })
     }
 
     /// The same control from the weighted Laplacian, equation (9): `U = -(1/N) [L_w(P) P + (1 + a22) L_G V]` with
     /// `w_ij = V'_ij(l_ij)/l_ij`, N x 3 \[m/s^2\].
     ///
-    /// Equal to [`Law::control`] to rounding, and there to check it: it takes O(N^2) memory and O(N^3) time.
+    /// Equal to [`Law::command`] to rounding, and there to check it: it takes O(N^2) memory and O(N^3) time.
     ///
     /// # Errors
-    /// As [`Law::control`].
+    /// As [`Law::command`].
     pub fn matrix_form(&self, swarm: &Swarm) -> Result<Rows, LawError> {
         check_state(self.graph.count(), swarm)?;
         let EdgeTensionParameters { alpha, delta_m, a22_per_s } = self.parameters;
@@ -127,24 +215,51 @@ impl Law for EdgeTensionLaw {
         "edge-tension"
     }
 
-    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-        check_state(self.graph.count(), swarm)?;
-        check_count(self.graph.count(), control.nrows())?;
-        control.fill(0.0);
-        self.kernel.add_pulls(&swarm.positions_m, control).map_err(|_| self.fault(swarm))?;
-        let per_vehicle = -1.0 / swarm.count().max(1) as f64;
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), at, command)?;
+        self.follow(at)?;
+        command.fill(0.0);
+        let per_vehicle = -1.0 / at.own.count().max(1) as f64;
         let EdgeTensionParameters { alpha, a22_per_s, .. } = self.parameters;
-        *control *= alpha * per_vehicle;
-        add_laplacian_product(&self.graph, &swarm.velocities_m_s, (1.0 + a22_per_s) * per_vehicle, control);
-        check_range(control)
+        let velocity_gain = (1.0 + a22_per_s) * per_vehicle;
+        if let Some(swarm) = at.shared() {
+            self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
+            *command *= alpha * per_vehicle;
+            add_laplacian_product(&self.graph, &swarm.velocities_m_s, velocity_gain, command);
+        } else {
+            self.add_heard_pulls(at, command)?;
+            *command *= alpha * per_vehicle;
+            add_heard(at, command, |_, own, _, heard| Ok(velocity_gain * (own.velocity_m_s - heard.velocity_m_s)))?;
+        }
+        check_range(command)
     }
 
-    fn energy(&self, swarm: &Swarm) -> Option<f64> {
-        self.try_energy(swarm).ok()
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        self.try_energy(at.own).ok()
     }
 
     fn barrier_m(&self) -> Option<f64> {
         Some(self.parameters.delta_m)
+    }
+
+    fn controls(&self) -> Controls {
+        Controls::Distances
+    }
+
+    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
+    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
+    /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at `nearest_m` of the pair with
+    /// the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
+    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
+    /// largest eigenvalue is at most V''max: omega^2 <= V''max. On the complete graph relative velocities decay at the
+    /// rate 1/s, so the fastest rate is max(omega, 1/s).
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
+        Some(self.tightest?.second_derivative(nearest_m?).sqrt().max(1.0))
+    }
+
+    fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
+        let gain_per_s = 1.0 + self.parameters.a22_per_s;
+        Some(consensus_margin(self.graph.count(), gain_per_s, connectivity, a22_per_s))
     }
 
     /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair, for ever. In s = (l - delta)/K all tensions are
@@ -153,8 +268,8 @@ impl Law for EdgeTensionLaw {
     ///
     /// The promise is that of the proof: exact state, no delay, no saturation, no disturbance, continuous time.
     /// Without pairs there is nothing to promise, and nothing void either.
-    fn certificate(&self, start: &Swarm) -> Certificate {
-        let energy = self.try_energy(start);
+    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+        let energy = self.try_energy(start.own);
         let mut void = Vec::new();
         if !self.graph.is_complete() {
             void.push(Void::GraphNotComplete);
@@ -165,7 +280,7 @@ impl Law for EdgeTensionLaw {
         let energy_initial = energy.ok();
         let certified_m = match (energy_initial, self.tightest) {
             (Some(energy), Some(tension)) if void.is_empty() => {
-                Some(tension.push_side_root(start.count() as f64 * energy))
+                Some(tension.push_side_root(start.own.count() as f64 * energy))
             }
             _ => None,
         };

@@ -54,6 +54,11 @@ impl Kernel {
         Self { delta_m, edges, inverse_k_per_m, arch: pulp::Arch::new() }
     }
 
+    /// 1/K of each edge in row order \[1/m\].
+    pub(super) fn inverse_k_per_m_mut(&mut self) -> &mut [f64] {
+        &mut self.inverse_k_per_m
+    }
+
     /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
     /// Both tables have a row for each vehicle of the graph.
     pub(super) fn add_pulls(&self, positions_m: &Rows, sums: &mut Rows) -> Result<(), OutOfDomain> {

@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use crate::formation::{affine_dimension, closest_pair};
 use crate::graph::Graph;
-use crate::law::{Certificate, EdgeTension, ParameterError};
-use crate::scenario::{LawSpec, PlantSpec, Precision, Scenario, Space};
+use crate::law::{Controls, Law, ParameterError};
+use crate::scenario::{PlantSpec, Precision, Scenario, Space};
 use crate::swarm::{Rows, Swarm, row, set_row};
 
 pub use rigidity::{MOST_RANKED, RANK_TOLERANCE, Rigidity};
@@ -125,22 +125,15 @@ impl Preflight {
     /// connected graph.
     ///
     /// # The longest step
-    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
-    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
-    /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at the certified separation of
-    /// the pair with the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
-    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
-    /// largest eigenvalue on the complete graph is V''max: omega^2 <= V''max. Relative velocities decay at the rate 1/s
-    /// there, so the fastest rate is max(omega, 1/s) and the step [`STEP_PER_MODE`] of its inverse.
-    ///
-    /// The Laplacian law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues
-    /// 0 <= mu <= N of `L_G` have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
+    /// [`STEP_PER_MODE`] of the inverse of the fastest rate that the law can have while no pair comes nearer than its
+    /// certificate says, see [`Law::fastest_rate_per_s`].
     ///
     /// # Errors
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
-        let certificate = scenario.law()?.certificate(&scenario.start);
-        let formation_dimension = scenario.formation.affine_dimension(FLATNESS);
+        let law = scenario.law()?;
+        let certificate = law.certificate(&scenario.observation(&scenario.start));
+        let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = connectivity(&scenario.graph);
         let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
@@ -149,23 +142,26 @@ impl Preflight {
             dimensions: dimensions(scenario.space),
             delta_m: scenario.delta_m,
             algebraic_connectivity: connectivity,
-            velocity_margin_per_s: connectivity.map(|lambda2| velocity_margin(scenario, lambda2)),
-            common_mode_rate_per_s: scenario.a22_per_s,
+            velocity_margin_per_s: connectivity
+                .and_then(|lambda2| Some(law.velocity_margin(lambda2, scenario.a22_per_s)?.per_s)),
+            common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.a22_per_s),
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             dt_s: scenario.time.dt_s,
-            dt_max_s: dt_max_s(scenario, &certificate),
+            dt_max_s: law
+                .fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s)
+                .map(|rate_per_s| STEP_PER_MODE / rate_per_s),
             start_dimension: motion_dimension(&scenario.start),
             start_margin_m: margin(&scenario.start.positions_m),
             formation_dimension,
-            formation_margin_m: margin(&scenario.formation.slots_m),
-            rigidity: Rigidity::of(&scenario.formation, &scenario.graph, dimensions(scenario.space)),
+            formation_margin_m: margin(&scenario.formation().slots_m),
+            rigidity: Rigidity::of(scenario.formation(), &scenario.graph, dimensions(scenario.space)),
             warnings: Vec::new(),
-            controls_distances: controls_distances(scenario),
+            controls_distances: law.controls() == Controls::Distances,
         };
         let warnings = [
-            found.relative_velocity_unstable(scenario),
+            found.relative_velocity_unstable(law.as_ref(), scenario),
             found.start_too_flat(),
             found.no_certificate(),
             found.not_rigid(scenario),
@@ -183,20 +179,18 @@ impl Preflight {
         self.warnings.iter().any(|warning| warning.code.refuses())
     }
 
-    fn relative_velocity_unstable(&self, scenario: &Scenario) -> Option<Warning> {
-        let rounding_per_s = MARGIN_ROUNDING * (velocity_gain(scenario).abs() + scenario.a22_per_s.abs());
+    fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<Warning> {
         // Fiedler: lambda2 is at most N/(N - 1) times the smallest degree.
-        let most = |graph: &Graph| {
-            let count = graph.count() as f64;
-            velocity_margin(scenario, smallest_degree(graph) as f64 * count / (count - 1.0).max(1.0))
-        };
-        let margin_per_s = self.velocity_margin_per_s.unwrap_or_else(|| most(&scenario.graph));
-        (margin_per_s <= rounding_per_s).then(|| Warning {
+        let count = self.vehicles as f64;
+        let most = || smallest_degree(&scenario.graph) as f64 * count / (count - 1.0).max(1.0);
+        let connectivity = self.algebraic_connectivity.unwrap_or_else(most);
+        let margin = law.velocity_margin(connectivity, scenario.a22_per_s)?;
+        (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| Warning {
             code: Code::RelativeVelocityUnstable,
             message: format!(
                 "Relative velocities are not damped: their margin is {} 1/s and must be positive. Add edges to the graph, \
                  or reduce swarm.a22_per_s.",
-                words::rate(margin_per_s)
+                words::rate(margin.per_s)
             ),
         })
     }
@@ -299,31 +293,8 @@ fn dimensions(space: Space) -> usize {
     }
 }
 
-/// Whether the law acts along the lines between vehicles and knows nothing but distances.
-fn controls_distances(scenario: &Scenario) -> bool {
-    match scenario.law {
-        LawSpec::EdgeTension { .. } => true,
-        LawSpec::Laplacian { .. } => false,
-    }
-}
-
 fn connectivity(graph: &Graph) -> Option<f64> {
     (graph.is_complete() || graph.count() <= MOST_CONNECTED).then(|| graph.algebraic_connectivity())
-}
-
-fn velocity_gain(scenario: &Scenario) -> f64 {
-    match scenario.law {
-        LawSpec::EdgeTension { .. } => 1.0 + scenario.a22_per_s,
-        LawSpec::Laplacian { f2_per_s, .. } => f2_per_s,
-    }
-}
-
-fn velocity_margin(scenario: &Scenario, lambda2: f64) -> f64 {
-    let count = scenario.count().max(1) as f64;
-    let gain = velocity_gain(scenario);
-    // No eigenvalue exceeds N: where the gain is negative that is the worst mode.
-    let worst = if gain < 0.0 { count } else { lambda2 };
-    gain * (worst / count) - scenario.a22_per_s
 }
 
 fn smallest_degree(graph: &Graph) -> usize {
@@ -333,22 +304,6 @@ fn smallest_degree(graph: &Graph) -> usize {
         degrees[j] += 1;
     }
     degrees.into_iter().min().unwrap_or(0)
-}
-
-/// See [`Preflight::of`].
-fn dt_max_s(scenario: &Scenario, certificate: &Certificate) -> Option<f64> {
-    let fastest_per_s = match scenario.law {
-        LawSpec::EdgeTension { alpha } => {
-            let (_, tightest_m) = scenario.formation.min_distance()?;
-            let tension = EdgeTension::new(alpha, scenario.delta_m, tightest_m).ok()?;
-            tension.second_derivative(certificate.certified_m?).sqrt().max(1.0)
-        }
-        LawSpec::Laplacian { f1_per_s2, f2_per_s } => {
-            let a22_per_s = scenario.a22_per_s;
-            f1_per_s2.sqrt().max((f2_per_s - a22_per_s).abs()).max(a22_per_s.abs())
-        }
-    };
-    Some(STEP_PER_MODE / fastest_per_s)
 }
 
 /// Dimension of the flat, moving with the swarm's mean velocity, that forces along the lines between vehicles never

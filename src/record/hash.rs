@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use super::{Event, RecordError, Recorder, Sample};
+use super::{Event, RecordError, Sample, Sink};
 use crate::swarm::Rows;
 
 /// SHA-256 over the bits of every recorded state.
@@ -42,7 +42,7 @@ impl StateHash {
     }
 }
 
-impl Recorder for StateHash {
+impl Sink for StateHash {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.observe(sample);
         Ok(())

@@ -125,6 +125,13 @@ pub enum Event {
         /// Smallest separation within \[m\].
         min_m: f64,
     },
+    /// A leg of the flight began; the first begins with the flight and is not told.
+    LegBegan {
+        /// The leg, from 0.
+        leg: usize,
+        /// When \[s\].
+        time_s: f64,
+    },
     /// The engine's own collision detection saw two keep-out balls overlap for the first time.
     EngineContact {
         /// The pair.
@@ -156,6 +163,7 @@ impl Event {
         match *self {
             Self::ViolationBegan { time_s, .. }
             | Self::ViolationEnded { time_s, .. }
+            | Self::LegBegan { time_s, .. }
             | Self::EngineContact { time_s, .. }
             | Self::StepRefined { time_s, .. }
             | Self::EndedEarly { time_s, .. } => time_s,
@@ -164,7 +172,7 @@ impl Event {
 }
 
 /// Receives a run as it is made.
-pub trait Recorder {
+pub trait Sink {
     /// Takes one sample.
     ///
     /// # Errors
@@ -179,7 +187,7 @@ pub trait Recorder {
 }
 
 /// Keeps nothing.
-impl Recorder for () {
+impl Sink for () {
     fn sample(&mut self, _sample: &Sample<'_>) -> Result<(), RecordError> {
         Ok(())
     }
@@ -189,7 +197,7 @@ impl Recorder for () {
     }
 }
 
-impl<R: Recorder + ?Sized> Recorder for &mut R {
+impl<R: Sink + ?Sized> Sink for &mut R {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         (**self).sample(sample)
     }
@@ -200,7 +208,7 @@ impl<R: Recorder + ?Sized> Recorder for &mut R {
 }
 
 /// Gives everything to the first, then to the second; stops at the first error.
-impl<A: Recorder, B: Recorder> Recorder for (A, B) {
+impl<A: Sink, B: Sink> Sink for (A, B) {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.0.sample(sample)?;
         self.1.sample(sample)

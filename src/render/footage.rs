@@ -8,9 +8,10 @@ use std::path::Path;
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::law::EdgeTension;
+use crate::law::{EdgeTensionKeys, LawSpec};
 use crate::record::mcap::{Entry, McapRecording};
-use crate::record::{Event, RecordError, Recorder, Sample};
-use crate::scenario::{LawSpec, Scenario, Source};
+use crate::record::{Event, RecordError, Sample, Sink};
+use crate::scenario::{Scenario, Source};
 use crate::swarm::{ClosestApproach, Pair, Rows, separation};
 use stretch::Stretch;
 pub use tracks::TracksError;
@@ -29,7 +30,7 @@ const COORDINATE: &str = "coordinate";
 
 /// A flight in memory: instants in order of time, and what is known about it.
 ///
-/// It is a [`Recorder`] and can watch a flight as it is flown. What goes beyond [`BUDGET_BYTES`] is thinned: pictures are
+/// It is a [`Sink`] and can watch a flight as it is flown. What goes beyond [`BUDGET_BYTES`] is thinned: pictures are
 /// then drawn from every second, fourth, ... sample and the last one; the closest approach stays that of all.
 #[derive(Clone, Debug)]
 pub struct Footage {
@@ -170,7 +171,7 @@ impl Plan {
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         Self {
-            formation: scenario.formation.clone(),
+            formation: scenario.formation().clone(),
             graph: scenario.graph.clone(),
             law: scenario.law.clone(),
             delta_m: scenario.delta_m,
@@ -207,7 +208,7 @@ impl Plan {
 
     /// Alpha \[m^2/s^2\] and the tension of an edge, where the law has one.
     fn edge_tension(&self, pair: Pair) -> Option<(f64, EdgeTension)> {
-        let LawSpec::EdgeTension { alpha } = self.law else { return None };
+        let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = self.law else { return None };
         let rest_m = self.formation.desired_distance(pair.first(), pair.second());
         Some((alpha, EdgeTension::new(alpha, self.delta_m, rest_m).ok()?))
     }
@@ -461,7 +462,7 @@ impl Footage {
     }
 }
 
-impl Recorder for Footage {
+impl Sink for Footage {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.take(sample);
         Ok(())

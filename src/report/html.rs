@@ -173,7 +173,7 @@ impl Report {
         } else {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
         };
-        let (time, judge) = (&scenario.time, &scenario.judge);
+        let (time, judge) = (&scenario.time, &scenario.arrival);
         let (plant, command) = match scenario.plant {
             PlantSpec::Rapier(precision) => (
                 format!(

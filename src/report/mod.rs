@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::audit::{self, AuditOutcome};
 use crate::law::Certificate;
 use crate::metrics::Summary;
-use crate::scenario::JudgeSpec;
+use crate::target::Arrival;
 
 /// Version of the keys: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -37,7 +37,7 @@ pub struct Findings<'a> {
     /// Safety distance delta that was judged by \[m\].
     pub delta_m: f64,
     /// What counted as reached.
-    pub judge: JudgeSpec,
+    pub judge: Arrival,
     /// Dimension of the flat that the start never leaves, where the formation does not fit into it: 0 point, 1 line,
     /// 2 plane.
     pub trap_dimension: Option<usize>,

@@ -6,7 +6,7 @@ use crate::law::Void;
 use crate::swarm::Rows;
 
 const DELTA_M: f64 = 2.0;
-const JUDGE: JudgeSpec = JudgeSpec { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
+const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
 
 /// Two vehicles that pass each other at `miss_m` between 0 and 1 s, as the judge sees it.
 fn passing(miss_m: f64) -> AuditOutcome {

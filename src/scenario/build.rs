@@ -12,10 +12,12 @@ use super::file::{
     PrecisionFile, ScenarioFile, StartFile, StartShape,
 };
 use super::validate::{check_count, check_memory, pair_count, positive};
-use super::{JudgeSpec, LawSpec, PlantSpec, Precision, Scenario, Space, TimeSpec, start};
+use super::{PlantSpec, Precision, Scenario, Space, TimeSpec, start};
 use crate::formation::Formation;
 use crate::graph::{Graph, GraphError};
+use crate::law::{EdgeTensionKeys, LaplacianKeys, LawSpec};
 use crate::swarm::{Rows, Swarm, set_row};
+use crate::target::{Arrival, Leg};
 
 /// Slots of the pentagon.
 const PENTAGON_COUNT: usize = 5;
@@ -33,7 +35,7 @@ pub(super) fn scenario(file: ScenarioFile) -> Result<Scenario, ScenarioError> {
         mass_kg: per_vehicle(file.swarm.mass_kg, count),
         hull_radius_m: per_vehicle(file.swarm.hull_radius_m, count),
         a22_per_s: file.swarm.a22_per_s,
-        formation: formation(&file.formation, count)?,
+        legs: vec![Leg::first(formation(&file.formation, count)?)],
         graph: graph(&file.graph.kind, count)?,
         plant: plant(&file.plant),
         time: TimeSpec {
@@ -42,7 +44,7 @@ pub(super) fn scenario(file: ScenarioFile) -> Result<Scenario, ScenarioError> {
             record_hz: file.time.record_hz,
             max_halvings: file.time.max_halvings,
         },
-        judge: JudgeSpec {
+        arrival: Arrival {
             edge_error_m: file.judge.edge_error_m,
             disagreement_m_s: file.judge.disagreement_m_s,
             hold_s: file.judge.hold_s,
@@ -162,12 +164,11 @@ fn formation(file: &FormationFile, count: usize) -> Result<Formation, ScenarioEr
 }
 
 fn law(file: &LawFile, a22_per_s: f64) -> (f64, LawSpec) {
-    let law = match file.kind {
-        LawKind::EdgeTension { alpha } => LawSpec::EdgeTension { alpha },
-        LawKind::Laplacian { f1_per_s2, f2_per_s } => {
-            LawSpec::Laplacian { f1_per_s2, f2_per_s: f2_per_s.unwrap_or(1.0 + a22_per_s) }
-        }
+    let mut law = match file.kind {
+        LawKind::EdgeTension { alpha } => LawSpec::EdgeTension(EdgeTensionKeys { alpha }),
+        LawKind::Laplacian { f1_per_s2, f2_per_s } => LawSpec::Laplacian(LaplacianKeys { f1_per_s2, f2_per_s }),
     };
+    law.complete(a22_per_s);
     (file.delta_m, law)
 }
 

@@ -10,7 +10,8 @@ use schemars::JsonSchema;
 use serde::de::{SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::{JudgeSpec, TimeSpec};
+use super::TimeSpec;
+use crate::target::Arrival;
 
 /// Default mass of a vehicle in kg.
 pub const DEFAULT_MASS_KG: f64 = 1.0;
@@ -375,7 +376,7 @@ impl Default for GraphFile {
 
 impl Default for JudgeFile {
     fn default() -> Self {
-        let JudgeSpec { edge_error_m, disagreement_m_s, hold_s } = JudgeSpec::default();
+        let Arrival { edge_error_m, disagreement_m_s, hold_s } = Arrival::default();
         Self { edge_error_m, disagreement_m_s, hold_s }
     }
 }

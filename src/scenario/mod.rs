@@ -28,8 +28,10 @@ pub use validate::{
 
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::law::{EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, ParameterError};
+use crate::law::{EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
+use crate::observation::Observation;
 use crate::swarm::Swarm;
+use crate::target::{Arrival, Leg};
 
 /// A complete flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,8 +48,9 @@ pub struct Scenario {
     pub hull_radius_m: Vec<f64>,
     /// Velocity coefficient a22 of the plant \[1/s\], equation (1): negative is drag, positive feeds energy in.
     pub a22_per_s: f64,
-    /// The slots to be reached, up to a rigid motion for laws that control distances only.
-    pub formation: Formation,
+    /// The formations to be reached, one after the other and at least one, up to a rigid motion for laws that control
+    /// distances only.
+    pub legs: Vec<Leg>,
     /// Which vehicles sense each other.
     pub graph: Graph,
     /// The control law and its parameters.
@@ -59,7 +62,7 @@ pub struct Scenario {
     /// Duration and rates.
     pub time: TimeSpec,
     /// What counts as reached.
-    pub judge: JudgeSpec,
+    pub arrival: Arrival,
 }
 
 /// The space that a swarm lives in.
@@ -69,23 +72,6 @@ pub enum Space {
     Plane,
     /// All three axes.
     Volume,
-}
-
-/// Which law flies, with its parameters.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LawSpec {
-    /// The edge-tension law (8).
-    EdgeTension {
-        /// Scale alpha of the tension \[m^2/s^2\].
-        alpha: f64,
-    },
-    /// The Laplacian baseline (3).
-    Laplacian {
-        /// Position gain f1 \[1/s^2\].
-        f1_per_s2: f64,
-        /// Velocity gain f2 \[1/s\].
-        f2_per_s: f64,
-    },
 }
 
 /// Which plant flies.
@@ -160,23 +146,6 @@ impl TimeSpec {
     }
 }
 
-/// What counts as a reached formation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JudgeSpec {
-    /// Largest error of a desired distance over the graph's edges \[m\].
-    pub edge_error_m: f64,
-    /// Largest speed relative to the swarm's mean velocity \[m/s\].
-    pub disagreement_m_s: f64,
-    /// Shortest time for which both must hold, up to the end of the run \[s\].
-    pub hold_s: f64,
-}
-
-impl Default for JudgeSpec {
-    fn default() -> Self {
-        Self { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 }
-    }
-}
-
 impl Scenario {
     /// A flight with every default of the scenario file: the edge-tension law on the complete graph, in the plane if
     /// start and formation lie in it. Change the fields as needed, then [`Scenario::validate`].
@@ -192,13 +161,13 @@ impl Scenario {
             hull_radius_m: vec![file::DEFAULT_HULL_RADIUS_M; count],
             a22_per_s: 0.0,
             graph: Graph::complete(count),
-            law: LawSpec::EdgeTension { alpha: file::DEFAULT_ALPHA },
+            law: LawSpec::EdgeTension(EdgeTensionKeys::default()),
             delta_m,
             plant: PlantSpec::Rapier(Precision::Single),
             time: TimeSpec::lasting(duration_s),
-            judge: JudgeSpec::default(),
+            arrival: Arrival::default(),
             start,
-            formation,
+            legs: vec![Leg::first(formation)],
         }
     }
 
@@ -208,22 +177,29 @@ impl Scenario {
         self.start.count()
     }
 
+    /// The formation of the first leg.
+    ///
+    /// # Panics
+    /// Without a leg, which a validated scenario has.
+    #[must_use]
+    pub fn formation(&self) -> &Formation {
+        &self.legs[0].formation
+    }
+
     /// The law that this scenario asks for, ready to fly.
     ///
     /// # Errors
     /// [`ParameterError`] when the law does not exist for these parameters, which a validated scenario rules out, or
     /// its memory cannot be had.
     pub fn law(&self) -> Result<Box<dyn Law>, ParameterError> {
-        let (graph, formation) = (&self.graph, &self.formation);
-        Ok(match self.law {
-            LawSpec::EdgeTension { alpha } => {
-                let parameters = EdgeTensionParameters { alpha, delta_m: self.delta_m, a22_per_s: self.a22_per_s };
-                Box::new(EdgeTensionLaw::new(graph, formation, parameters)?)
-            }
-            LawSpec::Laplacian { f1_per_s2, f2_per_s } => {
-                Box::new(LaplacianLaw::new(graph, formation, f1_per_s2, f2_per_s)?)
-            }
-        })
+        let (links, formation) = (&self.graph, self.formation());
+        self.law.build(&Setting { links, formation, delta_m: self.delta_m, a22_per_s: self.a22_per_s })
+    }
+
+    /// What a law is told of a true state on the first leg, by sensors and radio without fault.
+    #[must_use]
+    pub fn observation<'a>(&'a self, swarm: &'a Swarm) -> Observation<'a> {
+        Observation::exact(swarm, &self.graph, self.formation())
     }
 }
 

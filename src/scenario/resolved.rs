@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use super::{LawSpec, PlantSpec, Precision, Scenario, Space};
+use super::{PlantSpec, Precision, Scenario, Space};
+use crate::law::LawSpec;
 use crate::swarm::Rows;
 
 impl Scenario {
@@ -45,14 +46,15 @@ impl Scenario {
         self.write_rows(out, "velocities_m_s", &self.start.velocities_m_s)?;
 
         writeln!(out, "\n[formation]\nshape = \"points\"")?;
-        self.write_rows(out, "points_m", &self.formation.slots_m)?;
+        self.write_rows(out, "points_m", &self.formation().slots_m)?;
 
         writeln!(out, "\n[law]")?;
-        match self.law {
-            LawSpec::EdgeTension { alpha } => writeln!(out, "kind = \"edge-tension\"\nalpha = {}", number(alpha))?,
-            LawSpec::Laplacian { f1_per_s2, f2_per_s } => {
+        match &self.law {
+            LawSpec::EdgeTension(keys) => writeln!(out, "kind = \"edge-tension\"\nalpha = {}", number(keys.alpha))?,
+            LawSpec::Laplacian(keys) => {
                 writeln!(out, "kind = \"laplacian\"")?;
-                writeln!(out, "f1_per_s2 = {}\nf2_per_s = {}", number(f1_per_s2), number(f2_per_s))?;
+                let f2_per_s = keys.f2_per_s.unwrap_or(1.0 + self.a22_per_s);
+                writeln!(out, "f1_per_s2 = {}\nf2_per_s = {}", number(keys.f1_per_s2), number(f2_per_s))?;
             }
         }
         writeln!(out, "delta_m = {}", number(self.delta_m))?;
@@ -87,9 +89,9 @@ impl Scenario {
         writeln!(out, "max_halvings = {}", self.time.max_halvings)?;
 
         writeln!(out, "\n[judge]")?;
-        writeln!(out, "edge_error_m = {}", number(self.judge.edge_error_m))?;
-        writeln!(out, "disagreement_m_s = {}", number(self.judge.disagreement_m_s))?;
-        writeln!(out, "hold_s = {}", number(self.judge.hold_s))
+        writeln!(out, "edge_error_m = {}", number(self.arrival.edge_error_m))?;
+        writeln!(out, "disagreement_m_s = {}", number(self.arrival.disagreement_m_s))?;
+        writeln!(out, "hold_s = {}", number(self.arrival.hold_s))
     }
 
     fn write_rows(&self, out: &mut String, key: &str, rows: &Rows) -> std::fmt::Result {

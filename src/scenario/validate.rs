@@ -4,8 +4,9 @@ use std::fmt::Display;
 
 use super::error::ScenarioError;
 use super::neighbours::Spaced;
-use super::{LawSpec, PlantSpec, Precision, Scenario, Space, TimeSpec};
+use super::{PlantSpec, Precision, Scenario, Space, TimeSpec};
 use crate::graph::Graph;
+use crate::law::Gain;
 use crate::swarm::{Pair, Rows, mean_row, row};
 
 /// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such
@@ -82,7 +83,7 @@ impl Scenario {
     }
 
     fn check_judge(&self) -> Result<(), ScenarioError> {
-        let (judge, time) = (self.judge, self.time);
+        let (judge, time) = (self.arrival, self.time);
         positive("judge.edge_error_m", "the edge error", judge.edge_error_m)?;
         positive("judge.disagreement_m_s", "the disagreement", judge.disagreement_m_s)?;
         at_least_zero("judge.hold_s", "the hold time", judge.hold_s)?;
@@ -118,9 +119,9 @@ impl Scenario {
                 .at("plant.precision"))
         };
         let (dt_s, half_ulp) = (self.time.dt_s, 0.5 * f64::from(f32::EPSILON));
-        let extent_m = extent_m(&self.start.positions_m).max(extent_m(&self.formation.slots_m));
+        let extent_m = extent_m(&self.start.positions_m).max(extent_m(&self.formation().slots_m));
         let stalled_m_s = half_ulp * extent_m / dt_s;
-        if stalled_m_s > self.judge.disagreement_m_s {
+        if stalled_m_s > self.arrival.disagreement_m_s {
             return refuse(format!(
                 "in single precision, {extent_m:.3e} m from the middle of the swarm and in steps of {dt_s} s, a vehicle \
                  slower than {stalled_m_s:.1e} m/s does not move"
@@ -147,7 +148,7 @@ impl Scenario {
         let count = self.count();
         let lengths = [
             ("start.velocities_m_s", "start velocities", self.start.velocities_m_s.nrows()),
-            ("formation.points_m", "slots in the formation", self.formation.count()),
+            ("formation.points_m", "slots in the formation", self.formation().count()),
             ("swarm.mass_kg", "masses", self.mass_kg.len()),
             ("swarm.hull_radius_m", "hull radii", self.hull_radius_m.len()),
             ("graph.edges", "vehicles in the graph", self.graph.count()),
@@ -162,13 +163,10 @@ impl Scenario {
 
     fn check_law(&self) -> Result<(), ScenarioError> {
         positive("law.delta_m", "the safety distance delta", self.delta_m)?;
-        match self.law {
-            LawSpec::EdgeTension { alpha } => positive("law.alpha", "alpha", alpha).map(drop),
-            LawSpec::Laplacian { f1_per_s2, f2_per_s } => {
-                positive("law.f1_per_s2", "the gain f1", f1_per_s2)?;
-                at_least_zero("law.f2_per_s", "the gain f2", f2_per_s)
-            }
+        for Gain { key, name, value, may_be_zero } in self.law.gains() {
+            if may_be_zero { at_least_zero(key, name, value)? } else { positive(key, name, value).map(drop)? }
         }
+        Ok(())
     }
 
     fn check_vehicles(&self) -> Result<(), ScenarioError> {
@@ -188,7 +186,7 @@ impl Scenario {
         let tables = [
             ("start.positions_m", "the start position", &self.start.positions_m),
             ("start.velocities_m_s", "the start velocity", &self.start.velocities_m_s),
-            ("formation.points_m", "the slot", &self.formation.slots_m),
+            ("formation.points_m", "the slot", &self.formation().slots_m),
         ];
         for (key, what, rows) in tables {
             for i in 0..rows.nrows() {
@@ -226,7 +224,7 @@ impl Scenario {
                 .at_entry("start.positions_m", pair.first())
                 .at("law.delta_m"));
         }
-        if let Some((pair, distance_m)) = first_within(&self.formation.slots_m, delta_m * (1.0 + SLOT_MARGIN)) {
+        if let Some((pair, distance_m)) = first_within(&self.formation().slots_m, delta_m * (1.0 + SLOT_MARGIN)) {
             let [a, b] = pair.numbers();
             let said = if distance_m == 0.0 {
                 format!("the slots of vehicles {a} and {b} are the same point")

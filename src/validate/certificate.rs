@@ -7,10 +7,10 @@ use super::flights::{engine_to_any_end, times, with_step};
 use super::starts::{COUNTS, RandomStart, random_starts};
 use super::words::bound;
 use super::{Progress, ValidateError};
+use crate::continuous::{self, IdealError, Tolerances};
 use crate::formation::Formation;
-use crate::law::{EdgeTension, Law, ParameterError};
-use crate::plant::ideal::{self, IdealError, Tolerances};
-use crate::scenario::{LawSpec, Precision, Scenario};
+use crate::law::{EdgeTension, EdgeTensionKeys, Law, LawSpec, ParameterError};
+use crate::scenario::{Precision, Scenario};
 use crate::sim::Ending;
 use crate::swarm::{ClosestApproach, Swarm};
 
@@ -69,8 +69,8 @@ fn scenario(start: &RandomStart) -> Scenario {
 
 /// The longest step that resolves the tension at the certified separation.
 fn honest_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, ValidateError> {
-    let LawSpec::EdgeTension { alpha } = scenario.law else { return Ok(LONGEST_STEP_S) };
-    let Some((_, rest_m)) = scenario.formation.min_distance() else { return Ok(LONGEST_STEP_S) };
+    let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = scenario.law else { return Ok(LONGEST_STEP_S) };
+    let Some((_, rest_m)) = scenario.formation().min_distance() else { return Ok(LONGEST_STEP_S) };
     let stiffness = EdgeTension::new(alpha, scenario.delta_m, rest_m)?.second_derivative(certified_m);
     Ok(LONGEST_STEP_S.min(STIFF_SHARE / stiffness.sqrt()))
 }
@@ -86,27 +86,26 @@ fn fly(start: &RandomStart) -> Result<Trial, ValidateError> {
 /// solver its step, has no closest approach that keeps a promise.
 fn fly_under(start: &RandomStart, make_law: MakeLaw) -> Result<Trial, ValidateError> {
     let scenario = scenario(start);
-    let certificate = scenario.law()?.certificate(&scenario.start);
+    let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start));
     let certified_m = certificate.certified_m.unwrap_or(f64::NAN);
     let energy_initial = certificate.energy_initial.unwrap_or(f64::NAN);
     let mut law = make_law(&scenario)?;
     let looks_s = times(DURATION_S, LOOKS_HZ);
-    let (start, a22_per_s) = (&scenario.start, scenario.a22_per_s);
-    let (continuous_m, energy_rise) =
-        match ideal::solve(law.as_mut(), start, a22_per_s, &looks_s, Tolerances::default()) {
-            Ok(solution) => {
-                let energy = |state: &Swarm| law.energy(state).unwrap_or(f64::NAN);
-                let energies: Vec<f64> = solution.states.iter().map(energy).collect();
-                let rises = energies.windows(2).map(|pair| (pair[1] - pair[0]) / energy_initial);
-                (separation_m(solution.closest), rises.fold(0.0, larger))
-            }
-            Err(IdealError::Law { .. } | IdealError::Stalled { .. }) => (f64::NAN, f64::NAN),
-            Err(error) => return Err(error.into()),
-        };
+    let (continuous_m, energy_rise) = match continuous::solve(&scenario, law.as_mut(), &looks_s, Tolerances::default())
+    {
+        Ok(solution) => {
+            let energy = |state: &Swarm| law.energy(&scenario.observation(state)).unwrap_or(f64::NAN);
+            let energies: Vec<f64> = solution.states.iter().map(energy).collect();
+            let rises = energies.windows(2).map(|pair| (pair[1] - pair[0]) / energy_initial);
+            (separation_m(solution.closest), rises.fold(0.0, larger))
+        }
+        Err(IdealError::Law { .. } | IdealError::Stalled { .. }) => (f64::NAN, f64::NAN),
+        Err(error) => return Err(error.into()),
+    };
 
     let dt_s = honest_step_s(&scenario, certified_m)?;
     let (mut lowest, mut engine_energy_rise, mut engine_energy_excess) = (energy_initial, 0.0, 0.0);
-    let flight = engine_to_any_end(&with_step(&scenario, Precision::Double, dt_s), law.as_mut(), |sample| {
+    let flight = engine_to_any_end(&with_step(&scenario, Precision::Double, dt_s), law, |sample| {
         let energy = sample.energy.unwrap_or(f64::NAN);
         engine_energy_rise = larger(engine_energy_rise, (energy - lowest) / energy_initial);
         engine_energy_excess = larger(engine_energy_excess, (energy - energy_initial) / energy_initial);
@@ -149,10 +148,11 @@ fn head_on(speed_m_s: f64) -> Result<f64, ValidateError> {
     let mut swarm = Swarm::at_rest(Formation::line(2, 2.0 * DELTA_M).slots_m);
     (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (speed_m_s, -speed_m_s);
     let scenario = Scenario::new("head-on", swarm, Formation::line(2, 2.0 * DELTA_M), DELTA_M, 1.0);
-    let certified_m = scenario.law()?.certificate(&scenario.start).certified_m.unwrap_or(f64::NAN);
+    let certified_m =
+        scenario.law()?.certificate(&scenario.observation(&scenario.start)).certified_m.unwrap_or(f64::NAN);
     let mut law = scenario.law()?;
     let end_s = [scenario.time.duration_s];
-    let closest = ideal::solve(law.as_mut(), &scenario.start, 0.0, &end_s, Tolerances::default())?.closest;
+    let closest = continuous::solve(&scenario, law.as_mut(), &end_s, Tolerances::default())?.closest;
     let min_m = closest.map_or(f64::NAN, |closest| closest.separation_m);
     Ok((min_m - DELTA_M) / (certified_m - DELTA_M))
 }
@@ -335,11 +335,16 @@ mod tests {
         (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (5.0, -5.0);
         let mut scenario = Scenario::new("jump", swarm, Formation::line(2, 2.0), DELTA_M, 1.0);
         scenario.time.max_halvings = 0;
-        let certified_m = scenario.law().expect("a law").certificate(&scenario.start).certified_m.expect("a promise");
+        let certified_m = scenario
+            .law()
+            .expect("a law")
+            .certificate(&scenario.observation(&scenario.start))
+            .certified_m
+            .expect("a promise");
         let trial = |dt_s: f64| {
-            let mut law = scenario.law().expect("a law");
+            let law = scenario.law().expect("a law");
             let scenario = with_step(&scenario, Precision::Double, dt_s);
-            let flight = engine_to_any_end(&scenario, law.as_mut(), |_| ()).expect("a flight");
+            let flight = engine_to_any_end(&scenario, law, |_| ()).expect("a flight");
             let engine_m = flight.audit.closest.expect("two vehicles").separation_m;
             Trial { certified_m, engine_m, dt_s, ..GOOD }
         };
@@ -363,6 +368,7 @@ mod tests {
 
     /// The edge-tension law with the sign of its tension flipped: the tension turns with the positions, the damping does
     /// not.
+    #[derive(Clone)]
     struct Flipped(Box<dyn Law>, Swarm);
 
     impl Law for Flipped {
@@ -370,14 +376,14 @@ mod tests {
             "flipped"
         }
 
-        fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-            self.1.positions_m.copy_from(&-&swarm.positions_m);
-            self.1.velocities_m_s.copy_from(&swarm.velocities_m_s);
-            self.0.control(&self.1, control)
+        fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+            self.1.positions_m.copy_from(&-&at.own.positions_m);
+            self.1.velocities_m_s.copy_from(&at.own.velocities_m_s);
+            self.0.command(&Observation { own: &self.1, ..*at }, command)
         }
 
-        fn energy(&self, swarm: &Swarm) -> Option<f64> {
-            self.0.energy(swarm)
+        fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+            self.0.energy(at)
         }
     }
 

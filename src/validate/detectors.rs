@@ -38,7 +38,7 @@ pub(super) struct Flights {
 
 fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, ValidateError> {
     let scenario = builtin(name)?;
-    let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
     let mut course = Course::new();
     let flight = engine(&scenario, |sample| {
         metrics.observe(sample);

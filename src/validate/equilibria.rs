@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::claim::{Claim, Kind};
 use super::words::bound;
 use super::{Progress, ValidateError};
+use crate::continuous::{self, Tolerances};
 use crate::formation::{Formation, largest_edge_error_m};
-use crate::plant::ideal::{self, Tolerances};
 use crate::scenario::{Scenario, Space, offset, random, scatter};
 use crate::swarm::{Rows, Swarm, row, set_row};
 
@@ -63,10 +63,10 @@ fn rest(
 ) -> Result<Rest, ValidateError> {
     let scenario = Scenario::new("rest", Swarm::at_rest(start), formation.clone(), delta_m, duration_s);
     let mut law = scenario.law()?;
-    let solution = ideal::solve(law.as_mut(), &scenario.start, 0.0, &[duration_s], tolerances)?;
+    let solution = continuous::solve(&scenario, law.as_mut(), &[duration_s], tolerances)?;
     let mut control = Rows::zeros(scenario.count());
     let last = solution.states.last().unwrap_or(&scenario.start);
-    law.control(last, &mut control)?;
+    law.command(&scenario.observation(last), &mut control)?;
     Ok(Rest {
         edge_error_m: largest_edge_error_m(&last.positions_m, formation, &scenario.graph),
         pull_m_s2: (0..scenario.count()).map(|i| row(&control, i).norm()).fold(0.0, f64::max),
@@ -171,7 +171,7 @@ fn polygon(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
         let start = scatter(POLYGON_COUNT, space, extent_m, spacing_m, &mut random)?;
         let scenario = Scenario::new("polygon", Swarm::at_rest(start), formation.clone(), POLYGON_DELTA_M, 1.0);
         let mut law = scenario.law()?;
-        let states = ideal::solve(law.as_mut(), &scenario.start, 0.0, &POLYGON_TIMES_S, COARSE)?.states;
+        let states = continuous::solve(&scenario, law.as_mut(), &POLYGON_TIMES_S, COARSE)?.states;
         let error_m = |state: &Swarm| largest_edge_error_m(&state.positions_m, &formation, &scenario.graph);
         Ok(states.iter().map(|state| error_m(state) < REACHED_M).collect::<Vec<_>>())
     };

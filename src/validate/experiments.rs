@@ -7,8 +7,8 @@ use super::claim::{Claim, Kind};
 use super::flights::{builtin, continuous, reached_at_s, times};
 use super::words::bound;
 use super::{Progress, ValidateError};
+use crate::continuous::Solution;
 use crate::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
-use crate::plant::ideal::Solution;
 use crate::scenario::Scenario;
 use crate::swarm::{Rows, Swarm, row, set_row};
 
@@ -86,11 +86,16 @@ impl Experiment {
     }
 
     fn energy_initial(&self) -> Result<f64, ValidateError> {
-        Ok(self.scenario.law()?.energy(&self.scenario.start).unwrap_or(f64::NAN))
+        Ok(self.scenario.law()?.energy(&self.scenario.observation(&self.scenario.start)).unwrap_or(f64::NAN))
     }
 
     fn certified_m(&self) -> Result<f64, ValidateError> {
-        Ok(self.scenario.law()?.certificate(&self.scenario.start).certified_m.unwrap_or(f64::NAN))
+        Ok(self
+            .scenario
+            .law()?
+            .certificate(&self.scenario.observation(&self.scenario.start))
+            .certified_m
+            .unwrap_or(f64::NAN))
     }
 
     /// The closest approach \[m\] and its time \[s\]. Its pair is not told: mirror images come equally close.
@@ -99,7 +104,7 @@ impl Experiment {
     }
 
     fn reached_at_s(&self) -> f64 {
-        let Scenario { formation, graph, .. } = &self.scenario;
+        let (formation, graph) = (self.scenario.formation(), &self.scenario.graph);
         reached_at_s(&self.times_s, &self.solution.states, formation, graph, REACHED_M).unwrap_or(f64::NAN)
     }
 
@@ -108,7 +113,7 @@ impl Experiment {
     }
 
     fn last_edge_error_m(&self) -> f64 {
-        largest_edge_error_m(self.last_positions_m(), &self.scenario.formation, &self.scenario.graph)
+        largest_edge_error_m(self.last_positions_m(), &self.scenario.formation(), &self.scenario.graph)
     }
 
     /// The paper's statement about a figure under the edge-tension law: formed, and never below delta.
@@ -156,7 +161,7 @@ fn pentagon() -> Result<Vec<Claim>, ValidateError> {
     let flight = Experiment::fly("pentagon")?;
     let mut law = flight.scenario.law()?;
     let mut control = Rows::zeros(flight.scenario.count());
-    law.control(&flight.scenario.start, &mut control)?;
+    law.command(&flight.scenario.observation(&flight.scenario.start), &mut control)?;
     let at_10_s = flight.times_s.iter().position(|&time_s| time_s == 10.0).map(|k| &flight.solution.states[k]);
     let position = at_10_s.map_or_else(Vector3::zeros, |state| row(&state.positions_m, 0));
     let (min_m, min_at_s) = flight.closest();
@@ -274,7 +279,7 @@ fn up_to_rigid_motion() -> Result<Vec<Claim>, ValidateError> {
         set_row(&mut scenario.start.positions_m, i, turned);
     }
     let turned = Experiment::of(scenario)?;
-    let formation = &turned.scenario.formation;
+    let formation = &turned.scenario.formation();
     let positions_m = turned.last_positions_m();
     let fits_m = [straight.last_positions_m(), positions_m].map(|end_m| procrustes_rms_m(end_m, formation));
     let fit_m = fits_m[0].max(fits_m[1]);

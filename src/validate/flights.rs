@@ -3,14 +3,13 @@
 use std::ops::ControlFlow;
 
 use super::ValidateError;
+use crate::continuous::{self, Solution, Tolerances};
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
 use crate::law::Law;
-use crate::plant;
-use crate::plant::ideal::{self, Solution, Tolerances};
-use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::record::{Event, RecordError, Sample, Sink};
 use crate::scenario::{PlantSpec, Precision, Scenario, Source};
-use crate::sim::{self, Ending, Flight};
+use crate::sim::{self, Ending, Flight, Parts};
 use crate::swarm::Swarm;
 
 /// The embedded scenario of this name.
@@ -32,14 +31,12 @@ pub(super) fn times(duration_s: f64, rate_hz: f64) -> Vec<f64> {
 /// The scenario in continuous time, with its states at these times \[s\].
 pub(super) fn continuous(scenario: &Scenario, times_s: &[f64]) -> Result<Solution, ValidateError> {
     let mut law = scenario.law()?;
-    let (start, a22_per_s) = (&scenario.start, scenario.a22_per_s);
-    Ok(ideal::solve(law.as_mut(), start, a22_per_s, times_s, Tolerances::default())?)
+    Ok(continuous::solve(scenario, law.as_mut(), times_s, Tolerances::default())?)
 }
 
 /// The scenario in the physics engine, step by step, to its duration; `observe` sees every recorded sample.
 pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> Result<Flight, ValidateError> {
-    let mut law = scenario.law()?;
-    let flight = engine_to_any_end(scenario, law.as_mut(), observe)?;
+    let flight = engine_to_any_end(scenario, scenario.law()?, observe)?;
     match flight.ending {
         Ending::Completed => Ok(flight),
         ending => Err(ValidateError::EndedEarly { scenario: scenario.name.clone(), time_s: flight.duration_s, ending }),
@@ -49,12 +46,11 @@ pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> R
 /// The scenario in the physics engine under this law, to whatever end it comes.
 pub(super) fn engine_to_any_end(
     scenario: &Scenario,
-    law: &mut dyn Law,
+    law: Box<dyn Law>,
     observe: impl FnMut(&Sample<'_>),
 ) -> Result<Flight, ValidateError> {
-    let mut plant = plant::for_scenario(scenario);
     let go_on = &mut |_| ControlFlow::Continue(());
-    Ok(sim::fly(scenario, law, plant.as_mut(), &mut Watch(observe), go_on)?)
+    Ok(sim::fly(scenario, Parts::under(scenario, law), &mut Watch(observe), go_on)?)
 }
 
 /// The same scenario at another precision and step \[s\], with every step recorded and taken as it is.
@@ -83,7 +79,7 @@ pub(super) fn reached_at_s(
 /// A recorder that shows each sample to a function.
 struct Watch<F>(F);
 
-impl<F: FnMut(&Sample<'_>)> Recorder for Watch<F> {
+impl<F: FnMut(&Sample<'_>)> Sink for Watch<F> {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         (self.0)(sample);
         Ok(())

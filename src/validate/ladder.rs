@@ -8,7 +8,7 @@ use super::claim::{Claim, Kind};
 use super::flights::{builtin, continuous, engine, times, with_step};
 use super::words::bound;
 use super::{Progress, ValidateError};
-use crate::plant::rapier;
+use crate::plant::{Path, rapier};
 use crate::scenario::{Precision, Scenario};
 use crate::swarm::{Rows, Swarm, mean_row, row, set_row};
 
@@ -286,11 +286,12 @@ fn free_decay_error(precision: Precision) -> Result<f64, ValidateError> {
             let velocity = Vector3::new(1.0, -0.5, 0.0) * (1.0 + i as f64);
             set_row(&mut scenario.start.velocities_m_s, i, velocity);
         }
-        let (mut law, mut plant) = (scenario.law()?, rapier::plant(&scenario, precision));
-        let (still, mut state, mut time_s) = (Rows::zeros(scenario.count()), scenario.start.clone(), 0.0);
+        let (mut plant, mut path) = (rapier::plant(&scenario, precision), Path::default());
+        let (mut state, mut time_s) = (scenario.start.clone(), 0.0);
+        plant.apply(&Rows::zeros(scenario.count()), &mut state);
         for step in 0..FREE_STEPS {
             let dt_s = FREE_STEP_S[step % FREE_STEP_S.len()];
-            plant.step(law.as_mut(), &still, dt_s)?;
+            plant.advance(dt_s, &mut state, &mut path)?;
             time_s += dt_s;
         }
         plant.observe(&mut state);

@@ -9,6 +9,7 @@ use super::{Progress, ValidateError};
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law as _};
+use crate::observation::Observation;
 use crate::swarm::{Rows, Swarm, mean_row, row, set_row};
 
 /// Random states that each claim is tried on; every one with each kind of graph.
@@ -48,7 +49,7 @@ impl State {
 
     fn control(&self) -> Result<Rows, ValidateError> {
         let mut control = Rows::zeros(self.swarm.count());
-        self.law()?.control(&self.swarm, &mut control)?;
+        self.law()?.command(&Observation::exact(&self.swarm, &self.graph, &self.formation), &mut control)?;
         Ok(control)
     }
 
@@ -200,14 +201,16 @@ fn literal_baseline() -> Result<Claim, ValidateError> {
     let count = goal.count();
     let (f1_per_s2, f2_per_s) = (1.0, 1.0 + A22_PER_S);
     let origin = Formation::points(Rows::zeros(count));
-    let mut law = LaplacianLaw::new(&Graph::complete(count), &origin, f1_per_s2, f2_per_s)?;
+    let links = Graph::complete(count);
+    let mut law = LaplacianLaw::new(&links, &origin, f1_per_s2, f2_per_s)?;
     let mut control_at = |scale: f64| {
         let mut swarm = Swarm::at_rest(goal.slots_m.clone() * scale);
         for i in 0..count {
             set_row(&mut swarm.velocities_m_s, i, -row(&goal.slots_m, i));
         }
         let mut control = Rows::zeros(count);
-        law.control(&swarm, &mut control).map(|()| (0..count).map(|i| row(&control, i).norm()).fold(0.0, f64::max))
+        let at = Observation::exact(&swarm, &links, &origin);
+        law.command(&at, &mut control).map(|()| (0..count).map(|i| row(&control, i).norm()).fold(0.0, f64::max))
     };
     let (at_goal, at_scaled) = (control_at(1.0)?, control_at(f2_per_s / f1_per_s2)?);
     Ok(Claim {

@@ -31,10 +31,10 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::continuous::IdealError;
 use crate::figures::{Figure, FigureError};
 use crate::law::{LawError, ParameterError, TensionError};
 use crate::plant::PlantError;
-use crate::plant::ideal::IdealError;
 use crate::scenario::ScenarioError;
 use crate::sim::{Ending, SimError};
 

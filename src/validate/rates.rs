@@ -7,9 +7,9 @@ use super::claim::{Claim, Kind};
 use super::flights::{engine, engine_to_any_end, with_step};
 use super::words::bound;
 use super::{Progress, ValidateError};
+use crate::continuous::{self, Tolerances};
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
-use crate::plant::ideal::{self, Tolerances};
 use crate::scenario::{Precision, Scenario, Space};
 use crate::sim::Ending;
 use crate::swarm::{Rows, Swarm, set_row};
@@ -82,7 +82,7 @@ fn bent() -> Scenario {
 fn bent_hexagon() -> Result<Claim, ValidateError> {
     let scenario = bent();
     let mut law = scenario.law()?;
-    let solution = ideal::solve(law.as_mut(), &scenario.start, 0.0, &BEND_TIMES_S, Tolerances::default())?;
+    let solution = continuous::solve(&scenario, law.as_mut(), &BEND_TIMES_S, Tolerances::default())?;
     let at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
     let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
@@ -142,7 +142,7 @@ fn common_rate(id: &'static str, kind: Kind, statement: &'static str, rate_per_s
 fn common_mode() -> Result<Claim, ValidateError> {
     let scenario = drifting();
     let mut law = scenario.law()?;
-    let solution = ideal::solve(law.as_mut(), &scenario.start, A22_PER_S, &[COMMON_S], Tolerances::default())?;
+    let solution = continuous::solve(&scenario, law.as_mut(), &[COMMON_S], Tolerances::default())?;
     let last = solution.states.last().unwrap_or(&scenario.start);
     Ok(common_rate(
         "common-mode",
@@ -168,10 +168,9 @@ fn lost_to_rounding() -> Result<Claim, ValidateError> {
     scenario.time.duration_s = LOST_S;
     let mut scenario = with_step(&scenario, Precision::Double, ENGINE_STEP_S);
     scenario.time.record_hz = 1.0;
-    let mut law = scenario.law()?;
     let mut lost_at_s = f64::NAN;
-    let flight = engine_to_any_end(&scenario, law.as_mut(), |sample| {
-        let error_m = largest_edge_error_m(&sample.swarm.positions_m, &scenario.formation, &scenario.graph);
+    let flight = engine_to_any_end(&scenario, scenario.law()?, |sample| {
+        let error_m = largest_edge_error_m(&sample.swarm.positions_m, scenario.formation(), &scenario.graph);
         let kept = error_m <= LOST_M;
         if lost_at_s.is_nan() && !kept {
             lost_at_s = sample.time_s;
@@ -226,7 +225,7 @@ fn star_rate_per_s(count: usize) -> Result<f64, ValidateError> {
     scenario.graph = Graph::star(count);
     scenario.a22_per_s = A22_PER_S;
     let mut law = scenario.law()?;
-    let solution = ideal::solve(law.as_mut(), &scenario.start, A22_PER_S, &[STAR_S], FINE)?;
+    let solution = continuous::solve(&scenario, law.as_mut(), &[STAR_S], FINE)?;
     let last = solution.states.last().unwrap_or(&scenario.start);
     Ok((last.disagreement_m_s() / scenario.start.disagreement_m_s()).ln() / STAR_S)
 }

@@ -37,7 +37,7 @@ fn solve(scenario: &Scenario, times_s: &[f64]) -> Solution {
 }
 
 fn edge_error_m(scenario: &Scenario, swarm: &Swarm) -> f64 {
-    largest_edge_error_m(&swarm.positions_m, &scenario.formation, &scenario.graph)
+    largest_edge_error_m(&swarm.positions_m, scenario.formation(), &scenario.graph)
 }
 
 /// A law that commands nothing.

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use tautline::audit::Status;
 use tautline::formation::affine_dimension;
 use tautline::metrics::{Metrics, Summary};
-use tautline::record::Recorder;
+use tautline::record::Sink;
 use tautline::scenario::Scenario;
 use tautline::sim::{Ending, Flight};
 use tautline::swarm::{Pair, row};
@@ -33,7 +33,7 @@ const BASELINE_MIN_M: f64 = 1.5327;
 const BASELINE_MIN_AT_S: f64 = 3.63;
 
 fn summary(scenario: &Scenario, log: &Log) -> Summary {
-    let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
     for sample in &log.samples {
         metrics.sample(&sample.as_sample()).expect("metrics take any sample");
     }
@@ -165,7 +165,7 @@ fn a_start_on_a_line_stays_on_it_exactly_and_forms_nothing() {
     assert_eq!(summary.reached_at_s, None);
     assert_near(summary.max_edge_error_m, 8.57, 0.01, "largest edge error, known to two decimals");
     assert_eq!(affine_dimension(&scenario.start.positions_m, 1e-9), 1);
-    assert_eq!(scenario.formation.affine_dimension(1e-9), 2);
+    assert_eq!(scenario.formation().affine_dimension(1e-9), 2);
 }
 
 /// A built-in scenario for so many seconds in steps of 1/`steps_per_s`, in double precision.

@@ -6,7 +6,7 @@ use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::EdgeTension;
 use tautline::record::mcap::{Header, McapRecorder, McapRecording};
-use tautline::record::{Recorder as _, Sample};
+use tautline::record::{Sample, Sink as _};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, separation, set_row};
 
 /// Drawings count in whole tenths of a pixel, and an axis in one of them less than its length.

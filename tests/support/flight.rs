@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use tautline::law::Law;
 use tautline::plant::{self, Plant};
-use tautline::record::{Event, OwnedSample, RecordError, Recorder, Sample};
+use tautline::record::{Event, OwnedSample, RecordError, Sample, Sink};
 use tautline::scenario::{Override, Scenario, Source};
 use tautline::sim::{self, Flight, SimError};
 
@@ -21,7 +21,7 @@ pub(crate) struct Log {
     pub(crate) events: Vec<Event>,
 }
 
-impl Recorder for Log {
+impl Sink for Log {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.samples.push(sample.into());
         Ok(())

@@ -6,8 +6,7 @@ use engine::prelude::{
 };
 use nalgebra::Vector3;
 
-use crate::law::Law;
-use crate::plant::{Plant, PlantError};
+use crate::plant::{Path, Plant, PlantError};
 use crate::scenario::{CONTACT_PREDICTION_M, Scenario, Space};
 use crate::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 
@@ -22,6 +21,8 @@ const HULL_RESTITUTION: Real = 0.5;
 pub(super) struct Bodies {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
+    /// Accelerations held over the step \[m/s^2\].
+    held: Rows,
     /// Where the engine's origin is: the middle of the start, so that single precision resolves the swarm's own extent
     /// wherever it flies.
     origin_m: Vector3<f64>,
@@ -39,6 +40,7 @@ impl Bodies {
         let mut bodies = Self {
             world,
             handles,
+            held: Rows::zeros(scenario.count()),
             origin_m,
             mass_kg: scenario.mass_kg.clone(),
             a22_per_s: scenario.a22_per_s,
@@ -62,22 +64,46 @@ impl Bodies {
     }
 }
 
+/// With everything that the engine carries from step to step: bodies, contacts, islands, bounding volumes. What it leaves
+/// out is working memory.
+impl Clone for Bodies {
+    fn clone(&self) -> Self {
+        let world = PhysicsWorld {
+            gravity: self.world.gravity,
+            integration_parameters: self.world.integration_parameters,
+            islands: self.world.islands.clone(),
+            broad_phase: self.world.broad_phase.clone(),
+            narrow_phase: self.world.narrow_phase.clone(),
+            bodies: self.world.bodies.clone(),
+            colliders: self.world.colliders.clone(),
+            impulse_joints: self.world.impulse_joints.clone(),
+            multibody_joints: self.world.multibody_joints.clone(),
+            ..PhysicsWorld::default()
+        };
+        let (handles, held, mass_kg) = (self.handles.clone(), self.held.clone(), self.mass_kg.clone());
+        Self { world, handles, held, mass_kg, ..*self }
+    }
+}
+
 impl Plant for Bodies {
-    fn step(&mut self, _law: &mut dyn Law, held: &Rows, dt_s: f64) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
         self.set_dt(dt_s);
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
             body.reset_forces(false);
-            body.add_force(reals(row(held, i)) * real(self.mass_kg[i]), true);
+            body.add_force(reals(row(&self.held, i)) * real(self.mass_kg[i]), true);
         }
         self.world.step();
-        match self.world.quarantine().bodies().first() {
-            None => Ok(()),
-            Some(lost) => {
-                let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
-                Err(PlantError::NotFinite { vehicle })
-            }
+        if let Some(lost) = self.world.quarantine().bodies().first() {
+            let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
+            return Err(PlantError::NotFinite { vehicle });
         }
+        self.observe(predicted);
+        Ok(())
+    }
+
+    fn apply(&mut self, command: &Rows, _state: &mut Swarm) {
+        self.held.copy_from(command);
     }
 
     fn observe(&self, swarm: &mut Swarm) {

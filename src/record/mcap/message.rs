@@ -251,6 +251,9 @@ impl From<&Event> for EventMessage<&'static str> {
                 *min_m,
                 format!("vehicles {pair} are clear again after coming to {min_m} m"),
             ),
+            Event::LegBegan { leg, .. } => {
+                ("leg-began", None, (leg + 1) as f64, format!("leg {} of the flight began", leg + 1))
+            }
             Event::EngineContact { pair, .. } => (
                 "engine-contact",
                 Some(*pair),
@@ -275,10 +278,20 @@ impl EventMessage<String> {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
             "engine-contact" => Event::EngineContact { pair: pair()?, time_s },
+            "leg-began" => Event::LegBegan { leg: self.leg()?, time_s },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },
             unknown => return Err(Topic::Events.fault(format!("unknown kind {unknown:?}"))),
         })
+    }
+}
+
+impl EventMessage<String> {
+    fn leg(&self) -> Result<usize, ReadFault> {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+        let number = self.value as usize;
+        let leg = number.checked_sub(1).filter(|_| self.value.fract() == 0.0);
+        leg.ok_or_else(|| Topic::Events.fault(format!("there is no leg {}", self.value)))
     }
 }
 

@@ -14,7 +14,7 @@ use super::Header;
 use super::message::{
     EventMessage, MESSAGE_ENCODING, SCHEMA_ENCODING, ScenarioMessage, SummaryMessage, SwarmMessage, Topic, encode,
 };
-use crate::record::{Event, RecordError, Recorder, Sample};
+use crate::record::{Event, RecordError, Sample, Sink};
 
 /// A chunk is closed and handed to the system with the first message this long after the chunk before \[simulated s\].
 pub const FLUSH_PERIOD_S: f64 = 1.0;
@@ -183,7 +183,7 @@ impl McapRecorder {
     }
 }
 
-impl Recorder for McapRecorder {
+impl Sink for McapRecorder {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.write(Topic::Summary, sample.time_s, &SummaryMessage::from(sample))?;
         self.write(Topic::Swarm, sample.time_s, &SwarmMessage::from(sample))?;

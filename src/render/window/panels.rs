@@ -483,7 +483,7 @@ mod tests {
         let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
         let (plan, swarm) = (Plan::of(&scenario), Swarm::at_rest(scenario.start.positions_m.clone()));
         let mut control = Rows::zeros(swarm.count());
-        scenario.law().expect("a law").control(&swarm, &mut control).expect("a command");
+        scenario.law().expect("a law").command(&scenario.observation(&swarm), &mut control).expect("a command");
         for i in 0..swarm.count() {
             let others = (0..swarm.count()).filter(|&j| j != i);
             let pulls = others.map(|j| {

@@ -1,8 +1,8 @@
-//! The ideal plant: p'' = a22 v + u(p, v) (equation (1)) solved in continuous time, with the law inside the right-hand
-//! side: nothing is sampled or held.
+//! Continuous time: p'' = a22 v + u(p, v) (equation (1)) solved with the law inside the right-hand side. Nothing is sampled
+//! or held.
 //!
-//! [`solve`] is the oracle that every physics run is measured against; [`plant`] puts the same solution behind
-//! [`Plant`] so that a scenario can be flown in it.
+//! [`solve`] is the oracle that every physics run is measured against; [`Continuous`] flies the same solution step by
+//! step, in the place of a law that is asked once a step and a plant that holds its command.
 //!
 //! # Method
 //! Dormand and Prince's explicit Runge-Kutta method of order 8 with error control (Hairer, Norsett and Wanner,
@@ -21,10 +21,41 @@ use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinar
 use differential_equations::ode::{ODE, OrdinaryNumericalMethod as _};
 use nalgebra::Vector3;
 
-use super::{Plant, PlantError};
 use crate::law::{Law, LawError};
+use crate::observation::Observation;
+use crate::plant::Path;
 use crate::scenario::Scenario;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
+
+/// What closes the loop: the accelerations u(t, p, v).
+pub trait Feedback {
+    /// Writes the accelerations \[m/s^2\], N x 3, for a true state at a time \[s\]. Trial states are asked about too, in
+    /// any order of time.
+    ///
+    /// # Errors
+    /// [`LawError`] where there are none.
+    fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError>;
+
+    /// The solution has come to this state, in the order of time: what a delayed sensor remembers.
+    fn accept(&mut self, _time_s: f64, _truth: &Swarm) {}
+
+    /// Longest solver step that the memory of the feedback allows \[s\].
+    fn longest_step_s(&self) -> f64 {
+        f64::INFINITY
+    }
+}
+
+/// A law that knows the present state.
+struct Exact<'a> {
+    law: &'a mut dyn Law,
+    scenario: &'a Scenario,
+}
+
+impl Feedback for Exact<'_> {
+    fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
+        self.law.command(&Observation { time_s, ..self.scenario.observation(truth) }, command)
+    }
+}
 
 /// First step that is tried \[s\]: the error control lengthens it tenfold a step, or shortens it.
 const FIRST_STEP_S: f64 = 1e-3;
@@ -90,7 +121,8 @@ pub struct Solution {
     pub closest: Option<ClosestApproach>,
 }
 
-/// Solves p'' = a22 v + u(p, v) from `start` at time 0 and hands out the states at `times_s` \[s\], ascending from 0.
+/// Solves p'' = a22 v + u(p, v) from the scenario's start at time 0, under `law` with exact knowledge of the present
+/// state, and hands out the states at `times_s` \[s\], ascending from 0.
 ///
 /// # Accuracy
 /// The error per solver step is at most that of the tolerances, and stable motion forgets it: on the reference flights
@@ -100,9 +132,8 @@ pub struct Solution {
 /// # Errors
 /// [`IdealError`]: the law has no answer on the way, the times do not ascend, or the tolerances cannot be met.
 pub fn solve(
+    scenario: &Scenario,
     law: &mut dyn Law,
-    start: &Swarm,
-    a22_per_s: f64,
     times_s: &[f64],
     tolerances: Tolerances,
 ) -> Result<Solution, IdealError> {
@@ -113,8 +144,9 @@ pub fn solve(
     if let Some(entry) = (0..times_s.len()).find(|entry| !in_order(entry)) {
         return Err(IdealError::Times { entry });
     }
-    let flow = Flow::new(law, start, a22_per_s);
-    let mut solver = Solver::begin(&flow, 0.0, &packed(start), tolerances, FIRST_STEP_S)?;
+    let mut feedback = Exact { law, scenario };
+    let flow = Flow::new(&mut feedback, &scenario.start, scenario.a22_per_s, 0.0);
+    let mut solver = Solver::begin(&flow, 0.0, &packed(&scenario.start), tolerances, FIRST_STEP_S)?;
     let mut closest = None;
     for (pair, approach) in pairs(solver.method.y()) {
         offer(&mut closest, pair, approach.separation_m, 0.0);
@@ -127,58 +159,61 @@ pub fn solve(
     Ok(Solution { states, closest })
 }
 
-/// A swarm that moves as equation (1) says, at the scenario's start.
-#[must_use]
-pub fn plant(scenario: &Scenario) -> Box<dyn Plant> {
-    Box::new(Ideal { swarm: scenario.start.clone(), a22_per_s: scenario.a22_per_s, step_s: FIRST_STEP_S, bend_m: 0.0 })
-}
-
-struct Ideal {
+/// A swarm that moves as equation (1) says, in continuous time.
+#[derive(Clone, Debug)]
+pub struct Continuous {
     swarm: Swarm,
     a22_per_s: f64,
     /// Solver step that the error control came to last.
     step_s: f64,
-    /// See [`Plant::bend_m`].
-    bend_m: f64,
 }
 
-impl Plant for Ideal {
-    fn step(&mut self, law: &mut dyn Law, _held: &Rows, dt_s: f64) -> Result<(), PlantError> {
-        let flow = Flow::new(law, &self.swarm, self.a22_per_s);
-        let first_step_s = self.step_s.min(dt_s);
-        let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), first_step_s)?;
+impl Continuous {
+    /// At the scenario's start.
+    #[must_use]
+    pub fn new(scenario: &Scenario) -> Self {
+        Self { swarm: scenario.start.clone(), a22_per_s: scenario.a22_per_s, step_s: FIRST_STEP_S }
+    }
+
+    /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end; `path` gets how far the
+    /// way there bends.
+    ///
+    /// The bend is from the Green's function of a second derivative, which is at most T/4: a path of duration T stays
+    /// within T/4 times the integral of |p''| of its chord. The integral is taken from the change of velocity in each
+    /// solver step.
+    ///
+    /// # Errors
+    /// [`IdealError`]; the state is then not to be observed.
+    pub fn advance(
+        &mut self,
+        (from_s, dt_s): (f64, f64),
+        feedback: &mut dyn Feedback,
+        end: &mut Swarm,
+        path: &mut Path,
+    ) -> Result<(), IdealError> {
+        let flow = Flow::new(feedback, &self.swarm, self.a22_per_s, from_s);
+        let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), self.step_s.min(dt_s))?;
         let mut turned_m_s = vec![0.0; self.swarm.count()];
         solver.advance(dt_s, &mut |solver| {
             solver.add_turns(&mut turned_m_s);
+            flow.accept(solver.method.t(), solver.method.y());
             Ok(())
         })?;
-        self.bend_m = 0.25 * dt_s * turned_m_s.into_iter().fold(0.0, f64::max);
+        path.bend(0.25 * dt_s * turned_m_s.into_iter().fold(0.0, f64::max));
         self.step_s = solver.method.h();
         self.swarm = solver.swarm();
+        end.clone_from(&self.swarm);
         Ok(())
     }
 
-    fn observe(&self, swarm: &mut Swarm) {
+    /// Writes the state.
+    pub fn observe(&self, swarm: &mut Swarm) {
         swarm.clone_from(&self.swarm);
     }
 
-    fn restore(&mut self, swarm: &Swarm) {
+    /// Goes back to a state that was observed.
+    pub fn restore(&mut self, swarm: &Swarm) {
         self.swarm.clone_from(swarm);
-    }
-
-    /// From the Green's function of a second derivative, which is at most T/4: a path of duration T stays within T/4
-    /// times the integral of |p''| of its chord. The integral is taken from the change of velocity in each solver step.
-    fn bend_m(&self) -> f64 {
-        self.bend_m
-    }
-}
-
-impl From<IdealError> for PlantError {
-    fn from(error: IdealError) -> Self {
-        match error {
-            IdealError::Law { source, .. } => Self::LawUndefined(source),
-            IdealError::Stalled { .. } | IdealError::Times { .. } | IdealError::Tolerances => Self::Stalled,
-        }
     }
 }
 
@@ -203,8 +238,9 @@ impl<'a, 'law> Solver<'a, 'law> {
         if ![relative, absolute].iter().all(|tolerance| *tolerance > 0.0 && tolerance.is_finite()) {
             return Err(IdealError::Tolerances);
         }
-        let method = Method::dop853().rtol(relative).atol(absolute).h_max(LONGEST_STEP_S).max_steps(usize::MAX);
-        let mut method = method.h0(step_s.min(LONGEST_STEP_S));
+        let longest_step_s = flow.longest_step_s();
+        let method = Method::dop853().rtol(relative).atol(absolute).h_max(longest_step_s).max_steps(usize::MAX);
+        let mut method = method.h0(step_s.min(longest_step_s));
         // The end of the interval only tells the direction of time.
         method.init(flow, time_s, f64::INFINITY, &state.to_vec()).map_err(|_| IdealError::Stalled { time_s })?;
         match flow.take_failure() {
@@ -318,11 +354,13 @@ impl<'a, 'law> Solver<'a, 'law> {
 /// The right-hand side. The solver asks it through a shared reference, so what changes is in a cell.
 struct Flow<'law> {
     a22_per_s: f64,
+    /// Time of the flight at the solver's time 0 \[s\].
+    from_s: f64,
     scratch: RefCell<Scratch<'law>>,
 }
 
 struct Scratch<'law> {
-    law: &'law mut dyn Law,
+    feedback: &'law mut dyn Feedback,
     swarm: Swarm,
     control: Rows,
     /// Why the law had no answer, the last time that it had none.
@@ -330,21 +368,32 @@ struct Scratch<'law> {
 }
 
 impl<'law> Flow<'law> {
-    fn new(law: &'law mut dyn Law, swarm: &Swarm, a22_per_s: f64) -> Self {
+    fn new(feedback: &'law mut dyn Feedback, swarm: &Swarm, a22_per_s: f64, from_s: f64) -> Self {
         let control = Rows::zeros(swarm.count());
-        Self { a22_per_s, scratch: RefCell::new(Scratch { law, swarm: swarm.clone(), control, failure: None }) }
+        let scratch = Scratch { feedback, swarm: swarm.clone(), control, failure: None };
+        Self { a22_per_s, from_s, scratch: RefCell::new(scratch) }
     }
 
     fn take_failure(&self) -> Option<LawError> {
         self.scratch.borrow_mut().failure.take()
     }
+
+    fn longest_step_s(&self) -> f64 {
+        self.scratch.borrow().feedback.longest_step_s().min(LONGEST_STEP_S)
+    }
+
+    fn accept(&self, time_s: f64, state: &[f64]) {
+        let Scratch { feedback, swarm, .. } = &mut *self.scratch.borrow_mut();
+        unpack(state, swarm);
+        feedback.accept(self.from_s + time_s, swarm);
+    }
 }
 
 impl ODE<f64, Vec<f64>> for Flow<'_> {
-    fn diff(&self, _time_s: f64, state: &Vec<f64>, rates: &mut Vec<f64>) {
-        let Scratch { law, swarm, control, failure } = &mut *self.scratch.borrow_mut();
+    fn diff(&self, time_s: f64, state: &Vec<f64>, rates: &mut Vec<f64>) {
+        let Scratch { feedback, swarm, control, failure } = &mut *self.scratch.borrow_mut();
         unpack(state, swarm);
-        if let Err(undefined) = law.control(swarm, control) {
+        if let Err(undefined) = feedback.command(self.from_s + time_s, swarm, control) {
             *failure = Some(undefined);
             // An error estimate that is not a number refuses the step.
             rates.fill(f64::NAN);

@@ -1,0 +1,104 @@
+//! Why a law has no answer, or does not exist.
+
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::swarm::{Pair, first_row_not_finite};
+
+use super::tension::TensionError;
+/// Why a law has no answer for a state.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LawError {
+    /// A pair is at or inside the distance where its tension is infinite: a collision, not a number to clamp.
+    #[error("vehicles {pair} are {separation_m} m apart, not more than the safety distance {delta_m} m")]
+    Collision {
+        /// The first such pair in index order.
+        pair: Pair,
+        /// Its separation \[m\].
+        separation_m: f64,
+        /// The safety distance delta \[m\].
+        delta_m: f64,
+    },
+    /// A position or velocity is not a finite number.
+    #[error("the state of vehicle {} is not a finite number", vehicle + 1)]
+    NotFinite {
+        /// The first such vehicle, from 0.
+        vehicle: usize,
+    },
+    /// The state is finite, but distances, velocities or accelerations computed from it are not.
+    #[error("the state of the swarm is too large for double precision")]
+    OutOfRange,
+    /// Two slots of a leg are too near for the pair's tension to exist.
+    #[error("the slots of vehicles {pair} are {distance_m} m apart, not more than the safety distance {delta_m} m")]
+    Target {
+        /// The first such pair in index order.
+        pair: Pair,
+        /// The distance of its slots \[m\].
+        distance_m: f64,
+        /// The safety distance delta \[m\].
+        delta_m: f64,
+    },
+    /// The state or the table of accelerations is of another swarm.
+    #[error("the law is for {expected} vehicles and was given {found}")]
+    WrongCount {
+        /// Number of vehicles of the law.
+        expected: usize,
+        /// Number of vehicles given.
+        found: usize,
+    },
+}
+
+/// Why a law cannot be made from its parameters.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ParameterError {
+    /// An edge has no tension.
+    #[error("vehicles {pair}: {source}")]
+    Tension {
+        /// The first such edge in index order.
+        pair: Pair,
+        /// What is wrong.
+        source: TensionError,
+    },
+    /// Graph and formation are of different swarms.
+    #[error("the graph has {graph} vehicles and the formation has {formation}")]
+    Counts {
+        /// Number of vehicles of the graph.
+        graph: usize,
+        /// Number of slots of the formation.
+        formation: usize,
+    },
+    /// A gain is not a finite number.
+    #[error("{name} is {value}; it must be a finite number")]
+    NotFinite {
+        /// The gain, as in the equations.
+        name: &'static str,
+        /// As given.
+        value: f64,
+    },
+    /// A slot of the formation is not a finite number.
+    #[error("the slot of vehicle {} is not a finite number", vehicle + 1)]
+    Slot {
+        /// The first such vehicle, from 0.
+        vehicle: usize,
+    },
+    /// The edges do not fit in memory.
+    #[error("{edges} edges do not fit in memory")]
+    Memory {
+        /// Number of edges.
+        edges: usize,
+    },
+}
+
+impl ParameterError {
+    pub(super) fn check(graph: &Graph, formation: &Formation, gains: &[(&'static str, f64)]) -> Result<(), Self> {
+        if graph.count() != formation.count() {
+            return Err(Self::Counts { graph: graph.count(), formation: formation.count() });
+        }
+        if let Some(vehicle) = first_row_not_finite(&formation.slots_m) {
+            return Err(Self::Slot { vehicle });
+        }
+        match gains.iter().find(|(_, value)| !value.is_finite()) {
+            Some(&(name, value)) => Err(Self::NotFinite { name, value }),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! What a law is.
+
+use dyn_clone::DynClone;
+
+use super::certificate::{Certificate, Void};
+use super::error::LawError;
+use crate::observation::Observation;
+use crate::swarm::Rows;
+
+/// A control law: a function from what the vehicles know to an acceleration for each.
+///
+/// A law of your own implements [`Law::name`] and [`Law::command`] and is flown like the built-in ones. Its memory, if it
+/// has any, is saved with a simulation, so it must be [`Clone`].
+pub trait Law: DynClone + Send {
+    /// Short name for reports, such as `edge-tension`.
+    fn name(&self) -> &str;
+
+    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i is to rest on nothing but what
+    /// vehicle i knows.
+    ///
+    /// Called once a step; implementations keep their scratch memory so that nothing is allocated here.
+    ///
+    /// # Errors
+    /// [`LawError`] where the law is not defined, such as a pair at or inside the keep-out distance of a barrier.
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError>;
+
+    /// The law's Lyapunov function E \[m^2/s^2\] where it has one.
+    fn energy(&self, _at: &Observation<'_>) -> Option<f64> {
+        None
+    }
+
+    /// What the law promises about separation from this start on, before the first step.
+    fn certificate(&self, _start: &Observation<'_>) -> Certificate {
+        Certificate::void(Void::NoBarrier)
+    }
+
+    /// Distance at which the law's barrier is infinite \[m\], where it has a barrier. The loop refuses a step that
+    /// takes more than half of some pair's clearance above it.
+    fn barrier_m(&self) -> Option<f64> {
+        None
+    }
+
+    /// How near of each other vehicles must be for the law to ask what they *see* of each other \[m\]; a law that lives
+    /// on links alone asks nothing.
+    fn sensing_range_m(&self) -> Option<f64> {
+        None
+    }
+
+    /// What the law holds vehicles to.
+    fn controls(&self) -> Controls {
+        Controls::Displacements
+    }
+
+    /// Upper bound on the rates of the closed loop \[1/s\] while no pair is nearer than `nearest_m`, for vehicles with
+    /// velocity coefficient a22. `None` where none is known, or where it depends on a distance that is not given.
+    fn fastest_rate_per_s(&self, _nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
+        None
+    }
+
+    /// How fast relative velocities are damped at least, on a graph of this algebraic connectivity.
+    fn velocity_margin(&self, _connectivity: f64, _a22_per_s: f64) -> Option<VelocityMargin> {
+        None
+    }
+
+    /// Rate at which the swarm's mean velocity grows by itself \[1/s\]; negative where it decays.
+    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
+        a22_per_s
+    }
+}
+
+dyn_clone::clone_trait_object!(Law);
+
+/// What a law holds vehicles to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Controls {
+    /// Distances alone: it pushes and pulls along the lines between vehicles, and a formation is reached up to rotation,
+    /// reflection and translation.
+    Distances,
+    /// Differences of positions, in the directions of the common frame: a formation is reached up to translation.
+    Displacements,
+}
+
+/// How fast relative velocities are damped: at least at this rate where it is positive, and perhaps growing where it is
+/// negative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VelocityMargin {
+    /// The margin \[1/s\].
+    pub per_s: f64,
+    /// The size of the terms that it is the difference of \[1/s\]: a margin of a 1e-12th of that is rounding.
+    pub terms_per_s: f64,
+}

@@ -1,0 +1,48 @@
+//! The list of laws. What there is to know of a law stands in its own file; this list is the only one.
+
+use serde::{Deserialize, Serialize};
+
+use super::edge_tension::EdgeTensionKeys;
+use super::error::ParameterError;
+use super::interface::Law;
+use super::laplacian::LaplacianKeys;
+use super::setting::{Gain, Setting};
+
+macro_rules! laws {
+    ($($(#[doc = $doc:literal])+ $kind:ident($keys:ty),)+) => {
+        /// A control law and its parameters, as `[law]` of a scenario gives them.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum LawSpec {
+            $($(#[doc = $doc])+ $kind($keys),)+
+        }
+
+        impl LawSpec {
+            /// The numbers among its keys.
+            #[must_use]
+            pub fn gains(&self) -> Vec<Gain> {
+                match self { $(Self::$kind(keys) => keys.gains(),)+ }
+            }
+
+            /// The law, ready to fly.
+            ///
+            /// # Errors
+            /// [`ParameterError`] where it does not exist for these parameters.
+            pub fn build(&self, setting: &Setting<'_>) -> Result<Box<dyn Law>, ParameterError> {
+                Ok(match self { $(Self::$kind(keys) => Box::new(keys.build(setting)?),)+ })
+            }
+
+            /// Puts in the keys that follow from others where they are not given.
+            pub fn complete(&mut self, a22_per_s: f64) {
+                match self { $(Self::$kind(keys) => keys.complete(a22_per_s),)+ }
+            }
+        }
+    };
+}
+
+laws! {
+    /// Distances as springs with a barrier at delta: collision-free on the complete graph.
+    EdgeTension(EdgeTensionKeys),
+    /// The Laplacian baseline: converges from every start and avoids nothing.
+    Laplacian(LaplacianKeys),
+}

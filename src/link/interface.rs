@@ -1,0 +1,55 @@
+//! What a link is, and the one that does nothing.
+
+use dyn_clone::DynClone;
+
+use crate::observation::Others;
+use crate::swarm::{Rows, Swarm};
+
+/// What lies between truth and law.
+///
+/// All of its memory (filters, messages under way, random numbers) is saved with a simulation, so it must be [`Clone`].
+pub trait Link: DynClone + Send {
+    /// What the vehicles know at a time \[s\] at which the true state is `truth`.
+    ///
+    /// In continuous time this is asked about trial states too, in any order of time; only what [`Link::accept`] is told
+    /// has happened.
+    fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Sensed<'a>;
+
+    /// Changes the commanded accelerations \[m/s^2\], N x 3, into those that reach the vehicles.
+    fn actuate(&mut self, _time_s: f64, _command: &mut Rows) {}
+
+    /// The swarm has come to this state, in the order of time.
+    fn accept(&mut self, _time_s: f64, _truth: &Swarm) {}
+
+    /// What was accepted after this time has not happened: a step was refused.
+    fn forget_after(&mut self, _time_s: f64) {}
+
+    /// Longest step of continuous time that its memory allows \[s\].
+    fn longest_step_s(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Begins its random numbers anew.
+    fn reseed(&mut self, _seed: u64) {}
+}
+
+dyn_clone::clone_trait_object!(Link);
+
+/// What the vehicles know at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Sensed<'a> {
+    /// Each vehicle of itself.
+    pub own: &'a Swarm,
+    /// Vehicles of each other.
+    pub others: Others<'a>,
+}
+
+/// Nothing between truth and law.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Direct;
+
+impl Link for Direct {
+    fn sense<'a>(&'a mut self, _time_s: f64, truth: &'a Swarm) -> Sensed<'a> {
+        Sensed { own: truth, others: Others::Shared }
+    }
+}

@@ -1,0 +1,81 @@
+//! A scenario, flown to its report.
+//!
+//! [`run`] is a function of its scenario: many of them run side by side, and memory does not grow with the length of a
+//! flight. Whatever else is wanted of a flight (a recording, figures, pictures) is the business of the sink.
+
+use std::ops::ControlFlow;
+
+use crate::metrics::Metrics;
+use crate::preflight::Preflight;
+use crate::record::{Sink, StateHash};
+use crate::report::{EndedEarly, Findings, Performance, Report, Run};
+use crate::scenario::{PlantSpec, Scenario};
+use crate::sim::{self, Ending, Flight, Parts, SimError};
+
+/// Flies a scenario to its end, hands what is recorded to `sink`, and reports.
+///
+/// # Errors
+/// [`SimError`]; what was recorded up to then stays recorded.
+pub fn run(scenario: &Scenario, sink: &mut impl Sink) -> Result<Report, SimError> {
+    run_while(scenario, &Preflight::of(scenario)?, sink, &mut |_| ControlFlow::Continue(()))
+}
+
+/// As [`run`], with what is known before the first step; `carry_on` is asked after each step with the number of steps
+/// flown and ends the flight with [`ControlFlow::Break`].
+///
+/// # Errors
+/// As [`run`].
+pub fn run_while(
+    scenario: &Scenario,
+    preflight: &Preflight,
+    sink: &mut dyn Sink,
+    carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> Result<Report, SimError> {
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
+    let mut state_hash = StateHash::new();
+    let mut sinks = (sink, (&mut metrics, &mut state_hash));
+    let flight = sim::fly(scenario, Parts::of(scenario)?, &mut sinks, carry_on)?;
+    Ok(report(scenario, preflight, &flight, &metrics, state_hash.finish()))
+}
+
+fn report(
+    scenario: &Scenario,
+    preflight: &Preflight,
+    flight: &Flight,
+    metrics: &Metrics<'_>,
+    state_hash: String,
+) -> Report {
+    let reason = match &flight.ending {
+        Ending::BrokeDown(why) => Some(format!("{why}; shorten time.dt_s, or look for speeds and gains that grow")),
+        ending => ending.reason(),
+    };
+    let wall_s = flight.performance.wall.as_secs_f64();
+    Report::new(&Findings {
+        scenario_name: &scenario.name,
+        scenario_sha256: &scenario.sha256_hex(),
+        delta_m: scenario.delta_m,
+        judge: scenario.arrival,
+        trap_dimension: preflight.trap_dimension(),
+        formation_dimension: preflight.formation_dimension,
+        certificate: &flight.certificate,
+        audit: &flight.audit,
+        engine_contact_pairs: (scenario.plant != PlantSpec::Ideal).then_some(flight.engine_contacts.len() as u64),
+        summary: &metrics.finish(),
+        run: &Run {
+            duration_s: flight.duration_s,
+            dt_s: scenario.time.dt_s,
+            steps: flight.steps,
+            vehicles: scenario.count(),
+            state_hash,
+        },
+        performance: Performance {
+            wall_s: Some(wall_s),
+            real_time_factor: Some(flight.duration_s / wall_s),
+            law_s: Some(flight.performance.law.as_secs_f64()),
+            physics_s: Some(flight.performance.physics.as_secs_f64()),
+            audit_s: Some(flight.performance.audit.as_secs_f64()),
+            record_s: Some(flight.performance.record.as_secs_f64()),
+        },
+        ended_early: reason.as_deref().map(|reason| EndedEarly { time_s: flight.duration_s, reason }),
+    })
+}

@@ -1,0 +1,76 @@
+//! From the true state to the accelerations that reach the vehicles: sense, supervise, command, actuate.
+
+use crate::continuous::Feedback;
+use crate::graph::Graph;
+use crate::law::{Law, LawError};
+use crate::link::{Link, Sensed};
+use crate::observation::Observation;
+use crate::space::NearPairs;
+use crate::swarm::{Rows, Swarm};
+use crate::target::{CurrentTarget, Supervisor};
+
+/// Everything between the true state and the vehicles' actuators, with all of its memory.
+#[derive(Clone)]
+pub(super) struct Controller {
+    pub(super) law: Box<dyn Law>,
+    pub(super) link: Box<dyn Link>,
+    pub(super) supervisor: Box<dyn Supervisor>,
+    pub(super) target: CurrentTarget,
+    pub(super) links: Graph,
+    near: NearPairs,
+}
+
+impl Controller {
+    pub(super) fn new(
+        law: Box<dyn Law>,
+        link: Box<dyn Link>,
+        supervisor: Box<dyn Supervisor>,
+        target: CurrentTarget,
+        links: Graph,
+    ) -> Self {
+        Self { law, link, supervisor, target, links, near: NearPairs::default() }
+    }
+
+    /// Lets the supervisor look at the swarm as it is sensed, at an instant of the flight.
+    pub(super) fn supervise(&mut self, time_s: f64, truth: &Swarm) {
+        if !self.supervisor.is_idle() {
+            let sensed = self.link.sense(time_s, truth);
+            self.supervisor.supervise(time_s, sensed.own, &mut self.target);
+        }
+    }
+
+    /// The law's energy of a true state.
+    pub(super) fn energy(&self, time_s: f64, truth: &Swarm) -> Option<f64> {
+        let exact = Observation::exact(truth, &self.links, self.target.view().formation);
+        self.law.energy(&Observation { time_s, target: self.target.view(), ..exact })
+    }
+}
+
+impl Feedback for Controller {
+    fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
+        let Sensed { own, others } = self.link.sense(time_s, truth);
+        if let Some(range_m) = self.law.sensing_range_m() {
+            self.near.update(&own.positions_m, range_m);
+        }
+        let at = Observation {
+            time_s,
+            own,
+            others,
+            target: self.target.view(),
+            links: &self.links,
+            near: self.near.pairs(),
+            obstacles: &[],
+        };
+        self.law.command(&at, command)?;
+        self.link.actuate(time_s, command);
+        Ok(())
+    }
+
+    fn accept(&mut self, time_s: f64, truth: &Swarm) {
+        self.link.accept(time_s, truth);
+    }
+
+    fn longest_step_s(&self) -> f64 {
+        self.link.longest_step_s()
+    }
+}

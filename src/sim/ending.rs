@@ -1,0 +1,158 @@
+//! How a flight ends, and what it leaves behind.
+
+use std::time::Duration;
+
+use crate::audit::{AuditError, AuditOutcome};
+use crate::law::{Certificate, LawError, ParameterError};
+use crate::record::RecordError;
+use crate::swarm::{Pair, Swarm};
+
+/// A path may bend away from the straight line that is swept by this much \[m\]; two vehicles by twice as much. A step
+/// that bends more is flown in halves.
+pub(super) const MAX_BEND_M: f64 = 1e-5;
+
+/// What a flight left behind besides its recording.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// Name of the law that was flown.
+    pub law: String,
+    /// How it ended.
+    pub ending: Ending,
+    /// Time flown \[s\].
+    pub duration_s: f64,
+    /// Whole steps flown.
+    pub steps: u64,
+    /// The law's promise, made before the first step.
+    pub certificate: Certificate,
+    /// What the independent judge found.
+    pub audit: AuditOutcome,
+    /// Pairs whose keep-out balls the plant's own collision detection saw overlap, in index order.
+    pub engine_contacts: Vec<Pair>,
+    /// State at the end.
+    pub last: Swarm,
+    /// Wall-clock time by kind of work.
+    pub performance: Performance,
+}
+
+/// How a flight ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ending {
+    /// At the scenario's duration.
+    Completed,
+    /// The caller asked for it.
+    Interrupted,
+    /// The law had no answer for the state that was reached.
+    LawUndefined(LawError),
+    /// The motion could not be carried on.
+    BrokeDown(Breakdown),
+}
+
+/// Wall-clock time by kind of work. Work done side by side counts in each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Performance {
+    /// From first to last step.
+    pub wall: Duration,
+    /// In the law.
+    pub law: Duration,
+    /// In the plant.
+    pub physics: Duration,
+    /// In the audit.
+    pub audit: Duration,
+    /// In what receives the recording.
+    pub record: Duration,
+}
+
+/// Why a motion could not be carried on. The state before is the last.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Breakdown {
+    /// The law commanded something that is not a number.
+    #[error("step {step}: the law's command for vehicle {} is not a finite number", vehicle + 1)]
+    CommandNotFinite {
+        /// The step, from 1; 0 is the start.
+        step: u64,
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
+    /// A vehicle's state left the range of numbers.
+    #[error("step {step}: the state of vehicle {} is no longer a finite number", vehicle + 1)]
+    StateNotFinite {
+        /// The step, from 1; 0 is the start.
+        step: u64,
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
+    /// The plant could not be solved any further.
+    #[error("step {step}: the equation of motion cannot be solved to its tolerances")]
+    Stalled {
+        /// The step, from 1.
+        step: u64,
+    },
+    /// A path bends too far from the straight line that is swept, however often the step is halved.
+    #[error(
+        "step {step}: a path bends by {bend_m:.1e} m from the straight line that is audited, and {MAX_BEND_M:e} m are allowed"
+    )]
+    Bent {
+        /// The step, from 1.
+        step: u64,
+        /// By how much at most \[m\].
+        bend_m: f64,
+    },
+    /// The judge refused what it was shown.
+    #[error("step {step}: {why}")]
+    Audit {
+        /// The step, from 1; 0 is the start.
+        step: u64,
+        /// The judge's reason.
+        why: AuditError,
+    },
+}
+
+/// Why there is no flight to report on.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// There is no judge for the scenario.
+    #[error(transparent)]
+    Audit(#[from] AuditError),
+    /// The recording could not be kept.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The law does not exist.
+    #[error(transparent)]
+    Law(#[from] ParameterError),
+    /// The scenario has no formation to fly to.
+    #[error("the scenario has no leg")]
+    NoLeg,
+    /// Accelerations from outside that are not a finite row for each vehicle.
+    #[error("{found} rows of accelerations for {expected} vehicles, or a number among them that is not finite")]
+    Commands {
+        /// Number of vehicles.
+        expected: usize,
+        /// Number of rows given.
+        found: usize,
+    },
+}
+
+impl Ending {
+    /// Why a flight ended before its time, in a sentence.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        match self {
+            Self::Completed => None,
+            Self::Interrupted => Some("interrupted".to_owned()),
+            Self::LawUndefined(why) => Some(format!("the law is undefined: {why}")),
+            Self::BrokeDown(why) => Some(why.to_string()),
+        }
+    }
+}
+
+impl From<LawError> for Ending {
+    fn from(undefined: LawError) -> Self {
+        Self::LawUndefined(undefined)
+    }
+}
+
+impl From<Breakdown> for Ending {
+    fn from(breakdown: Breakdown) -> Self {
+        Self::BrokeDown(breakdown)
+    }
+}

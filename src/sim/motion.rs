@@ -1,0 +1,86 @@
+//! What moves the vehicles between two instants at which the law is asked.
+
+use crate::continuous::{Continuous, IdealError};
+use crate::plant::{Path, Plant, PlantError, rapier};
+use crate::scenario::{PlantSpec, Scenario};
+use crate::swarm::{Pair, Rows, Swarm};
+
+use super::controller::Controller;
+use super::ending::{Breakdown, Ending};
+
+/// What moves the vehicles.
+#[derive(Clone)]
+pub enum Motion {
+    /// A plant that holds the command of the beginning of a step (sample-and-hold).
+    Sampled(Box<dyn Plant>),
+    /// Continuous time: the law is asked all the way along.
+    Continuous(Box<Continuous>),
+}
+
+impl<P: Plant + 'static> From<P> for Motion {
+    fn from(plant: P) -> Self {
+        Self::Sampled(Box::new(plant))
+    }
+}
+
+impl Motion {
+    /// What the scenario asks for, at its start.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        match scenario.plant {
+            PlantSpec::Rapier(precision) => Self::Sampled(rapier::plant(scenario, precision)),
+            PlantSpec::Ideal => Self::Continuous(Box::new(Continuous::new(scenario))),
+        }
+    }
+
+    /// Moves from `from_s` over `dt_s` seconds, and says where the vehicles are then.
+    pub(super) fn advance(
+        &mut self,
+        (step, from_s, dt_s): (u64, f64, f64),
+        controller: &mut Controller,
+        end: &mut Swarm,
+        path: &mut Path,
+    ) -> Result<(), Ending> {
+        path.begin();
+        match self {
+            Self::Sampled(plant) => plant
+                .advance(dt_s, end, path)
+                .map_err(|PlantError::NotFinite { vehicle }| Breakdown::StateNotFinite { step, vehicle }.into()),
+            Self::Continuous(solution) => {
+                solution.advance((from_s, dt_s), controller, end, path).map_err(|error| match error {
+                    IdealError::Law { source, .. } => Ending::LawUndefined(source),
+                    IdealError::Stalled { .. } | IdealError::Times { .. } | IdealError::Tolerances => {
+                        Breakdown::Stalled { step }.into()
+                    }
+                })
+            }
+        }
+    }
+
+    /// Completes the state with the law's command, which is held from now on.
+    pub(super) fn apply(&mut self, command: &Rows, state: &mut Swarm) {
+        if let Self::Sampled(plant) = self {
+            plant.apply(command, state);
+        }
+    }
+
+    pub(super) fn observe(&self, state: &mut Swarm) {
+        match self {
+            Self::Sampled(plant) => plant.observe(state),
+            Self::Continuous(solution) => solution.observe(state),
+        }
+    }
+
+    pub(super) fn restore(&mut self, state: &Swarm) {
+        match self {
+            Self::Sampled(plant) => plant.restore(state),
+            Self::Continuous(solution) => solution.restore(state),
+        }
+    }
+
+    pub(super) fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
+        if let Self::Sampled(plant) = self {
+            plant.keep_out_contacts(pairs);
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! What counts as a reached formation.
+
+use crate::formation::{Formation, largest_edge_error_m, procrustes_rms_m};
+use crate::graph::Graph;
+use crate::swarm::Swarm;
+
+/// Times are sums and products of steps: this much shorter than `hold_s` still counts as held \[s\].
+const TIME_ROUNDING_S: f64 = 1e-9;
+
+/// What counts as a reached formation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// Largest error of a desired distance over the graph's edges \[m\], and largest root mean square distance from the
+    /// formation laid over the swarm.
+    pub edge_error_m: f64,
+    /// Largest speed relative to the swarm's mean velocity \[m/s\].
+    pub disagreement_m_s: f64,
+    /// Shortest time for which all must hold, up to the end of the leg \[s\].
+    pub hold_s: f64,
+}
+
+impl Default for Arrival {
+    fn default() -> Self {
+        Self { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 }
+    }
+}
+
+/// How far a swarm is from its formation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// Largest error of a desired distance over the graph's edges \[m\].
+    pub max_edge_error_m: f64,
+    /// Root mean square distance from the formation in its best place, turned and perhaps mirrored \[m\].
+    pub rms_position_error_m: f64,
+    /// Largest speed relative to the mean velocity \[m/s\].
+    pub disagreement_m_s: f64,
+}
+
+impl Distance {
+    /// Of a swarm from a formation: O(edges).
+    #[must_use]
+    pub fn of(swarm: &Swarm, formation: &Formation, graph: &Graph) -> Self {
+        Self {
+            max_edge_error_m: largest_edge_error_m(&swarm.positions_m, formation, graph),
+            rms_position_error_m: procrustes_rms_m(&swarm.positions_m, formation),
+            disagreement_m_s: swarm.disagreement_m_s(),
+        }
+    }
+
+    /// Of a run without samples: nothing is known.
+    #[must_use]
+    pub fn unknown() -> Self {
+        Self { max_edge_error_m: f64::NAN, rms_position_error_m: f64::NAN, disagreement_m_s: f64::NAN }
+    }
+}
+
+impl Arrival {
+    /// Whether everything is within the limits at this instant; never where a number is not finite.
+    #[must_use]
+    pub fn is_within(&self, distance: &Distance) -> bool {
+        distance.max_edge_error_m <= self.edge_error_m
+            && distance.rms_position_error_m <= self.edge_error_m
+            && distance.disagreement_m_s <= self.disagreement_m_s
+    }
+
+    /// Whether limits that have been kept from one time to another \[s\] have been kept for long enough.
+    #[must_use]
+    pub fn is_held(&self, since_s: f64, until_s: f64) -> bool {
+        until_s - since_s >= self.hold_s - TIME_ROUNDING_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_limit_is_a_limit_and_what_is_not_a_number_is_not_within() {
+        let arrival = Arrival::default();
+        let good = Distance { max_edge_error_m: 0.01, rms_position_error_m: 0.01, disagreement_m_s: 0.01 };
+        assert!(arrival.is_within(&good));
+        for bad in [0.011, f64::NAN] {
+            assert!(!arrival.is_within(&Distance { max_edge_error_m: bad, ..good }));
+            assert!(!arrival.is_within(&Distance { rms_position_error_m: bad, ..good }));
+            assert!(!arrival.is_within(&Distance { disagreement_m_s: bad, ..good }));
+        }
+    }
+
+    #[test]
+    fn held_means_for_as_long_as_asked_but_for_rounding() {
+        let arrival = Arrival { hold_s: 0.3, ..Arrival::default() };
+        assert!(arrival.is_held(0.1, 0.1 + 0.1 + 0.2) && !arrival.is_held(0.1, 0.399));
+    }
+}

@@ -1,0 +1,108 @@
+//! Who changes the target while the swarm flies.
+
+use dyn_clone::DynClone;
+
+use super::{Arrival, Begins, CurrentTarget, Distance, Leg};
+use crate::graph::Graph;
+use crate::swarm::Swarm;
+
+/// Reads the swarm as it is sensed and may change its target: from leg to leg, or within a leg.
+///
+/// Its memory is saved with a simulation, so it must be [`Clone`].
+pub trait Supervisor: DynClone + Send {
+    /// Called once at every instant at which the law is asked, before it.
+    fn supervise(&mut self, time_s: f64, sensed: &Swarm, target: &mut CurrentTarget);
+
+    /// Whether it never changes anything: then it is not asked.
+    fn is_idle(&self) -> bool {
+        false
+    }
+}
+
+dyn_clone::clone_trait_object!(Supervisor);
+
+/// Goes from leg to leg by time, or when the leg before has been reached and held.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    legs: Vec<Leg>,
+    links: Graph,
+    arrival: Arrival,
+    /// Since when the present leg has been within the limits \[s\].
+    within_since_s: Option<f64>,
+}
+
+impl Schedule {
+    /// The legs of a flight on this graph; the first is under way.
+    #[must_use]
+    pub fn new(legs: &[Leg], links: &Graph, arrival: Arrival) -> Self {
+        Self { legs: legs.to_vec(), links: links.clone(), arrival, within_since_s: None }
+    }
+
+    fn is_due(&mut self, begins: Begins, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
+        match begins {
+            Begins::At(from_s) => time_s >= from_s,
+            Begins::Reached => {
+                let distance = Distance::of(sensed, target.view().formation, &self.links);
+                let within = self.arrival.is_within(&distance);
+                self.within_since_s = within.then(|| self.within_since_s.unwrap_or(time_s));
+                self.within_since_s.is_some_and(|since_s| self.arrival.is_held(since_s, time_s))
+            }
+        }
+    }
+}
+
+impl Supervisor for Schedule {
+    fn supervise(&mut self, time_s: f64, sensed: &Swarm, target: &mut CurrentTarget) {
+        while let Some(next) = self.legs.get(target.view().leg + 1) {
+            let begins = next.begins;
+            if !self.is_due(begins, time_s, sensed, target) {
+                return;
+            }
+            let leg = target.view().leg + 1;
+            target.begin(leg, &self.legs[leg].formation);
+            self.within_since_s = None;
+        }
+    }
+
+    fn is_idle(&self) -> bool {
+        self.legs.len() < 2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formation::Formation;
+
+    fn legs(begins: [Begins; 2]) -> Vec<Leg> {
+        let leg = |spacing_m, begins| Leg { formation: Formation::line(2, spacing_m), begins };
+        vec![Leg::first(Formation::line(2, 1.0)), leg(2.0, begins[0]), leg(3.0, begins[1])]
+    }
+
+    /// The leg at times 0, 0.5, 1, ... while the swarm is in the formation of leg `at(time)`.
+    fn flown(legs: &[Leg], at: impl Fn(f64) -> usize) -> Vec<usize> {
+        let mut schedule = Schedule::new(legs, &Graph::complete(2), Arrival::default());
+        let mut target = CurrentTarget::first_of(legs).expect("legs");
+        (0..8)
+            .map(|k| {
+                let time_s = 0.5 * f64::from(k);
+                let swarm = Swarm::at_rest(legs[at(time_s)].formation.slots_m.clone());
+                schedule.supervise(time_s, &swarm, &mut target);
+                target.view().leg
+            })
+            .collect()
+    }
+
+    #[test]
+    fn legs_begin_at_their_times_and_two_may_be_due_at_once() {
+        assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(2.5)]), |_| 0), [0, 0, 1, 1, 1, 2, 2, 2]);
+        assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(1.0)]), |_| 0), [0, 0, 2, 2, 2, 2, 2, 2]);
+    }
+
+    #[test]
+    fn a_leg_that_is_reached_and_held_ends_and_one_that_is_lost_does_not() {
+        let legs = legs([Begins::Reached, Begins::Reached]);
+        assert_eq!(flown(&legs, |time_s| usize::from(time_s > 1.0)), [0, 0, 1, 1, 1, 2, 2, 2]);
+        assert_eq!(flown(&legs, |time_s| usize::from(time_s == 0.5)), [0, 0, 0, 0, 1, 1, 1, 1]);
+    }
+}
