@@ -52,6 +52,7 @@ pub mod render;
 pub mod report;
 pub mod scenario;
 pub mod sim;
+pub mod space;
 pub mod swarm;
 pub mod track;
 pub mod validate;
