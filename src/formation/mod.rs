@@ -8,6 +8,7 @@ mod fit;
 use nalgebra::Vector3;
 
 use crate::graph::Graph;
+use crate::space::closest_pair;
 use crate::swarm::{Pair, Rows, row, separation, set_row};
 
 pub use fit::{RigidMotion, affine_dimension, best_rigid_motion, procrustes_rms_m};
@@ -113,42 +114,6 @@ impl Formation {
     pub fn min_distance(&self) -> Option<(Pair, f64)> {
         closest_pair(&self.slots_m)
     }
-}
-
-/// The two nearest rows of a table of positions and their distance \[m\]; the first such pair in index order, and none
-/// for fewer than two rows or where a number is not finite.
-///
-/// Sweeps along the axis of the greatest extent: O(N log N) for spread-out positions, O(N^2) at worst.
-#[must_use]
-pub fn closest_pair(positions_m: &Rows) -> Option<(Pair, f64)> {
-    if crate::swarm::first_row_not_finite(positions_m).is_some() {
-        return None;
-    }
-    let extent = |axis: &usize| {
-        let column = positions_m.column(*axis);
-        column.max() / 2.0 - column.min() / 2.0
-    };
-    if positions_m.nrows() < 2 {
-        return None;
-    }
-    let axis = (0..3).max_by(|a, b| extent(a).total_cmp(&extent(b)))?;
-    let along = positions_m.column(axis);
-    let mut order: Vec<_> = (0..positions_m.nrows()).collect();
-    order.sort_by(|&i, &j| along[i].total_cmp(&along[j]));
-
-    let mut closest: Option<(Pair, f64)> = None;
-    for (place, &i) in order.iter().enumerate() {
-        for &j in &order[place + 1..] {
-            if closest.is_some_and(|(_, distance)| along[j] - along[i] > distance) {
-                break;
-            }
-            let found = (Pair::new(i, j), separation(positions_m, i, j));
-            if closest.is_none_or(|best| (found.1, found.0) < (best.1, best.0)) {
-                closest = Some(found);
-            }
-        }
-    }
-    closest
 }
 
 /// Largest error of a desired distance over the edges of the graph, `max |l_ij - d_ij|` \[m\]; 0 without edges.

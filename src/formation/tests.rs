@@ -175,25 +175,3 @@ fn shapes_have_the_distances_they_are_named_for() {
         [0; 3]
     );
 }
-
-proptest! {
-    #[test]
-    fn the_closest_pair_is_that_of_the_full_search(points in prop::collection::vec([0..6_i32, 0..6, 0..6], 0..30)) {
-        let positions = Rows::from_fn(points.len(), |i, axis| f64::from(points[i][axis]));
-        let mut expected: Option<(Pair, f64)> = None;
-        for (i, j) in Graph::complete(points.len()).edges() {
-            let distance = separation(&positions, i, j);
-            if expected.is_none_or(|(_, best)| distance < best) {
-                expected = Some((Pair::new(i, j), distance));
-            }
-        }
-        prop_assert_eq!(closest_pair(&positions), expected);
-    }
-}
-
-#[test]
-fn the_closest_pair_of_less_than_two_or_not_finite_positions_is_none() {
-    assert_eq!(closest_pair(&Rows::zeros(1)), None);
-    assert_eq!(closest_pair(&rows(&[[0.0; 3], [f64::NAN; 3], [1.0; 3]])), None);
-    assert_eq!(closest_pair(&rows(&[[2.0; 3], [1.0; 3], [2.0; 3]])), Some((Pair::new(0, 2), 0.0)));
-}

@@ -9,10 +9,11 @@ mod words;
 
 use serde::Serialize;
 
-use crate::formation::{affine_dimension, closest_pair};
+use crate::formation::affine_dimension;
 use crate::graph::Graph;
 use crate::law::{Controls, Law, ParameterError};
 use crate::scenario::{PlantSpec, Precision, Scenario, Space};
+use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
 
 pub use rigidity::{MOST_RANKED, RANK_TOLERANCE, Rigidity};

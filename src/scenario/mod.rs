@@ -10,7 +10,6 @@ mod document;
 mod error;
 pub mod file;
 mod homes;
-mod neighbours;
 mod overrides;
 mod resolved;
 mod source;

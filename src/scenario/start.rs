@@ -10,9 +10,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use super::Space;
 use super::error::ScenarioError;
 use super::file::StartShape;
-use super::neighbours::Spaced;
 use super::validate::positive;
 use crate::formation::Formation;
+use crate::space::Spaced;
 use crate::swarm::{Rows, row, set_row};
 
 /// Random positions tried for one vehicle before the square or cube is called full.

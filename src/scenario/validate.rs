@@ -3,10 +3,10 @@
 use std::fmt::Display;
 
 use super::error::ScenarioError;
-use super::neighbours::Spaced;
 use super::{PlantSpec, Precision, Scenario, Space, TimeSpec};
 use crate::graph::Graph;
 use crate::law::Gain;
+use crate::space::Spaced;
 use crate::swarm::{Pair, Rows, mean_row, row};
 
 /// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::stretch::Stretch;
 use super::{BUDGET_BYTES, COORDINATE, Footage, FootageError, Instant, Span, UNKNOWN_RADIUS_M, nearer};
-use crate::formation::closest_pair;
+use crate::space::closest_pair;
 use crate::swarm::{Pair, Rows, row, set_row};
 use crate::track::{Item, Piece, Tracks};
 

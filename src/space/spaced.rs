@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 /// Points lie in cubic cells of twice the distance, so whatever is within the distance of a point is in its cell or in
 /// one that touches it, rounding of the cell's number included; and a cell holds few points, because they keep their
 /// distance.
-pub(super) struct Spaced {
+#[derive(Clone, Debug)]
+pub struct Spaced {
     distance_m: f64,
     cells: HashMap<[i64; 3], Vec<(usize, Vector3<f64>)>>,
     count: usize,
@@ -17,13 +18,17 @@ pub(super) struct Spaced {
 
 impl Spaced {
     /// No points yet; `distance_m` must be positive.
-    pub(super) fn new(distance_m: f64) -> Self {
+    #[must_use]
+    pub fn new(distance_m: f64) -> Self {
         Self { distance_m, cells: HashMap::new(), count: 0 }
     }
 
     /// Adds a point, unless one of those before it (numbered from 0 in order of insertion; the lowest is named) is at
-    /// the distance or nearer: then that one and its separation are the error.
-    pub(super) fn insert(&mut self, point: Vector3<f64>) -> Result<(), (usize, f64)> {
+    /// the distance or nearer.
+    ///
+    /// # Errors
+    /// That one and its separation \[m\], and the point is not added.
+    pub fn insert(&mut self, point: Vector3<f64>) -> Result<(), (usize, f64)> {
         let cell = self.cell(point);
         let mut nearest: Option<(usize, f64)> = None;
         for dx in -1..=1 {

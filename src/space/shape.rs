@@ -1,0 +1,191 @@
+//! Solids that a vehicle may have to keep clear of.
+
+use nalgebra::Vector3;
+
+/// The form of an obstacle around its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A ball.
+    Ball {
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// A box, upright.
+    Box {
+        /// Half of its lengths \[m\].
+        half_m: Vector3<f64>,
+        /// How far it is turned about the vertical \[rad\], counter-clockwise from above.
+        yaw_rad: f64,
+    },
+    /// Everything within a radius of a straight line.
+    Capsule {
+        /// One end of the line, from the place of the obstacle \[m\].
+        from_m: Vector3<f64>,
+        /// The other end \[m\].
+        to_m: Vector3<f64>,
+        /// Radius \[m\].
+        radius_m: f64,
+    },
+    /// Everything behind a plane through the place of the obstacle.
+    HalfSpace {
+        /// Points out of it; of any length but zero.
+        normal: Vector3<f64>,
+    },
+}
+
+impl Shape {
+    /// Distance of a point from the surface \[m\], below zero within, and the unit normal of the surface point that is
+    /// nearest, pointing out: the direction in which the distance grows by one metre a metre. The point is given from the
+    /// obstacle's place \[m\].
+    ///
+    /// Where several surface points are nearest (the centre of a ball, the axis of a capsule, an inner diagonal of a box)
+    /// the normal is that of one of them.
+    #[must_use]
+    pub fn signed_distance_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
+        match *self {
+            Self::Ball { radius_m } => from_core(point_m, radius_m, Vector3::z()),
+            Self::Box { half_m, yaw_rad } => {
+                let (sin, cos) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
+                let turned =
+                    Vector3::new(cos * point_m.x + sin * point_m.y, cos * point_m.y - sin * point_m.x, point_m.z);
+                let (distance_m, normal) = from_box(turned, half_m);
+                let back = Vector3::new(cos * normal.x - sin * normal.y, sin * normal.x + cos * normal.y, normal.z);
+                (distance_m, back)
+            }
+            Self::Capsule { from_m, to_m, radius_m } => {
+                let (along, aside) = (to_m - from_m, point_m - from_m);
+                let squared = along.norm_squared();
+                let share = if squared > 0.0 { (aside.dot(&along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+                from_core(aside - along * share, radius_m, across(along))
+            }
+            Self::HalfSpace { normal } => {
+                let normal = normal.normalize();
+                (point_m.dot(&normal), normal)
+            }
+        }
+    }
+}
+
+/// Outside a core by the given vector: distance from the surface `radius_m` around the core, and the normal, which is
+/// `instead` on the core itself.
+fn from_core(off: Vector3<f64>, radius_m: f64, instead: Vector3<f64>) -> (f64, Vector3<f64>) {
+    let distance_m = off.norm();
+    (distance_m - radius_m, if distance_m > 0.0 { off / distance_m } else { instead })
+}
+
+/// The same for a box along the axes around the origin.
+fn from_box(point: Vector3<f64>, half_m: Vector3<f64>) -> (f64, Vector3<f64>) {
+    let off = point.zip_map(&half_m, |x, half| x - x.clamp(-half, half));
+    if off.norm_squared() > 0.0 {
+        return from_core(off, 0.0, Vector3::z());
+    }
+    let depths = point.abs() - half_m;
+    let axis = depths.imax();
+    let mut normal = Vector3::zeros();
+    normal[axis] = 1.0_f64.copysign(point[axis]);
+    (depths[axis], normal)
+}
+
+/// A unit vector at right angles to another, up as far as it can be.
+fn across(along: Vector3<f64>) -> Vector3<f64> {
+    let up = Vector3::z() * along.norm_squared() - along * along.z;
+    up.try_normalize(0.0).unwrap_or_else(|| if along.z == 0.0 { Vector3::z() } else { Vector3::x() })
+}
+
+#[cfg(test)]
+mod tests {
+    use parry3d_f64::math::{Pose, Vector};
+    use parry3d_f64::query::PointQuery as _;
+    use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Rounding of lengths of a few metres.
+    const TOLERANCE_M: f64 = 1e-9;
+
+    fn vector(extent: f64) -> impl Strategy<Value = Vector3<f64>> {
+        [-extent..extent, -extent..extent, -extent..extent].prop_map(Vector3::from)
+    }
+
+    fn shape() -> impl Strategy<Value = Shape> {
+        let length = || 0.1..3.0;
+        prop_oneof![
+            length().prop_map(|radius_m| Shape::Ball { radius_m }),
+            ([length(), length(), length()], -7.0..7.0)
+                .prop_map(|(half, yaw_rad)| Shape::Box { half_m: half.into(), yaw_rad }),
+            (vector(3.0), vector(3.0), length()).prop_map(|(from_m, to_m, radius_m)| Shape::Capsule {
+                from_m,
+                to_m,
+                radius_m
+            }),
+            vector(1.0).prop_filter("a direction", |n| n.norm() > 0.1).prop_map(|normal| Shape::HalfSpace { normal }),
+        ]
+    }
+
+    /// Distance from the surface by the library that has shapes of its own.
+    fn by_parry(shape: &Shape, point: Vector3<f64>) -> f64 {
+        let vector = |v: Vector3<f64>| Vector::new(v.x, v.y, v.z);
+        let point = vector(point);
+        match *shape {
+            Shape::Ball { radius_m } => Ball::new(radius_m).distance_to_local_point(point, false),
+            Shape::Box { half_m, yaw_rad } => Cuboid::new(vector(half_m)).distance_to_point(
+                &Pose::rotation(Vector::new(0.0, 0.0, yaw_rad)),
+                point,
+                false,
+            ),
+            Shape::Capsule { from_m, to_m, radius_m } => {
+                Capsule::new(vector(from_m), vector(to_m), radius_m).distance_to_local_point(point, false)
+            }
+            Shape::HalfSpace { normal } => {
+                HalfSpace::new(vector(normal.normalize())).distance_to_local_point(point, false)
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        #[test]
+        fn distances_are_those_of_parry(shape in shape(), point in vector(5.0)) {
+            let (distance_m, _) = shape.signed_distance_m(point);
+            prop_assert!((distance_m - by_parry(&shape, point)).abs() < TOLERANCE_M, "{shape:?}: {distance_m}");
+        }
+
+        #[test]
+        fn the_surface_is_as_far_as_said_along_the_normal_and_nowhere_nearer(
+            shape in shape(), point in vector(5.0), directions in prop::collection::vec(vector(1.0), 200),
+        ) {
+            let (distance_m, normal) = shape.signed_distance_m(point);
+            prop_assert!((normal.norm() - 1.0).abs() < TOLERANCE_M);
+            let (on_surface, _) = shape.signed_distance_m(point - normal * distance_m);
+            prop_assert!(on_surface.abs() < TOLERANCE_M, "{shape:?}: {on_surface}");
+            for direction in directions.iter().filter_map(|d| d.try_normalize(0.1)) {
+                let (nearer, _) = shape.signed_distance_m(point + direction * (distance_m.abs() * 0.999));
+                prop_assert!(nearer * distance_m >= 0.0, "{shape:?}: the surface is crossed on the way");
+            }
+        }
+
+        #[test]
+        fn the_normal_is_where_the_distance_grows(shape in shape(), point in vector(5.0)) {
+            const STEP_M: f64 = 1e-6;
+            let (distance_m, normal) = shape.signed_distance_m(point);
+            let (farther_m, same) = shape.signed_distance_m(point + normal * STEP_M);
+            // Not where the nearest feature changes within the step.
+            prop_assume!((same - normal).norm() < 1e-3);
+            prop_assert!((farther_m - distance_m - STEP_M).abs() < 1e-9, "{shape:?}");
+        }
+    }
+
+    #[test]
+    fn a_point_with_many_nearest_surface_points_has_the_normal_of_one() {
+        let up = Vector3::z();
+        assert_eq!(Shape::Ball { radius_m: 2.0 }.signed_distance_m(Vector3::zeros()), (-2.0, up));
+        let capsule = |to_m| Shape::Capsule { from_m: Vector3::zeros(), to_m, radius_m: 0.5 };
+        assert_eq!(capsule(Vector3::x()).signed_distance_m(Vector3::x() * 0.5), (-0.5, up));
+        assert_eq!(capsule(up).signed_distance_m(up * 0.5), (-0.5, Vector3::x()));
+        assert_eq!(capsule(Vector3::zeros()).signed_distance_m(Vector3::zeros()), (-0.5, up));
+        let cube = Shape::Box { half_m: Vector3::repeat(1.0), yaw_rad: 0.0 };
+        assert_eq!(cube.signed_distance_m(Vector3::zeros()), (-1.0, Vector3::x()));
+    }
+}
