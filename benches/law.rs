@@ -10,6 +10,7 @@ use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterio
 use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law};
+use tautline::observation::Observation;
 use tautline::swarm::{Rows, Swarm};
 
 /// Vehicles on a sphere with about two metres to their neighbours, at rest lengths of about one.
@@ -26,10 +27,10 @@ fn edge_tension(graph: &Graph, formation: &Formation) -> EdgeTensionLaw {
     EdgeTensionLaw::new(graph, formation, parameters).expect("slots farther apart than delta")
 }
 
-fn control(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, graph: &Graph, law: &mut dyn Law, swarm: &Swarm) {
-    let mut control = Rows::zeros(swarm.count());
-    group.throughput(Throughput::Elements(2 * graph.edge_count() as u64));
-    group.bench_function(name, |bencher| bencher.iter(|| law.control(black_box(swarm), &mut control)));
+fn control(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, at: &Observation<'_>, law: &mut dyn Law) {
+    let mut control = Rows::zeros(at.own.count());
+    group.throughput(Throughput::Elements(2 * at.links.edge_count() as u64));
+    group.bench_function(name, |bencher| bencher.iter(|| law.command(black_box(at), &mut control)));
 }
 
 fn laws(criterion: &mut Criterion) {
@@ -37,15 +38,17 @@ fn laws(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(format!("law/{count}"));
         let (formation, swarm) = swarm(count);
         for (graph_name, graph) in [("complete", Graph::complete(count)), ("ring", Graph::ring(count))] {
+            let at = Observation::exact(&swarm, &graph, &formation);
             let mut law = edge_tension(&graph, &formation);
-            control(&mut group, &format!("edge-tension {graph_name}"), &graph, &mut law, &swarm);
+            control(&mut group, &format!("edge-tension {graph_name}"), &at, &mut law);
             let mut law = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
-            control(&mut group, &format!("laplacian {graph_name}"), &graph, &mut law, &swarm);
+            control(&mut group, &format!("laplacian {graph_name}"), &at, &mut law);
         }
-        let law = edge_tension(&Graph::complete(count), &formation);
+        let complete = Graph::complete(count);
+        let (law, at) = (edge_tension(&complete, &formation), Observation::exact(&swarm, &complete, &formation));
         group.throughput(Throughput::Elements((count * (count - 1)) as u64));
-        group.bench_function("energy complete", |bencher| bencher.iter(|| law.energy(black_box(&swarm))));
-        group.bench_function("certificate complete", |bencher| bencher.iter(|| law.certificate(black_box(&swarm))));
+        group.bench_function("energy complete", |bencher| bencher.iter(|| law.energy(black_box(&at))));
+        group.bench_function("certificate complete", |bencher| bencher.iter(|| law.certificate(black_box(&at))));
         group.finish();
     }
 }

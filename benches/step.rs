@@ -8,9 +8,9 @@ use std::ops::ControlFlow;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use tautline::formation::Formation;
-use tautline::plant;
-use tautline::scenario::Scenario;
-use tautline::sim;
+use tautline::plant::{Path, rapier};
+use tautline::scenario::{Precision, Scenario};
+use tautline::sim::{self, Parts};
 use tautline::swarm::{Rows, Swarm};
 
 const DELTA_M: f64 = 2.0;
@@ -29,12 +29,13 @@ fn steps(criterion: &mut Criterion) {
         let scenario = lattice(count);
         scenario.validate().expect("the lattice can be flown");
         group.bench_function(BenchmarkId::from_parameter("bare engine"), |bencher| {
-            let (mut law, held) = (scenario.law().expect("a law"), Rows::zeros(count));
+            let (held, mut state, mut path) = (Rows::zeros(count), scenario.start.clone(), Path::default());
             bencher.iter_batched(
-                || plant::for_scenario(&scenario),
+                || rapier::plant(&scenario, Precision::Single),
                 |mut plant| {
                     for _ in 0..STEPS {
-                        plant.step(law.as_mut(), &held, scenario.time.dt_s).expect("finite");
+                        plant.apply(&held, &mut state);
+                        plant.advance(scenario.time.dt_s, &mut state, &mut path).expect("finite");
                     }
                 },
                 BatchSize::LargeInput,
@@ -45,14 +46,10 @@ fn steps(criterion: &mut Criterion) {
             let name = format!("whole, {threads} threads");
             group.bench_function(BenchmarkId::from_parameter(name), |bencher| {
                 bencher.iter_batched(
-                    || (scenario.law().expect("a law"), plant::for_scenario(&scenario)),
-                    |(mut law, mut plant)| {
-                        pool.install(|| {
-                            sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut (), &mut |_| {
-                                ControlFlow::Continue(())
-                            })
-                        })
-                        .expect("a clean flight")
+                    || Parts::of(&scenario).expect("a law"),
+                    |parts| {
+                        pool.install(|| sim::fly(&scenario, parts, &mut (), &mut |_| ControlFlow::Continue(())))
+                            .expect("a clean flight")
                     },
                     BatchSize::LargeInput,
                 );

@@ -9,7 +9,7 @@ use std::path::Path;
 use tautline::render::scene::Stage;
 use tautline::render::{AdapterChoice, Film, FilmFormat, Footage, Renderer, Scene, View};
 use tautline::scenario::{Override, Scenario, Source};
-use tautline::{plant, sim};
+use tautline::sim::{self, Parts};
 
 const FPS: u32 = 25;
 /// Seconds of the flight in a second of the film.
@@ -18,9 +18,8 @@ const SPEED: f64 = 6.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let shorter = Override::parse("time.duration_s=60")?;
     let scenario = Scenario::read(&Source::resolve("circle")?, &[shorter])?;
-    let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(&scenario));
     let mut footage = Footage::of(&scenario);
-    sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut footage, &mut |_step| ControlFlow::Continue(()))?;
+    sim::fly(&scenario, Parts::of(&scenario)?, &mut footage, &mut |_step| ControlFlow::Continue(()))?;
 
     let path = Path::new("circle.mp4");
     let view = View { size_px: [960, 540], ..View::default() };

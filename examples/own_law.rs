@@ -8,31 +8,30 @@
 use std::error::Error;
 use std::ops::ControlFlow;
 
-use tautline::formation::Formation;
 use tautline::law::{Law, LawError};
+use tautline::observation::Observation;
 use tautline::scenario::{Scenario, Source};
-use tautline::swarm::{Rows, Swarm, row, set_row};
-use tautline::{plant, sim};
+use tautline::sim::{self, Parts};
+use tautline::swarm::{Rows, row, set_row};
 
 /// `u_i = -(p_i - h_i) - 2 v_i + 4 sum_j (p_i - p_j) / |p_i - p_j|^4`
-struct SpringsAndRepulsion {
-    formation: Formation,
-}
+#[derive(Clone)]
+struct SpringsAndRepulsion;
 
 impl Law for SpringsAndRepulsion {
     fn name(&self) -> &'static str {
         "springs-and-repulsion"
     }
 
-    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-        for i in 0..swarm.count() {
-            let position = row(&swarm.positions_m, i);
-            let mut u = row(&self.formation.slots_m, i) - position - 2.0 * row(&swarm.velocities_m_s, i);
-            for j in (0..swarm.count()).filter(|&j| j != i) {
-                let away = position - row(&swarm.positions_m, j);
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        for i in 0..at.own.count() {
+            let position = row(&at.own.positions_m, i);
+            let mut u = row(&at.target.formation.slots_m, i) - position - 2.0 * row(&at.own.velocities_m_s, i);
+            for j in (0..at.own.count()).filter(|&j| j != i) {
+                let away = position - at.seen(i, j).position_m;
                 u += 4.0 * away / away.norm_squared().powi(2);
             }
-            set_row(control, i, u);
+            set_row(command, i, u);
         }
         Ok(())
     }
@@ -40,10 +39,9 @@ impl Law for SpringsAndRepulsion {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let mut law = SpringsAndRepulsion { formation: scenario.formation().clone() };
-    let mut plant = plant::for_scenario(&scenario);
-    let flight = sim::fly(&scenario, &mut law, plant.as_mut(), &mut (), &mut |_step| ControlFlow::Continue(()))?;
-    println!("{}: {:?}", law.name(), flight.audit.status);
+    let parts = Parts::under(&scenario, Box::new(SpringsAndRepulsion));
+    let flight = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()))?;
+    println!("{}: {:?}", flight.law, flight.audit.status);
     if let Some(closest) = flight.audit.closest {
         println!("closest: vehicles {} at {:.3} m after {:.2} s", closest.pair, closest.separation_m, closest.time_s);
     }

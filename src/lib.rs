@@ -13,12 +13,13 @@
 //! use std::ops::ControlFlow;
 //!
 //! use tautline::scenario::{Override, Scenario, Source};
-//! use tautline::{audit, plant, sim};
+//! use tautline::sim::{self, Parts};
+//! use tautline::audit;
 //!
 //! let shorter = Override::parse("time.duration_s=5")?;
 //! let scenario = Scenario::read(&Source::resolve("pentagon")?, &[shorter])?;
-//! let (mut law, mut plant) = (scenario.law()?, plant::for_scenario(&scenario));
-//! let flight = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut (), &mut |_step| ControlFlow::Continue(()))?;
+//! let parts = Parts::of(&scenario)?;
+//! let flight = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()))?;
 //! assert_eq!(flight.audit.status, audit::Status::Clear);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

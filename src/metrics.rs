@@ -283,7 +283,7 @@ mod tests {
     fn rounding_of_times_does_not_cost_the_hold() {
         let (legs, graph) = pair_of_vehicles();
         let mut metrics = Metrics::new(&legs, &graph, JUDGE);
-        let swarm = Swarm::at_rest(formation.slots_m.clone());
+        let swarm = Swarm::at_rest(legs[0].formation.slots_m.clone());
         for time_s in [9.0_f64.next_up(), 10.0] {
             let control = Rows::zeros(2);
             metrics.observe(&Sample {
@@ -355,7 +355,7 @@ mod tests {
     fn a_start_without_energy_has_no_ratio() {
         let (legs, graph) = pair_of_vehicles();
         let mut metrics = Metrics::new(&legs, &graph, JUDGE);
-        let (swarm, control) = (Swarm::at_rest(formation.slots_m.clone()), Rows::zeros(2));
+        let (swarm, control) = (Swarm::at_rest(legs[0].formation.slots_m.clone()), Rows::zeros(2));
         metrics.observe(&Sample {
             time_s: 0.0,
             step: 0,

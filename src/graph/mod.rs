@@ -87,7 +87,7 @@ pub enum GraphError {
 impl Graph {
     /// Every vehicle senses every other.
     #[must_use]
-    pub fn complete(count: usize) -> Self {
+    pub const fn complete(count: usize) -> Self {
         Self { count, edges: Edges::All }
     }
 

@@ -2,6 +2,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::formation::Formation;
+use crate::law::EdgeTension;
 use crate::scenario::{Override, Source};
 
 /// Certified separations are printed with 6 digits.

@@ -358,18 +358,20 @@ impl Simulation {
     /// Whether the move from `state` to `next` takes more than half of some pair's clearance above the barrier.
     fn is_refused(&self) -> bool {
         let Some(barrier_m) = self.controller.law.barrier_m() else { return false };
-        let moved_m = (0..self.state.count())
-            .map(|i| (row(&self.next.positions_m, i) - row(&self.state.positions_m, i)).norm())
+        let start = &self.state.positions_m;
+        let instants = || self.path.passed().map(|(_, rows)| rows).chain([&self.next.positions_m]);
+        let moved_m = instants()
+            .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
             .fold(0.0, f64::max);
         // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
         if 2.0 * moved_m <= 0.5 * (self.nearest_m - barrier_m) {
             return false;
         }
         self.controller.links.edges().any(|(i, j)| {
-            let from = row(&self.state.positions_m, j) - row(&self.state.positions_m, i);
-            let to = row(&self.next.positions_m, j) - row(&self.next.positions_m, i);
-            let clearance_m = from.norm() - barrier_m;
-            swept_separation_m(from, to) - barrier_m < 0.5 * clearance_m
+            let apart = |rows: &Rows| row(rows, j) - row(rows, i);
+            let mut from = apart(start);
+            let least_m = barrier_m + 0.5 * (from.norm() - barrier_m);
+            instants().map(apart).any(|to| swept_separation_m(std::mem::replace(&mut from, to), to) < least_m)
         })
     }
 

@@ -366,6 +366,8 @@ mod tests {
         assert!(!in_continuous_time(&[GOOD, lost]).pass, "a separation that is no number keeps no promise");
     }
 
+    use crate::observation::Observation;
+
     /// The edge-tension law with the sign of its tension flipped: the tension turns with the positions, the damping does
     /// not.
     #[derive(Clone)]

@@ -4,6 +4,7 @@ use stats_alloc::Region;
 use tautline::formation::{Formation, best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use tautline::graph::Graph;
 use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law};
+use tautline::observation::Observation;
 use tautline::swarm::{Rows, Swarm};
 
 use crate::ALLOCATOR;
@@ -18,11 +19,12 @@ pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
             let mut edge_tension = EdgeTensionLaw::new(&graph, &formation, parameters).expect("slots clear of delta");
             let mut laplacian = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
             let laws: [&mut dyn Law; 2] = [&mut edge_tension, &mut laplacian];
+            let at = Observation::exact(&swarm, &graph, &formation);
             let region = Region::new(ALLOCATOR);
             for law in laws {
                 for _ in 0..3 {
-                    law.control(&swarm, &mut control).expect("a state clear of delta");
-                    std::hint::black_box(law.energy(&swarm));
+                    law.command(&at, &mut control).expect("a state clear of delta");
+                    std::hint::black_box(law.energy(&at));
                 }
             }
             std::hint::black_box(largest_edge_error_m(&swarm.positions_m, &formation, &graph));

@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 
 use stats_alloc::Region;
 use tautline::law::{Law, LawError};
-use tautline::plant::{self, Plant, PlantError};
+use tautline::observation::Observation;
+use tautline::plant::{Path, Plant, PlantError};
 use tautline::scenario::{Override, Scenario, Source};
-use tautline::sim;
+use tautline::sim::{self, Motion, Parts};
 use tautline::swarm::{Rows, Swarm};
 
 use crate::ALLOCATOR;
@@ -15,21 +16,28 @@ const FEW: u32 = 20;
 const MANY: u32 = 300;
 
 /// Semi-implicit Euler without an engine.
+#[derive(Clone)]
 struct Euler {
     state: Swarm,
+    held: Rows,
     a22_per_s: f64,
 }
 
 impl Plant for Euler {
-    fn step(&mut self, _law: &mut dyn Law, control: &Rows, dt_s: f64) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
         let Swarm { positions_m, velocities_m_s } = &mut self.state;
-        for (v, u) in velocities_m_s.iter_mut().zip(control.iter()) {
+        for (v, u) in velocities_m_s.iter_mut().zip(self.held.iter()) {
             *v += (*u + self.a22_per_s * *v) * dt_s;
         }
         for (p, v) in positions_m.iter_mut().zip(velocities_m_s.iter()) {
             *p += v * dt_s;
         }
+        self.observe(predicted);
         Ok(())
+    }
+
+    fn apply(&mut self, command: &Rows, _state: &mut Swarm) {
+        self.held.copy_from(command);
     }
 
     fn observe(&self, swarm: &mut Swarm) {
@@ -44,6 +52,7 @@ impl Plant for Euler {
 }
 
 /// A law that takes memory each time it is asked.
+#[derive(Clone)]
 struct Wasteful(Box<dyn Law>);
 
 impl Law for Wasteful {
@@ -51,8 +60,8 @@ impl Law for Wasteful {
         "wasteful"
     }
 
-    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-        self.0.control(&std::hint::black_box(swarm.clone()), control)
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.0.command(&Observation { own: &std::hint::black_box(at.own.clone()), ..*at }, command)
     }
 }
 
@@ -62,19 +71,20 @@ fn builtin(name: &str, sets: &[&str]) -> Scenario {
 }
 
 /// How often a flight of so many steps takes memory.
-fn allocations(scenario: &Scenario, steps: u32, law: &mut dyn Law, plant: &mut dyn Plant) -> usize {
+fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, motion: Motion) -> usize {
     let mut scenario = scenario.clone();
     scenario.time.duration_s = f64::from(steps) * scenario.time.dt_s;
+    let parts = Parts { motion, ..Parts::under(&scenario, law) };
     let region = Region::new(ALLOCATOR);
-    let flown = sim::fly(&scenario, law, plant, &mut (), &mut |_step| ControlFlow::Continue(()));
+    let flown = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()));
     let change = region.change();
     assert_eq!(flown.expect("a flight").steps, u64::from(steps));
     change.allocations + change.reallocations
 }
 
 /// How much more often a long flight takes memory than a short one, once the threads have what they take at first.
-fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, plant: impl Fn() -> Box<dyn Plant>) -> usize {
-    let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law().as_mut(), plant().as_mut()));
+fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, motion: impl Fn() -> Motion) -> usize {
+    let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law(), motion()));
     many.checked_sub(few).expect("more steps take no less memory")
 }
 
@@ -91,8 +101,10 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
     for (name, scenario) in [("five vehicles", &pentagon), ("law and audit side by side", &crowd)] {
         let law = || scenario.law().expect("a law");
-        let euler =
-            || -> Box<dyn Plant> { Box::new(Euler { state: scenario.start.clone(), a22_per_s: scenario.a22_per_s }) };
+        let euler = || {
+            let (state, held) = (scenario.start.clone(), Rows::zeros(scenario.count()));
+            Motion::from(Euler { state, held, a22_per_s: scenario.a22_per_s })
+        };
         let grown = threads.install(|| growth(scenario, law, euler));
         assert_eq!(grown, 0, "{name}");
 
@@ -100,7 +112,7 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
         let grown = threads.install(|| growth(scenario, wasteful, euler));
         assert!(grown >= (MANY - FEW) as usize, "{name}: a law that allocates is seen: {grown}");
 
-        let engine = threads.install(|| growth(scenario, law, || plant::for_scenario(scenario)));
+        let engine = threads.install(|| growth(scenario, law, || Motion::of(scenario)));
         println!("{name}: the engine takes memory {:.2} times a step", engine as f64 / f64::from(MANY - FEW));
     }
 }

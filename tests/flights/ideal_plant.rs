@@ -4,13 +4,13 @@ use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 use tautline::audit::Auditor;
+use tautline::continuous::{self, IdealError, Solution, Tolerances};
 use tautline::formation::{Formation, largest_edge_error_m};
 use tautline::graph::Graph;
 use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, Law, LawError};
-use tautline::plant::PlantError;
-use tautline::plant::ideal::{self, IdealError, Solution, Tolerances};
+use tautline::observation::Observation;
 use tautline::scenario::{Override, PlantSpec, Scenario, Source};
-use tautline::sim::{self, Breakdown, Ending};
+use tautline::sim::{self, Breakdown, Ending, Parts};
 use tautline::swarm::{Pair, Rows, Swarm, row, set_row};
 
 /// The reference values are printed with 7 digits after the point.
@@ -33,7 +33,7 @@ fn scenario(name: &str, sets: &[&str]) -> Scenario {
 
 fn solve(scenario: &Scenario, times_s: &[f64]) -> Solution {
     let mut law = scenario.law().expect("a law");
-    ideal::solve(law.as_mut(), &scenario.start, scenario.a22_per_s, times_s, Tolerances::default()).expect("a solution")
+    continuous::solve(scenario, law.as_mut(), times_s, Tolerances::default()).expect("a solution")
 }
 
 fn edge_error_m(scenario: &Scenario, swarm: &Swarm) -> f64 {
@@ -41,6 +41,7 @@ fn edge_error_m(scenario: &Scenario, swarm: &Swarm) -> f64 {
 }
 
 /// A law that commands nothing.
+#[derive(Clone)]
 struct Free;
 
 impl Law for Free {
@@ -48,10 +49,29 @@ impl Law for Free {
         "free"
     }
 
-    fn control(&mut self, _swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-        control.fill(0.0);
+    fn command(&mut self, _at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        command.fill(0.0);
         Ok(())
     }
+}
+
+/// A flight from this start with this a22, towards a line.
+fn from(start: Swarm, a22_per_s: f64) -> Scenario {
+    let formation = Formation::line(start.count(), 3.0);
+    let mut scenario = Scenario::new("from", start, formation, 2.0, 5.0);
+    scenario.a22_per_s = a22_per_s;
+    scenario
+}
+
+/// The same under a law of one's own.
+fn solve_under(
+    law: &mut dyn Law,
+    start: &Swarm,
+    a22_per_s: f64,
+    times_s: &[f64],
+    tolerances: Tolerances,
+) -> Result<Solution, IdealError> {
+    continuous::solve(&from(start.clone(), a22_per_s), law, times_s, tolerances)
 }
 
 #[test]
@@ -67,7 +87,7 @@ fn the_pentagon_flies_as_the_reference_says() {
     assert!([Pair::new(0, 2), Pair::new(1, 2)].contains(&closest.pair), "{closest:?}");
     let error_m = edge_error_m(&pentagon, &solution.states[1]);
     assert!(error_m < 1e-11, "{error_m}");
-    let energy = pentagon.law().expect("a law").energy(&pentagon.start).expect("an energy");
+    let energy = pentagon.law().expect("a law").energy(&pentagon.observation(&pentagon.start)).expect("an energy");
     assert!((energy - 3.656_742_96).abs() < PRINTED_ENERGY, "{energy}");
 }
 
@@ -75,7 +95,7 @@ fn the_pentagon_flies_as_the_reference_says() {
 fn a_wrong_sign_of_a22_does_not_fly_as_the_reference_says() {
     let pentagon = scenario("pentagon", &[]);
     let mut law = pentagon.law().expect("a law");
-    let solved = ideal::solve(law.as_mut(), &pentagon.start, -0.1, &[10.0], Tolerances::default()).expect("a solution");
+    let solved = solve_under(law.as_mut(), &pentagon.start, -0.1, &[10.0], Tolerances::default()).expect("a solution");
     assert!((row(&solved.states[0].positions_m, 0).x - 4.318_055_1).abs() > 1e3 * PRINTED_M);
 }
 
@@ -87,7 +107,7 @@ fn the_circle_flies_as_the_reference_says() {
     assert!((closest.separation_m - 1.238_135).abs() < PRINTED_MINIMUM_M, "{closest:?}");
     assert!((closest.time_s - 4.18).abs() < PRINTED_TIME_S, "{closest:?}");
     assert_eq!(closest.pair, Pair::new(2, 3));
-    let energy = circle.law().expect("a law").energy(&circle.start).expect("an energy");
+    let energy = circle.law().expect("a law").energy(&circle.observation(&circle.start)).expect("an energy");
     assert!((energy - 4.479_772_16).abs() < PRINTED_ENERGY, "{energy}");
     let errors = solution.states.iter().map(|state| edge_error_m(&circle, state)).collect::<Vec<_>>();
     assert!(errors[0] > 1e-2 && errors[1] < 1e-2 && errors[2] < 1e-11, "{errors:?}");
@@ -118,7 +138,7 @@ fn free_motion_is_exact_for_drag_and_for_its_opposite() {
     let v = row(&start.velocities_m_s, 0);
     for a22 in [-1.5_f64, -0.1, 0.1] {
         let times_s = [0.0, 0.5, 0.5, 3.0, 20.0];
-        let solved = ideal::solve(&mut Free, &start, a22, &times_s, Tolerances::default()).expect("a solution");
+        let solved = solve_under(&mut Free, &start, a22, &times_s, Tolerances::default()).expect("a solution");
         assert_eq!(solved.states[0], start);
         for (state, t) in solved.states.iter().zip(times_s) {
             let scale = (a22 * t).exp().max(1.0);
@@ -132,8 +152,13 @@ fn free_motion_is_exact_for_drag_and_for_its_opposite() {
 fn largest_rise(scenario: &Scenario, a22_per_s: f64, tenths: u32) -> f64 {
     let mut law = scenario.law().expect("a law");
     let times_s: Vec<_> = (0..=tenths).map(|k| f64::from(k) * 0.1).collect();
-    let solved = ideal::solve(law.as_mut(), &scenario.start, a22_per_s, &times_s, Tolerances::default());
-    let energies = solved.expect("a solution").states.into_iter().map(|state| law.energy(&state).expect("an energy"));
+    let fed = Scenario { a22_per_s, ..scenario.clone() };
+    let solved = continuous::solve(&fed, law.as_mut(), &times_s, Tolerances::default());
+    let energies = solved
+        .expect("a solution")
+        .states
+        .into_iter()
+        .map(|state| law.energy(&scenario.observation(&state)).expect("an energy"));
     let (mut least, mut rise) = (f64::INFINITY, 0.0_f64);
     for energy in energies {
         rise = rise.max(energy - least);
@@ -162,7 +187,7 @@ fn tighter_tolerances_change_the_reference_flights_by_less_than_the_stated_error
         let [default, tight] = [1e-12, 1e-13].map(|tolerance| {
             let tolerances = Tolerances { relative: tolerance, absolute: tolerance };
             let mut law = scenario.law().expect("a law");
-            ideal::solve(law.as_mut(), &scenario.start, scenario.a22_per_s, &times_s, tolerances).expect("a solution")
+            continuous::solve(&scenario, law.as_mut(), &times_s, tolerances).expect("a solution")
         });
         let apart = |other: &Solution| {
             let of = |(a, b): (&Swarm, &Swarm)| (&a.positions_m - &b.positions_m).amax();
@@ -181,7 +206,7 @@ fn the_closest_approach_is_found_between_the_times_asked_for() {
     let mut start = Swarm::at_rest(Rows::zeros(2));
     set_row(&mut start.positions_m, 1, Vector3::new(10.0123, 0.3, 0.0));
     set_row(&mut start.velocities_m_s, 1, Vector3::new(-1.0, 0.0, 0.0));
-    let solved = ideal::solve(&mut Free, &start, 0.0, &[60.0], Tolerances::default()).expect("a solution");
+    let solved = solve_under(&mut Free, &start, 0.0, &[60.0], Tolerances::default()).expect("a solution");
     let closest = solved.closest.expect("a closest approach");
     assert!((closest.separation_m - 0.3).abs() < 1e-12 && (closest.time_s - 10.0123).abs() < 1e-6, "{closest:?}");
 }
@@ -199,14 +224,16 @@ fn thrown(closing_m_s: f64) -> (EdgeTensionLaw, Swarm) {
 #[test]
 fn a_hard_throw_stays_above_its_certificate_although_trial_steps_leave_the_law() {
     let (mut law, start) = thrown(40.0);
-    let certified_m = law.certificate(&start).certified_m.expect("a certificate");
-    let solved = ideal::solve(&mut law, &start, 0.0, &[5.0], Tolerances::default()).expect("a solution");
+    let certified_m =
+        law.certificate(&from(start.clone(), 0.0).observation(&start)).certified_m.expect("a certificate");
+    let solved = solve_under(&mut law, &start, 0.0, &[5.0], Tolerances::default()).expect("a solution");
     let closest = solved.closest.expect("a closest approach");
     assert!(certified_m < 2.01, "the throw is hard: {certified_m}");
     assert!(closest.separation_m > certified_m, "{closest:?}");
 }
 
 /// A law that brakes nothing and has no answer within 2 m.
+#[derive(Clone)]
 struct Wall;
 
 impl Law for Wall {
@@ -214,9 +241,9 @@ impl Law for Wall {
         "wall"
     }
 
-    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-        control.fill(0.0);
-        let separation_m = tautline::swarm::separation(&swarm.positions_m, 0, 1);
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        command.fill(0.0);
+        let separation_m = tautline::swarm::separation(&at.own.positions_m, 0, 1);
         let hit = LawError::Collision { pair: Pair::new(0, 1), separation_m, delta_m: 2.0 };
         if separation_m > 2.0 { Ok(()) } else { Err(hit) }
     }
@@ -225,7 +252,7 @@ impl Law for Wall {
 #[test]
 fn a_solution_that_runs_into_the_edge_of_the_law_ends_there_with_the_laws_reason() {
     let (_, start) = thrown(1.0);
-    let ended = ideal::solve(&mut Wall, &start, 0.0, &[0.5, 5.0], Tolerances::default());
+    let ended = solve_under(&mut Wall, &start, 0.0, &[0.5, 5.0], Tolerances::default());
     match ended {
         Err(IdealError::Law { time_s, source: LawError::Collision { pair, .. } }) => {
             assert!((time_s - 1.0).abs() < 1e-9, "{time_s}");
@@ -233,7 +260,7 @@ fn a_solution_that_runs_into_the_edge_of_the_law_ends_there_with_the_laws_reason
         }
         other => panic!("{other:?}"),
     }
-    let before = ideal::solve(&mut Wall, &start, 0.0, &[0.999], Tolerances::default());
+    let before = solve_under(&mut Wall, &start, 0.0, &[0.999], Tolerances::default());
     assert!(before.is_ok(), "the negative twin: {before:?}");
 }
 
@@ -241,7 +268,7 @@ fn a_solution_that_runs_into_the_edge_of_the_law_ends_there_with_the_laws_reason
 fn a_start_that_the_law_refuses_is_refused() {
     let (mut law, mut start) = thrown(0.0);
     set_row(&mut start.positions_m, 1, Vector3::new(1.5, 0.0, 0.0));
-    let refused = ideal::solve(&mut law, &start, 0.0, &[1.0], Tolerances::default());
+    let refused = solve_under(&mut law, &start, 0.0, &[1.0], Tolerances::default());
     assert!(matches!(refused, Err(IdealError::Law { time_s: 0.0, source: LawError::Collision { .. } })), "{refused:?}");
 }
 
@@ -250,7 +277,7 @@ fn wrong_times_and_tolerances_are_refused_and_motion_beyond_numbers_stalls() {
     let (mut law, start) = thrown(0.0);
     let mut solve = |a22: f64, times_s: &[f64], tolerance: f64| {
         let tolerances = Tolerances { relative: tolerance, absolute: 1e-12 };
-        ideal::solve(&mut law, &start, a22, times_s, tolerances).map(drop)
+        solve_under(&mut law, &start, a22, times_s, tolerances).map(drop)
     };
     assert_eq!(solve(0.0, &[1.0, 0.5], 1e-12), Err(IdealError::Times { entry: 1 }));
     assert_eq!(solve(0.0, &[-1.0], 1e-12), Err(IdealError::Times { entry: 0 }));
@@ -263,7 +290,7 @@ fn wrong_times_and_tolerances_are_refused_and_motion_beyond_numbers_stalls() {
     assert!(matches!(nan, Err(IdealError::Stalled { .. } | IdealError::Law { .. })), "{nan:?}");
     let mut runaway = Swarm::at_rest(Rows::zeros(2));
     runaway.velocities_m_s[(0, 0)] = 1.0;
-    let stalled = ideal::solve(&mut Free, &runaway, 100.0, &[10.0], Tolerances::default());
+    let stalled = solve_under(&mut Free, &runaway, 100.0, &[10.0], Tolerances::default());
     assert!(matches!(stalled, Err(IdealError::Stalled { .. } | IdealError::Law { .. })), "{stalled:?}");
 }
 
@@ -271,7 +298,7 @@ fn wrong_times_and_tolerances_are_refused_and_motion_beyond_numbers_stalls() {
 fn an_empty_swarm_and_a_single_vehicle_have_no_closest_approach() {
     for count in [0, 1] {
         let start = Swarm::at_rest(Rows::zeros(count));
-        let solved = ideal::solve(&mut Free, &start, 0.1, &[1.0], Tolerances::default()).expect("a solution");
+        let solved = solve_under(&mut Free, &start, 0.1, &[1.0], Tolerances::default()).expect("a solution");
         assert_eq!((solved.states.len(), solved.closest), (1, None));
     }
 }
@@ -282,10 +309,9 @@ fn the_ideal_plant_flies_the_same_solution_whatever_the_step() {
     for dt in ["0.1", "0.004166666666666667"] {
         let scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=10", &format!("time.dt_s={dt}")]);
         assert_eq!(scenario.plant, PlantSpec::Ideal);
-        let mut law = scenario.law().expect("a law");
-        let mut plant = tautline::plant::for_scenario(&scenario);
         let carry_on = &mut |_| ControlFlow::Continue(());
-        let flight = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut (), carry_on).expect("a flight");
+        let parts = Parts::of(&scenario).expect("a law");
+        let flight = sim::fly(&scenario, parts, &mut (), carry_on).expect("a flight");
         let gap_m = (&flight.last.positions_m - &solved.states[0].positions_m).amax();
         assert!(gap_m < SOLVED_M, "dt = {dt}: {gap_m}");
         assert!(flight.engine_contacts.is_empty() && flight.ending == Ending::Completed);
@@ -297,9 +323,8 @@ fn baseline_in_long_steps(max_halvings: u32) -> (sim::Flight, f64) {
     let sets = ["plant.kind=ideal", "law.delta_m=1.6", "time.dt_s=1", "time.record_hz=1", "time.duration_s=10"];
     let mut scenario = scenario("pentagon-laplacian", &sets);
     scenario.time.max_halvings = max_halvings;
-    let (mut law, mut plant) = (scenario.law().expect("a law"), tautline::plant::for_scenario(&scenario));
     let carry_on = &mut |_| ControlFlow::Continue(());
-    let flight = sim::fly(&scenario, law.as_mut(), plant.as_mut(), &mut (), carry_on).expect("a flight");
+    let flight = sim::fly(&scenario, Parts::of(&scenario).expect("a law"), &mut (), carry_on).expect("a flight");
     let seconds: Vec<f64> = (0..=10_u32).map(f64::from).collect();
     let solution = solve(&scenario, &seconds);
     let mut chords = Auditor::new(scenario.count(), scenario.delta_m).expect("a judge");
@@ -330,20 +355,13 @@ fn a_bent_step_that_cannot_be_divided_ends_the_flight_and_says_so() {
 fn the_ideal_plant_asks_the_law_it_is_given_and_ends_where_that_has_no_answer() {
     let (_, start) = thrown(1.0);
     let mut scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=5"]);
-    let mut plant = tautline::plant::for_scenario(&scenario);
-    let held = Rows::zeros(5);
-    assert!(plant.step(&mut Free, &held, 1.0).is_ok());
-    let mut after = scenario.start.clone();
-    plant.observe(&mut after);
-    assert_eq!(after, scenario.start, "without a command nothing moves");
+    let carry_on = &mut |_| ControlFlow::Continue(());
+    let free = sim::fly(&scenario, Parts::under(&scenario, Box::new(Free)), &mut (), carry_on).expect("a flight");
+    assert_eq!(free.last, scenario.start, "without a command nothing moves");
 
     scenario = Scenario::new("wall", start, Formation::line(2, 3.0), 0.5, 5.0);
     scenario.plant = PlantSpec::Ideal;
-    let mut plant = tautline::plant::for_scenario(&scenario);
-    assert!(matches!(plant.step(&mut Wall, &held, 2.0), Err(PlantError::LawUndefined(_))));
-    let mut plant = tautline::plant::for_scenario(&scenario);
-    let carry_on = &mut |_| ControlFlow::Continue(());
-    let flight = sim::fly(&scenario, &mut Wall, plant.as_mut(), &mut (), carry_on).expect("a flight");
+    let flight = sim::fly(&scenario, Parts::under(&scenario, Box::new(Wall)), &mut (), carry_on).expect("a flight");
     assert!(matches!(flight.ending, Ending::LawUndefined(LawError::Collision { .. })));
     assert!((flight.duration_s - 1.0).abs() <= scenario.time.dt_s, "{}", flight.duration_s);
 }

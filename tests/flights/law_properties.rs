@@ -5,9 +5,11 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseResult;
-use tautline::formation::{Formation, closest_pair};
+use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, LawError};
+use tautline::observation::Observation;
+use tautline::space::closest_pair;
 use tautline::swarm::{Rows, Swarm, row, separation, set_row};
 
 const ALPHA: f64 = 1.3;
@@ -110,9 +112,15 @@ fn isometries() -> impl Strategy<Value = Matrix3<f64>> {
     })
 }
 
-fn control_of(law: &mut dyn Law, swarm: &Swarm) -> Result<Rows, TestCaseError> {
+/// What the vehicles know where they know everything.
+fn exact<'a>(swarm: &'a Swarm, formation: &'a Formation) -> Observation<'a> {
+    static NOBODY: Graph = Graph::complete(0);
+    Observation::exact(swarm, &NOBODY, formation)
+}
+
+fn control_of(law: &mut dyn Law, swarm: &Swarm, formation: &Formation) -> Result<Rows, TestCaseError> {
     let mut control = Rows::from_element(swarm.count(), f64::NAN);
-    law.control(swarm, &mut control).map_err(fail)?;
+    law.command(&exact(swarm, formation), &mut control).map_err(fail)?;
     Ok(control)
 }
 
@@ -134,13 +142,14 @@ fn permuted(rows: &Rows, order: &[usize]) -> Rows {
 }
 
 /// The derivative of the law's energy along p' = v, v' = a22 v + u, by a central difference.
-fn rate_of_energy(law: &mut dyn Law, swarm: &Swarm, a22_per_s: f64) -> Result<f64, TestCaseError> {
+fn rate_of_energy(law: &mut dyn Law, case: &Case) -> Result<f64, TestCaseError> {
     const STEP_S: f64 = 1e-6;
-    let acceleration = control_of(law, swarm)? + &swarm.velocities_m_s * a22_per_s;
+    let Case { formation, swarm, a22_per_s } = case;
+    let acceleration = control_of(law, swarm, formation)? + &swarm.velocities_m_s * *a22_per_s;
     let energy_at = |time_s: f64| {
         let positions_m = &swarm.positions_m + &swarm.velocities_m_s * time_s;
         let velocities_m_s = &swarm.velocities_m_s + &acceleration * time_s;
-        law.energy(&Swarm { positions_m, velocities_m_s }).ok_or_else(|| fail("no energy"))
+        law.energy(&exact(&Swarm { positions_m, velocities_m_s }, formation)).ok_or_else(|| fail("no energy"))
     };
     Ok((energy_at(STEP_S)? - energy_at(-STEP_S)?) / (2.0 * STEP_S))
 }
@@ -153,7 +162,7 @@ fn relative_speeds_squared(swarm: &Swarm) -> f64 {
 
 /// The check that `dE/dt = -sum |v_i - mean v|^2` on the complete graph, for any law with an energy.
 fn energy_falls_by_the_relative_speeds_squared(law: &mut dyn Law, case: &Case) -> TestCaseResult {
-    let found = rate_of_energy(law, &case.swarm, case.a22_per_s)?;
+    let found = rate_of_energy(law, case)?;
     let expected = -relative_speeds_squared(&case.swarm);
     prop_assert!((found - expected).abs() <= allowed_rate_error(case), "{found} and {expected}");
     Ok(())
@@ -164,6 +173,7 @@ fn allowed_rate_error(case: &Case) -> f64 {
 }
 
 /// The edge-tension law with the sign of its tension flipped: the wrong twin that the energy check must reject.
+#[derive(Clone)]
 struct Flipped(EdgeTensionLaw);
 
 impl Law for Flipped {
@@ -171,16 +181,17 @@ impl Law for Flipped {
         "flipped"
     }
 
-    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-        let mut tension = Rows::zeros(swarm.count());
-        self.0.control(&Swarm::at_rest(swarm.positions_m.clone()), &mut tension)?;
-        self.0.control(swarm, control)?;
-        *control -= tension * 2.0;
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        let mut tension = Rows::zeros(at.own.count());
+        let at_rest = Swarm::at_rest(at.own.positions_m.clone());
+        self.0.command(&Observation { own: &at_rest, ..*at }, &mut tension)?;
+        self.0.command(at, command)?;
+        *command -= tension * 2.0;
         Ok(())
     }
 
-    fn energy(&self, swarm: &Swarm) -> Option<f64> {
-        self.0.energy(swarm)
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        self.0.energy(at)
     }
 }
 
@@ -191,7 +202,7 @@ proptest! {
             let allowed = ROUNDING * case.scale(&graph) * case.swarm.count() as f64;
             let laws: [&mut dyn Law; 2] = [&mut case.edge_tension(&graph)?, &mut case.laplacian(&graph)?];
             for law in laws {
-                let net = control_of(law, &case.swarm)?.row_sum();
+                let net = control_of(law, &case.swarm, &case.formation)?.row_sum();
                 prop_assert!(net.amax() <= allowed, "{}: {net}", law.name());
             }
         }
@@ -202,7 +213,7 @@ proptest! {
         for graph in graphs(case.swarm.count(), &keep)? {
             let mut law = case.edge_tension(&graph)?;
             let matrix = law.matrix_form(&case.swarm).map_err(fail)?;
-            let difference = (control_of(&mut law, &case.swarm)? - matrix).amax();
+            let difference = (control_of(&mut law, &case.swarm, &case.formation)? - matrix).amax();
             prop_assert!(difference <= ROUNDING * case.scale(&graph), "{difference:e}");
         }
     }
@@ -219,14 +230,14 @@ proptest! {
         };
         for graph in graphs(case.swarm.count(), &keep)? {
             let allowed = MOVED_ROUNDING * case.scale(&graph);
-            let expected = turned(&control_of(&mut case.edge_tension(&graph)?, &case.swarm)?, &isometry);
+            let expected = turned(&control_of(&mut case.edge_tension(&graph)?, &case.swarm, &case.formation)?, &isometry);
             // The edge-tension law knows distances only: its shape need not turn along.
             for mut law in [case.edge_tension(&graph)?, turned_case.edge_tension(&graph)?] {
-                let difference = (control_of(&mut law, &turned_case.swarm)? - &expected).amax();
+                let difference = (control_of(&mut law, &turned_case.swarm, &turned_case.formation)? - &expected).amax();
                 prop_assert!(difference <= allowed, "{difference:e}");
             }
-            let expected = turned(&control_of(&mut case.laplacian(&graph)?, &case.swarm)?, &isometry);
-            let found = control_of(&mut turned_case.laplacian(&graph)?, &turned_case.swarm)?;
+            let expected = turned(&control_of(&mut case.laplacian(&graph)?, &case.swarm, &case.formation)?, &isometry);
+            let found = control_of(&mut turned_case.laplacian(&graph)?, &turned_case.swarm, &turned_case.formation)?;
             prop_assert!((found - expected).amax() <= allowed);
         }
     }
@@ -242,7 +253,8 @@ proptest! {
         for graph in graphs(case.swarm.count(), &keep)? {
             let laws: [&mut dyn Law; 2] = [&mut case.edge_tension(&graph)?, &mut case.laplacian(&graph)?];
             for law in laws {
-                let difference = (control_of(law, &swarm)? - control_of(law, &case.swarm)?).amax();
+                let formation = &case.formation;
+                let difference = (control_of(law, &swarm, formation)? - control_of(law, &case.swarm, formation)?).amax();
                 prop_assert!(difference <= MOVED_ROUNDING * case.scale(&graph), "{difference:e}");
             }
         }
@@ -274,8 +286,8 @@ proptest! {
                 (&mut case.laplacian(&graph)?, &mut relabelled.laplacian(&relabelled_graph)?),
             ];
             for (law, relabelled_law) in pairs {
-                let expected = permuted(&control_of(law, &case.swarm)?, &order);
-                let difference = (control_of(relabelled_law, &relabelled.swarm)? - expected).amax();
+                let expected = permuted(&control_of(law, &case.swarm, &case.formation)?, &order);
+                let difference = (control_of(relabelled_law, &relabelled.swarm, &relabelled.formation)? - expected).amax();
                 prop_assert!(difference <= ROUNDING * case.scale(&graph), "{difference:e}");
             }
         }
@@ -292,7 +304,8 @@ proptest! {
     #[test]
     fn with_the_sign_of_the_tension_flipped_the_energy_check_fails(case in cases()) {
         let graph = Graph::complete(case.swarm.count());
-        let tension = control_of(&mut case.edge_tension(&graph)?, &Swarm::at_rest(case.swarm.positions_m.clone()))?;
+        let at_rest = Swarm::at_rest(case.swarm.positions_m.clone());
+        let tension = control_of(&mut case.edge_tension(&graph)?, &at_rest, &case.formation)?;
         // Flipping the tension changes the rate by twice its power, which must be more than the check lets pass.
         prop_assume!(tension.dot(&case.swarm.velocities_m_s).abs() > allowed_rate_error(&case));
         let flipped = &mut Flipped(case.edge_tension(&graph)?);
@@ -304,7 +317,7 @@ proptest! {
         for graph in graphs(case.swarm.count(), &keep)? {
             let (count, a22) = (case.swarm.count() as f64, case.a22_per_s);
             let rate = (1.0 + a22) * graph.algebraic_connectivity() / count - a22;
-            let found = rate_of_energy(&mut case.edge_tension(&graph)?, &case.swarm, a22)?;
+            let found = rate_of_energy(&mut case.edge_tension(&graph)?, &case)?;
             let bound = -rate * relative_speeds_squared(&case.swarm);
             prop_assert!(found <= bound + allowed_rate_error(&case), "{found} above {bound}");
         }
@@ -313,7 +326,7 @@ proptest! {
     #[test]
     fn the_certified_separation_lies_between_delta_and_the_start(case in cases()) {
         let law = case.edge_tension(&Graph::complete(case.swarm.count()))?;
-        let certificate = law.certificate(&case.swarm);
+        let certificate = law.certificate(&exact(&case.swarm, &case.formation));
         prop_assert!(certificate.void.is_empty());
         let certified_m = certificate.certified_m.ok_or_else(|| fail("nothing certified"))?;
         let closest_m = closest_pair(&case.swarm.positions_m).map_or(f64::NAN, |(_, distance_m)| distance_m);

@@ -8,11 +8,12 @@ use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 use tautline::audit::Status;
 use tautline::formation::Formation;
-use tautline::law::{Law, LawError};
-use tautline::plant::{self, Plant, PlantError};
+use tautline::law::{LaplacianKeys, Law, LawError, LawSpec};
+use tautline::observation::Observation;
+use tautline::plant::{Path, Plant, PlantError, rapier};
 use tautline::record::{Event, OwnedSample};
-use tautline::scenario::{LawSpec, PlantSpec, Precision, Scenario};
-use tautline::sim::{self, Breakdown, Ending, Flight, SimError};
+use tautline::scenario::{PlantSpec, Precision, Scenario};
+use tautline::sim::{self, Breakdown, Ending, Flight, Motion, Parts, SimError};
 use tautline::swarm::{Pair, Rows, Swarm, row, separation, set_row};
 
 /// A sum of ten tensions and five squares, relative to a sum that may be many times larger.
@@ -21,6 +22,7 @@ const ENERGY_ROUNDING: f64 = 1e-12;
 const ORDER: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 
 /// A law whose commands are changed after the fact.
+#[derive(Clone)]
 struct Bent<F> {
     inner: Box<dyn Law>,
     /// Given how often the law was asked before, the state, and the command.
@@ -34,19 +36,19 @@ impl<F> Bent<F> {
     }
 }
 
-impl<F: FnMut(u64, &Swarm, &mut Rows) -> Result<(), LawError> + Send> Law for Bent<F> {
+impl<F: FnMut(u64, &Swarm, &mut Rows) -> Result<(), LawError> + Clone + Send> Law for Bent<F> {
     fn name(&self) -> &'static str {
         "bent"
     }
 
-    fn control(&mut self, swarm: &Swarm, control: &mut Rows) -> Result<(), LawError> {
-        self.inner.control(swarm, control)?;
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.inner.command(at, command)?;
         self.asked += 1;
-        (self.bend)(self.asked - 1, swarm, control)
+        (self.bend)(self.asked - 1, at.own, command)
     }
 
-    fn energy(&self, swarm: &Swarm) -> Option<f64> {
-        self.inner.energy(swarm)
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        self.inner.energy(at)
     }
 
     fn barrier_m(&self) -> Option<f64> {
@@ -55,6 +57,7 @@ impl<F: FnMut(u64, &Swarm, &mut Rows) -> Result<(), LawError> + Send> Law for Be
 }
 
 /// A plant that is lost after some steps: it says so, or it does not and shows a vehicle that is nowhere.
+#[derive(Clone)]
 struct Lost {
     inner: Box<dyn Plant>,
     steps_left: u32,
@@ -63,11 +66,16 @@ struct Lost {
 }
 
 impl Plant for Lost {
-    fn step(&mut self, law: &mut dyn Law, control: &Rows, dt_s: f64) -> Result<(), PlantError> {
-        self.inner.step(law, control, dt_s)?;
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError> {
+        self.inner.advance(dt_s, predicted, path)?;
         self.steps_left = self.steps_left.saturating_sub(1);
+        self.observe(predicted);
         let lost = self.steps_left == 0 && self.says_so;
         if lost { Err(PlantError::NotFinite { vehicle: self.vehicle }) } else { Ok(()) }
+    }
+
+    fn apply(&mut self, command: &Rows, state: &mut Swarm) {
+        self.inner.apply(command, state);
     }
 
     fn observe(&self, swarm: &mut Swarm) {
@@ -140,11 +148,11 @@ fn stepwise(name: &str, steps_per_s: u32) -> Scenario {
 }
 
 /// The law with the sign of its tension flipped: pairs that are too near pull, pairs that are too far push.
-fn flipped(scenario: &Scenario) -> impl Law {
-    let mut tension = scenario.law().expect("a law");
+fn flipped(scenario: &Scenario) -> impl Law + use<> {
+    let (mut tension, flown) = (scenario.law().expect("a law"), scenario.clone());
     Bent::new(scenario, move |_, swarm: &Swarm, control: &mut Rows| {
-        let mut pull = Rows::zeros(swarm.count());
-        tension.control(&Swarm::at_rest(swarm.positions_m.clone()), &mut pull)?;
+        let (mut pull, at_rest) = (Rows::zeros(swarm.count()), Swarm::at_rest(swarm.positions_m.clone()));
+        tension.command(&flown.observation(&at_rest), &mut pull)?;
         *control -= pull * 2.0;
         Ok(())
     })
@@ -168,7 +176,7 @@ fn energy_never_increases_and_is_lost_at_the_rate_of_the_theory_up_to_the_step()
 #[test]
 fn with_the_sign_of_the_tension_flipped_both_energy_checks_fail() {
     let scenario = stepwise("pentagon", 240);
-    let (_, log) = fly_with(&scenario, &mut flipped(&scenario), plant::for_scenario(&scenario).as_mut());
+    let (_, log) = fly_with(&scenario, Box::new(flipped(&scenario)), Motion::of(&scenario));
     assert!(energy_rise(&log) > 1.0, "{}", energy_rise(&log));
     assert!(energy_imbalance(&log) > 1.0, "{}", energy_imbalance(&log));
 }
@@ -178,7 +186,7 @@ fn with_the_sign_of_the_tension_flipped_both_energy_checks_fail() {
 /// Thrown at 1000 m/s past a vehicle at rest: 16.7 m a step, from 8.4 m before it to 8.3 m behind it.
 fn thrown() -> Scenario {
     let mut scenario = duel([-41.7, 0.0], [1000.0, 0.0], 2.0, 1.0 / 60.0, 0.1);
-    scenario.law = LawSpec::Laplacian { f1_per_s2: 1.0, f2_per_s: 1.0 };
+    scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
     scenario.time.record_hz = 60.0;
     scenario
 }
@@ -266,7 +274,7 @@ fn without_halvings_a_step_that_lands_within_the_barrier_ends_the_run_as_a_colli
 #[test]
 fn a_law_without_a_barrier_is_never_refused_a_step() {
     let mut scenario = barrier_ahead(1.0);
-    scenario.law = LawSpec::Laplacian { f1_per_s2: 1.0, f2_per_s: 1.0 };
+    scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
     let (flight, log) = fly(&scenario);
     assert_eq!((refinements(&log), flight.audit.steps), (vec![], flight.steps));
 }
@@ -285,13 +293,13 @@ fn breakdown(flown: Result<Flight, SimError>) -> Breakdown {
 fn a_law_that_commands_what_is_not_a_number_is_named_with_vehicle_and_step() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for (bad, at) in [(f64::NAN, 0), (f64::INFINITY, 7), (f64::NEG_INFINITY, 239)] {
-        let mut law = Bent::new(&scenario, |asked, _: &Swarm, control: &mut Rows| {
+        let law = Bent::new(&scenario, move |asked, _: &Swarm, control: &mut Rows| {
             if asked == at {
                 control[(3, 1)] = bad;
             }
             Ok(())
         });
-        let (flown, log) = fly_with(&scenario, &mut law, plant::for_scenario(&scenario).as_mut());
+        let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
         let error = breakdown(flown);
         assert_eq!(error, Breakdown::CommandNotFinite { step: at, vehicle: 3 });
         assert_eq!(log.samples.last().map(|last| (last.step, last.control.nrows())), Some((at, 0)));
@@ -306,10 +314,9 @@ fn a_law_that_commands_what_is_not_a_number_is_named_with_vehicle_and_step() {
 fn a_plant_that_loses_a_vehicle_is_named_with_vehicle_and_step() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for (says_so, lost_at) in [(true, 1), (true, 9), (false, 0), (false, 1), (false, 9)] {
-        let inner = plant::for_scenario(&scenario);
-        let mut plant = Lost { inner, steps_left: lost_at, vehicle: 2, says_so };
-        let mut law = scenario.law().expect("a law");
-        let (flown, log) = fly_with(&scenario, law.as_mut(), &mut plant);
+        let inner = rapier::plant(&scenario, Precision::Single);
+        let plant = Lost { inner, steps_left: lost_at, vehicle: 2, says_so };
+        let (flown, log) = fly_with(&scenario, scenario.law().expect("a law"), plant);
         let error = breakdown(flown);
         assert_eq!(error, Breakdown::StateNotFinite { step: u64::from(lost_at), vehicle: 2 });
         assert!(error.to_string().contains("vehicle 3"), "{error}");
@@ -320,13 +327,13 @@ fn a_plant_that_loses_a_vehicle_is_named_with_vehicle_and_step() {
 #[test]
 fn the_engine_itself_reports_a_vehicle_that_left_the_range_of_its_numbers() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
-    let mut law = Bent::new(&scenario, |asked, _: &Swarm, control: &mut Rows| {
+    let law = Bent::new(&scenario, |asked, _: &Swarm, control: &mut Rows| {
         if asked == 5 {
             control[(1, 0)] = 1e39;
         }
         Ok(())
     });
-    let (flown, _) = fly_with(&scenario, &mut law, plant::for_scenario(&scenario).as_mut());
+    let (flown, _) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
     assert_eq!(breakdown(flown), Breakdown::StateNotFinite { step: 6, vehicle: 1 });
 }
 
@@ -334,13 +341,13 @@ fn the_engine_itself_reports_a_vehicle_that_left_the_range_of_its_numbers() {
 fn a_law_that_becomes_undefined_ends_the_run_with_what_was_recorded() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for undefined_at in [0, 1, 101] {
-        let mut law = Bent::new(
+        let law = Bent::new(
             &scenario,
-            |asked, _: &Swarm, _: &mut Rows| {
+            move |asked, _: &Swarm, _: &mut Rows| {
                 if asked == undefined_at { Err(LawError::OutOfRange) } else { Ok(()) }
             },
         );
-        let (flown, log) = fly_with(&scenario, &mut law, plant::for_scenario(&scenario).as_mut());
+        let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
         let flight = flown.expect("an early end is no error");
         assert_eq!(flight.ending, Ending::LawUndefined(LawError::OutOfRange));
         assert_eq!((flight.steps, flight.audit.steps), (undefined_at, undefined_at));
@@ -359,14 +366,12 @@ fn a_caller_that_breaks_off_gets_a_complete_flight_up_to_there() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for (break_at, last_sample) in [(1, 1), (100, 100), (101, 101)] {
         let mut log = Log::default();
-        let mut law = scenario.law().expect("a law");
         let mut asked = Vec::new();
-        let flight =
-            sim::fly(&scenario, law.as_mut(), plant::for_scenario(&scenario).as_mut(), &mut log, &mut |step| {
-                asked.push(step);
-                if step == break_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            })
-            .expect("breaking off is no error");
+        let flight = sim::fly(&scenario, Parts::of(&scenario).expect("parts"), &mut log, &mut |step| {
+            asked.push(step);
+            if step == break_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .expect("breaking off is no error");
         assert_eq!((flight.ending, flight.steps), (Ending::Interrupted, break_at));
         assert_eq!(asked, (1..=break_at).collect::<Vec<_>>());
         assert_eq!(log.samples.last().map(|sample| sample.step), Some(last_sample));
@@ -379,8 +384,7 @@ fn a_caller_that_breaks_off_gets_a_complete_flight_up_to_there() {
 #[test]
 fn breaking_off_at_the_last_step_is_a_completed_flight() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
-    let mut law = scenario.law().expect("a law");
-    let flight = sim::fly(&scenario, law.as_mut(), plant::for_scenario(&scenario).as_mut(), &mut (), &mut |step| {
+    let flight = sim::fly(&scenario, Parts::of(&scenario).expect("parts"), &mut (), &mut |step| {
         if step == 240 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert_eq!(flight.expect("a flight").ending, Ending::Completed);
@@ -453,7 +457,7 @@ proptest! {
         let mut changed = plain.clone();
         changed.start.positions_m = relabelled(&moved(&plain.start.positions_m, |p| rotation * p + offset), &order);
         changed.start.velocities_m_s = relabelled(&moved(&plain.start.velocities_m_s, |v| rotation * v), &order);
-        changed.formation.slots_m = relabelled(&plain.formation.slots_m, &order);
+        changed.legs[0].formation.slots_m = relabelled(&plain.formation().slots_m, &order);
         let (expected, found) = (end(&plain), end(&changed));
         let positions_m = relabelled(&moved(&expected.positions_m, |p| rotation * p + offset), &order);
         let velocities_m_s = relabelled(&moved(&expected.velocities_m_s, |v| rotation * v), &order);

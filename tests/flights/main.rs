@@ -9,3 +9,4 @@ mod loop_claims;
 mod plant_claims;
 mod reference_flights;
 mod scenario_files;
+mod simulation;

@@ -4,25 +4,24 @@
 use crate::flight::{builtin, fly};
 use nalgebra::Vector3;
 use tautline::formation::Formation;
-use tautline::law::{Law, LawError};
-use tautline::plant::{self, Plant};
+use tautline::plant::{Path, Plant, rapier};
 use tautline::scenario::{PlantSpec, Precision, Scenario, Space};
 use tautline::swarm::{Rows, Swarm, row, separation, set_row};
 
 const DT_S: f64 = 1.0 / 240.0;
 const HULL_RADIUS_M: f64 = 0.25;
 
-/// Rigid bodies hold the command that they are given and ask no law.
-struct Unasked;
+/// Moves a plant over a step under these accelerations \[m/s^2\].
+fn step(plant: &mut dyn Plant, command: &Rows, dt_s: f64) {
+    let mut state = observed(plant, command.nrows());
+    plant.apply(command, &mut state);
+    plant.advance(dt_s, &mut state, &mut Path::default()).expect("a finite motion");
+}
 
-impl Law for Unasked {
-    fn name(&self) -> &'static str {
-        "unasked"
-    }
-
-    fn control(&mut self, _swarm: &Swarm, _control: &mut Rows) -> Result<(), LawError> {
-        unreachable!("rigid bodies asked the law")
-    }
+/// The rigid bodies of a scenario.
+fn bodies(scenario: &Scenario) -> Box<dyn Plant> {
+    let PlantSpec::Rapier(precision) = scenario.plant else { panic!("{:?}", scenario.plant) };
+    rapier::plant(scenario, precision)
 }
 
 /// Rounding of one operation, relative, in the engine's numbers.
@@ -59,9 +58,9 @@ fn a_free_velocity_is_exactly_v0_exp_a22_t_whatever_the_sign_of_a22() {
             let mut scenario =
                 scenario(precision, &[0.0, 0.0, 0.0, 90.0, 0.0, 0.0], &[0.75, -0.5, 0.25, 0.0, 0.0, 0.0]);
             scenario.a22_per_s = a22_per_s;
-            let mut plant = plant::for_scenario(&scenario);
+            let mut plant = bodies(&scenario);
             for _ in 0..STEPS {
-                plant.step(&mut Unasked, &Rows::zeros(2), DT_S).expect("a finite motion");
+                step(plant.as_mut(), &Rows::zeros(2), DT_S);
             }
             let found = row(&observed(plant.as_ref(), 2).velocities_m_s, 0);
             let expected = velocity * (a22_per_s * f64::from(STEPS) * DT_S).exp();
@@ -79,10 +78,10 @@ fn a_free_velocity_is_exactly_v0_exp_a22_t_whatever_the_sign_of_a22() {
 #[test]
 fn within_a_step_motion_is_the_straight_line_that_the_audit_sweeps() {
     let scenario = scenario(Precision::Double, &[0.0, 0.0, 0.0, 90.0, 0.0, 0.0], &[0.75, -0.5, 0.25, 0.0, 0.0, 0.0]);
-    let mut plant = plant::for_scenario(&scenario);
+    let mut plant = bodies(&scenario);
     let mut control = Rows::zeros(2);
     set_row(&mut control, 0, Vector3::new(2.0, 4.0, -8.0));
-    plant.step(&mut Unasked, &control, DT_S).expect("a finite motion");
+    step(plant.as_mut(), &control, DT_S);
     let after = observed(plant.as_ref(), 2);
     let velocity = Vector3::new(0.75, -0.5, 0.25) + Vector3::new(2.0, 4.0, -8.0) * DT_S;
     let rounding = 4.0 * f64::EPSILON;
@@ -110,10 +109,10 @@ fn hulls_are_solid_and_bounce() {
     for precision in [Precision::Single, Precision::Double] {
         // Head-on at 1 m/s each.
         let scenario = scenario(precision, &[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
-        let mut plant = plant::for_scenario(&scenario);
+        let mut plant = bodies(&scenario);
         let mut nearest_m = f64::INFINITY;
         for _ in 0..STEPS {
-            plant.step(&mut Unasked, &Rows::zeros(2), DT_S).expect("a finite motion");
+            step(plant.as_mut(), &Rows::zeros(2), DT_S);
             nearest_m = nearest_m.min(separation(&observed(plant.as_ref(), 2).positions_m, 0, 1));
         }
         let rounding = f64::from(STEPS) * epsilon(precision);
@@ -130,9 +129,9 @@ fn hulls_are_solid_and_bounce() {
 fn hulls_that_pass_beside_each_other_do_not_touch() {
     let apart_m = 2.0 * HULL_RADIUS_M + 1e-3;
     let start = [-1.0, 0.0, 0.0, 1.0, apart_m, 0.0];
-    let mut plant = plant::for_scenario(&scenario(Precision::Single, &start, &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]));
+    let mut plant = bodies(&scenario(Precision::Single, &start, &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]));
     for _ in 0..480 {
-        plant.step(&mut Unasked, &Rows::zeros(2), DT_S).expect("a finite motion");
+        step(plant.as_mut(), &Rows::zeros(2), DT_S);
     }
     assert_eq!(observed(plant.as_ref(), 2).velocities_m_s, Rows::from_row_slice(&[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]));
 }
@@ -145,9 +144,9 @@ fn a_swarm_in_the_plane_never_leaves_it_even_when_it_is_told_to() {
         let mut control = Rows::zeros(2);
         control.column_mut(2).fill(3.0);
         let lifted = |scenario: &Scenario| {
-            let mut plant = plant::for_scenario(scenario);
+            let mut plant = bodies(scenario);
             (0..480).any(|_| {
-                plant.step(&mut Unasked, &control, DT_S).expect("a finite motion");
+                step(plant.as_mut(), &control, DT_S);
                 let swarm = observed(plant.as_ref(), 2);
                 swarm.positions_m.column(2).iter().chain(swarm.velocities_m_s.column(2).iter()).any(|&z| z != 0.0)
             })
@@ -184,14 +183,14 @@ fn mass_does_not_change_motion() {
 #[test]
 fn a_restored_plant_flies_on_as_if_the_refused_step_had_not_been() {
     let scenario = builtin("pentagon", &[]);
-    let mut plant = plant::for_scenario(&scenario);
+    let mut plant = bodies(&scenario);
     let mut control = Rows::zeros(5);
     control.column_mut(0).copy_from_slice(&[1.0, -2.0, 3.0, -4.0, 5.0]);
     let before = observed(plant.as_ref(), 5);
-    plant.step(&mut Unasked, &control, DT_S).expect("a finite motion");
+    step(plant.as_mut(), &control, DT_S);
     let straight = observed(plant.as_ref(), 5);
-    plant.step(&mut Unasked, &control, 100.0 * DT_S).expect("a finite motion");
+    step(plant.as_mut(), &control, 100.0 * DT_S);
     plant.restore(&before);
-    plant.step(&mut Unasked, &control, DT_S).expect("a finite motion");
+    step(plant.as_mut(), &control, DT_S);
     assert_eq!(observed(plant.as_ref(), 5), straight);
 }

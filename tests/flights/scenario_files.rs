@@ -204,7 +204,7 @@ fn an_override_sets_any_key_and_makes_those_that_are_not_there() {
     assert!(says(&["start.positions_m.4=[-1, 0.5]"], "[-1.0, 0.5],"));
     assert!(says(&["time.dt_s=0.1", "time.dt_s=0.2"], "dt_s = 0.2"), "the last one wins");
     assert_eq!(set(&["graph.kind=star"]).graph.edge_count(), 4);
-    assert_eq!(set(&["formation={shape=\"circle\", radius_m=3}"]).formation, Formation::circle(5, 3.0));
+    assert_eq!(set(&["formation={shape=\"circle\", radius_m=3}"]).formation(), &Formation::circle(5, 3.0));
 }
 
 #[test]
@@ -292,7 +292,7 @@ fn random_starts_are_the_same_on_every_machine_and_keep_their_distance() {
     assert_eq!(plane.start.positions_m[(0, 0)].to_bits(), GOLDEN_RANDOM_X);
     assert_eq!(plane, random(1, 2));
     assert_ne!(plane, random(2, 2));
-    assert!(plane.formation.is_in_plane_z0() && plane.start.positions_m.column(2).iter().all(|&z| z == 0.0));
+    assert!(plane.formation().is_in_plane_z0() && plane.start.positions_m.column(2).iter().all(|&z| z == 0.0));
     let volume = random(1, 3);
     assert!(volume.start.positions_m.column(2).iter().any(|&z| z != 0.0));
     for scenario in [plane, volume] {
@@ -347,11 +347,11 @@ fn a_scenario_broken_in_code_is_refused_and_never_panics() {
     let breaks: &[fn(&mut Scenario)] = &[
         |s| s.start.velocities_m_s = Rows::zeros(0),
         |s| s.start = Swarm::at_rest(Rows::zeros(0)),
-        |s| s.formation = Formation::circle(5, 3.0),
+        |s| s.legs[0].formation = Formation::circle(5, 3.0),
         |s| s.hull_radius_m.clear(),
         |s| s.graph = tautline::graph::Graph::ring(4),
         |s| s.delta_m = f64::NAN,
-        |s| s.formation.slots_m[(0, 0)] = f64::NAN,
+        |s| s.legs[0].formation.slots_m[(0, 0)] = f64::NAN,
         |s| s.start.positions_m[(5, 2)] = 1.0,
         |s| s.time.dt_s = f64::NEG_INFINITY,
         |s| s.name = "\u{1b}".to_owned(),
@@ -371,7 +371,7 @@ fn integrate(scenario: &Scenario, time_s: f64, steps: u32) -> (Swarm, f64) {
     let mut law = scenario.law().expect("a validated scenario has a law");
     let mut control = Rows::zeros(scenario.count());
     let mut slope = |swarm: &Swarm| {
-        law.control(swarm, &mut control).expect("no collision");
+        law.command(&scenario.observation(swarm), &mut control).expect("no collision");
         Swarm {
             positions_m: swarm.velocities_m_s.clone(),
             velocities_m_s: &control + &swarm.velocities_m_s * scenario.a22_per_s,
@@ -407,10 +407,10 @@ fn the_built_in_pentagon_is_the_reference_pentagon() {
     let scenario = read_builtin("pentagon", &[]).expect("a built-in");
     let mut law = scenario.law().expect("a law");
     let mut control = Rows::zeros(5);
-    law.control(&scenario.start, &mut control).expect("no collision");
+    law.command(&scenario.observation(&scenario.start), &mut control).expect("no collision");
     assert!((control[(0, 0)] - 0.860_843_123).abs() < TABLE_TOLERANCE);
     assert!((control[(0, 1)] + 0.021_225_585).abs() < TABLE_TOLERANCE);
-    assert!((law.energy(&scenario.start).unwrap_or(0.0) - 3.656_742_96).abs() < TABLE_TOLERANCE);
+    assert!((law.energy(&scenario.observation(&scenario.start)).unwrap_or(0.0) - 3.656_742_96).abs() < TABLE_TOLERANCE);
 
     let (swarm, smallest_m) = integrate(&scenario, 10.0, 4000);
     assert!((swarm.positions_m[(0, 0)] - 4.318_055_1).abs() < TABLE_TOLERANCE, "{}", swarm.positions_m);
@@ -422,7 +422,7 @@ fn the_built_in_pentagon_is_the_reference_pentagon() {
 #[test]
 fn the_other_built_ins_are_their_reference_cases() {
     let circle = read_builtin("circle", &[]).expect("a built-in");
-    let energy = circle.law().expect("a law").energy(&circle.start).unwrap_or(0.0);
+    let energy = circle.law().expect("a law").energy(&circle.observation(&circle.start)).unwrap_or(0.0);
     assert!((energy - 4.479_772_16).abs() < TABLE_TOLERANCE, "{energy}");
     let (_, smallest_m) = integrate(&circle, 10.0, 4000);
     assert!((smallest_m - 1.238_135).abs() < 1e-5, "{smallest_m}");

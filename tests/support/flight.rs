@@ -3,10 +3,9 @@
 use std::ops::ControlFlow;
 
 use tautline::law::Law;
-use tautline::plant::{self, Plant};
 use tautline::record::{Event, OwnedSample, RecordError, Sample, Sink};
 use tautline::scenario::{Override, Scenario, Source};
-use tautline::sim::{self, Flight, SimError};
+use tautline::sim::{self, Flight, Motion, Parts, SimError};
 
 /// A built-in scenario with some keys set.
 pub(crate) fn builtin(name: &str, sets: &[&str]) -> Scenario {
@@ -35,18 +34,19 @@ impl Sink for Log {
 
 /// Flies the scenario with its own law and plant.
 pub(crate) fn fly(scenario: &Scenario) -> (Flight, Log) {
-    let mut law = scenario.law().expect("the law of a valid scenario");
-    let (flown, log) = fly_with(scenario, law.as_mut(), plant::for_scenario(scenario).as_mut());
+    let law = scenario.law().expect("the law of a valid scenario");
+    let (flown, log) = fly_with(scenario, law, Motion::of(scenario));
     (flown.expect("a flight"), log)
 }
 
 /// Flies the scenario with another law or plant.
 pub(crate) fn fly_with(
     scenario: &Scenario,
-    law: &mut dyn Law,
-    plant: &mut dyn Plant,
+    law: Box<dyn Law>,
+    motion: impl Into<Motion>,
 ) -> (Result<Flight, SimError>, Log) {
     let mut log = Log::default();
-    let flown = sim::fly(scenario, law, plant, &mut log, &mut |_step| ControlFlow::Continue(()));
+    let parts = Parts { motion: motion.into(), ..Parts::under(scenario, law) };
+    let flown = sim::fly(scenario, parts, &mut log, &mut |_step| ControlFlow::Continue(()));
     (flown, log)
 }

@@ -1,7 +1,8 @@
+use std::sync::LazyLock;
+
 use nalgebra::Vector3;
 
 use super::*;
-use crate::law::TensionError;
 use crate::swarm::{row, set_row};
 
 /// Places printed for E(0) in the reference cases.
@@ -23,6 +24,13 @@ fn pentagon_start() -> Swarm {
     Swarm::at_rest(positions_m)
 }
 
+/// Exact knowledge of a swarm: the law asks its own graph and formation.
+fn exact(swarm: &Swarm) -> Observation<'_> {
+    static NOBODY: Graph = Graph::complete(0);
+    static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
+    Observation::exact(swarm, &NOBODY, &NOWHERE)
+}
+
 fn law(graph: &Graph, formation: &Formation, delta_m: f64) -> EdgeTensionLaw {
     let parameters = EdgeTensionParameters { alpha: 1.0, delta_m, a22_per_s: A22_PER_S };
     EdgeTensionLaw::new(graph, formation, parameters).expect("slots farther apart than delta")
@@ -35,12 +43,12 @@ fn pentagon_law() -> EdgeTensionLaw {
 #[test]
 fn the_pentagon_starts_with_the_energy_certificate_and_control_of_the_reference() -> Result<(), LawError> {
     let (mut law, start) = (pentagon_law(), pentagon_start());
-    let certificate = law.certificate(&start);
+    let certificate = law.certificate(&exact(&start));
     assert_eq!(certificate.void, []);
     assert!((certificate.energy_initial.unwrap_or(f64::NAN) - 3.656_742_96).abs() < ENERGY_TOLERANCE);
     assert!((certificate.certified_m.unwrap_or(f64::NAN) - 2.055_307).abs() < CERTIFIED_TOLERANCE_M);
     let mut control = Rows::zeros(5);
-    law.control(&start, &mut control)?;
+    law.command(&exact(&start), &mut control)?;
     let error = row(&control, 0) - Vector3::new(0.860_843_123, -0.021_225_585, 0.0);
     assert!(error.amax() < CONTROL_TOLERANCE_M_S2, "{error}");
     assert!(control.column(2).iter().all(|&z| z == 0.0));
@@ -51,7 +59,7 @@ fn the_pentagon_starts_with_the_energy_certificate_and_control_of_the_reference(
 fn the_circle_starts_with_the_energy_and_certificate_of_the_reference() {
     let positions_m = Rows::from_fn(6, |i, axis| [2.0 * i as f64, if i == 0 { 0.05 } else { 0.0 }, 0.0][axis]);
     let certificate =
-        law(&Graph::complete(6), &Formation::circle(6, 1.5), 1.0).certificate(&Swarm::at_rest(positions_m));
+        law(&Graph::complete(6), &Formation::circle(6, 1.5), 1.0).certificate(&exact(&Swarm::at_rest(positions_m)));
     assert_eq!(certificate.void, []);
     assert!((certificate.energy_initial.unwrap_or(f64::NAN) - 4.479_772_16).abs() < ENERGY_TOLERANCE);
     assert!((certificate.certified_m.unwrap_or(f64::NAN) - 1.019_476).abs() < CERTIFIED_TOLERANCE_M);
@@ -61,7 +69,7 @@ fn the_circle_starts_with_the_energy_and_certificate_of_the_reference() {
 fn the_certificate_is_the_smallest_root_over_all_pairs() {
     let (law, mut start, formation) = (pentagon_law(), pentagon_start(), Formation::pentagon(3.0));
     start.velocities_m_s[(2, 1)] = 1.5;
-    let certificate = law.certificate(&start);
+    let certificate = law.certificate(&exact(&start));
     let bound = 5.0 * certificate.energy_initial.unwrap_or(f64::NAN);
     let smallest = Graph::complete(5)
         .edges()
@@ -69,22 +77,22 @@ fn the_certificate_is_the_smallest_root_over_all_pairs() {
         .map(|tension| tension.push_side_root(bound))
         .fold(f64::INFINITY, f64::min);
     assert_eq!(certificate.certified_m, Some(smallest));
-    let at_rest = law.certificate(&pentagon_start());
+    let at_rest = law.certificate(&exact(&pentagon_start()));
     assert!(certificate.certified_m < at_rest.certified_m);
 }
 
 #[test]
 fn the_certificate_says_why_it_is_void() {
     let (graph, formation) = (Graph::ring(5), Formation::pentagon(3.0));
-    let on_ring = law(&graph, &formation, 2.0).certificate(&pentagon_start());
+    let on_ring = law(&graph, &formation, 2.0).certificate(&exact(&pentagon_start()));
     assert_eq!((on_ring.certified_m, on_ring.void), (None, vec![Void::GraphNotComplete]));
     assert!(on_ring.energy_initial.is_some());
 
     let mut touching = pentagon_start();
     touching.positions_m[(1, 0)] -= 1.5;
-    let certificate = law(&graph, &formation, 2.0).certificate(&touching);
+    let certificate = law(&graph, &formation, 2.0).certificate(&exact(&touching));
     assert_eq!(certificate.void.len(), 2);
-    let certificate = pentagon_law().certificate(&touching);
+    let certificate = pentagon_law().certificate(&exact(&touching));
     assert_eq!((certificate.certified_m, certificate.energy_initial), (None, None));
     assert!(matches!(certificate.void[..], [Void::StartRefused(LawError::Collision { .. })]));
 }
@@ -95,9 +103,9 @@ fn at_the_formation_the_law_asks_for_nothing_but_rounding() -> Result<(), LawErr
     let mut law = law(&Graph::complete(40), &formation, 0.5);
     let mut control = Rows::zeros(40);
     let swarm = Swarm::at_rest(formation.slots_m.clone());
-    law.control(&swarm, &mut control)?;
+    law.command(&exact(&swarm), &mut control)?;
     assert!(control.amax() < 1e-14, "{:e}", control.amax());
-    assert!(law.energy(&swarm).unwrap_or(f64::NAN).abs() < 1e-14);
+    assert!(law.energy(&exact(&swarm)).unwrap_or(f64::NAN).abs() < 1e-14);
     Ok(())
 }
 
@@ -108,9 +116,9 @@ fn a_pair_exactly_at_delta_is_a_collision_and_one_step_of_rounding_farther_is_no
     for (distance, collides) in [(2.0_f64.next_down(), true), (2.0, true), (2.0_f64.next_up(), false)] {
         let swarm = Swarm::at_rest(Formation::line(2, distance).slots_m);
         let expected = LawError::Collision { pair: Pair::new(0, 1), separation_m: distance, delta_m: 2.0 };
-        assert_eq!(law.control(&swarm, &mut control), if collides { Err(expected) } else { Ok(()) });
+        assert_eq!(law.command(&exact(&swarm), &mut control), if collides { Err(expected) } else { Ok(()) });
         assert_eq!(law.matrix_form(&swarm).err(), collides.then_some(expected));
-        assert_eq!(law.energy(&swarm).is_none(), collides);
+        assert_eq!(law.energy(&exact(&swarm)).is_none(), collides);
     }
 }
 
@@ -121,7 +129,7 @@ fn of_several_collisions_the_first_in_index_order_is_named() {
         let mut swarm = Swarm::at_rest(formation.slots_m.clone());
         swarm.positions_m[(4, 0)] = swarm.positions_m[(6, 0)] - 0.5;
         swarm.positions_m[(2, 0)] = swarm.positions_m[(7, 0)] + 0.75;
-        let error = law(&Graph::complete(count), &formation, 2.0).control(&swarm, &mut Rows::zeros(count));
+        let error = law(&Graph::complete(count), &formation, 2.0).command(&exact(&swarm), &mut Rows::zeros(count));
         assert_eq!(error, Err(LawError::Collision { pair: Pair::new(2, 7), separation_m: 0.75, delta_m: 2.0 }));
     }
 }
@@ -137,19 +145,22 @@ fn states_that_are_not_finite_or_of_another_swarm_are_refused() {
                 lost.positions_m[(vehicle, axis)] = bad;
                 fast.velocities_m_s[(vehicle, axis)] = bad;
                 for swarm in [lost, fast] {
-                    assert_eq!(law.control(&swarm, &mut control), Err(LawError::NotFinite { vehicle }));
+                    assert_eq!(law.command(&exact(&swarm), &mut control), Err(LawError::NotFinite { vehicle }));
                     assert_eq!(law.matrix_form(&swarm), Err(LawError::NotFinite { vehicle }));
-                    assert_eq!(law.energy(&swarm), None);
-                    assert_eq!(law.certificate(&swarm).void, [Void::StartRefused(LawError::NotFinite { vehicle })]);
+                    assert_eq!(law.energy(&exact(&swarm)), None);
+                    assert_eq!(
+                        law.certificate(&exact(&swarm)).void,
+                        [Void::StartRefused(LawError::NotFinite { vehicle })]
+                    );
                 }
             }
         }
     }
     let wrong = LawError::WrongCount { expected: 5, found: 4 };
-    assert_eq!(law.control(&Swarm::at_rest(Rows::zeros(4)), &mut control), Err(wrong));
-    assert_eq!(law.control(&start, &mut Rows::zeros(4)), Err(wrong));
+    assert_eq!(law.command(&exact(&Swarm::at_rest(Rows::zeros(4))), &mut control), Err(wrong));
+    assert_eq!(law.command(&exact(&start), &mut Rows::zeros(4)), Err(wrong));
     let ragged = Swarm { velocities_m_s: Rows::zeros(4), ..start };
-    assert_eq!(law.control(&ragged, &mut control), Err(wrong));
+    assert_eq!(law.command(&exact(&ragged), &mut control), Err(wrong));
 }
 
 #[test]
@@ -161,9 +172,9 @@ fn states_beyond_double_precision_are_refused() {
         swarm.positions_m[(1, 0)] -= position;
         swarm.velocities_m_s[(0, 0)] = velocity;
         swarm.velocities_m_s[(1, 0)] = -velocity;
-        assert_eq!(law.control(&swarm, &mut control), Err(LawError::OutOfRange), "{position:e} {velocity:e}");
+        assert_eq!(law.command(&exact(&swarm), &mut control), Err(LawError::OutOfRange), "{position:e} {velocity:e}");
         assert_eq!(law.matrix_form(&swarm), Err(LawError::OutOfRange), "{position:e} {velocity:e}");
-        assert_eq!(law.energy(&swarm), None);
+        assert_eq!(law.energy(&exact(&swarm)), None);
     }
 }
 
@@ -197,10 +208,10 @@ fn a_swarm_without_pairs_is_left_alone() -> Result<(), LawError> {
         let mut swarm = Swarm::at_rest(Rows::zeros(count));
         swarm.velocities_m_s.fill(3.0);
         let mut control = Rows::from_element(count, 1.0);
-        law.control(&swarm, &mut control)?;
-        assert_eq!((control.amax(), law.energy(&swarm)), (0.0, Some(0.0)));
+        law.command(&exact(&swarm), &mut control)?;
+        assert_eq!((control.amax(), law.energy(&exact(&swarm))), (0.0, Some(0.0)));
         let expected = Certificate { certified_m: None, energy_initial: Some(0.0), void: vec![] };
-        assert_eq!(law.certificate(&swarm), expected);
+        assert_eq!(law.certificate(&exact(&swarm)), expected);
     }
     Ok(())
 }

@@ -1,0 +1,216 @@
+//! A simulation is stepped, saved and loaded, takes commands from outside, goes from leg to leg, and knows the world
+//! through its link.
+
+use std::ops::ControlFlow;
+
+use proptest::strategy::{Strategy as _, ValueTree as _};
+use tautline::formation::Formation;
+use tautline::law::{LaplacianKeys, LawSpec};
+use tautline::link::Delay;
+use tautline::metrics::Metrics;
+use tautline::record::{Event, Sink, StateHash};
+use tautline::run::run;
+use tautline::scenario::{PlantSpec, Precision, Scenario};
+use tautline::sim::{self, Ending, Parts, SimError, Simulation};
+use tautline::swarm::{Rows, Swarm};
+use tautline::target::{Begins, Leg};
+
+use crate::flight::{Log, builtin};
+
+/// Hands what is due to a hash.
+fn record(simulation: &mut Simulation, hash: &mut StateHash) {
+    if let Some(sample) = simulation.sample() {
+        hash.observe(&sample);
+    }
+}
+
+/// Flies to the end.
+fn finish(simulation: &mut Simulation, hash: &mut StateHash) {
+    while simulation.ending().is_none() {
+        simulation.step();
+        record(simulation, hash);
+    }
+}
+
+/// Vehicles that hit each other's hulls on the way, so that the engine has contacts to remember.
+fn bouncing() -> Scenario {
+    let mut scenario = builtin("pentagon-laplacian", &["time.duration_s=4", "time.record_hz=240", "law.delta_m=1.0"]);
+    scenario.hull_radius_m.fill(0.48);
+    for i in 0..scenario.count() {
+        scenario.start.velocities_m_s[(i, 0)] = if i % 2 == 0 { 2.0 } else { -2.0 };
+    }
+    scenario
+}
+
+#[test]
+fn a_simulation_loaded_at_any_of_fifty_steps_ends_with_the_hash_of_one_that_was_never_interrupted() {
+    let mut runner = proptest::test_runner::TestRunner::deterministic();
+    let tension = builtin("pentagon", &["time.duration_s=4", "time.record_hz=240"]);
+    let ideal = builtin("pentagon", &["time.duration_s=4", "plant.kind=ideal", "time.dt_s=0.05", "time.record_hz=20"]);
+    let mut double = bouncing();
+    double.plant = PlantSpec::Rapier(Precision::Double);
+    for (name, scenario, loads) in
+        [("tension", tension, 20), ("bouncing", bouncing(), 20), ("double", double, 5), ("ideal", ideal, 5)]
+    {
+        let mut whole = (Simulation::new(&scenario).expect("a simulation"), StateHash::new());
+        record(&mut whole.0, &mut whole.1);
+        let mut other = Simulation::new(&scenario).expect("a simulation");
+        let mut at: Vec<u64> =
+            (0..loads).map(|_| (1..scenario.time.steps()).new_tree(&mut runner).expect("a step").current()).collect();
+        at.sort_unstable();
+        let mut ends = Vec::new();
+        for step in at {
+            while whole.0.steps() < step {
+                whole.0.step();
+                record(&mut whole.0, &mut whole.1);
+            }
+            let (saved, mut hash) = (whole.0.save(), whole.1.clone());
+            // Loaded into a simulation that has been elsewhere.
+            (0..7).for_each(|_| other.step());
+            other.load(&saved, None);
+            finish(&mut other, &mut hash);
+            ends.push((hash.finish(), other.clone().finish().audit));
+            other.load(&saved, None);
+        }
+        finish(&mut whole.0, &mut whole.1);
+        let expected = (whole.1.finish(), whole.0.finish().audit);
+        assert!(ends.iter().all(|end| *end == expected), "{name}");
+    }
+}
+
+#[test]
+fn a_saved_state_that_is_not_whole_would_be_seen() {
+    let scenario = bouncing();
+    let mut whole = Simulation::new(&scenario).expect("a simulation");
+    let (mut hash, mut twin_hash) = (StateHash::new(), StateHash::new());
+    (0..300).for_each(|_| whole.step());
+    let mut twin = whole.clone();
+    // One vehicle pushed for one step by a millionth.
+    let mut commands = twin.control().clone();
+    commands[(0, 0)] += 1e-6;
+    twin.step_with(&commands).expect("finite commands");
+    whole.step();
+    finish(&mut whole, &mut hash);
+    finish(&mut twin, &mut twin_hash);
+    assert_ne!(hash.finish(), twin_hash.finish());
+}
+
+#[test]
+fn stepping_is_flying() {
+    let scenario = builtin("pentagon", &["time.duration_s=3"]);
+    let report = run(&scenario, &mut ()).expect("a report");
+    let (mut simulation, mut hash) = (Simulation::new(&scenario).expect("a simulation"), StateHash::new());
+    record(&mut simulation, &mut hash);
+    finish(&mut simulation, &mut hash);
+    assert_eq!(report.run.state_hash, hash.finish());
+    assert_eq!(simulation.ending(), Some(&Ending::Completed));
+    simulation.step();
+    assert_eq!((simulation.steps(), simulation.time_s()), (720, 3.0), "an ended flight stays where it is");
+}
+
+#[test]
+fn commands_from_outside_are_flown_in_the_place_of_the_laws() {
+    let scenario = builtin("pentagon", &["time.duration_s=3", "plant.precision=double", "swarm.a22_per_s=0"]);
+    let mut by_law = Simulation::new(&scenario).expect("a simulation");
+    let mut by_hand = by_law.clone();
+    for _ in 0..100 {
+        let commands = by_law.control().clone();
+        by_law.step();
+        by_hand.step_with(&commands).expect("finite commands");
+        assert_eq!(by_hand.state(), by_law.state());
+    }
+    by_law.step();
+    by_hand.step();
+    by_hand.step();
+    by_law.step();
+    assert_eq!(by_hand.state(), by_law.state(), "the law takes over at the state that it finds");
+
+    let mut still = Simulation::new(&scenario).expect("a simulation");
+    still.step_with(&Rows::zeros(5)).expect("finite commands");
+    assert_eq!(still.state().positions_m, scenario.start.positions_m);
+    for wrong in [Rows::zeros(4), Rows::from_element(5, f64::NAN)] {
+        assert!(matches!(still.step_with(&wrong), Err(SimError::Commands { expected: 5, .. })));
+    }
+    assert_eq!(still.steps(), 1, "what is refused is not flown");
+}
+
+/// The pentagon, and then a larger one.
+fn two_legs(begins: Begins) -> Scenario {
+    let mut scenario = builtin("pentagon", &["time.duration_s=120", "swarm.a22_per_s=-0.1"]);
+    scenario.legs.push(Leg { formation: Formation::pentagon(4.0), begins });
+    scenario
+}
+
+#[test]
+fn a_flight_goes_from_leg_to_leg_by_time_or_when_the_leg_before_is_reached() {
+    for (begins, expected_s) in [(Begins::At(50.0), 50.0..=50.0), (Begins::Reached, 20.0..=60.0)] {
+        let scenario = two_legs(begins);
+        let mut log = Log::default();
+        let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
+        let parts = Parts::of(&scenario).expect("parts");
+        let flight = sim::fly(&scenario, parts, &mut (&mut log, &mut metrics), &mut |_| ControlFlow::Continue(()))
+            .expect("a flight");
+        assert_eq!(flight.ending, Ending::Completed);
+        let began: Vec<_> = log.events.iter().filter(|event| matches!(event, Event::LegBegan { .. })).collect();
+        let [Event::LegBegan { leg: 1, time_s }] = began[..] else { panic!("{began:?}") };
+        assert!(expected_s.contains(time_s), "{time_s}");
+        let [first] = metrics.ended_legs() else { panic!("one leg has ended") };
+        assert!(first.reached_at_s.is_some_and(|reached_s| reached_s < *time_s), "{first:?}");
+        let last = metrics.finish();
+        assert!(last.reached_at_s.is_some_and(|reached_s| reached_s > *time_s), "{last:?}");
+        assert!(last.max_edge_error_m < 0.01, "the larger pentagon is the one that is held");
+    }
+    let scenario = two_legs(Begins::At(119.0));
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
+    sim::fly(&scenario, Parts::of(&scenario).expect("parts"), &mut metrics, &mut |_| ControlFlow::Continue(()))
+        .expect("a flight");
+    assert_eq!(metrics.finish().reached_at_s, None, "a leg that has only begun is not reached");
+}
+
+/// Two vehicles under the baseline in continuous time, whose relative motion is the one mode g = 1 of
+/// s^2 - a22 s + g (f1 + f2 s) e^(-s tau) = 0; the largest distance from the goal over the last 20 s of 200 s.
+fn left_after(delay_s: f64) -> f64 {
+    let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.01, 0.0, 0.0]));
+    let mut scenario = Scenario::new("late", start, Formation::line(2, 3.0), 0.5, 200.0);
+    scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
+    scenario.plant = PlantSpec::Ideal;
+    (scenario.time.dt_s, scenario.time.record_hz, scenario.time.max_halvings) = (0.05, 20.0, 10);
+    let link = Box::new(Delay::new(delay_s, &scenario.start));
+    let parts = Parts { link, ..Parts::of(&scenario).expect("parts") };
+    let mut log = Log::default();
+    sim::fly(&scenario, parts, &mut log, &mut |_| ControlFlow::Continue(())).expect("a flight");
+    let late = log.samples.iter().filter(|sample| sample.time_s > 180.0);
+    late.map(|sample| (sample.swarm.positions_m[(1, 0)] - sample.swarm.positions_m[(0, 0)] - 3.0).abs())
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn a_delayed_link_in_continuous_time_loses_stability_at_the_delay_of_the_closed_form() {
+    // tau* = [atan(f2 omega/f1)]/omega with omega^2 = [1 + sqrt 5]/2 for g = f1 = f2 = 1, a22 = 0.
+    let omega = (0.5 * (1.0 + 5.0_f64.sqrt())).sqrt();
+    let margin_s = omega.atan() / omega;
+    assert!((margin_s - 0.711).abs() < 1e-3);
+    let (below, above) = (left_after(0.95 * margin_s), left_after(1.05 * margin_s));
+    assert!(below < 0.002, "below the margin the error of 0.01 m decays: {below}");
+    assert!(above > 0.05, "above it grows: {above}");
+}
+
+/// A sink that refuses.
+struct Full;
+
+impl Sink for Full {
+    fn sample(&mut self, _: &tautline::record::Sample<'_>) -> Result<(), tautline::record::RecordError> {
+        let source = std::io::Error::other("full");
+        Err(tautline::record::RecordError::Write { path: "disk".to_owned(), source })
+    }
+
+    fn event(&mut self, _: &Event) -> Result<(), tautline::record::RecordError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_sink_that_cannot_keep_a_sample_ends_the_run_with_its_error() {
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
+    assert!(matches!(run(&scenario, &mut Full), Err(SimError::Record(_))));
+}
