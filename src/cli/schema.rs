@@ -2,9 +2,9 @@
 
 use super::console;
 use super::{Exit, Failure};
-use crate::scenario::file;
+use crate::scenario;
 
 pub(super) fn schema() -> Result<Exit, Failure> {
-    console::data(&format!("{:#}\n", file::schema()))?;
+    console::data(&format!("{:#}\n", scenario::schema()))?;
     Ok(Exit::Good)
 }

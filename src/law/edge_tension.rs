@@ -20,6 +20,7 @@ use crate::swarm::{Pair, Rows, Swarm, separation};
 
 /// Keys of `[law]` with `kind = "edge-tension"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EdgeTensionKeys {
     /// Scale of the tension in m^2/s^2.

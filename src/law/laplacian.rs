@@ -17,6 +17,7 @@ use crate::swarm::{Rows, row};
 
 /// Keys of `[law]` with `kind = "laplacian"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LaplacianKeys {
     /// Gain on positions in 1/s^2.

@@ -1,4 +1,4 @@
-//! From the keys of a scenario file to the scenario: numbers per vehicle, shapes into points, defaults that depend on
+//! From the document to the scenario: numbers per vehicle, shapes into points, defaults that depend on
 //! other keys.
 //!
 //! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
@@ -6,50 +6,41 @@
 
 use nalgebra::Vector3;
 
-use super::error::ScenarioError;
-use super::file::{
-    Edge, FormationFile, FormationShape, GraphKind, LawFile, LawKind, PerVehicle, PlantFile, PlantKind, Point,
-    PrecisionFile, ScenarioFile, StartFile, StartShape,
+use super::document::{
+    Document, Edge, FormationShape, GraphKind, PerVehicle, PlantKind, PlantTable, Point, StartShape, StartTable,
 };
-use super::validate::{check_count, check_memory, pair_count, positive};
-use super::{PlantSpec, Precision, Scenario, Space, TimeSpec, start};
+use super::error::ScenarioError;
+use super::limits::{check_count, check_memory, pair_count, positive};
+use super::spec::{PlantSpec, Precision, Scenario, Space};
+use super::start;
 use crate::formation::Formation;
 use crate::graph::{Graph, GraphError};
-use crate::law::{EdgeTensionKeys, LaplacianKeys, LawSpec};
 use crate::swarm::{Rows, Swarm, set_row};
-use crate::target::{Arrival, Leg};
+use crate::target::Leg;
 
 /// Slots of the pentagon.
 const PENTAGON_COUNT: usize = 5;
 
 /// Completes a scenario. It still has to be validated.
-pub(super) fn scenario(file: ScenarioFile) -> Result<Scenario, ScenarioError> {
-    let count = count(&file)?;
+pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
+    let count = count(&document)?;
     check_count(count)?;
-    check_memory(count, edge_count(&file.graph.kind, count))?;
-    check_counts(&file, count)?;
-    let space = space(&file)?;
-    let (delta_m, law) = law(&file.law, file.swarm.a22_per_s);
+    check_memory(count, edge_count(&document.graph.kind, count))?;
+    check_counts(&document, count)?;
+    let space = space(&document)?;
+    let (mut law, delta_m) = (document.law.kind, document.law.delta_m);
+    law.complete(document.swarm.a22_per_s);
     Ok(Scenario {
-        start: start(&file.start, count, space, delta_m)?,
-        mass_kg: per_vehicle(file.swarm.mass_kg, count),
-        hull_radius_m: per_vehicle(file.swarm.hull_radius_m, count),
-        a22_per_s: file.swarm.a22_per_s,
-        legs: vec![Leg::first(formation(&file.formation, count)?)],
-        graph: graph(&file.graph.kind, count)?,
-        plant: plant(&file.plant),
-        time: TimeSpec {
-            duration_s: file.time.duration_s,
-            dt_s: file.time.dt_s,
-            record_hz: file.time.record_hz,
-            max_halvings: file.time.max_halvings,
-        },
-        arrival: Arrival {
-            edge_error_m: file.judge.edge_error_m,
-            disagreement_m_s: file.judge.disagreement_m_s,
-            hold_s: file.judge.hold_s,
-        },
-        name: file.name,
+        start: start(&document.start, count, space, delta_m)?,
+        mass_kg: per_vehicle(document.swarm.mass_kg, count),
+        hull_radius_m: per_vehicle(document.swarm.hull_radius_m, count),
+        a22_per_s: document.swarm.a22_per_s,
+        legs: vec![Leg::first(formation(&document.formation.shape, count)?)],
+        graph: graph(&document.graph.kind, count)?,
+        plant: plant(&document.plant),
+        time: document.time,
+        arrival: document.arrival,
+        name: document.name,
         space,
         law,
         delta_m,
@@ -57,12 +48,12 @@ pub(super) fn scenario(file: ScenarioFile) -> Result<Scenario, ScenarioError> {
 }
 
 /// Number of vehicles: as given, or else as many as there are points, start before formation.
-fn count(file: &ScenarioFile) -> Result<usize, ScenarioError> {
-    if let Some(count) = file.swarm.count {
+fn count(document: &Document) -> Result<usize, ScenarioError> {
+    if let Some(count) = document.swarm.count {
         return usize::try_from(count).map_err(|_| ScenarioError::new("too many vehicles").at("swarm.count"));
     }
-    let listed = file.start.positions_m.as_ref().map(Vec::len);
-    let slots = match &file.formation.shape {
+    let listed = document.start.positions_m.as_ref().map(Vec::len);
+    let slots = match &document.formation.shape {
         FormationShape::Points { points_m } => Some(points_m.len()),
         FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
         _ => None,
@@ -75,22 +66,22 @@ fn count(file: &ScenarioFile) -> Result<usize, ScenarioError> {
 }
 
 /// Refuses lists that are not as long as there are vehicles.
-fn check_counts(file: &ScenarioFile, count: usize) -> Result<(), ScenarioError> {
+fn check_counts(document: &Document, count: usize) -> Result<(), ScenarioError> {
     let per_vehicle = |numbers: &PerVehicle| match numbers {
         PerVehicle::All(_) => None,
         PerVehicle::Each(list) => Some(list.len()),
     };
-    let slots = match &file.formation.shape {
+    let slots = match &document.formation.shape {
         FormationShape::Points { points_m } => Some(points_m.len()),
         FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
         _ => None,
     };
     let lists = [
-        ("start.positions_m", "start positions", file.start.positions_m.as_ref().map(Vec::len)),
-        ("start.velocities_m_s", "start velocities", file.start.velocities_m_s.as_ref().map(Vec::len)),
+        ("start.positions_m", "start positions", document.start.positions_m.as_ref().map(Vec::len)),
+        ("start.velocities_m_s", "start velocities", document.start.velocities_m_s.as_ref().map(Vec::len)),
         ("formation.points_m", "slots in the formation", slots),
-        ("swarm.mass_kg", "masses", per_vehicle(&file.swarm.mass_kg)),
-        ("swarm.hull_radius_m", "hull radii", per_vehicle(&file.swarm.hull_radius_m)),
+        ("swarm.mass_kg", "masses", per_vehicle(&document.swarm.mass_kg)),
+        ("swarm.hull_radius_m", "hull radii", per_vehicle(&document.swarm.hull_radius_m)),
     ];
     for (key, what, listed) in lists {
         if let Some(listed) = listed.filter(|&listed| listed != count) {
@@ -105,32 +96,32 @@ fn check_counts(file: &ScenarioFile, count: usize) -> Result<(), ScenarioError> 
 }
 
 /// The space asked for, or else the plane if everything lies in it.
-fn space(file: &ScenarioFile) -> Result<Space, ScenarioError> {
-    let flat = |points: &[Point]| points.iter().all(|point| point.0[2] == 0.0);
-    let formation_is_flat = match &file.formation.shape {
+fn space(document: &Document) -> Result<Space, ScenarioError> {
+    let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
+    let formation_is_flat = match &document.formation.shape {
         FormationShape::Points { points_m } => flat(points_m),
         FormationShape::Sphere { .. } => false,
         _ => true,
     };
-    match file.swarm.dimensions {
+    match document.swarm.dimensions {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),
         Some(other) => Err(ScenarioError::new(format!("a swarm of {other} dimensions"))
             .with_help("2 is the plane z = 0, 3 is space")
             .at("swarm.dimensions")),
         None => {
-            let listed = [&file.start.positions_m, &file.start.velocities_m_s];
+            let listed = [&document.start.positions_m, &document.start.velocities_m_s];
             let start_is_flat = listed.into_iter().flatten().all(|points| flat(points))
-                && !matches!(file.start.shape, Some(StartShape::Sphere { .. }));
+                && !matches!(document.start.shape, Some(StartShape::Sphere { .. }));
             Ok(if start_is_flat && formation_is_flat { Space::Plane } else { Space::Volume })
         }
     }
 }
 
 /// Positions and velocities at time 0.
-fn start(file: &StartFile, count: usize, space: Space, delta_m: f64) -> Result<Swarm, ScenarioError> {
-    let mut random = start::random(file.seed);
-    let mut positions_m = match (&file.positions_m, &file.shape) {
+fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result<Swarm, ScenarioError> {
+    let mut random = start::random(table.seed);
+    let mut positions_m = match (&table.positions_m, &table.shape) {
         (Some(points), None) => rows(points),
         (None, Some(shape)) => start::positions(shape, count, space, delta_m, &mut random)?,
         (Some(_), Some(_)) => {
@@ -145,15 +136,15 @@ fn start(file: &StartFile, count: usize, space: Space, delta_m: f64) -> Result<S
                 .at("start"));
         }
     };
-    start::jitter(&mut positions_m, file.jitter_m, space, &mut random)?;
-    let velocities_m_s = file.velocities_m_s.as_deref().map_or_else(|| Rows::zeros(count), rows);
+    start::jitter(&mut positions_m, table.jitter_m, space, &mut random)?;
+    let velocities_m_s = table.velocities_m_s.as_deref().map_or_else(|| Rows::zeros(count), rows);
     Ok(Swarm { positions_m, velocities_m_s })
 }
 
-fn formation(file: &FormationFile, count: usize) -> Result<Formation, ScenarioError> {
+fn formation(shape: &FormationShape, count: usize) -> Result<Formation, ScenarioError> {
     let radius = |radius_m| positive("formation.radius_m", "the radius", radius_m);
     let spacing = |spacing_m| positive("formation.spacing_m", "the spacing", spacing_m);
-    Ok(match &file.shape {
+    Ok(match shape {
         &FormationShape::Pentagon { side_m } => Formation::pentagon(positive("formation.side_m", "the side", side_m)?),
         &FormationShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
         &FormationShape::Line { spacing_m } => Formation::line(count, spacing(spacing_m)?),
@@ -163,20 +154,10 @@ fn formation(file: &FormationFile, count: usize) -> Result<Formation, ScenarioEr
     })
 }
 
-fn law(file: &LawFile, a22_per_s: f64) -> (f64, LawSpec) {
-    let mut law = match file.kind {
-        LawKind::EdgeTension { alpha } => LawSpec::EdgeTension(EdgeTensionKeys { alpha }),
-        LawKind::Laplacian { f1_per_s2, f2_per_s } => LawSpec::Laplacian(LaplacianKeys { f1_per_s2, f2_per_s }),
-    };
-    law.complete(a22_per_s);
-    (file.delta_m, law)
-}
-
-fn plant(file: &PlantFile) -> PlantSpec {
-    match (file.kind, file.precision) {
-        (PlantKind::Rapier, PrecisionFile::Single) => PlantSpec::Rapier(Precision::Single),
-        (PlantKind::Rapier, PrecisionFile::Double) => PlantSpec::Rapier(Precision::Double),
-        (PlantKind::Ideal, _) => PlantSpec::Ideal,
+fn plant(table: &PlantTable) -> PlantSpec {
+    match table.kind {
+        PlantKind::Rapier => PlantSpec::Rapier(table.precision.unwrap_or(Precision::Single)),
+        PlantKind::Ideal => PlantSpec::Ideal,
     }
 }
 
@@ -228,8 +209,8 @@ fn per_vehicle(numbers: PerVehicle, count: usize) -> Vec<f64> {
 
 fn rows(points: &[Point]) -> Rows {
     let mut rows = Rows::zeros(points.len());
-    for (i, &Point([x, y, z])) in points.iter().enumerate() {
-        set_row(&mut rows, i, Vector3::new(x, y, z));
+    for (i, point) in points.iter().enumerate() {
+        set_row(&mut rows, i, Vector3::from(point.coordinates()));
     }
     rows
 }

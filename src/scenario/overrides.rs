@@ -11,6 +11,10 @@ use super::error::{Place, ScenarioError};
 /// What the text of an override is called in messages.
 const SOURCE: &str = "--set";
 
+/// The table of what counts as a reached formation, and the name that it had.
+pub(super) const ARRIVAL: &str = "arrival";
+pub(super) const OLD_ARRIVAL: &str = "judge";
+
 /// One key of the scenario set to another value, whatever the file says.
 ///
 /// The path is dotted: `law.delta_m=1.5`. Keys and tables that the file does not have are made:
@@ -87,7 +91,11 @@ impl Override {
         let mut value = self.value().map_err(|error| self.refuse(&self.value, error.message()))?;
         shift(&mut value, base + self.value.start);
         let Some((first, rest)) = self.path.split_first() else { return Ok(()) };
-        self.set_key(root, first, rest, value, base)
+        let table = match &self.text[first.clone()] {
+            OLD_ARRIVAL => ARRIVAL,
+            table => table,
+        };
+        self.set_key(root, (table, first), rest, value, base)
     }
 
     /// The value, with spans from its own first byte.
@@ -114,7 +122,7 @@ impl Override {
             return Ok(());
         };
         match target {
-            DeValue::Table(table) => self.set_key(table, first, rest, value, base),
+            DeValue::Table(table) => self.set_key(table, (&self.text[first.clone()], first), rest, value, base),
             DeValue::Array(list) => {
                 let count = list.len();
                 let entry = self.entry(first)?.checked_sub(1).and_then(|entry| list.get_mut(entry));
@@ -139,12 +147,11 @@ impl Override {
     fn set_key<'a>(
         &'a self,
         table: &mut DeTable<'a>,
-        key: &'a Range<usize>,
+        (name, key): (&'a str, &Range<usize>),
         rest: &'a [Range<usize>],
         value: Spanned<DeValue<'a>>,
         base: usize,
     ) -> Result<(), ScenarioError> {
-        let name = &self.text[key.clone()];
         let span = base + key.start..base + key.end;
         if rest.is_empty() {
             // Removed first: a map keeps the key that it has, and this key's place is here now.

@@ -1,12 +1,16 @@
-//! A scenario as TOML with nothing left to be derived: every default written out, every shape as points, random
+//! A scenario as a document with nothing left to be derived: every default written out, every shape as points, random
 //! numbers drawn.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 
 use sha2::{Digest, Sha256};
+use toml::{Table, Value};
 
-use super::{PlantSpec, Precision, Scenario, Space};
-use crate::law::LawSpec;
+use super::document::{
+    Document, Edge, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, PerVehicle, PlantKind, PlantTable,
+    Point, StartTable, SwarmTable,
+};
+use super::spec::{PlantSpec, Scenario, Space};
 use crate::swarm::Rows;
 
 impl Scenario {
@@ -16,9 +20,11 @@ impl Scenario {
     /// either. Equal scenarios have equal texts.
     #[must_use]
     pub fn resolved_toml(&self) -> String {
+        // Every key of the document has a form in TOML.
+        let tables = Table::try_from(Document::from(self)).unwrap_or_default();
         let mut out = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write(&mut out);
+        let _ = write_document(&mut out, &tables);
         out
     }
 
@@ -31,91 +37,107 @@ impl Scenario {
         })
     }
 
-    fn write(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(out, "name = {}", toml::Value::from(self.name.as_str()))?;
-
-        writeln!(out, "\n[swarm]")?;
-        writeln!(out, "count = {}", self.count())?;
-        writeln!(out, "dimensions = {}", if self.space == Space::Plane { 2 } else { 3 })?;
-        writeln!(out, "mass_kg = {}", per_vehicle(&self.mass_kg))?;
-        writeln!(out, "hull_radius_m = {}", per_vehicle(&self.hull_radius_m))?;
-        writeln!(out, "a22_per_s = {}", number(self.a22_per_s))?;
-
-        writeln!(out, "\n[start]")?;
-        self.write_rows(out, "positions_m", &self.start.positions_m)?;
-        self.write_rows(out, "velocities_m_s", &self.start.velocities_m_s)?;
-
-        writeln!(out, "\n[formation]\nshape = \"points\"")?;
-        self.write_rows(out, "points_m", &self.formation().slots_m)?;
-
-        writeln!(out, "\n[law]")?;
-        match &self.law {
-            LawSpec::EdgeTension(keys) => writeln!(out, "kind = \"edge-tension\"\nalpha = {}", number(keys.alpha))?,
-            LawSpec::Laplacian(keys) => {
-                writeln!(out, "kind = \"laplacian\"")?;
-                let f2_per_s = keys.f2_per_s.unwrap_or(1.0 + self.a22_per_s);
-                writeln!(out, "f1_per_s2 = {}\nf2_per_s = {}", number(keys.f1_per_s2), number(f2_per_s))?;
-            }
-        }
-        writeln!(out, "delta_m = {}", number(self.delta_m))?;
-
-        writeln!(out, "\n[graph]")?;
-        if self.graph.is_complete() {
-            writeln!(out, "kind = \"complete\"")?;
-        } else {
-            writeln!(out, "kind = \"edges\"\nedges = [")?;
-            for (i, j) in self.graph.edges() {
-                writeln!(out, "    [{}, {}],", i + 1, j + 1)?;
-            }
-            writeln!(out, "]")?;
-        }
-
-        writeln!(out, "\n[plant]")?;
-        match self.plant {
-            PlantSpec::Rapier(precision) => {
-                let precision = match precision {
-                    Precision::Single => "single",
-                    Precision::Double => "double",
-                };
-                writeln!(out, "kind = \"rapier\"\nprecision = \"{precision}\"")?;
-            }
-            PlantSpec::Ideal => writeln!(out, "kind = \"ideal\"")?,
-        }
-
-        writeln!(out, "\n[time]")?;
-        writeln!(out, "duration_s = {}", number(self.time.duration_s))?;
-        writeln!(out, "dt_s = {}", number(self.time.dt_s))?;
-        writeln!(out, "record_hz = {}", number(self.time.record_hz))?;
-        writeln!(out, "max_halvings = {}", self.time.max_halvings)?;
-
-        writeln!(out, "\n[judge]")?;
-        writeln!(out, "edge_error_m = {}", number(self.arrival.edge_error_m))?;
-        writeln!(out, "disagreement_m_s = {}", number(self.arrival.disagreement_m_s))?;
-        writeln!(out, "hold_s = {}", number(self.arrival.hold_s))
+    fn points(&self, rows: &Rows) -> Vec<Point> {
+        rows.row_iter()
+            .map(|row| match self.space {
+                Space::Plane => Point::Plane([row[0], row[1]]),
+                Space::Volume => Point::Space([row[0], row[1], row[2]]),
+            })
+            .collect()
     }
+}
 
-    fn write_rows(&self, out: &mut String, key: &str, rows: &Rows) -> std::fmt::Result {
-        writeln!(out, "{key} = [")?;
-        for i in 0..rows.nrows() {
-            write!(out, "    [{}, {}", number(rows[(i, 0)]), number(rows[(i, 1)]))?;
-            if self.space == Space::Volume {
-                write!(out, ", {}", number(rows[(i, 2)]))?;
-            }
-            writeln!(out, "],")?;
+impl From<&Scenario> for Document {
+    fn from(scenario: &Scenario) -> Self {
+        let mut law = scenario.law.clone();
+        law.complete(scenario.a22_per_s);
+        let (kind, precision) = match scenario.plant {
+            PlantSpec::Rapier(precision) => (PlantKind::Rapier, Some(precision)),
+            PlantSpec::Ideal => (PlantKind::Ideal, None),
+        };
+        Self {
+            name: scenario.name.clone(),
+            swarm: SwarmTable {
+                count: Some(scenario.count() as u64),
+                dimensions: Some(if scenario.space == Space::Plane { 2 } else { 3 }),
+                mass_kg: per_vehicle(&scenario.mass_kg),
+                hull_radius_m: per_vehicle(&scenario.hull_radius_m),
+                a22_per_s: scenario.a22_per_s,
+            },
+            start: StartTable {
+                positions_m: Some(scenario.points(&scenario.start.positions_m)),
+                velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),
+                jitter_m: 0.0,
+                seed: 0,
+                shape: None,
+            },
+            formation: FormationTable {
+                shape: FormationShape::Points { points_m: scenario.points(&scenario.formation().slots_m) },
+            },
+            law: LawTable { kind: law, delta_m: scenario.delta_m },
+            graph: GraphTable {
+                kind: if scenario.graph.is_complete() {
+                    GraphKind::Complete {}
+                } else {
+                    let edges = scenario.graph.edges().map(|(i, j)| Edge([i as u64 + 1, j as u64 + 1])).collect();
+                    GraphKind::Edges { edges }
+                },
+            },
+            plant: PlantTable { kind, precision },
+            time: scenario.time,
+            arrival: scenario.arrival,
         }
-        writeln!(out, "]")
     }
 }
 
 /// One number if all are the same, otherwise the list.
-fn per_vehicle(numbers: &[f64]) -> String {
+fn per_vehicle(numbers: &[f64]) -> PerVehicle {
     match numbers {
-        [first, rest @ ..] if rest.iter().all(|other| other.to_bits() == first.to_bits()) => number(*first),
-        _ => format!("[{}]", numbers.iter().map(|&x| number(x)).collect::<Vec<_>>().join(", ")),
+        [first, rest @ ..] if rest.iter().all(|other| other.to_bits() == first.to_bits()) => PerVehicle::All(*first),
+        _ => PerVehicle::Each(numbers.to_vec()),
     }
 }
 
-/// The shortest decimal number that reads back to the same bits, as TOML writes it.
-fn number(x: f64) -> String {
-    if x.is_nan() { "nan".to_owned() } else { format!("{x:?}") }
+fn write_document(out: &mut String, document: &Table) -> fmt::Result {
+    for (key, value) in document {
+        match value {
+            Value::Table(table) => {
+                writeln!(out, "\n[{key}]")?;
+                write_keys(out, table)?;
+            }
+            _ => writeln!(out, "{key} = {value}")?,
+        }
+    }
+    Ok(())
+}
+
+/// Writes the keys of a table, those of a choice after it.
+fn write_keys(out: &mut String, table: &Table) -> fmt::Result {
+    for (key, value) in table {
+        match value {
+            Value::Table(choice) => {
+                for (name, keys) in choice {
+                    writeln!(out, "{key} = \"{name}\"")?;
+                    write_keys(out, keys.as_table().unwrap_or(&Table::new()))?;
+                }
+            }
+            Value::Array(rows) if rows.iter().all(Value::is_array) => {
+                writeln!(out, "{key} = [")?;
+                rows.iter().try_for_each(|row| writeln!(out, "    {},", inline(row)))?;
+                writeln!(out, "]")?;
+            }
+            _ => writeln!(out, "{key} = {}", inline(value))?,
+        }
+    }
+    Ok(())
+}
+
+/// A value in one line; a number as the shortest decimal that reads back to the same bits.
+fn inline(value: &Value) -> String {
+    match value {
+        Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),
+        Value::Float(x) if x.is_nan() => "nan".to_owned(),
+        Value::Float(x) => format!("{x:?}"),
+        _ => value.to_string(),
+    }
 }

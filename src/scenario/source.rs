@@ -4,9 +4,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::document::{Document, suggest};
 use super::error::{Place, ScenarioError};
-use super::{Override, Scenario, build, builtin};
+use super::overrides::Override;
+use super::spec::Scenario;
+use super::suggest::suggest;
+use super::text::Text;
+use super::{build, builtin};
 
 /// Largest scenario file that is read \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge
 /// each. Reading takes about 45 times the length of the file in memory.
@@ -65,15 +68,15 @@ impl Scenario {
     /// text or in an override.
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
-        let document = Document { name: &name, text: &text, overrides };
-        let scenario = build::scenario(document.decode()?).map_err(|error| document.place(error))?;
-        scenario.validate().map_err(|error| document.place(error))?;
+        let text = Text { name: &name, toml: &text, overrides };
+        let scenario = build::scenario(text.decode()?).map_err(|error| text.place(error))?;
+        scenario.validate().map_err(|error| text.place(error))?;
         Ok(scenario)
     }
 }
 
 fn unknown_builtin(name: &str) -> ScenarioError {
-    let names: Vec<String> = builtin::all().iter().map(|builtin| builtin.name.to_owned()).collect();
+    let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
     ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file")).with_help(suggest(name, &names))
 }
 

@@ -7,10 +7,10 @@ use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::Space;
+use super::document::StartShape;
 use super::error::ScenarioError;
-use super::file::StartShape;
-use super::validate::positive;
+use super::limits::positive;
+use super::spec::Space;
 use crate::formation::Formation;
 use crate::space::Spaced;
 use crate::swarm::{Rows, row, set_row};

@@ -1,51 +1,19 @@
 //! What a scenario must be for it to be flown.
 
-use std::fmt::Display;
-
 use super::error::ScenarioError;
-use super::{PlantSpec, Precision, Scenario, Space, TimeSpec};
+use super::limits::{
+    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, at_least_zero, check_count, check_memory, positive,
+    require_finite, require_more_than_zero, require_positive,
+};
+use super::spec::{PlantSpec, Precision, Scenario, Space};
+use super::time::TimeSpec;
 use crate::graph::Graph;
 use crate::law::Gain;
 use crate::space::Spaced;
 use crate::swarm::{Pair, Rows, mean_row, row};
 
-/// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such
-/// numbers stay finite in single precision too.
-pub const LARGEST: f64 = 1e9;
-
-/// Smallest magnitude of a number that must be positive, in SI units. Squares of such numbers are normal numbers in
-/// single precision too.
-pub const SMALLEST: f64 = 1e-9;
-
-/// Most steps of a flight. Up to here the product of step number, step and recording rate is known to better than the
-/// 1e-6 that decides whether a step is recorded ([`TimeSpec::records`]); at a microsecond a step it takes 17 minutes.
-pub const MAX_STEPS: f64 = 1e9;
-
-/// Most halvings of a step. Up to here doubles tell the times of its parts apart to the end of the longest flight.
-pub const MAX_HALVINGS: u32 = 20;
-
-/// Distance at which the engine begins to act on two hulls that are about to touch \[m\]: hulls must stay so far from
-/// touching while no pair is closer than delta.
-pub const CONTACT_PREDICTION_M: f64 = 0.02;
-
 /// Largest error of a22 by the engine's rounding, as a share of a22.
 const DAMPING_RESOLUTION: f64 = 0.01;
-
-/// Longest name \[characters\].
-pub const MAX_NAME_CHARS: usize = 64;
-
-/// Memory that a flight may be expected to take \[bytes\].
-pub const MAX_MEMORY_BYTES: u128 = 8 << 30;
-
-/// Memory expected for a vehicle: state, rigid body, two colliders and their places in the engine's and the audit's
-/// bounding volumes \[bytes\].
-pub const BYTES_PER_VEHICLE: u128 = 4096;
-
-/// Memory expected for an edge: its parameters in the law and its place in the graph \[bytes\].
-pub const BYTES_PER_EDGE: u128 = 16;
-
-/// Bytes of a GiB.
-const GIB: f64 = (1_u64 << 30) as f64;
 
 /// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
 /// step.
@@ -78,30 +46,30 @@ impl Scenario {
         self.check_hulls()?;
         check_connected(&self.graph)?;
         self.check_time()?;
-        self.check_judge()?;
+        self.check_arrival()?;
         self.check_resolution()
     }
 
-    fn check_judge(&self) -> Result<(), ScenarioError> {
-        let (judge, time) = (self.arrival, self.time);
-        positive("judge.edge_error_m", "the edge error", judge.edge_error_m)?;
-        positive("judge.disagreement_m_s", "the disagreement", judge.disagreement_m_s)?;
-        at_least_zero("judge.hold_s", "the hold time", judge.hold_s)?;
-        if judge.hold_s > time.duration_s {
+    fn check_arrival(&self) -> Result<(), ScenarioError> {
+        let (arrival, time) = (self.arrival, self.time);
+        positive("arrival.edge_error_m", "the edge error", arrival.edge_error_m)?;
+        positive("arrival.disagreement_m_s", "the disagreement", arrival.disagreement_m_s)?;
+        at_least_zero("arrival.hold_s", "the hold time", arrival.hold_s)?;
+        if arrival.hold_s > time.duration_s {
             return Err(ScenarioError::new(format!(
                 "the formation is to be held for {} s in a flight of {} s",
-                judge.hold_s, time.duration_s
+                arrival.hold_s, time.duration_s
             ))
-            .with_help("enlarge time.duration_s or reduce judge.hold_s")
-            .at("judge.hold_s"));
+            .with_help("enlarge time.duration_s or reduce arrival.hold_s")
+            .at("arrival.hold_s"));
         }
-        if time.record_hz * judge.hold_s < 1.0 && judge.hold_s > 0.0 {
+        if time.record_hz * arrival.hold_s < 1.0 && arrival.hold_s > 0.0 {
             return Err(ScenarioError::new(format!(
                 "{} samples a second cannot tell whether the formation is held for {} s",
-                time.record_hz, judge.hold_s
+                time.record_hz, arrival.hold_s
             ))
-            .with_help(format!("set time.record_hz to at least {}", 1.0 / judge.hold_s))
-            .at("judge.hold_s")
+            .with_help(format!("set time.record_hz to at least {}", 1.0 / arrival.hold_s))
+            .at("arrival.hold_s")
             .at("time.record_hz"));
         }
         Ok(())
@@ -330,40 +298,6 @@ fn extent_m(rows: &Rows) -> f64 {
     (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm()).fold(0.0, f64::max)
 }
 
-/// Refuses a swarm in which nothing can be kept apart.
-pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
-    if count >= 2 {
-        return Ok(());
-    }
-    let vehicles = if count == 1 { "vehicle" } else { "vehicles" };
-    Err(ScenarioError::new(format!("{count} {vehicles} cannot form a formation"))
-        .with_help("a swarm has at least 2 vehicles")
-        .at("swarm.count"))
-}
-
-/// Refuses a swarm that would take more memory than [`MAX_MEMORY_BYTES`].
-pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioError> {
-    let bytes = (count as u128 * BYTES_PER_VEHICLE).saturating_add(edges.saturating_mul(BYTES_PER_EDGE));
-    if bytes <= MAX_MEMORY_BYTES {
-        return Ok(());
-    }
-    Err(ScenarioError::new(format!(
-        "{count} vehicles with {edges} edges would take {:.1} GiB of memory ({BYTES_PER_VEHICLE} bytes a vehicle, \
-         {BYTES_PER_EDGE} bytes an edge); at most {} GiB are used",
-        bytes as f64 / GIB,
-        MAX_MEMORY_BYTES >> 30
-    ))
-    .with_help("fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"")
-    .at("swarm.count")
-    .at("graph.kind"))
-}
-
-/// Number of pairs of `count` vehicles.
-pub(super) fn pair_count(count: usize) -> u128 {
-    let count = count as u128;
-    count * count.saturating_sub(1) / 2
-}
-
 /// The first vehicle, and the first before it, that are at most `distance_m` apart.
 fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
     let mut spaced = Spaced::new(distance_m);
@@ -397,57 +331,4 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
     Err(ScenarioError::new(format!("the graph is not connected: no path joins vehicle 1 to {named}{more}"))
         .with_help("add edges until every vehicle can be reached from every other")
         .at("graph.edges"))
-}
-
-/// The number, if it is positive and within the limits.
-pub(super) fn positive(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
-    require_positive(what, number).map_err(|error| error.at(key))
-}
-
-fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<(), ScenarioError> {
-    require_finite(what, number)
-        .and_then(|number| {
-            if number >= 0.0 {
-                Ok(())
-            } else {
-                Err(ScenarioError::new(format!("{what} is {number}")).with_help("it must be at least 0"))
-            }
-        })
-        .map_err(|error| error.at(key))
-}
-
-fn require_positive(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
-    require_finite(&what, number)?;
-    require_more_than_zero(&what, number)?;
-    if number < SMALLEST {
-        return Err(ScenarioError::new(format!("{what} is {number:e}, too small to compute with"))
-            .with_help(format!("the least is {SMALLEST:e}")));
-    }
-    Ok(number)
-}
-
-fn require_more_than_zero(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
-    if number > 0.0 && number.is_finite() {
-        return Ok(number);
-    }
-    let shown = match number {
-        _ if number.is_nan() => "not a number".to_owned(),
-        f64::INFINITY => "infinite".to_owned(),
-        _ => number.to_string(),
-    };
-    Err(ScenarioError::new(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
-}
-
-fn require_finite(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
-    if number.abs() <= LARGEST {
-        return Ok(number);
-    }
-    let (shown, help) = if number.is_nan() {
-        ("not a number".to_owned(), "give a number".to_owned())
-    } else if number.is_infinite() {
-        ("infinite".to_owned(), "give a finite number".to_owned())
-    } else {
-        (format!("{number:e}, too large to compute with"), format!("the most is {LARGEST:e} in either direction"))
-    };
-    Err(ScenarioError::new(format!("{what} is {shown}")).with_help(help))
 }

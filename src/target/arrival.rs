@@ -1,5 +1,7 @@
 //! What counts as a reached formation.
 
+use serde::{Deserialize, Serialize};
+
 use crate::formation::{Formation, largest_edge_error_m, procrustes_rms_m};
 use crate::graph::Graph;
 use crate::swarm::Swarm;
@@ -7,15 +9,17 @@ use crate::swarm::Swarm;
 /// Times are sums and products of steps: this much shorter than `hold_s` still counts as held \[s\].
 const TIME_ROUNDING_S: f64 = 1e-9;
 
-/// What counts as a reached formation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What counts as a reached formation: to the end of the flight, and at least for `hold_s`, both limits hold, and the
+/// vehicles are no more than `edge_error_m` (root mean square) from the formation laid over them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
 pub struct Arrival {
-    /// Largest error of a desired distance over the graph's edges \[m\], and largest root mean square distance from the
-    /// formation laid over the swarm.
+    /// Largest error of a desired distance over the edges of the graph in m.
     pub edge_error_m: f64,
-    /// Largest speed relative to the swarm's mean velocity \[m/s\].
+    /// Largest speed relative to the swarm's mean velocity in m/s.
     pub disagreement_m_s: f64,
-    /// Shortest time for which all must hold, up to the end of the leg \[s\].
+    /// Shortest time for which both must hold in s.
     pub hold_s: f64,
 }
 

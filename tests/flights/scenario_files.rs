@@ -4,7 +4,7 @@ use std::fs;
 
 use proptest::prelude::*;
 use tautline::formation::Formation;
-use tautline::scenario::{Override, Scenario, ScenarioError, Source, Space, builtin, file};
+use tautline::scenario::{self, Override, Scenario, ScenarioError, Source, Space, builtin};
 use tautline::swarm::{Rows, Swarm, separation};
 
 /// A minimal flight that is right: what the wrong ones below are changed from.
@@ -109,8 +109,11 @@ fn every_wrong_input_is_refused_at_its_place_with_a_remedy() {
         ("duration_s = 1.0", "duration_s = nan", "the duration is not a number", (14, 14)),
         ("[time]", "[time]\nrecord_hz = 0", "the recording rate is 0", (14, 13)),
         ("[time]", "[time]\nmax_halvings = 21", "at most 20 times", (14, 16)),
+        ("[time]", "[arrival]\nhold_s = -1\n[time]", "the hold time is -1", (14, 10)),
         ("[time]", "[judge]\nhold_s = -1\n[time]", "the hold time is -1", (14, 10)),
-        ("[time]", "[judge]\nedge_error_m = 0\n[time]", "the edge error is 0", (14, 16)),
+        ("[time]", "[arrival]\n[judge]\nhold_s = 0\n[time]", "both [arrival] and [judge] are given", (14, 2)),
+        ("name = \"pair\"", "name = \"pair\"\n\"a, expected `b`\" = 1", "unknown key `a, expected `b``", (2, 1)),
+        ("[time]", "[arrival]\nedge_error_m = 0\n[time]", "the edge error is 0", (14, 16)),
         ("\"pair\"", "\"a/../b\"", "the name holds '/'", (1, 8)),
         ("\"pair\"", "\"\"", "the name is empty", (1, 8)),
     ];
@@ -202,6 +205,7 @@ fn an_override_sets_any_key_and_makes_those_that_are_not_there() {
     assert!(says(&["start.positions_m.4.x=-1"], "[-1.0, 0.05],"));
     assert!(says(&["start.positions_m.4.1=-1"], "[-1.0, 0.05],"));
     assert!(says(&["start.positions_m.4=[-1, 0.5]"], "[-1.0, 0.5],"));
+    assert!(says(&["judge.hold_s=0.5"], "hold_s = 0.5") && says(&["arrival.hold_s=0.5"], "hold_s = 0.5"));
     assert!(says(&["time.dt_s=0.1", "time.dt_s=0.2"], "dt_s = 0.2"), "the last one wins");
     assert_eq!(set(&["graph.kind=star"]).graph.edge_count(), 4);
     assert_eq!(set(&["formation={shape=\"circle\", radius_m=3}"]).formation(), &Formation::circle(5, 3.0));
@@ -256,7 +260,7 @@ fn the_resolved_scenario_reads_back_to_the_same_bits_and_the_same_hash() {
         &["swarm.count=5", random],
         &["start.jitter_m=0.05", "start.seed=3", "swarm.dimensions=3"],
         &["graph.kind=ring", "plant.precision=double", "law.delta_m=0.9"],
-        &["swarm.mass_kg=[0.1,0.2,0.3,0.4,0.7]", "time.dt_s=0.01", "time.record_hz=7", "judge.hold_s=0"],
+        &["swarm.mass_kg=[0.1,0.2,0.3,0.4,0.7]", "time.dt_s=0.01", "time.record_hz=7", "arrival.hold_s=0"],
         &["formation={shape=\"sphere\", radius_m=4}", "start.velocities_m_s=[[1,0],[0,1],[0.1,0.2,0.3],[0,0],[0,0]]"],
     ];
     let changed = changed.iter().map(|&sets| ("pentagon", sets));
@@ -450,7 +454,7 @@ fn every_built_in_is_right_explains_itself_and_carries_its_name() {
 
 #[test]
 fn the_schema_describes_every_key_and_refuses_null() {
-    let schema = file::schema();
+    let schema = scenario::schema();
     let text = schema.to_string();
     for key in ["delta_m", "hull_radius_m", "max_halvings", "min_separation_m", "points_m", "disagreement_m_s", "edges"]
     {
@@ -500,7 +504,7 @@ proptest! {
         key in prop::sample::select(vec![
             "name", "swarm.count", "swarm.mass_kg", "start.positions_m.2", "start.positions_m.2.x", "start.shape",
             "start.velocities_m_s", "start.jitter_m", "formation.shape", "formation", "law.kind", "law.delta_m",
-            "graph.kind", "graph.edges", "time.dt_s", "time.duration_s", "judge.hold_s", "nothing.at.all",
+            "graph.kind", "graph.edges", "time.dt_s", "time.duration_s", "arrival.hold_s", "nothing.at.all",
         ]),
         value in prop_oneof![
             any::<f64>().prop_map(|x| format!("{x:?}")),

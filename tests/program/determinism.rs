@@ -36,7 +36,7 @@ kind = "edge-tension"
 delta_m = 2.0
 [time]
 duration_s = 0.1
-[judge]
+[arrival]
 hold_s = 0.1
 "#;
 

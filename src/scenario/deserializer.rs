@@ -1,0 +1,281 @@
+//! From the tree of a TOML text to the types that hold its keys.
+//!
+//! serde tells a deserializer the keys and choices that a type knows, so an error here is known by its parts: what was
+//! not known, what is, and where it stands.
+//!
+//! A table whose keys depend on a choice is a struct whose field `kind` or `shape` is an enum: the keys that the struct
+//! does not have are those of the choice. TOML writes both in one flat table.
+
+use std::fmt::{self, Display};
+use std::ops::Range;
+
+use serde::de::value::{MapDeserializer, SeqDeserializer};
+use serde::de::{self, DeserializeSeed, EnumAccess, Error as _, IntoDeserializer, Unexpected, VariantAccess, Visitor};
+use serde::{Deserializer, forward_to_deserialize_any};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The fields that hold a choice.
+const CHOICES: [&str; 2] = ["kind", "shape"];
+
+/// What is wrong with a key or its value.
+#[derive(Debug)]
+pub(super) struct KeyError {
+    /// In one sentence.
+    pub(super) message: String,
+    /// The name that is not known.
+    pub(super) unknown: Option<Unknown>,
+    /// Where it stands in the text.
+    pub(super) span: Option<Range<usize>>,
+}
+
+/// A name where another was expected.
+#[derive(Debug)]
+pub(super) enum Unknown {
+    /// A key, and the keys that are known there.
+    Key(String, Vec<&'static str>),
+    /// A choice, and the choices.
+    Choice(String, Vec<&'static str>),
+}
+
+impl KeyError {
+    fn at(mut self, span: &Range<usize>) -> Self {
+        self.span.get_or_insert_with(|| span.clone());
+        self
+    }
+
+    /// Adds keys that are known beside those of a choice.
+    fn beside(mut self, keys: &[&'static str]) -> Self {
+        if let Some(Unknown::Key(_, known)) = &mut self.unknown {
+            known.extend(keys);
+        }
+        self
+    }
+}
+
+impl de::Error for KeyError {
+    fn custom<T: Display>(message: T) -> Self {
+        Self { message: message.to_string(), unknown: None, span: None }
+    }
+
+    fn missing_field(field: &'static str) -> Self {
+        Self::custom(format_args!("missing key `{field}`"))
+    }
+
+    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
+        let unknown = Some(Unknown::Key(field.to_owned(), expected.to_vec()));
+        Self { unknown, ..Self::custom("unknown key") }
+    }
+
+    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
+        let unknown = Some(Unknown::Choice(variant.to_owned(), expected.to_vec()));
+        Self { unknown, ..Self::custom("unknown choice") }
+    }
+}
+
+impl std::error::Error for KeyError {}
+
+impl Display for KeyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+/// A value of the tree, or a key or the name of a choice as one.
+pub(super) struct Value<'de> {
+    inner: DeValue<'de>,
+    span: Range<usize>,
+    /// For a choice the keys of its table that are the choice's.
+    chosen: Option<Chosen<'de>>,
+}
+
+/// The keys of a choice.
+pub(super) struct Chosen<'de> {
+    keys: DeTable<'de>,
+    /// Those that the table has whatever is chosen.
+    common: &'static [&'static str],
+    /// The table.
+    span: Range<usize>,
+}
+
+impl<'de> Value<'de> {
+    /// The whole document.
+    pub(super) fn root(root: Spanned<DeTable<'de>>) -> Self {
+        Self::new(DeValue::Table(root.into_inner()), 0..0)
+    }
+
+    fn new(inner: DeValue<'de>, span: Range<usize>) -> Self {
+        Self { inner, span, chosen: None }
+    }
+
+    fn unexpected(&self) -> Unexpected<'_> {
+        match &self.inner {
+            DeValue::String(text) => Unexpected::Str(text),
+            DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix())
+                .map_or(Unexpected::Other("number"), Unexpected::Signed),
+            DeValue::Float(number) => number.as_str().parse().map_or(Unexpected::Other("number"), Unexpected::Float),
+            DeValue::Boolean(flag) => Unexpected::Bool(*flag),
+            DeValue::Datetime(_) => Unexpected::Other("date"),
+            DeValue::Array(_) => Unexpected::Seq,
+            DeValue::Table(_) => Unexpected::Map,
+        }
+    }
+
+    fn wrong_type(&self, expected: &str) -> KeyError {
+        KeyError::invalid_type(self.unexpected(), &expected).at(&self.span)
+    }
+
+    fn whole_number(&self, most: u64) -> Result<u64, KeyError> {
+        const FROM_0: &str = "a whole number from 0";
+        let DeValue::Integer(written) = &self.inner else { return Err(self.wrong_type(FROM_0)) };
+        let number = u64::from_str_radix(written.as_str(), written.radix()).ok().filter(|&number| number <= most);
+        number.ok_or_else(|| KeyError::invalid_value(self.unexpected(), &FROM_0).at(&self.span))
+    }
+}
+
+impl<'de> From<Spanned<DeValue<'de>>> for Value<'de> {
+    fn from(value: Spanned<DeValue<'de>>) -> Self {
+        let span = value.span();
+        Self::new(value.into_inner(), span)
+    }
+}
+
+/// The keys and values of a table.
+fn entries(table: DeTable<'_>) -> impl Iterator<Item = (Value<'_>, Value<'_>)> {
+    table.into_iter().map(|(key, value)| {
+        let span = key.span();
+        (Value::new(DeValue::String(key.into_inner()), span), Value::from(value))
+    })
+}
+
+impl<'de> Deserializer<'de> for Value<'de> {
+    type Error = KeyError;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, KeyError> {
+        match self.inner {
+            DeValue::String(text) => visitor.visit_str(&text),
+            DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
+                Ok(number) => visitor.visit_i64(number),
+                Err(_) => Err(KeyError::custom("integer number overflowed")),
+            },
+            DeValue::Float(number) => match number.as_str().parse::<f64>() {
+                Ok(parsed) if parsed.is_finite() || !number.as_str().ends_with(|c: char| c.is_ascii_digit()) => {
+                    visitor.visit_f64(parsed)
+                }
+                _ => Err(KeyError::custom("floating-point number overflowed")),
+            },
+            DeValue::Boolean(flag) => visitor.visit_bool(flag),
+            DeValue::Datetime(_) => Err(KeyError::invalid_type(Unexpected::Other("date"), &visitor)),
+            DeValue::Array(list) => {
+                let mut list = SeqDeserializer::new(list.into_iter().map(Value::from));
+                visitor.visit_seq(&mut list).and_then(|value| list.end().map(|()| value))
+            }
+            DeValue::Table(table) => visitor.visit_map(MapDeserializer::new(entries(table))),
+        }
+        .map_err(|error| error.at(&self.span))
+    }
+
+    fn deserialize_f64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, KeyError> {
+        match self.inner {
+            DeValue::Integer(_) | DeValue::Float(_) => self.deserialize_any(visitor),
+            _ => Err(self.wrong_type("a number")),
+        }
+    }
+
+    fn deserialize_u32<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, KeyError> {
+        visitor.visit_u64(self.whole_number(u32::MAX.into())?)
+    }
+
+    fn deserialize_u64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, KeyError> {
+        visitor.visit_u64(self.whole_number(u64::MAX)?)
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, KeyError> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, KeyError> {
+        let span = self.span.clone();
+        let DeValue::Table(table) = self.inner else { return Err(self.wrong_type("a table")) };
+        let is_chosen = |key: &&&str| matches!(table.get(**key).map(Spanned::get_ref), Some(DeValue::String(_)));
+        let choice = CHOICES.iter().filter(|key| fields.contains(key)).find(is_chosen).copied();
+        let is_own = |key: &str| choice.is_none() || fields.contains(&key);
+        let (own, keys): (DeTable<'_>, _) = table.into_iter().partition(|(key, _)| is_own(key.get_ref()));
+        let mut chosen = Some(Chosen { keys, common: fields, span: span.clone() });
+        let own = entries(own).map(|(key, mut value)| {
+            if matches!(&key.inner, DeValue::String(key) if Some(&**key) == choice) {
+                value.chosen = chosen.take();
+            }
+            (key, value)
+        });
+        visitor.visit_map(MapDeserializer::new(own)).map_err(|error| error.at(&span))
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, KeyError> {
+        match self.inner {
+            DeValue::String(_) => visitor.visit_enum(self),
+            _ => Err(KeyError::custom("expected a string").at(&self.span)),
+        }
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u128 f32 char str string bytes byte_buf unit unit_struct newtype_struct seq tuple
+        tuple_struct map identifier ignored_any
+    }
+}
+
+impl<'de> IntoDeserializer<'de, KeyError> for Value<'de> {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl<'de> EnumAccess<'de> for Value<'de> {
+    type Error = KeyError;
+    type Variant = Chosen<'de>;
+
+    fn variant_seed<V: DeserializeSeed<'de>>(mut self, seed: V) -> Result<(V::Value, Chosen<'de>), KeyError> {
+        let none = || Chosen { keys: DeTable::new(), common: &[], span: self.span.clone() };
+        let chosen = self.chosen.take().unwrap_or_else(none);
+        Ok((seed.deserialize(self)?, chosen))
+    }
+}
+
+impl<'de> VariantAccess<'de> for Chosen<'de> {
+    type Error = KeyError;
+
+    fn unit_variant(self) -> Result<(), KeyError> {
+        let Some(key) = self.keys.keys().next() else { return Ok(()) };
+        Err(KeyError::unknown_field(key.get_ref(), self.common).at(&key.span()))
+    }
+
+    fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, KeyError> {
+        let keys = Value::new(DeValue::Table(self.keys), self.span);
+        seed.deserialize(keys).map_err(|error| error.beside(self.common))
+    }
+
+    fn struct_variant<V: Visitor<'de>>(
+        self,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, KeyError> {
+        let keys = Value::new(DeValue::Table(self.keys), self.span);
+        keys.deserialize_struct("", fields, visitor).map_err(|error| error.beside(self.common))
+    }
+
+    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, KeyError> {
+        Err(KeyError::invalid_type(Unexpected::TupleVariant, &visitor))
+    }
+}

@@ -1,0 +1,84 @@
+//! The JSON Schema of the scenario file, and where a key belongs as it says.
+
+use serde_json::{Value, json};
+
+use super::document::Document;
+use super::overrides::OLD_ARRIVAL;
+
+/// The JSON Schema of the scenario file, with descriptions, units and defaults.
+#[must_use]
+pub fn schema() -> Value {
+    let mut schema = schemars::schema_for!(Document).to_value();
+    tidy(&mut schema);
+    schema["properties"][OLD_ARRIVAL] =
+        json!({ "$ref": "#/$defs/Arrival", "deprecated": true, "description": "The old name of `arrival`." });
+    schema
+}
+
+/// TOML has no null: a key that may be left out has the type that it has when it is there. The defaults of a table stand
+/// at its keys.
+fn tidy(schema: &mut Value) {
+    match schema {
+        Value::Object(object) => {
+            object.retain(|key, value| key != "default" || !(value.is_null() || value.is_object()));
+            for (key, value) in object {
+                match value {
+                    Value::Array(types) if key == "type" => {
+                        types.retain(|name| name != "null");
+                        if let [only] = &mut types[..] {
+                            *value = only.take();
+                        }
+                    }
+                    other => tidy(other),
+                }
+            }
+        }
+        Value::Array(list) => list.iter_mut().for_each(tidy),
+        _ => {}
+    }
+}
+
+/// The tables of the scenario file that have a key of this name: `[swarm]`, or `[law] with kind = "laplacian"`.
+pub(super) fn tables_with(key: &str) -> Vec<String> {
+    let schema = schema();
+    let Some(tables) = schema["properties"].as_object() else { return Vec::new() };
+    let mut found = Vec::new();
+    for (table, place) in tables.iter().filter(|(_, place)| place["deprecated"] != true) {
+        let definition = place["$ref"].as_str().and_then(|path| schema.pointer(path.trim_start_matches('#')));
+        if let Some(definition) = definition {
+            collect(definition, key, table, &mut found);
+        }
+    }
+    found
+}
+
+/// Adds the places of a key in a table, or in one of its choices.
+fn collect(definition: &Value, key: &str, table: &str, found: &mut Vec<String>) {
+    if definition["properties"].get(key).is_some() {
+        found.push(format!("[{table}]{}", chosen(&definition["properties"])));
+    }
+    let alternatives = ["oneOf", "anyOf"].iter().filter_map(|of| definition[of].as_array()).flatten();
+    for alternative in alternatives {
+        collect(alternative, key, table, found);
+    }
+}
+
+/// The choice that these keys belong to, if they belong to one.
+fn chosen(keys: &Value) -> String {
+    let choice = keys.as_object().into_iter().flatten().find_map(|(key, value)| Some((key, value["const"].as_str()?)));
+    choice.map_or_else(String::new, |(key, value)| format!(" with {key} = \"{value}\""))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_found_in_its_table_and_in_each_choice_that_has_it() {
+        assert_eq!(tables_with("count"), ["[swarm]"]);
+        assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\""]);
+        assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
+        assert_eq!(tables_with("spacing_m").len(), 4);
+        assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
+    }
+}

@@ -1,0 +1,136 @@
+//! A complete flight as plain data.
+
+#[cfg(feature = "schema")]
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::time::TimeSpec;
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::law::{EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
+use crate::observation::Observation;
+use crate::swarm::{Rows, Swarm};
+use crate::target::{Arrival, Leg};
+
+/// Default mass of a vehicle \[kg\].
+pub const DEFAULT_MASS_KG: f64 = 1.0;
+/// Default radius of a vehicle's solid hull \[m\].
+pub const DEFAULT_HULL_RADIUS_M: f64 = 0.25;
+
+/// A complete flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Name: letters, digits, `-` and `_`; it names the run's folder.
+    pub name: String,
+    /// Positions \[m\] and velocities \[m/s\] at time 0.
+    pub start: Swarm,
+    /// Whether the swarm lives in the plane z = 0 or in space.
+    pub space: Space,
+    /// Mass of each vehicle \[kg\].
+    pub mass_kg: Vec<f64>,
+    /// Radius of each vehicle's solid hull \[m\].
+    pub hull_radius_m: Vec<f64>,
+    /// Velocity coefficient a22 of the plant \[1/s\], equation (1): negative is drag, positive feeds energy in.
+    pub a22_per_s: f64,
+    /// The formations to be reached, one after the other and at least one, up to a rigid motion for laws that control
+    /// distances only.
+    pub legs: Vec<Leg>,
+    /// Which vehicles sense each other.
+    pub graph: Graph,
+    /// The control law and its parameters.
+    pub law: LawSpec,
+    /// Safety distance delta \[m\] that the audit judges by, whatever the law.
+    pub delta_m: f64,
+    /// The body that carries out the commands.
+    pub plant: PlantSpec,
+    /// Duration and rates.
+    pub time: TimeSpec,
+    /// What counts as reached.
+    pub arrival: Arrival,
+}
+
+/// The space that a swarm lives in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Space {
+    /// The plane z = 0, kept exactly: translation along z is locked.
+    Plane,
+    /// All three axes.
+    Volume,
+}
+
+/// Which plant flies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlantSpec {
+    /// Rapier rigid bodies at the given floating-point precision.
+    Rapier(Precision),
+    /// The equation of motion solved in continuous time with the law inside, in double precision.
+    Ideal,
+}
+
+/// Floating-point precision of the physics engine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// 32 bits.
+    Single,
+    /// 64 bits.
+    Double,
+}
+
+impl Scenario {
+    /// A flight with every default of the scenario file: the edge-tension law on the complete graph, in the plane if
+    /// start and formation lie in it. Change the fields as needed, then [`Scenario::validate`].
+    #[must_use]
+    pub fn new(name: &str, start: Swarm, formation: Formation, delta_m: f64, duration_s: f64) -> Self {
+        let count = start.count();
+        let flat = |rows: &Rows| rows.column(2).iter().all(|&z| z == 0.0);
+        let is_flat = flat(&start.positions_m) && flat(&start.velocities_m_s) && formation.is_in_plane_z0();
+        Self {
+            name: name.to_owned(),
+            space: if is_flat { Space::Plane } else { Space::Volume },
+            mass_kg: vec![DEFAULT_MASS_KG; count],
+            hull_radius_m: vec![DEFAULT_HULL_RADIUS_M; count],
+            a22_per_s: 0.0,
+            graph: Graph::complete(count),
+            law: LawSpec::EdgeTension(EdgeTensionKeys::default()),
+            delta_m,
+            plant: PlantSpec::Rapier(Precision::Single),
+            time: TimeSpec::lasting(duration_s),
+            arrival: Arrival::default(),
+            start,
+            legs: vec![Leg::first(formation)],
+        }
+    }
+
+    /// Number of vehicles N.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.start.count()
+    }
+
+    /// The formation of the first leg.
+    ///
+    /// # Panics
+    /// Without a leg, which a validated scenario has.
+    #[must_use]
+    pub fn formation(&self) -> &Formation {
+        &self.legs[0].formation
+    }
+
+    /// The law that this scenario asks for, ready to fly.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when the law does not exist for these parameters, which a validated scenario rules out, or
+    /// its memory cannot be had.
+    pub fn law(&self) -> Result<Box<dyn Law>, ParameterError> {
+        let (links, formation) = (&self.graph, self.formation());
+        self.law.build(&Setting { links, formation, delta_m: self.delta_m, a22_per_s: self.a22_per_s })
+    }
+
+    /// What a law is told of a true state on the first leg, by sensors and radio without fault.
+    #[must_use]
+    pub fn observation<'a>(&'a self, swarm: &'a Swarm) -> Observation<'a> {
+        Observation::exact(swarm, &self.graph, self.formation())
+    }
+}

@@ -1,0 +1,173 @@
+//! A scenario's text with its overrides, and the way back from a value to its place.
+//!
+//! Spans live in one address space: the file's bytes first, then each override's. A value therefore knows where it was
+//! written, whichever text that was.
+
+use std::ops::Range;
+
+use serde::Deserialize as _;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::deserializer::{KeyError, Unknown, Value};
+use super::document::Document;
+use super::error::{Field, Place, ScenarioError};
+use super::overrides::{ARRIVAL, OLD_ARRIVAL, Override};
+#[cfg(feature = "schema")]
+use super::schema::tables_with;
+use super::suggest::suggest;
+
+/// Keys that give a missing key its value, in order: an error at one of these keys stands where its value comes from.
+const ORIGINS: [(&str, &[&str]); 5] = [
+    (
+        "start.positions_m",
+        &["start.spacing_m", "start.radius_m", "start.min_separation_m", "start.half_extent_m", "start.shape"],
+    ),
+    ("formation.points_m", &["formation.side_m", "formation.radius_m", "formation.spacing_m", "formation.shape"]),
+    ("graph.edges", &["graph.kind"]),
+    ("swarm.hull_radius_m", &["law.delta_m"]),
+    ("swarm.count", &["start.positions_m", "formation.points_m", "formation.shape"]),
+];
+
+/// Longest part of an unknown name that a message repeats \[characters\].
+const NAME_CHARS: usize = 40;
+
+/// A named text and the overrides on top of it.
+pub(super) struct Text<'a> {
+    pub(super) name: &'a str,
+    pub(super) toml: &'a str,
+    pub(super) overrides: &'a [Override],
+}
+
+impl<'a> Text<'a> {
+    /// Reads the keys of the scenario.
+    pub(super) fn decode(&self) -> Result<Document, ScenarioError> {
+        let root = self.tree()?;
+        if root.get_ref().is_empty() {
+            return Err(ScenarioError::new("the scenario is empty")
+                .with_help("start from a built-in scenario, such as `pentagon`")
+                .with_place(Place::new(self.name, self.toml, 0..0)));
+        }
+        Document::deserialize(Value::root(root)).map_err(|error| self.explain(error))
+    }
+
+    /// Gives an error about keys its place in the text: at the first key that an override touched, or else at the
+    /// first key.
+    pub(super) fn place(&self, error: ScenarioError) -> ScenarioError {
+        let (None, Ok(root)) = (error.place(), self.tree()) else { return error };
+        let spans = error.fields().iter().map(|&field| find(&root, field, self.toml.len() + 1));
+        let overridden = spans.clone().find(|span| span.start > self.toml.len());
+        match overridden.or_else(|| spans.clone().next()) {
+            Some(span) => {
+                let place = self.locate(span);
+                error.with_place(place)
+            }
+            None => error,
+        }
+    }
+
+    /// The text as a tree, overrides applied, `[judge]` under its new name.
+    fn tree(&self) -> Result<Spanned<DeTable<'a>>, ScenarioError> {
+        let mut root = DeTable::parse(self.toml).map_err(|error| {
+            ScenarioError::new(format!("this is not TOML: {}", error.message()))
+                .with_help("a scenario is `key = value` lines below `[table]` headers")
+                .with_place(self.locate(error.span().unwrap_or(0..0)))
+        })?;
+        if let Some((old, table)) = root.get_mut().remove_entry(OLD_ARRIVAL) {
+            if root.get_ref().contains_key(ARRIVAL) {
+                return Err(ScenarioError::new("both [arrival] and [judge] are given")
+                    .with_help("[judge] is the old name of [arrival]: keep one of them")
+                    .with_place(self.locate(old.span())));
+            }
+            root.get_mut().insert(Spanned::new(old.span(), ARRIVAL.into()), table);
+        }
+        let mut base = self.toml.len() + 1;
+        for set in self.overrides {
+            set.apply(root.get_mut(), base)?;
+            base += set.text().len() + 1;
+        }
+        Ok(root)
+    }
+
+    /// The place of a span of the common address space.
+    fn locate(&self, span: Range<usize>) -> Place {
+        let mut base = self.toml.len() + 1;
+        if span.start >= base {
+            for set in self.overrides {
+                let end = base + set.text().len();
+                if span.start <= end {
+                    return set.place(span.start - base..span.end.saturating_sub(base));
+                }
+                base = end + 1;
+            }
+        }
+        Place::new(self.name, self.toml, span)
+    }
+
+    /// An error about a key with its place and its remedy.
+    fn explain(&self, error: KeyError) -> ScenarioError {
+        let short = |name: &str| name.chars().take(NAME_CHARS).collect::<String>();
+        let (said, help) = match error.unknown {
+            Some(Unknown::Key(name, mut known)) => {
+                known.sort_unstable();
+                known.dedup();
+                let help = match tables_with(&name)[..] {
+                    [] => suggest(&name, &known),
+                    ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(&name, &known)),
+                };
+                (format!("unknown key `{}`", short(&name)), help)
+            }
+            Some(Unknown::Choice(name, known)) => {
+                (format!("unknown choice `{}`", short(&name)), suggest(&name, &known))
+            }
+            None => (
+                error.message,
+                "the built-in scenarios show every table; `tautline schema` describes every key".to_owned(),
+            ),
+        };
+        ScenarioError::new(said).with_help(help).with_place(self.locate(error.span.unwrap_or(0..0)))
+    }
+}
+
+/// Only the schema knows.
+#[cfg(not(feature = "schema"))]
+fn tables_with(_key: &str) -> Vec<String> {
+    Vec::new()
+}
+
+/// The span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its table
+/// if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
+fn find(root: &Spanned<DeTable<'_>>, field: Field, overridden: usize) -> Range<usize> {
+    let origins = ORIGINS.iter().find(|(key, _)| *key == field.key).map_or(&[][..], |(_, origins)| origins);
+    let found = std::iter::once(field.key).chain(origins.iter().copied()).find_map(|key| lookup(root, key));
+    let Some(value) = found else {
+        let table = field.key.split('.').next().unwrap_or_default();
+        return root.get_ref().get_key_value(table).map_or(0..0, |(key, _)| key.span());
+    };
+    let value = match (value.get_ref(), field.entry) {
+        (DeValue::Array(list), Some(entry)) => list.get(entry).unwrap_or(value),
+        _ => value,
+    };
+    first_span_from(value, overridden).unwrap_or_else(|| value.span())
+}
+
+/// The first span within a list, or of the value, that starts at `least` or later.
+fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<usize>> {
+    if value.span().start >= least {
+        return Some(value.span());
+    }
+    match value.get_ref() {
+        DeValue::Array(list) => list.iter().find_map(|entry| first_span_from(entry, least)),
+        _ => None,
+    }
+}
+
+/// The value at a dotted path.
+fn lookup<'t, 'a>(root: &'t Spanned<DeTable<'a>>, path: &str) -> Option<&'t Spanned<DeValue<'a>>> {
+    let mut parts = path.split('.');
+    let first = root.get_ref().get(parts.next()?)?;
+    parts.try_fold(first, |value, key| match value.get_ref() {
+        DeValue::Table(table) => table.get(key),
+        _ => None,
+    })
+}
