@@ -6,15 +6,25 @@
 //! null.
 
 mod artefact;
+mod findings;
+mod flight;
 mod html;
 pub mod page;
 pub mod recorded;
 mod verdict;
 mod words;
 
+pub use crate::audit::{Status, Violation};
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
+pub use findings::{EndedEarly, Findings, Performance, Run};
+pub use flight::{
+    Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,
+    Separation, Tool, Velocity,
+};
 pub use html::RunPage;
+pub use verdict::Verdict;
 
+<<<<<<< HEAD
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -418,6 +428,9 @@ impl From<&audit::Violation> for Violation {
 fn finite(number: f64) -> Option<f64> {
     Some(number).filter(|number| number.is_finite())
 }
+=======
+use findings::finite;
+>>>>>>> 1b12f8e (Figures write their SVG themselves; a page's size is bounded for any swarm and any time)
 
 #[cfg(test)]
 mod tests;

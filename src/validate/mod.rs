@@ -21,7 +21,6 @@ mod page;
 mod rates;
 mod starts;
 mod tension;
-mod words;
 
 pub use claim::{Claim, Kind, Values};
 pub use ladder::Rung;
@@ -31,8 +30,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
+<<<<<<< HEAD
 use crate::continuous::IdealError;
 use crate::figures::{Figure, FigureError};
+=======
+use crate::figures::Figure;
+>>>>>>> 1b12f8e (Figures write their SVG themselves; a page's size is bounded for any swarm and any time)
 use crate::law::{LawError, ParameterError, TensionError};
 use crate::plant::PlantError;
 use crate::scenario::ScenarioError;
@@ -109,9 +112,6 @@ pub(crate) enum ValidateError {
     /// A plant could not carry out a step.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// A figure cannot be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
     /// A flight failed.
     #[error(transparent)]
     Sim(#[from] SimError),
