@@ -58,10 +58,7 @@ pub mod scenario;
 pub mod sim;
 pub mod space;
 pub mod swarm;
-<<<<<<< HEAD
 pub mod target;
-=======
 mod text;
->>>>>>> 1b12f8e (Figures write their SVG themselves; a page's size is bounded for any swarm and any time)
 pub mod track;
 pub mod validate;

@@ -13,3 +13,203 @@ use super::pictures::Pictures;
 use super::snapshots::Watched;
 use super::{Exit, Failure};
 use crate::figures::RunHistory;
+use crate::preflight::Preflight;
+use crate::record::Sink;
+use crate::record::mcap::{Header, McapRecorder};
+use crate::report::{Report, page};
+use crate::run::run_while;
+use crate::scenario::{Override, Scenario, Source};
+
+/// Exit code of a second Ctrl-C, as shells give it.
+const INTERRUPTED_TWICE: i32 = 130;
+/// The recording's name in the folder of a run.
+const RECORDING: &str = "run.mcap";
+/// Steps between two looks at the progress bar.
+const PROGRESS_EVERY: u64 = 64;
+/// Threads that a flight has work for: one for the law and one for the audit.
+const THREADS_OF_USE: usize = 2;
+
+/// Arguments of `tautline run`.
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
+pub(super) struct RunArguments {
+    /// A scenario file, or the name of a built-in scenario.
+    #[arg(default_value = "pentagon")]
+    scenario: String,
+    /// Set any key of the scenario for this run; may be given several times.
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    overrides: Vec<String>,
+    /// What moves the vehicles: rigid bodies, or the equation of motion solved in continuous time. Short for
+    /// `--set plant.kind=...`.
+    #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
+    plant: Option<String>,
+    /// Folder for the recording and the report; by default out/NAME, where NAME is the scenario's.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite a folder that holds a finished run.
+    #[arg(long)]
+    force: bool,
+    /// Draw no figures.
+    #[arg(long)]
+    no_figures: bool,
+    /// Take no pictures.
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    no_snapshots: bool,
+    /// What draws pictures: best, hardware, software, or a part of an adapter's name.
+    #[cfg(feature = "viewer")]
+    #[arg(long, value_name = "NAME", default_value = "best")]
+    adapter: String,
+    /// Print the report as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+    /// Print no summary and no progress.
+    #[arg(long)]
+    quiet: bool,
+    /// Threads to use, of which two are of use, by default one a core; the recording has the same bits for any number.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl Default for RunArguments {
+    fn default() -> Self {
+        Self {
+            scenario: "pentagon".to_owned(),
+            overrides: Vec::new(),
+            plant: None,
+            out: None,
+            force: false,
+            no_figures: false,
+            #[cfg(feature = "viewer")]
+            no_snapshots: false,
+            #[cfg(feature = "viewer")]
+            adapter: "best".to_owned(),
+            json: false,
+            quiet: false,
+            threads: None,
+        }
+    }
+}
+
+impl RunArguments {
+    /// The command that flies the same again, for a shell.
+    fn command(&self) -> String {
+        let mut words = vec!["tautline", "run", &self.scenario];
+        words.extend(self.overrides.iter().flat_map(|text| ["--set", text]));
+        words.extend(self.plant.iter().flat_map(|plant| ["--plant", plant]));
+        // Only a zero byte cannot be quoted, and no argument has one.
+        shlex::try_join(words.iter().copied()).unwrap_or_else(|_| words.join(" "))
+    }
+}
+
+pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
+    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let plant = arguments.plant.iter().map(|kind| format!("plant.kind={kind}"));
+    let overrides = arguments.overrides.iter().cloned().chain(plant);
+    let overrides = overrides.map(|text| Override::parse(&text)).collect::<Result<Vec<_>, _>>()?;
+    let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))
+        .build()
+        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    let preflight = Preflight::of(&scenario)?;
+    for warning in &preflight.warnings {
+        console.warn(&warning.to_string());
+    }
+    let warnings: Vec<_> = preflight
+        .warnings
+        .iter()
+        .map(|warning| page::Warning { code: warning.code.name().to_owned(), message: warning.message.clone() })
+        .collect();
+    let interrupted = interruption()?;
+    // Nothing is written before everything that can be wrong with the input has been looked at.
+    let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
+    let folder = OutFolder::at(path, "run", "report.json");
+    let _lock = folder.open(arguments.force)?;
+    let mut history = RunHistory::new();
+    let mut watched = Watched::new(arguments, &scenario);
+    let mut watchers = (&mut history, &mut watched);
+    let report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
+    let snapshots = watched.snapshots(folder.path(), console)?;
+    let pictures = Pictures {
+        scenario: &scenario,
+        history: (!arguments.no_figures).then_some(&history),
+        warnings: &warnings,
+        command: &arguments.command(),
+        snapshots: &snapshots,
+    };
+    let page = pictures.write(folder.path(), &report)?;
+    report.write(&folder.report())?;
+
+    console.say(&format!("{}\n{}", report.headline(), report.text()));
+    for reason in &report.verdict.reasons {
+        console.say(reason);
+    }
+    console.say(&format!(
+        "wrote {}, {} and {}",
+        folder.file(RECORDING).display(),
+        folder.report().display(),
+        page.display()
+    ));
+    if arguments.json {
+        let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
+        console::data(&json)?;
+    }
+    Ok(if report.verdict.pass { Exit::Good } else { Exit::Bad })
+}
+
+/// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
+fn fly(
+    scenario: &Scenario,
+    preflight: &Preflight,
+    folder: &OutFolder,
+    console: Console,
+    interrupted: &AtomicBool,
+    watchers: &mut dyn Sink,
+) -> Result<Report, Failure> {
+    let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+    let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
+    #[cfg(feature = "viewer")]
+    {
+        recording = recording.with(Box::new(crate::render::FoxgloveScene::of(scenario)))?;
+    }
+    let progress = console.progress(scenario.time.steps(), scenario.name.clone());
+    let mut carry_on = |step: u64| {
+        if step.is_multiple_of(PROGRESS_EVERY) {
+            progress.set_position(step);
+        }
+        if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let flown = run_while(scenario, preflight, &mut (&mut recording, watchers), &mut carry_on);
+    progress.finish_and_clear();
+    let closed = recording.finish();
+    let report = flown?;
+    closed?;
+    Ok(report)
+}
+
+impl Watched {
+    /// Watches what these arguments want pictures of.
+    fn new(arguments: &RunArguments, scenario: &Scenario) -> Self {
+        #[cfg(feature = "viewer")]
+        if !arguments.no_snapshots {
+            return Self::of(scenario, &arguments.adapter);
+        }
+        let _ = (arguments, scenario);
+        Self::nothing()
+    }
+}
+
+/// Set by Ctrl-C (and by a request to terminate). The second one does not wait for what is under way to end.
+pub(super) fn interruption() -> Result<Arc<AtomicBool>, Failure> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    let again = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(INTERRUPTED_TWICE);
+        }
+    };
+    ctrlc::set_handler(again).map_err(|error| Failure::machine(format!("cannot listen to Ctrl-C: {error}")))?;
+    Ok(interrupted)
+}

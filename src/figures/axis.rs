@@ -129,7 +129,8 @@ impl Axis {
     }
 }
 
-fn extent(numbers: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+/// The smallest and the largest of the numbers that have a place on an axis.
+pub(super) fn extent(numbers: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     numbers.into_iter().filter(|x| x.abs() <= LARGEST).fold(None, |extent, x| {
         let (low, high) = extent.unwrap_or((x, x));
         Some((low.min(x), high.max(x)))

@@ -1,6 +1,6 @@
 //! A run thinned to what a figure can show.
 
-use super::axis::Axis;
+use super::axis::{Axis, extent};
 use crate::record::mcap::Entry;
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::swarm::{ClosestApproach, Rows, row, separation};
@@ -24,11 +24,7 @@ pub(super) const FEW_VEHICLES: usize = 12;
 /// disagreement. So what a figure must show, the extreme, is never thinned out. Memory is at most some 32 MiB for up
 /// to 16 000 vehicles, whatever the length of the run.
 ///
-<<<<<<< HEAD:src/figures/course.rs
-/// A course is a [`Sink`]: it can watch a run as it is flown, or [`Course::read`] a recording.
-=======
-/// It is a [`Recorder`]: it can watch a run as it is flown, or [`RunHistory::read`] a recording.
->>>>>>> 1b12f8e (Figures write their SVG themselves; a page's size is bounded for any swarm and any time):src/figures/history.rs
+/// It is a [`Sink`]: it can watch a run as it is flown, or [`RunHistory::read`] a recording.
 #[derive(Clone, Debug, Default)]
 pub struct RunHistory {
     vehicles: usize,
@@ -115,15 +111,13 @@ impl RunHistory {
 
     /// Merges every two spans into one.
     fn halve(&mut self) {
-        let mut merged = Vec::with_capacity(self.most_spans);
         let mut spans = std::mem::take(&mut self.spans).into_iter();
         while let Some(mut span) = spans.next() {
             if let Some(next) = spans.next() {
                 span.absorb(&next);
             }
-            merged.push(span);
+            self.spans.push(span);
         }
-        self.spans = merged;
         self.samples_per_span *= 2;
     }
 
@@ -185,24 +179,13 @@ impl RunHistory {
         z <= FLATNESS * x.max(y)
     }
 
-    /// Smallest and largest coordinate along an axis \[m\]; none where nothing is finite.
+    /// Smallest and largest coordinate along an axis \[m\]; none where nothing has a place on one.
     pub(super) fn extent(&self, axis: usize) -> Option<(f64, f64)> {
-        let mut extent: Option<(f64, f64)> = None;
-        for span in self.spans() {
-            for x in span.positions_m.column(axis).iter().copied().filter(|x| x.is_finite()) {
-                let (low, high) = extent.unwrap_or((x, x));
-                extent = Some((low.min(x), high.max(x)));
-            }
-        }
-        extent
+        extent(self.spans().flat_map(|span| span.positions_m.column(axis).iter().copied()))
     }
 }
 
-<<<<<<< HEAD:src/figures/course.rs
-impl Sink for Course {
-=======
-impl Recorder for RunHistory {
->>>>>>> 1b12f8e (Figures write their SVG themselves; a page's size is bounded for any swarm and any time):src/figures/history.rs
+impl Sink for RunHistory {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.observe(sample);
         Ok(())
@@ -260,13 +243,8 @@ pub(super) fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> + Clon
 
 /// The closer approach; the first of equals, and never one that is not a number.
 fn closer(a: Option<ClosestApproach>, b: Option<ClosestApproach>) -> Option<ClosestApproach> {
-    let mut closest: Option<ClosestApproach> = None;
-    for candidate in [a, b].into_iter().flatten().filter(|candidate| candidate.separation_m.is_finite()) {
-        if closest.is_none_or(|closest| candidate.separation_m < closest.separation_m) {
-            closest = Some(candidate);
-        }
-    }
-    closest
+    let known = [a, b].into_iter().flatten().filter(|closest| closest.separation_m.is_finite());
+    known.reduce(|first, second| if second.separation_m < first.separation_m { second } else { first })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::audit::AuditOutcome;
 use crate::law::Certificate;
 use crate::metrics::Summary;
-use crate::scenario::JudgeSpec;
+use crate::target::Arrival;
 
 /// Everything that a report is made of.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub struct Findings<'a> {
     /// Safety distance delta that was judged by \[m\].
     pub delta_m: f64,
     /// What counted as reached.
-    pub judge: JudgeSpec,
+    pub judge: Arrival,
     /// Dimension of the flat that the start never leaves, where the formation does not fit into it: 0 point, 1 line,
     /// 2 plane.
     pub trap_dimension: Option<usize>,

@@ -6,9 +6,11 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::findings::finite;
+use super::flight::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION};
 use super::page::{Badge, Block, Column, Page, Section, Table, Tone};
-use super::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Status, Violation, finite};
 use crate::audit::recorded::{self, Approach, Outcome, Question, Who};
+use crate::audit::{Status, Violation};
 use crate::figures::Figure;
 use crate::swarm::Pair;
 use crate::text::{at_least, counted, fixed, metres, metres_below, seconds};

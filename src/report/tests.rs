@@ -4,8 +4,8 @@ use super::*;
 use crate::audit::{self, AuditOutcome, Auditor};
 use crate::law::{Certificate, Void};
 use crate::metrics::Summary;
-use crate::scenario::JudgeSpec;
 use crate::swarm::{Pair, Rows};
+use crate::target::Arrival;
 
 const DELTA_M: f64 = 2.0;
 const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };

@@ -38,13 +38,8 @@ pub(super) struct Flights {
 
 fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, ValidateError> {
     let scenario = builtin(name)?;
-<<<<<<< HEAD
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
-    let mut course = Course::new();
-=======
-    let mut metrics = Metrics::new(&scenario.formation, &scenario.graph, scenario.judge);
     let mut history = RunHistory::new();
->>>>>>> 1b12f8e (Figures write their SVG themselves; a page's size is bounded for any swarm and any time)
     let flight = engine(&scenario, |sample| {
         metrics.observe(sample);
         history.observe(sample);

@@ -30,12 +30,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
-<<<<<<< HEAD
 use crate::continuous::IdealError;
-use crate::figures::{Figure, FigureError};
-=======
 use crate::figures::Figure;
->>>>>>> 1b12f8e (Figures write their SVG themselves; a page's size is bounded for any swarm and any time)
 use crate::law::{LawError, ParameterError, TensionError};
 use crate::plant::PlantError;
 use crate::scenario::ScenarioError;

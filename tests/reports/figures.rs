@@ -289,6 +289,7 @@ fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
             control: &control,
             separation: Some(ClosestApproach { pair: Pair::new(4321, 4999), separation_m: 1.0, time_s: 7.0 }),
             energy: Some(f64::from(k % 7)),
+            channels: &[],
         });
     }
     let (formation, graph) = (Formation::line(count, 4.0), Graph::path(count));
