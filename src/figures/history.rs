@@ -181,7 +181,7 @@ impl RunHistory {
 
     /// Smallest and largest coordinate along an axis \[m\]; none where nothing has a place on one.
     pub(super) fn extent(&self, axis: usize) -> Option<(f64, f64)> {
-        extent(self.spans().flat_map(|span| span.positions_m.column(axis).iter().copied()))
+        extent(self.spans().flat_map(|span| (0..self.vehicles).map(move |i| span.positions_m[(i, axis)])))
     }
 }
 
