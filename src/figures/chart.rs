@@ -95,7 +95,7 @@ impl Chart {
     }
 
     /// Draws the chart under a title.
-    pub(super) fn figure(mut self, name: &str, title: &str, description: String) -> Figure {
+    pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Figure {
         let height = if self.equal { self.make_axes_equal() } else { HEIGHT };
         let bottom = TITLE + height;
         let legend = self.legend();

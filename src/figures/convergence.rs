@@ -42,5 +42,5 @@ pub fn convergence(steps: &[Step], title: &str) -> Figure {
         best(|step| step.double_m),
         best(|step| step.single_m)
     );
-    chart.figure("convergence", title, description)
+    chart.figure("convergence", title, &description)
 }

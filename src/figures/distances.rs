@@ -49,7 +49,7 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
         let at = (closest.time_s, closest.separation_m);
         chart.marks.push(Mark::ring(at, INK, Some(format!("closest {words}"))));
     }
-    chart.figure("distances", title, description + &curves.note)
+    chart.figure("distances", title, &(description + &curves.note))
 }
 
 struct Curves {

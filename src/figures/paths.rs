@@ -38,7 +38,7 @@ pub fn paths(history: &RunHistory, title: &str) -> Figure {
         chart.marks.extend(mark(points.last(), Marker::Ring, look.end, "end"));
         chart.lines.push(Line { points, stroke: look.path, label: None });
     }
-    chart.figure("paths", title, description(history, "from above"))
+    chart.figure("paths", title, &description(history, "from above"))
 }
 
 /// The vehicles whose paths are drawn.
@@ -117,7 +117,7 @@ pub fn paths_in_space(history: &RunHistory, title: &str) -> Figure {
             }
         }
     }
-    canvas.figure("paths-3d", description(history, "in space"))
+    canvas.figure("paths-3d", &description(history, "in space"))
 }
 
 /// A box of axes, seen from above its edge where x is largest and y smallest.

@@ -75,7 +75,7 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
         let drawn = encounter.nearest().map_or(f64::NAN, |k| encounter.distances[k].1);
         chart.marks.push(Mark::ring((encounter.closest_s, drawn), INK, Some(format!("closest {closest}"))));
     }
-    chart.figure(name, title, description)
+    chart.figure(name, title, &description)
 }
 
 /// The paths of two vehicles from above \[m\], and where both are when they are closest.
@@ -97,7 +97,7 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     }
     let [first, second] = &encounter.names;
     let description = format!("Paths of {first} and {second} from above; rings where they are closest, {closest}.");
-    chart.figure("closest-approach", title, description)
+    chart.figure("closest-approach", title, &description)
 }
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ pub fn control(history: &RunHistory, title: &str) -> Figure {
         chart.bands.push(Band { points, colour: PALETTE[0], opacity: 0.2, label: Some("5 to 95 %".to_owned()) });
     }
     let description = format!("Control effort of {count} vehicles over time; at most {peak:.3} m/s².");
-    chart.figure("control", title, description)
+    chart.figure("control", title, &description)
 }
 
 /// The law's energy \[m^2/s^2\] over time \[s\] with E(0), which on a complete graph it never exceeds.
@@ -63,7 +63,7 @@ pub fn energy(history: &RunHistory, title: &str) -> Figure {
             format!(" It never exceeds E(0), {initial:.4} m²/s².")
         };
     }
-    chart.figure("energy", title, description)
+    chart.figure("energy", title, &description)
 }
 
 /// Largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\].
@@ -111,5 +111,5 @@ fn decay(
         chart.level(allowed, Stroke::dashed(INK, 1.3), format!("counts as reached: {allowed} {unit}"));
     }
     let description = format!("The {what} over time on a logarithmic axis; {at_end:.2e} {unit} at the end.");
-    chart.figure(name, title, description)
+    chart.figure(name, title, &description)
 }

@@ -118,8 +118,7 @@ pub(super) struct Canvas {
 impl Canvas {
     /// Paper of a size \[px\] under a title, centred about `middle`.
     pub(super) fn new(size: (f64, f64), title: &str, middle: f64) -> Self {
-        // XML does not allow control characters.
-        let title: String = title.chars().filter(|c| !c.is_control()).collect();
+        let title = printable(title);
         let shapes = html! {
             rect width="100%" height="100%" fill=(PAPER.light) {}
             text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.light) { (title) }
@@ -176,7 +175,8 @@ impl Canvas {
     }
 
     pub(super) fn text(&mut self, (x, y): Point, Align(anchor, dy): Align, words: &str) {
-        let shape = html! { text x=(px(x)) y=(px(y)) text-anchor=(anchor) dy=(dy) fill=(INK.light) { (words) } };
+        let shape =
+            html! { text x=(px(x)) y=(px(y)) text-anchor=(anchor) dy=(dy) fill=(INK.light) { (printable(words)) } };
         self.shapes += &shape.into_string();
     }
 
@@ -188,8 +188,9 @@ impl Canvas {
     }
 
     /// The figure, with a description for people who cannot see it.
-    pub(super) fn figure(self, name: &str, description: String) -> Figure {
+    pub(super) fn figure(self, name: &str, description: &str) -> Figure {
         let Self { size: (width, height), title, shapes } = self;
+        let description = printable(description);
         let label = format!("{title}. {description}");
         let svg = html! {
             svg xmlns="http://www.w3.org/2000/svg" class="tautline-figure" width=(width) height=(height)
@@ -203,6 +204,11 @@ impl Canvas {
         };
         Figure { name: name.to_owned(), title, description, svg: svg.into_string() }
     }
+}
+
+/// The same text without control characters, which XML does not allow.
+fn printable(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).collect()
 }
 
 /// A length to a tenth of a pixel.

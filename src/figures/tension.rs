@@ -33,5 +33,5 @@ pub fn tension_curve(tension: &EdgeTension, title: &str) -> Figure {
     let minimum = format!("minimum at d = {rest_m:.4} m, Vmin = {:.4} m²/s²", tension.minimum());
     let description = format!("Edge tension over distance: it grows without bound towards {delta_m} m; {minimum}.");
     chart.marks.push(Mark::ring((rest_m, 0.0), PALETTE[1], Some(minimum)));
-    chart.figure("tension", title, description)
+    chart.figure("tension", title, &description)
 }
