@@ -3,7 +3,7 @@
 use super::axis::{Axis, Scale};
 use super::chart::{Band, Chart, Line, Mark};
 use super::figure::Figure;
-use super::history::{FEW_VEHICLES, RunHistory, pairs};
+use super::history::{FEW_VEHICLES, RunHistory, evenly, pairs};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
 use crate::swarm::{ClosestApproach, Pair, Rows, separation};
 use crate::text::at_least;
@@ -124,15 +124,9 @@ fn ranked_pairs(count: usize) -> (Vec<(usize, usize)>, usize) {
     if all <= RANKED_PAIRS {
         return (pairs(count).collect(), all);
     }
-    // Every vehicle as often as every other, each with partners spread over all numbers: multiples of the golden ratio
-    // fall evenly into the unit interval.
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let partner = |k: usize| {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number of vehicles")]
-        let ahead = 1 + ((golden * k as f64).fract() * (count - 1) as f64) as usize;
-        (k % count + ahead.min(count - 1)) % count
-    };
-    ((0..RANKED_PAIRS).map(|k| (k % count, partner(k))).collect(), all)
+    // Every vehicle about as often as every other, with partners spread over all others.
+    let pair = |k: usize| (k % count, (k % count + 1 + evenly(k, count - 1)) % count);
+    ((0..RANKED_PAIRS).map(pair).collect(), all)
 }
 
 /// Quantiles of 5, 25, 50, 75 and 95 % of the distances of pairs \[m\]; NaN where no distance is finite.

@@ -241,6 +241,15 @@ pub(super) fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> + Clon
     (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }
 
+/// The `k`-th of numbers below `count` that fill them evenly and follow no order of theirs: multiples of the golden ratio
+/// spread over the unit interval.
+pub(super) fn evenly(k: usize, count: usize) -> usize {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+    let number = ((golden * k as f64).fract() * count as f64) as usize;
+    number.min(count - 1)
+}
+
 /// The closer approach; the first of equals, and never one that is not a number.
 fn closer(a: Option<ClosestApproach>, b: Option<ClosestApproach>) -> Option<ClosestApproach> {
     let known = [a, b].into_iter().flatten().filter(|closest| closest.separation_m.is_finite());

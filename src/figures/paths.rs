@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::axis::Axis;
 use super::chart::{Chart, Line, Mark, TITLE, WIDTH};
 use super::figure::Figure;
-use super::history::{FEW_VEHICLES, RunHistory};
+use super::history::{FEW_VEHICLES, RunHistory, evenly};
 use super::svg::{Align, Canvas, Colour, GRID, Marker, PALETTE, Point, SOFT_INK, Stroke};
 use super::thin::thinned;
 use crate::swarm::row;
@@ -16,8 +16,8 @@ const MARGIN: f64 = 0.06;
 const MOST_PATHS: usize = 300;
 
 /// Where the vehicles went, seen from above: x and y \[m\], a unit as long on both axes, a cross at each start and a
-/// ring at each end. Up to 12 vehicles have their own colour and are numbered; of more than 300, every so many-th is
-/// drawn, and the two that come closest.
+/// ring at each end. Up to 12 vehicles have their own colour and are numbered; of more than 300, as many are drawn, chosen
+/// evenly, and the two that come closest.
 #[must_use]
 pub fn paths(history: &RunHistory, title: &str) -> Figure {
     let axis = |axis: usize, label: &str| {
@@ -48,8 +48,8 @@ fn drawn(history: &RunHistory) -> Vec<usize> {
         return (0..count).collect();
     }
     let closest = history.closest().map(|closest| [closest.pair.first(), closest.pair.second()]);
-    let evenly = (0..MOST_PATHS).map(|k| k * count / MOST_PATHS);
-    let mut drawn: Vec<_> = evenly.chain(closest.into_iter().flatten().filter(|&i| i < count)).collect();
+    let spread = (0..MOST_PATHS).map(|k| evenly(k, count));
+    let mut drawn: Vec<_> = spread.chain(closest.into_iter().flatten().filter(|&i| i < count)).collect();
     drawn.sort_unstable();
     drawn.dedup();
     drawn
@@ -80,7 +80,7 @@ impl Look {
 fn description(history: &RunHistory, from: &str) -> String {
     let (count, end_s) = (history.vehicles(), history.end_s());
     let of_all = match drawn(history).len() {
-        drawn if drawn < count => format!("{drawn} of {count} vehicles, spread over their numbers,"),
+        drawn if drawn < count => format!("{drawn} of {count} vehicles, chosen evenly,"),
         _ => format!("{count} vehicles"),
     };
     format!("Paths of {of_all} {from} over {end_s:.2} s; a cross marks each start and a ring each end.")
@@ -171,12 +171,12 @@ impl View {
         let on_x = |tick| [at(tick, y.from, z.from), at(tick, y.to, z.from), at(tick, y.to, z.to)];
         let on_y = |tick| [at(x.to, tick, z.from), at(x.from, tick, z.from), at(x.from, tick, z.to)];
         let on_z = |tick| [at(x.from, y.from, tick), at(x.from, y.to, tick), at(x.to, y.to, tick)];
-        numbered(x, &on_x, (-5.0, 7.0), Align::CENTRE_ABOVE);
-        numbered(y, &on_y, (7.0, 8.0), Align::LEFT);
+        numbered(x, &on_x, (-8.0, 7.0), Align::CENTRE_ABOVE);
+        numbered(y, &on_y, (11.0, 8.0), Align::LEFT);
         numbered(z, &on_z, (-7.0, 0.0), Align::RIGHT);
         for (axis, [beside, ..], (right, down), align) in [
             (x, on_x(x.middle()), (-8.0, 28.0), Align::RIGHT_ABOVE),
-            (y, on_y(y.middle()), (34.0, 26.0), Align::LEFT),
+            (y, on_y(y.middle()), (38.0, 26.0), Align::LEFT),
             (z, on_z(z.to), (0.0, -12.0), Align::CENTRE_BELOW),
         ] {
             canvas.text((beside.0 + right, beside.1 + down), align, &axis.label);
