@@ -46,7 +46,7 @@ impl Pictures<'_> {
         let criteria = Criteria {
             delta_m: self.scenario.delta_m,
             certified_m: report.separation.certified_m,
-            shape: Some((&self.scenario.formation(), &self.scenario.graph)),
+            shape: Some((self.scenario.formation(), &self.scenario.graph)),
             edge_error_m: Some(self.scenario.arrival.edge_error_m),
             disagreement_m_s: Some(self.scenario.arrival.disagreement_m_s),
         };

@@ -160,7 +160,9 @@ impl Chart {
         let corner = on_paper((*left, *low));
         let (top, end) = (on_paper((*left, *high)), on_paper((*right, *low)));
         canvas.line(&[top, corner, end], frame);
-        ticks.iter().for_each(|tick| canvas.line(tick, frame));
+        for tick in ticks {
+            canvas.line(&tick, frame);
+        }
         canvas.text((f64::midpoint(corner.0, end.0), corner.1 + BELOW - 6.0), Align::CENTRE_BELOW, &self.x.label);
         canvas.text_upwards((LABEL, f64::midpoint(corner.1, top.1)), &self.y.label);
     }

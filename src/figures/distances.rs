@@ -45,7 +45,7 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
     if let Some(closest) = closest {
         let metres = at_least(closest.separation_m, 3);
         let words = format!("{metres} m, vehicles {} at {:.2} s", closest.pair, closest.time_s);
-        description += &format!(" Closest: {words}.");
+        description.extend([" Closest: ", &words, "."]);
         let at = (closest.time_s, closest.separation_m);
         chart.marks.push(Mark::ring(at, INK, Some(format!("closest {words}"))));
     }

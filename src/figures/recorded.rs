@@ -71,7 +71,7 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     if let Some(encounter) = encounters.first() {
         let [first, second] = &encounter.names;
         let closest = encounter.closest();
-        description += &format!(" Closest: {first} and {second}, {closest}.");
+        description.extend([" Closest: ", first, " and ", second, ", ", &closest, "."]);
         let drawn = encounter.nearest().map_or(f64::NAN, |k| encounter.distances[k].1);
         chart.marks.push(Mark::ring((encounter.closest_s, drawn), INK, Some(format!("closest {closest}"))));
     }

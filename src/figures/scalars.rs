@@ -53,17 +53,17 @@ pub fn energy(history: &RunHistory, title: &str) -> Figure {
     let largest = points.iter().map(|&(_, y)| y).fold(f64::NAN, f64::max);
     let mut chart = Chart::new(history.time_axis(), y);
     chart.line(points, Stroke::solid(PALETTE[0], 1.8), "E(t)");
-    let mut description = "The law's energy over time.".to_owned();
+    let mut comparison = String::new();
     if let Some(initial) = initial {
         chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
         let excess = largest / initial - 1.0;
-        description += &if excess > 0.0 {
+        comparison = if excess > 0.0 {
             format!(" It exceeds E(0), {initial:.4} m²/s², by a share of {excess:.1e}.")
         } else {
             format!(" It never exceeds E(0), {initial:.4} m²/s².")
         };
     }
-    chart.figure("energy", title, &description)
+    chart.figure("energy", title, &format!("The law's energy over time.{comparison}"))
 }
 
 /// Largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\].

@@ -129,9 +129,9 @@ impl Canvas {
     /// A line through points; a dot where it is only one.
     pub(super) fn line(&mut self, points: &[Point], stroke: Stroke) {
         let Stroke { colour, width, dashes, .. } = stroke;
-        let shape = match points {
-            &[] => return,
-            &[(x, y)] => html! {
+        let shape = match *points {
+            [] => return,
+            [(x, y)] => html! {
                 circle cx=(px(x)) cy=(px(y)) r=(width) fill=(colour.light) opacity=[stroke.opacity()] {}
             },
             _ => html! {

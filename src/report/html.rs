@@ -254,11 +254,12 @@ impl Performance {
 
 /// The resolved scenario, or so many of its lines as a page has room for.
 fn folded_scenario(toml: &str, sha256: &str) -> Block {
-    let mut summary = format!("The resolved scenario, SHA-256 {sha256}");
     let end = toml.floor_char_boundary(LONGEST_SCENARIO);
-    if end < toml.len() {
-        summary += &format!("; its first {LONGEST_SCENARIO} of {} bytes, run.mcap holds all", toml.len());
-    }
+    let part = match toml.len() {
+        all if end < all => format!("; its first {end} of {all} bytes, run.mcap holds all"),
+        _ => String::new(),
+    };
+    let summary = format!("The resolved scenario, SHA-256 {sha256}{part}");
     Block::Folded { summary, text: toml[..end].to_owned() }
 }
 
