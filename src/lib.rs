@@ -60,5 +60,6 @@ pub mod sim;
 pub mod space;
 pub mod swarm;
 pub mod target;
+mod text;
 pub mod track;
 pub mod validate;

@@ -6,6 +6,7 @@
 use std::fmt;
 
 use nalgebra::{MatrixXx3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// An N x 3 table of vectors, a row per vehicle \[x, y, z\].
 pub type Rows = MatrixXx3<f64>;
@@ -90,8 +91,9 @@ pub fn first_row_not_finite(rows: &Rows) -> Option<usize> {
     (0..rows.nrows()).find(|&i| rows.row(i).iter().any(|x| !x.is_finite()))
 }
 
-/// Two different vehicles, the lower index first. Shown from 1: `2-3`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+/// Two different vehicles, the lower index first. Shown from 1: `2-3`, and in JSON `[2, 3]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(into = "[usize; 2]", try_from = "[usize; 2]")]
 pub struct Pair {
     first: usize,
     second: usize,
@@ -127,6 +129,24 @@ impl Pair {
     }
 }
 
+impl From<Pair> for [usize; 2] {
+    fn from(pair: Pair) -> Self {
+        pair.numbers()
+    }
+}
+
+/// From numbers as people read them, from 1.
+impl TryFrom<[usize; 2]> for Pair {
+    type Error = &'static str;
+
+    fn try_from([first, second]: [usize; 2]) -> Result<Self, Self::Error> {
+        if first == second || first == 0 || second == 0 {
+            return Err("a pair needs two different vehicles, counted from 1");
+        }
+        Ok(Self::new(first - 1, second - 1))
+    }
+}
+
 impl fmt::Display for Pair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}-{}", self.first + 1, self.second + 1)
@@ -144,39 +164,9 @@ pub struct ClosestApproach {
     pub time_s: f64,
 }
 
-/// A length with so many decimals, rounded down: what is said to be "never closer than" this never is. In powers of ten
-/// where digits would fill a line.
-#[must_use]
-pub(crate) fn at_least(length_m: f64, decimals: u8) -> String {
-    const LONG_M: f64 = 1e15;
-    if !length_m.is_finite() || length_m.abs() >= LONG_M {
-        return format!("{length_m:e}");
-    }
-    let places = usize::from(decimals);
-    let shown = format!("{length_m:.places$}");
-    match shown.parse::<f64>() {
-        Ok(rounded) if rounded > length_m => format!("{:.places$}", rounded - 0.1_f64.powi(i32::from(decimals))),
-        _ => shown,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_length_is_never_shown_longer_than_it_is_and_less_than_a_digit_shorter() {
-        let lengths_m =
-            [1.999_999_9, 2.46, 1.001, 0.305_304_9, 0.1 + 0.2, 0.2 - 4.0 * f64::EPSILON, 0.0, -0.5, 123_456.789_9];
-        for (decimals, digit) in [(3, 1e-3), (6, 1e-6)] {
-            for length_m in lengths_m {
-                let shown: f64 = at_least(length_m, decimals).parse().expect("a number");
-                assert!(shown <= length_m && length_m - shown < digit * (1.0 + 1e-9), "{length_m:?}: {shown}");
-            }
-        }
-        assert_eq!([2.46, 1.001, 1.999_999].map(|length_m| at_least(length_m, 3)), ["2.460", "1.001", "1.999"]);
-        assert_eq!([1e300, f64::INFINITY].map(|length_m| at_least(length_m, 3)), ["1e300", "inf"]);
-    }
 
     #[test]
     fn disagreement_ignores_the_common_velocity() {

@@ -2,10 +2,13 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::swarm::{ClosestApproach, Pair};
 
 /// The verdict over everything that was judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Status {
     /// No pair came closer than delta, both detectors agree on it, and every instant offered was judged.
     Clear,
@@ -17,7 +20,8 @@ pub enum Status {
 }
 
 /// A time during which a pair was closer than delta without a break.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Violation {
     /// The pair.
     pub pair: Pair,

@@ -363,7 +363,7 @@ fn figures(
     if !obstacles.is_empty() {
         drawn.push(figures::encounters(&obstacles, "obstacles", "Distances from the closest obstacles"));
     }
-    drawn.into_iter().map(|figure| figure.map_err(|error| Failure::machine(error.to_string()))).collect()
+    Ok(drawn)
 }
 
 /// What a figure shows of two who came close.

@@ -12,7 +12,7 @@ use super::folder::OutFolder;
 use super::pictures::Pictures;
 use super::snapshots::Watched;
 use super::{Exit, Failure};
-use crate::figures::Course;
+use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
 use crate::record::mcap::{Header, McapRecorder};
@@ -127,14 +127,14 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
-    let mut course = Course::new();
+    let mut history = RunHistory::new();
     let mut watched = Watched::new(arguments, &scenario);
-    let mut watchers = (&mut course, &mut watched);
+    let mut watchers = (&mut history, &mut watched);
     let report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
     let snapshots = watched.snapshots(folder.path(), console)?;
     let pictures = Pictures {
         scenario: &scenario,
-        course: (!arguments.no_figures).then_some(&course),
+        history: (!arguments.no_figures).then_some(&history),
         warnings: &warnings,
         command: &arguments.command(),
         snapshots: &snapshots,

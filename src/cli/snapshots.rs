@@ -58,17 +58,19 @@ impl Sink for Watched {
 
 #[cfg(feature = "viewer")]
 mod viewer {
-    use std::fs;
-    use std::io;
     use std::path::Path;
 
     use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-    use super::super::{Failure, console::Console, drawing};
+    use super::super::{Failure, console::Console, drawing, pictures::write_files};
     use super::{Picture, Watched};
-    use crate::render::{Footage, Renderer, ShootError, Snapshot, Theme, View, snapshot_names, snapshots_of_run};
-    use crate::report::write_atomically;
+    use crate::render::{
+        self, Footage, Renderer, ShootError, Snapshot, Theme, View, data_uri, snapshot_names, snapshots_of_run,
+    };
     use crate::scenario::Scenario;
+
+    /// Room for pictures on a page \[bytes\].
+    const PAGE_BYTES: usize = 900 << 10;
 
     /// Footage, and what is to draw it.
     pub(super) struct Camera {
@@ -91,20 +93,29 @@ mod viewer {
             }),
             None => Vec::new(),
         };
-        let folder = folder.join("snapshots");
-        let failure =
-            |path: &Path, error: &io::Error| Failure::machine(format!("cannot write {}: {error}", path.display()));
-        if !snapshots.is_empty() {
-            fs::create_dir_all(&folder).map_err(|error| failure(&folder, &error))?;
+        let file = |name: &str| format!("{name}.png");
+        let room = PAGE_BYTES / snapshots.len().max(1);
+        let encoded: Vec<_> =
+            snapshots.par_iter().map(|snapshot| encoded(&snapshot.picture, room)).collect::<Result<_, _>>()?;
+        let names: Vec<_> = snapshot_names().iter().map(|name| file(name)).collect();
+        let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
+            .map(|(Snapshot { name, description, .. }, [png, small])| {
+                ((file(&name), png), Picture { description, data_uri: data_uri(&small) })
+            })
+            .unzip();
+        write_files(&folder.join("snapshots"), &names, &files)?;
+        Ok(on_page)
+    }
+
+    /// A picture as PNG, and smaller where that takes more than its room on a page \[bytes\].
+    fn encoded(picture: &render::Picture, room: usize) -> Result<[Vec<u8>; 2], Failure> {
+        let png = picture.to_png()?;
+        let (mut small, mut smaller) = (png.clone(), picture.clone());
+        while small.len() > room {
+            smaller = smaller.halved();
+            small = smaller.to_png()?;
         }
-        for name in snapshot_names().iter().filter(|&name| snapshots.iter().all(|snapshot| snapshot.name != *name)) {
-            let path = folder.join(format!("{name}.png"));
-            match fs::remove_file(&path) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failure(&path, &error)),
-                _ => {}
-            }
-        }
-        snapshots.par_iter().map(|snapshot| kept(&folder, snapshot)).collect()
+        Ok([png, small])
     }
 
     fn taken(camera: &Camera) -> Result<Vec<Snapshot>, Failure> {
@@ -114,11 +125,5 @@ mod viewer {
         }
         let mut renderer = Renderer::open(&drawing::adapter(&camera.adapter))?;
         Ok(snapshots_of_run(&mut renderer, &camera.footage, &view)?)
-    }
-
-    fn kept(folder: &Path, snapshot: &Snapshot) -> Result<Picture, Failure> {
-        let png = snapshot.picture.to_png()?;
-        write_atomically(&folder.join(format!("{}.png", snapshot.name)), &png)?;
-        Ok(Picture { description: snapshot.description.clone(), data_uri: crate::render::data_uri(&png) })
     }
 }

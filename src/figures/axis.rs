@@ -1,9 +1,6 @@
 //! Axes: what range they show, and where their ticks are.
 
-use std::ops::Range;
-
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-use plotters::coord::types::RangedCoordf64;
+use crate::text::decimals_of;
 
 /// Numbers beyond this have no place on an axis: differences of larger ones might overflow.
 const LARGEST: f64 = 1e150;
@@ -30,8 +27,6 @@ pub(super) struct Axis {
     pub(super) to: f64,
     /// Places of the ticks.
     pub(super) ticks: Vec<f64>,
-    /// Drawn from its greater end to its lesser one.
-    pub(super) reversed: bool,
     step: f64,
 }
 
@@ -59,7 +54,7 @@ impl Axis {
         let ticks = (0..100).map(|k| (first + f64::from(k)) * step).take_while(|&tick| tick <= to + ROUNDING * step);
         // Adding 0 turns -0 into 0.
         let ticks = ticks.map(|tick| tick + 0.0).collect();
-        Self { label: label.to_owned(), scale: Scale::Linear, from, to, ticks, reversed: false, step }
+        Self { label: label.to_owned(), scale: Scale::Linear, from, to, ticks, step }
     }
 
     /// A logarithmic axis over whole decades that shows all of the finite positive `numbers`, or the upper
@@ -74,7 +69,7 @@ impl Axis {
         let step = f64::from((decades + 6) / 7);
         // Ticks are decades divisible by the step, so that 1 is one of them wherever it is on the axis.
         let ticks = (0..=decades).map(|k| from + f64::from(k)).filter(|place| place.rem_euclid(step) == 0.0).collect();
-        Self { label: label.to_owned(), scale: Scale::Log, from, to, ticks, reversed: false, step }
+        Self { label: label.to_owned(), scale: Scale::Log, from, to, ticks, step }
     }
 
     /// The place of a number on the axis; none where it has none.
@@ -89,6 +84,42 @@ impl Axis {
         (place >= self.from - slack && place <= self.to + slack).then(|| place.clamp(self.from, self.to))
     }
 
+    /// How far along the axis a place is, from 0 to 1.
+    pub(super) fn share(&self, place: f64) -> f64 {
+        (place - self.from) / (self.to - self.from)
+    }
+
+    /// The place halfway between its ends.
+    pub(super) fn middle(&self) -> f64 {
+        f64::midpoint(self.from, self.to)
+    }
+
+    /// An axis of time \[s\] between two instants, or of a second from the first where they are no two.
+    pub(super) fn time(from_s: f64, to_s: f64) -> Self {
+        let label = "time [s]";
+        if to_s > from_s {
+            return Self::spanning(label, from_s, to_s, 8.0);
+        }
+        let from_s = if from_s.is_finite() { from_s } else { 0.0 };
+        Self::spanning(label, from_s, from_s + 1.0, 5.0)
+    }
+
+    /// An axis of distances that shows 0, or a logarithmic one where the largest number is so far beyond a limit that the
+    /// limit could not be seen.
+    pub(super) fn distances(unit: &str, numbers: &[f64], limit: f64) -> Self {
+        /// The largest number that a linear axis shows, over the limit.
+        const LOG_FROM: f64 = 40.0;
+        let label = format!("distance [{unit}]");
+        let largest = numbers.iter().copied().filter(|x| x.is_finite()).fold(limit, f64::max);
+        let numbers = numbers.iter().copied();
+        // Within an obstacle distances are below zero.
+        if limit > 0.0 && largest > LOG_FROM * limit && !numbers.clone().any(|x| x < 0.0) {
+            Self::log(&label, numbers)
+        } else {
+            Self::linear(&label, numbers.chain([0.0]), true)
+        }
+    }
+
     /// What is written at the tick at `place`.
     pub(super) fn tick_label(&self, place: f64) -> String {
         match self.scale {
@@ -98,31 +129,8 @@ impl Axis {
     }
 }
 
-/// An axis is a coordinate of the drawing library, whose values are places.
-impl Ranged for Axis {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, place: &f64, pixels: (i32, i32)) -> i32 {
-        RangedCoordf64::from(self.range()).map(place, pixels)
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
-    }
-
-    fn range(&self) -> Range<f64> {
-        if self.reversed { self.to..self.from } else { self.from..self.to }
-    }
-}
-
-impl ValueFormatter<f64> for Axis {
-    fn format_ext(&self, place: &f64) -> String {
-        self.tick_label(*place)
-    }
-}
-
-fn extent(numbers: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+/// The smallest and the largest of the numbers that have a place on an axis.
+pub(super) fn extent(numbers: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     numbers.into_iter().filter(|x| x.abs() <= LARGEST).fold(None, |extent, x| {
         let (low, high) = extent.unwrap_or((x, x));
         Some((low.min(x), high.max(x)))
@@ -155,8 +163,7 @@ fn number_label(number: f64, step: f64) -> String {
     let text = if number != 0.0 && (number.abs() >= 1e5 || step < 1e-4) {
         format!("{number:.3e}").replace("000e", "e").replace(".e", "e")
     } else {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 4")]
-        let decimals = (-(step * 1.000_001).log10().floor()).clamp(0.0, 4.0) as usize;
+        let decimals = decimals_of(step, 4);
         format!("{number:.decimals$}")
     };
     text.replace('-', "\u{2212}")

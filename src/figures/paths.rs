@@ -1,56 +1,66 @@
 //! Where the vehicles went.
 
 use nalgebra::Vector3;
-use plotters::chart::ChartBuilder;
-use plotters::drawing::IntoDrawingArea as _;
-use plotters::element::{Circle, Cross, EmptyElement, PathElement};
-use plotters::prelude::SVGBackend;
-use plotters::style::Color as _;
-use plotters::style::RGBColor;
 
 use super::axis::Axis;
-use super::chart::{self, Chart, Drawn, GRID, INK, Line, Mark, MarkShape, PALETTE, PAPER, PX, SOFT_INK, Stroke, WIDTH};
-use super::course::{Course, FEW_VEHICLES};
+use super::chart::{Chart, Line, Mark, TITLE, WIDTH};
+use super::figure::Figure;
+use super::history::{FEW_VEHICLES, RunHistory, evenly};
+use super::svg::{Align, Canvas, Colour, GRID, Marker, PALETTE, Point, SOFT_INK, Stroke};
 use super::thin::thinned;
-use super::{Figure, FigureError, printable};
 use crate::swarm::row;
 
 /// Share of the extent left free on each side.
 const MARGIN: f64 = 0.06;
+/// Most vehicles whose paths are drawn.
+const MOST_PATHS: usize = 300;
 
 /// Where the vehicles went, seen from above: x and y \[m\], a unit as long on both axes, a cross at each start and a
-/// ring at each end. Up to 12 vehicles have their own colour and are numbered.
-///
-/// # Errors
-/// [`FigureError`] when the drawing library refuses.
-pub fn paths(course: &Course, title: &str) -> Result<Figure, FigureError> {
+/// ring at each end. Up to 12 vehicles have their own colour and are numbered; of more than 300, as many are drawn, chosen
+/// evenly, and the two that come closest.
+#[must_use]
+pub fn paths(history: &RunHistory, title: &str) -> Figure {
     let axis = |axis: usize, label: &str| {
-        let (low, high) = course.extent(axis).unwrap_or((0.0, 1.0));
+        let (low, high) = history.extent(axis).unwrap_or((0.0, 1.0));
         let margin = MARGIN * (high - low);
         Axis::linear(label, [low - margin, high + margin], false)
     };
     let mut chart = Chart::new(axis(0, "x [m]"), axis(1, "y [m]"));
     chart.equal = true;
-    for i in 0..course.vehicles() {
-        let look = Look::of(i, course.vehicles());
-        let points: Vec<_> = course.spans().map(|span| (span.positions_m[(i, 0)], span.positions_m[(i, 1)])).collect();
-        let mark = |at: Option<&(f64, f64)>, shape, color, label: &str| {
-            let label = (i == 0).then(|| label.to_owned());
-            at.map(|&at| Mark { at, shape, color, size_px: look.mark_px, text: look.number.clone(), label })
+    for (k, &i) in drawn(history).iter().enumerate() {
+        let look = Look::of(i, history.vehicles());
+        let points: Vec<_> = history.spans().map(|span| (span.positions_m[(i, 0)], span.positions_m[(i, 1)])).collect();
+        let mark = |at: Option<&(f64, f64)>, marker, colour, label: &str| {
+            let label = (k == 0).then(|| label.to_owned());
+            at.map(|&at| Mark { at, marker, colour, radius: look.radius, text: look.number.clone(), label })
         };
-        chart.marks.extend(mark(points.first(), MarkShape::Cross, look.start, "start"));
-        chart.marks.extend(mark(points.last(), MarkShape::Ring, look.end, "end"));
+        chart.marks.extend(mark(points.first(), Marker::Cross, look.start, "start"));
+        chart.marks.extend(mark(points.last(), Marker::Ring, look.end, "end"));
         chart.lines.push(Line { points, stroke: look.path, label: None });
     }
-    chart.figure("paths", title, &description(course, "from above"))
+    chart.figure("paths", title, &description(history, "from above"))
+}
+
+/// The vehicles whose paths are drawn.
+fn drawn(history: &RunHistory) -> Vec<usize> {
+    let count = history.vehicles();
+    if count <= MOST_PATHS {
+        return (0..count).collect();
+    }
+    let closest = history.closest().map(|closest| [closest.pair.first(), closest.pair.second()]);
+    let spread = (0..MOST_PATHS).map(|k| evenly(k, count));
+    let mut drawn: Vec<_> = spread.chain(closest.into_iter().flatten().filter(|&i| i < count)).collect();
+    drawn.sort_unstable();
+    drawn.dedup();
+    drawn
 }
 
 /// How a vehicle is drawn.
 struct Look {
     path: Stroke,
-    start: RGBColor,
-    end: RGBColor,
-    mark_px: f64,
+    start: Colour,
+    end: Colour,
+    radius: f64,
     number: Option<String>,
 }
 
@@ -59,107 +69,120 @@ impl Look {
         if count <= FEW_VEHICLES {
             let path = Stroke::of_line(vehicle);
             let number = Some((vehicle + 1).to_string());
-            return Self { path, start: path.color, end: path.color, mark_px: 4.5, number };
+            return Self { path, start: path.colour, end: path.colour, radius: 4.5, number };
         }
-        let path = Stroke { opacity: 0.45, ..Stroke::solid(PALETTE[0], 0.8) };
-        let mark_px = if count <= 100 { 3.0 } else { 2.0 };
-        Self { path, start: SOFT_INK, end: PALETTE[1], mark_px, number: None }
+        let path = Stroke::solid(PALETTE[0], 0.8).faint(0.45);
+        let radius = if count <= 100 { 3.0 } else { 2.0 };
+        Self { path, start: SOFT_INK, end: PALETTE[1], radius, number: None }
     }
 }
 
-fn description(course: &Course, from: &str) -> String {
-    let (count, end_s) = (course.vehicles(), course.end_s());
-    format!("Paths of {count} vehicles {from} over {end_s:.2} s; a cross marks each start and a ring each end.")
+fn description(history: &RunHistory, from: &str) -> String {
+    let (count, end_s) = (history.vehicles(), history.end_s());
+    let of_all = match drawn(history).len() {
+        drawn if drawn < count => format!("{drawn} of {count} vehicles, chosen evenly,"),
+        _ => format!("{count} vehicles"),
+    };
+    format!("Paths of {of_all} {from} over {end_s:.2} s; a cross marks each start and a ring each end.")
 }
 
 /// Angles of the view on a run in space \[rad\], and the height of the chart \[px\].
 const YAW: f64 = 0.6;
 const PITCH: f64 = 0.42;
-const HEIGHT: u32 = 330;
+const HEIGHT: f64 = 330.0;
 /// Most that the box of the axes may take, across and up \[px\]; the rest is for the numbers.
-const BOX: (f64, f64) = (340.0, 270.0);
+const BOX: Point = (340.0, 270.0);
 /// Least space between the numbers of an axis \[px\].
-const TICK_PX: f64 = 26.0;
+const TICK_PX: f64 = 32.0;
 
-/// Where the vehicles went in space: x, y and z \[m\] in a parallel projection, a unit as long on all axes. Marks and
-/// colours as in [`paths`].
-///
-/// # Errors
-/// [`FigureError`] when the drawing library refuses.
-pub fn paths_in_space(course: &Course, title: &str) -> Result<Figure, FigureError> {
-    let title = &printable(title);
-    let size = (WIDTH * PX, (chart::TITLE + HEIGHT) * PX);
-    let mut drawing = String::new();
-    draw_in_space(course, &mut drawing, size, title).map_err(|error| FigureError::new("paths-3d", &error))?;
-    Ok(Figure::framed("paths-3d", title, &description(course, "in space"), size, &drawing))
-}
-
-fn draw_in_space(course: &Course, drawing: &mut String, size: (u32, u32), title: &str) -> Drawn {
-    let root = SVGBackend::with_string(drawing, size).into_drawing_area();
-    root.fill(&PAPER)?;
-    chart::draw_title(&root, title)?;
-
-    let spans = [0, 1, 2].map(|axis| {
-        let (low, high) = course.extent(axis).unwrap_or((0.0, 1.0));
-        Axis::linear("", [low, high], true)
+/// Where the vehicles went in space: x, y and z \[m\] in a parallel projection, a unit as long on all axes. Which
+/// vehicles, marks and colours as in [`paths`].
+#[must_use]
+pub fn paths_in_space(history: &RunHistory, title: &str) -> Figure {
+    let view = View::of(history);
+    let mut canvas = Canvas::new((WIDTH, TITLE + HEIGHT), title, WIDTH / 2.0);
+    view.draw_axes(&mut canvas);
+    let lines = drawn(history).into_iter().map(|i| {
+        let look = Look::of(i, history.vehicles());
+        let places = history.spans().map(|span| row(&span.positions_m, i)).filter(|place| view.shows(place));
+        (look, places.map(|place| view.on_paper(place)).collect())
     });
-    let [across, deep, up] = spans.each_ref().map(|axis| axis.to - axis.from);
-    let seen_across = across * YAW.cos() + deep * YAW.sin();
-    let seen_up = (across * YAW.sin() + deep * YAW.cos()) * PITCH.sin() + up * PITCH.cos();
-    let unit = (BOX.0 / seen_across).min(BOX.1 / seen_up) * f64::from(PX);
-    #[expect(clippy::cast_possible_truncation, reason = "a length within a figure")]
-    let pixels = |span: f64| (unit * span).round() as i32;
-    let [x, mut y, z] = spans.map(|axis| {
-        let room = unit * (axis.to - axis.from) / f64::from(PX);
-        Axis::spanning("", axis.from, axis.to, (room / TICK_PX).max(1.0))
-    });
-    // The library's second axis points up and its third towards the reader: reversed, y makes a right-handed frame.
-    y.reversed = true;
-    let mut plot =
-        ChartBuilder::on(&root).margin_top(chart::TITLE * PX).build_cartesian_3d(x.clone(), z.clone(), y.clone())?;
-    plot.set_3d_pixel_range((pixels(across), pixels(up), pixels(deep)));
-    plot.with_projection(|mut view| {
-        (view.yaw, view.pitch, view.scale) = (YAW, PITCH, 1.0);
-        view.into_matrix()
-    });
-    let tick = |name: &'static str, axis: &Axis| {
-        let axis = axis.clone();
-        move |&place: &f64| {
-            let label = axis.tick_label(place);
-            if axis.ticks.last() == Some(&place) { format!("{name} = {label} m") } else { label }
-        }
-    };
-    let (tick_x, tick_y, tick_z) = (tick("x", &x), tick("y", &y), tick("z", &z));
-    plot.configure_axes()
-        .tick_size(6 * PX)
-        .axis_panel_style(PAPER.mix(0.0))
-        .bold_grid_style(Stroke::solid(GRID, 0.8).shape())
-        .label_style(chart::text(chart::TEXT, INK))
-        .x_formatter(&tick_x)
-        .y_formatter(&tick_z)
-        .z_formatter(&tick_y)
-        .draw()?;
-
-    let shows = |p: &Vector3<f64>| [&x, &y, &z].iter().zip(p.iter()).all(|(axis, &p)| axis.place(p).is_some());
-    for i in 0..course.vehicles() {
-        let look = Look::of(i, course.vehicles());
-        let points: Vec<_> = course.spans().map(|span| row(&span.positions_m, i)).filter(shows).collect();
-        let points: Vec<_> = points.into_iter().map(|p| (p.x, p.z, p.y)).collect();
-        let on_paper = |point| {
-            let (right, down) = plot.plotting_area().map_coordinate(&point);
-            (f64::from(right), f64::from(down))
-        };
-        let points = thinned(&points, on_paper);
+    for (look, points) in thinned(lines.collect()) {
         let (Some(&start), Some(&end)) = (points.first(), points.last()) else { continue };
-        let style = |color: RGBColor| Stroke::solid(color, 1.6).shape();
-        let radius = chart::tenths_i(look.mark_px);
-        plot.draw_series([PathElement::new(points, look.path.shape())])?;
-        plot.draw_series([Cross::new(start, radius, style(look.start))])?;
-        plot.draw_series([Circle::new(end, radius, style(look.end))])?;
-        if let Some(number) = look.number {
-            plot.draw_series([EmptyElement::at(start) + MarkShape::Cross.beside(&number)])?;
-            plot.draw_series([EmptyElement::at(end) + MarkShape::Ring.beside(&number)])?;
+        canvas.line(&points, look.path);
+        for (marker, at, colour) in [(Marker::Cross, start, look.start), (Marker::Ring, end, look.end)] {
+            canvas.marker(marker, at, look.radius, colour);
+            if let Some(number) = &look.number {
+                canvas.text_beside(marker, at, number);
+            }
         }
     }
-    root.present()
+    canvas.figure("paths-3d", &description(history, "in space"))
+}
+
+/// A box of axes, seen from above its edge where x is largest and y smallest.
+struct View {
+    axes: [Axis; 3],
+    /// Pixels of a metre.
+    unit: f64,
+}
+
+impl View {
+    fn of(history: &RunHistory) -> Self {
+        let spans = [(0, "x [m]"), (1, "y [m]"), (2, "z [m]")].map(|(axis, label)| {
+            let (low, high) = history.extent(axis).unwrap_or((0.0, 1.0));
+            Axis::linear(label, [low, high], true)
+        });
+        let [across, deep, up] = spans.each_ref().map(|axis| axis.to - axis.from);
+        let seen_across = across * YAW.cos() + deep * YAW.sin();
+        let seen_up = (across * YAW.sin() + deep * YAW.cos()) * PITCH.sin() + up * PITCH.cos();
+        let unit = (BOX.0 / seen_across).min(BOX.1 / seen_up);
+        let axes = spans.map(|axis| {
+            let room = unit * (axis.to - axis.from);
+            Axis::spanning(&axis.label, axis.from, axis.to, (room / TICK_PX).max(1.0))
+        });
+        Self { axes, unit }
+    }
+
+    fn shows(&self, place: &Vector3<f64>) -> bool {
+        self.axes.iter().zip(place.iter()).all(|(axis, &p)| axis.place(p).is_some())
+    }
+
+    /// Seen from afar: x to the right and nearer, y to the right and away, z up.
+    fn on_paper(&self, place: Vector3<f64>) -> Point {
+        let middle = Vector3::from(self.axes.each_ref().map(Axis::middle));
+        let [x, y, z] = (self.unit * (place - middle)).into();
+        let away = y * YAW.cos() - x * YAW.sin();
+        let (right, up) = (x * YAW.cos() + y * YAW.sin(), z * PITCH.cos() + away * PITCH.sin());
+        (WIDTH / 2.0 + right, TITLE + HEIGHT / 2.0 - up)
+    }
+
+    /// The floor and the two walls behind, with a grid, and the numbers along three edges.
+    fn draw_axes(&self, canvas: &mut Canvas) {
+        let [x, y, z] = &self.axes;
+        let at = |x, y, z| self.on_paper(Vector3::new(x, y, z));
+        let mut numbered = |axis: &Axis, line: &dyn Fn(f64) -> [Point; 3], (right, down), align| {
+            for &tick in &axis.ticks {
+                let line = line(tick);
+                canvas.line(&line, Stroke::solid(GRID, 0.8));
+                canvas.text((line[0].0 + right, line[0].1 + down), align, &axis.tick_label(tick));
+            }
+        };
+        let on_x = |tick| [at(tick, y.from, z.from), at(tick, y.to, z.from), at(tick, y.to, z.to)];
+        let on_y = |tick| [at(x.to, tick, z.from), at(x.from, tick, z.from), at(x.from, tick, z.to)];
+        let on_z = |tick| [at(x.from, y.from, tick), at(x.from, y.to, tick), at(x.to, y.to, tick)];
+        numbered(x, &on_x, (-8.0, 7.0), Align::CENTRE_ABOVE);
+        numbered(y, &on_y, (11.0, 8.0), Align::LEFT);
+        numbered(z, &on_z, (-7.0, 0.0), Align::RIGHT);
+        for (axis, [beside, ..], (right, down), align) in [
+            (x, on_x(x.middle()), (-8.0, 28.0), Align::RIGHT_ABOVE),
+            (y, on_y(y.middle()), (38.0, 26.0), Align::LEFT),
+            (z, on_z(z.to), (0.0, -12.0), Align::CENTRE_BELOW),
+        ] {
+            canvas.text((beside.0 + right, beside.1 + down), align, &axis.label);
+        }
+        let edges =
+            [at(x.from, y.from, z.to), at(x.from, y.from, z.from), at(x.to, y.from, z.from), at(x.to, y.to, z.from)];
+        canvas.line(&edges, Stroke::solid(SOFT_INK, 0.8));
+    }
 }

@@ -1,11 +1,9 @@
 //! Two of a recording: their distance over time, and their closest approach from above.
 
 use super::axis::{Axis, Scale};
-use super::chart::{Band, Chart, INK, Line, Mark, MarkShape, PALETTE, Stroke};
-use super::{Figure, FigureError};
-
-/// With the largest distance beyond this many limits the axis is logarithmic, or the limit could not be seen.
-const LOG_FROM: f64 = 40.0;
+use super::chart::{Band, Chart, Mark};
+use super::figure::Figure;
+use super::svg::{INK, PALETTE, Stroke};
 
 /// Two over time.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,68 +41,46 @@ impl Encounter {
 
 /// Distances over time \[s\] with the limit of the first, and bands where a distance is known to lie within an interval
 /// alone.
-///
-/// # Errors
-/// [`FigureError`] when the drawing library refuses.
-pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Result<Figure, FigureError> {
+#[must_use]
+pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     let all = || encounters.iter().flat_map(|encounter| &encounter.distances);
-    let numbers: Vec<f64> = all().flat_map(|&(_, distance, slack)| [distance - slack, distance + slack]).collect();
     let (limit, unit) = encounters.first().map_or((0.0, "m"), |first| (first.limit_m, first.unit));
-    let largest = numbers.iter().copied().filter(|y| y.is_finite()).fold(limit, f64::max);
-    let with_limit = numbers.iter().copied().chain([limit]);
-    // Within an obstacle distances are below zero.
-    let within = all().any(|point| point.1 < 0.0);
-    let label = format!("distance [{unit}]");
-    let y = if limit > 0.0 && !within && largest > LOG_FROM * limit {
-        Axis::log(&label, with_limit.filter(|y| *y > 0.0))
-    } else {
-        Axis::linear(&label, with_limit.chain([0.0]), true)
-    };
+    // Only within an obstacle are distances below zero.
+    let least = if all().any(|point| point.1 < 0.0) { f64::NEG_INFINITY } else { 0.0 };
+    let numbers = all().flat_map(|&(_, distance, slack)| [(distance - slack).max(least), distance + slack]);
+    let y = Axis::distances(unit, &numbers.chain([limit]).collect::<Vec<_>>(), limit);
     let from_s = all().map(|point| point.0).fold(f64::INFINITY, f64::min);
     let to_s = all().map(|point| point.0).fold(f64::NEG_INFINITY, f64::max);
-    let x = if to_s > from_s {
-        Axis::spanning("time [s]", from_s, to_s, 8.0)
-    } else {
-        let from_s = if from_s.is_finite() { from_s } else { 0.0 };
-        Axis::spanning("time [s]", from_s, from_s + 1.0, 5.0)
-    };
     // A logarithmic axis has no place for what may be zero.
-    let least = match y.scale {
-        Scale::Log => 10_f64.powf(y.from),
-        Scale::Linear if within => f64::NEG_INFINITY,
-        Scale::Linear => 0.0,
-    };
-    let mut chart = Chart::new(x, y);
+    let least = if y.scale == Scale::Log { 10_f64.powf(y.from) } else { least };
+    let mut chart = Chart::new(Axis::time(from_s, to_s), y);
     for (k, encounter) in encounters.iter().enumerate() {
         let [first, second] = &encounter.names;
         let stroke = Stroke::of_line(k);
         for known in encounter.distances.split(|point| point.1.is_nan()) {
             if known.iter().any(|point| point.2 > 0.0) {
                 let points = known.iter().map(|&(t, d, slack)| (t, (d - slack).max(least), d + slack)).collect();
-                chart.bands.push(Band { points, color: stroke.color, opacity: 0.22, label: None });
+                chart.bands.push(Band { points, colour: stroke.colour, opacity: 0.22, label: None });
             }
         }
         let points = encounter.distances.iter().map(|&(t, d, _)| (t, d)).collect();
-        chart.lines.push(Line { points, stroke, label: Some(format!("{first} and {second}")) });
+        chart.line(points, stroke, format!("{first} and {second}"));
     }
     chart.level(limit, Stroke::solid(INK, 2.0), format!("limit {limit:?} {unit}"));
-    let mut words = String::new();
+    let mut description = format!("{title} over time; the limit is {limit:?} {unit}.");
     if let Some(encounter) = encounters.first() {
         let [first, second] = &encounter.names;
-        words = format!(" Closest: {first} and {second}, {}.", encounter.closest());
+        let closest = encounter.closest();
+        description.extend([" Closest: ", first, " and ", second, ", ", &closest, "."]);
         let drawn = encounter.nearest().map_or(f64::NAN, |k| encounter.distances[k].1);
-        let (at, label) = ((encounter.closest_s, drawn), Some(format!("closest {}", encounter.closest())));
-        chart.marks.push(Mark { at, shape: MarkShape::Ring, color: INK, size_px: 4.5, text: None, label });
+        chart.marks.push(Mark::ring((encounter.closest_s, drawn), INK, Some(format!("closest {closest}"))));
     }
-    let description = format!("{title} over time; the limit is {limit:?} {unit}.{words}");
     chart.figure(name, title, &description)
 }
 
 /// The paths of two vehicles from above \[m\], and where both are when they are closest.
-///
-/// # Errors
-/// [`FigureError`] when the drawing library refuses.
-pub fn closest_approach(encounter: &Encounter, title: &str) -> Result<Figure, FigureError> {
+#[must_use]
+pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     let points = || encounter.paths_m.iter().flatten();
     let x = Axis::linear("x [m]", points().map(|point| point.0), false);
     let y = Axis::linear("y [m]", points().map(|point| point.1), false);
@@ -112,17 +88,12 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Result<Figure, Fi
     let nearest = encounter.nearest();
     let places = encounter.paths_m.each_ref().map(|path| nearest.and_then(|k| path.get(k).copied()));
     for (k, (path, name)) in encounter.paths_m.iter().zip(&encounter.names).enumerate() {
-        let label = Some(name.clone());
-        chart.lines.push(Line { points: path.clone(), stroke: Stroke::solid(PALETTE[k], 1.6), label });
-        if let Some(at) = places[k] {
-            let color = PALETTE[k];
-            chart.marks.push(Mark { at, shape: MarkShape::Ring, color, size_px: 4.5, text: None, label: None });
-        }
+        chart.line(path.clone(), Stroke::solid(PALETTE[k], 1.6), name.clone());
+        chart.marks.extend(places[k].map(|at| Mark::ring(at, PALETTE[k], None)));
     }
     let closest = encounter.closest();
     if let [Some(one), Some(other)] = places {
-        let label = Some(format!("closest {closest}"));
-        chart.lines.push(Line { points: vec![one, other], stroke: Stroke::dashed(INK, 1.4), label });
+        chart.line(vec![one, other], Stroke::dashed(INK, 1.4), format!("closest {closest}"));
     }
     let [first, second] = &encounter.names;
     let description = format!("Paths of {first} and {second} from above; rings where they are closest, {closest}.");
@@ -148,11 +119,11 @@ mod tests {
 
     #[test]
     fn a_figure_names_both_and_their_closest_and_shows_a_band_where_there_is_doubt() {
-        let sure = encounters(&[encounter(0.0)], "encounters", "Distance").unwrap();
-        let doubtful = encounters(&[encounter(0.5)], "encounters", "Distance").unwrap();
+        let sure = encounters(&[encounter(0.0)], "encounters", "Distance");
+        let doubtful = encounters(&[encounter(0.5)], "encounters", "Distance");
         assert!(sure.svg.contains("alpha and bravo") && sure.svg.contains("closest 1.000000 m"));
         assert!(doubtful.svg.matches("<polygon").count() > sure.svg.matches("<polygon").count());
-        let seen = closest_approach(&encounter(0.0), "Closest approach").unwrap();
+        let seen = closest_approach(&encounter(0.0), "Closest approach");
         assert!(seen.svg.contains("alpha") && seen.svg.contains("closest 1.000000 m at 1.000 s"));
     }
 
@@ -164,24 +135,25 @@ mod tests {
         broken.distances.insert(10, (1.0, f64::NAN, 0.0));
         broken.paths_m.iter_mut().for_each(|path| path.insert(10, (f64::NAN, f64::NAN)));
         let shapes = |encounter: &Encounter, shape: &str| {
-            let drawn = encounters(std::slice::from_ref(encounter), "encounters", "Distance").unwrap();
+            let drawn = encounters(std::slice::from_ref(encounter), "encounters", "Distance");
             drawn.svg.matches(shape).count()
         };
         for shape in ["<polygon", "<polyline"] {
             assert_eq!(shapes(&broken, shape), shapes(&whole, shape) + 1, "{shape}");
         }
-        let drawn = encounters(&[whole], "encounters", "Distance").unwrap().svg;
+        let drawn = encounters(&[whole], "encounters", "Distance").svg;
         assert!(drawn.contains("distance [ellipsoids]") && !drawn.contains(" m "), "{drawn}");
     }
 
     #[test]
     fn nothing_to_draw_and_impossible_numbers_make_a_figure_all_the_same() {
-        assert!(encounters(&[], "encounters", "Distance").is_ok());
+        assert!(encounters(&[], "encounters", "Distance").svg.contains("distance [m]"));
         let mut odd = encounter(f64::NAN);
         odd.distances.push((f64::INFINITY, -1.0, 0.0));
         odd.limit_m = 1e-9;
-        assert!(encounters(&[odd.clone()], "encounters", "Distance").is_ok());
+        let drawn = |figure: Figure| !figure.svg.contains("=\"NaN") && !figure.svg.contains("inf,");
+        assert!(drawn(encounters(std::slice::from_ref(&odd), "encounters", "Distance")));
         odd.paths_m = [vec![], vec![]];
-        assert!(closest_approach(&odd, "Closest approach").is_ok());
+        assert!(drawn(closest_approach(&odd, "Closest approach")));
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Code, Preflight, Warning};
+use crate::text::{self, at_least, counted};
 
 /// A rate \[1/s\] to six decimals, with its sign.
 pub(super) fn rate(rate_per_s: f64) -> String {
@@ -13,10 +14,7 @@ pub(super) fn rate(rate_per_s: f64) -> String {
 /// A positive number to three significant digits.
 pub(super) fn significant(number: f64) -> String {
     if number == 0.0 || (1e-6..1e6).contains(&number.abs()) {
-        let digits = if number == 0.0 { 0.0 } else { number.abs().log10().floor() };
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 8")]
-        let decimals = (2.0 - digits).clamp(0.0, 8.0) as usize;
-        format!("{number:.decimals$}")
+        text::significant(number, 3)
     } else {
         format!("{number:.2e}")
     }
@@ -59,7 +57,7 @@ impl Preflight {
             Some(certified_m) => {
                 format!(
                     "certified never closer than {} m in continuous time (delta {} m)",
-                    six_decimals_down(certified_m),
+                    at_least(certified_m, 6),
                     self.delta_m
                 )
             }
@@ -67,8 +65,7 @@ impl Preflight {
         };
         let warnings = match self.warnings.len() {
             0 => "no warnings".to_owned(),
-            1 => "1 warning".to_owned(),
-            n => format!("{n} warnings"),
+            n => counted(n as u64, "warning", "warnings"),
         };
         format!("READY: {promise}, {warnings}")
     }
@@ -104,7 +101,7 @@ impl Preflight {
     fn certificate_line(&self) -> String {
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
-            Some(certified_m) => format!("{} m, from {energy}", six_decimals_down(certified_m)),
+            Some(certified_m) => format!("{} m, from {energy}", at_least(certified_m, 6)),
             None => format!("none. {} {energy}", self.certificate_void.join(" ")).trim_end().to_owned(),
         }
     }
@@ -139,15 +136,6 @@ impl Preflight {
             _ => "",
         };
         format!("rank {rank}: in the plane {}, in space {}{convergence}", place(2), place(3))
-    }
-}
-
-/// A length \[m\] rounded down to six decimals, so that "never closer than" stays true.
-fn six_decimals_down(length_m: f64) -> String {
-    let shown = format!("{length_m:.6}");
-    match shown.parse::<f64>() {
-        Ok(rounded) if rounded > length_m => format!("{:.6}", rounded - 1e-6),
-        _ => shown,
     }
 }
 

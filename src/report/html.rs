@@ -1,14 +1,18 @@
 //! `report.html`: a run's report for people.
 
+use super::findings::Performance;
+use super::flight::Report;
 use super::page::{Badge, Block, Cell, Column, Page, Picture, Section, Table, Warning};
-use super::words::seconds;
-use super::{Performance, Report, Status, Violation};
+use crate::audit::Status;
 use crate::figures::Figure;
 use crate::scenario::{PlantSpec, Precision, Scenario};
-use crate::swarm::at_least;
+use crate::text::{at_least, seconds, significant};
 
 /// Most violations that are listed one by one.
 const LISTED_VIOLATIONS: usize = 50;
+
+/// Most bytes of a scenario on a page.
+const LONGEST_SCENARIO: usize = 100_000;
 
 /// What a run's page shows beside its report.
 #[derive(Clone, Copy, Debug)]
@@ -35,19 +39,19 @@ impl Report {
     }
 
     fn page(&self, page: &RunPage<'_>) -> Page {
-        let mut sections = vec![section("Numbers", vec![Block::Tables(self.numbers())])];
+        let mut sections = vec![Section::new("Numbers", vec![Block::Tables(self.numbers())])];
         if !self.audit.violations.is_empty() {
-            sections.push(section("Violations", self.violations()));
+            sections.push(Section::new("Violations", self.violations()));
         }
         if !page.pictures.is_empty() {
-            sections.push(section("Pictures", vec![Block::Pictures(page.pictures.to_vec())]));
+            sections.push(Section::new("Pictures", vec![Block::Pictures(page.pictures.to_vec())]));
         }
         if !page.figures.is_empty() {
-            sections.push(section("Figures", vec![Block::Figures(page.figures.to_vec())]));
+            sections.push(Section::new("Figures", vec![Block::Figures(page.figures.to_vec())]));
         }
-        sections.push(section("What was assumed", vec![Block::List(self.assumptions(page.scenario))]));
-        sections.push(section("Repeat it", self.repetition(page)));
-        sections.push(section("Performance", vec![Block::Table(self.performance.table())]));
+        sections.push(Section::new("What was assumed", vec![Block::List(self.assumptions(page.scenario))]));
+        sections.push(Section::new("Repeat it", self.repetition(page)));
+        sections.push(Section::new("Performance", vec![Block::Table(self.performance.table())]));
         Page {
             title: self.scenario.name.clone(),
             kind: "Flight report".to_owned(),
@@ -140,12 +144,9 @@ impl Report {
     fn violations(&self) -> Vec<Block> {
         let violations = &self.audit.violations;
         let rows = violations.iter().take(LISTED_VIOLATIONS).map(|violation| {
-            let [first, second] = violation.pair;
-            let mut row = vec![Cell::from(format!("{first}-{second}"))];
-            let Violation { from_s, to_s, min_m, min_at_s, .. } = violation;
-            let time = |time_s: &Option<f64>| time_s.map_or(NOT_KNOWN.to_owned(), seconds);
-            row.extend([time(from_s), time(to_s), proved_m(*min_m), time(min_at_s)].map(Cell::from));
-            row
+            let times = [violation.from_s, violation.to_s].map(seconds);
+            let smallest = [proved_m(Some(violation.min_m)), seconds(violation.min_at_s)];
+            [violation.pair.to_string()].into_iter().chain(times).chain(smallest).map(Cell::from).collect()
         });
         let table = Table {
             caption: "Times that a pair was closer than δ".to_owned(),
@@ -228,10 +229,7 @@ impl Report {
                  recorded states is {}.",
                 self.run.state_hash
             )),
-            Block::Folded {
-                summary: format!("The resolved scenario, SHA-256 {}", self.scenario.sha256),
-                text: page.scenario.resolved_toml(),
-            },
+            folded_scenario(&page.scenario.resolved_toml(), &self.scenario.sha256),
         ]
     }
 }
@@ -254,11 +252,18 @@ impl Performance {
     }
 }
 
-const NOT_KNOWN: &str = "–";
-
-fn section(heading: &str, blocks: Vec<Block>) -> Section {
-    Section { heading: heading.to_owned(), blocks }
+/// The resolved scenario, or so many of its lines as a page has room for.
+fn folded_scenario(toml: &str, sha256: &str) -> Block {
+    let end = toml.floor_char_boundary(LONGEST_SCENARIO);
+    let part = match toml.len() {
+        all if end < all => format!("; its first {end} of {all} bytes, run.mcap holds all"),
+        _ => String::new(),
+    };
+    let summary = format!("The resolved scenario, SHA-256 {sha256}{part}");
+    Block::Folded { summary, text: toml[..end].to_owned() }
 }
+
+const NOT_KNOWN: &str = "–";
 
 fn numbers(caption: &str, rows: Vec<Vec<Cell>>) -> Table {
     Table { caption: caption.to_owned(), columns: vec![Column::words("Quantity"), Column::numbers("Value")], rows }
@@ -287,8 +292,6 @@ fn short(number: f64) -> String {
     if !(1e-3..1e7).contains(&number.abs()) {
         return format!("{number:.3e}");
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 8")]
-    let decimals = (5.0 - number.abs().log10().floor()).max(0.0) as usize;
-    let text = format!("{number:.decimals$}");
+    let text = significant(number, 6);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }

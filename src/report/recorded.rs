@@ -6,12 +6,14 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::findings::finite;
+use super::flight::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION};
 use super::page::{Badge, Block, Column, Page, Section, Table, Tone};
-use super::words::{counted, fixed, metres, metres_below, seconds};
-use super::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Status, Violation, finite};
 use crate::audit::recorded::{self, Approach, Outcome, Question, Who};
+use crate::audit::{Status, Violation};
 use crate::figures::Figure;
-use crate::swarm::{Pair, at_least};
+use crate::swarm::Pair;
+use crate::text::{at_least, counted, fixed, metres, metres_below, seconds};
 
 /// Violations that are listed in words, and on the page.
 const LISTED_IN_WORDS: usize = 10;
@@ -210,7 +212,7 @@ impl RecordedReport {
         let min_m = first.and_then(|first| finite(first.certain_m()));
         Self {
             schema_version: SCHEMA_VERSION,
-            status: outcome.status.into(),
+            status: outcome.status,
             source,
             measure: if scaled { "ellipsoids" } else { "metres" },
             motion: motion.to_owned(),
@@ -225,7 +227,7 @@ impl RecordedReport {
                 ..Separation::default()
             },
             audit: Audit {
-                status: outcome.status.into(),
+                status: outcome.status,
                 violations: outcome.violations.iter().filter_map(violation).collect(),
                 steps: outcome.stretches,
                 pairs_checked: outcome.swept,
@@ -420,13 +422,13 @@ impl RecordedReport {
     pub fn to_html(&self, figures: &[Figure], command: &str) -> String {
         let mut sections = Vec::new();
         if !self.closest.is_empty() {
-            sections.push(section("Closest pairs", vec![Block::Table(closest_table(&self.closest))]));
+            sections.push(Section::new("Closest pairs", vec![Block::Table(closest_table(&self.closest))]));
         }
         if !figures.is_empty() {
-            sections.push(section("Figures", vec![Block::Figures(figures.to_vec())]));
+            sections.push(Section::new("Figures", vec![Block::Figures(figures.to_vec())]));
         }
         if !self.obstacles.closest.is_empty() {
-            sections.push(section("Obstacles", vec![Block::Table(closest_table(&self.obstacles.closest))]));
+            sections.push(Section::new("Obstacles", vec![Block::Table(closest_table(&self.obstacles.closest))]));
         }
         let lists = [
             ("Violations", self.violations.iter().map(Breach::words).collect::<Vec<_>>()),
@@ -441,7 +443,7 @@ impl RecordedReport {
                 lines.push(format!("and {rest} more"));
             }
             if !lines.is_empty() {
-                sections.push(section(heading, vec![Block::List(lines)]));
+                sections.push(Section::new(heading, vec![Block::List(lines)]));
             }
         }
         let assumed = vec![
@@ -449,8 +451,8 @@ impl RecordedReport {
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
-        sections.push(section("What was assumed", vec![Block::List(assumed)]));
-        sections.push(section("Repeat it", vec![Block::Command(command.to_owned())]));
+        sections.push(Section::new("What was assumed", vec![Block::List(assumed)]));
+        sections.push(Section::new("Repeat it", vec![Block::Command(command.to_owned())]));
         let tone = match self.status {
             Status::Clear => Tone::Good,
             Status::Violation => Tone::Bad,
@@ -471,13 +473,8 @@ impl RecordedReport {
 }
 
 fn violation(violation: &recorded::Violation) -> Option<Violation> {
-    Some(Violation {
-        pair: violation.who.pair()?.numbers(),
-        from_s: finite(violation.from_s),
-        to_s: finite(violation.to_s),
-        min_m: finite(violation.min_m),
-        min_at_s: finite(violation.min_at_s),
-    })
+    let recorded::Violation { from_s, to_s, min_m, min_at_s, .. } = *violation;
+    Some(Violation { pair: violation.who.pair()?, from_s, to_s, min_m, min_at_s })
 }
 
 impl Breach {
@@ -522,10 +519,6 @@ fn span(from_s: f64, to_s: f64) -> String {
 pub fn interval(lower: f64, upper: f64) -> String {
     let (low, high) = (at_least(lower, 6), fixed(upper, 6));
     if upper - lower <= 2.0 * recorded::WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
-}
-
-fn section(heading: &str, blocks: Vec<Block>) -> Section {
-    Section { heading: heading.to_owned(), blocks }
 }
 
 fn closest_table(closest: &[Closest]) -> Table {

@@ -1,9 +1,11 @@
 //! Tests of the report as a whole: keys, null for what is no number, reasons, headlines.
 
 use super::*;
-use crate::audit::Auditor;
-use crate::law::Void;
-use crate::swarm::Rows;
+use crate::audit::{self, AuditOutcome, Auditor};
+use crate::law::{Certificate, Void};
+use crate::metrics::Summary;
+use crate::swarm::{Pair, Rows};
+use crate::target::Arrival;
 
 const DELTA_M: f64 = 2.0;
 const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
@@ -219,7 +221,7 @@ fn a_violation_is_told_with_its_pair_distance_and_time() {
     );
     assert_eq!(case.report().headline(), "VIOLATION: vehicles 1-2 came to 1.533 m (delta 2.000 m) at 0.50 s");
     let violation = &case.report().audit.violations[0];
-    assert_eq!((violation.pair, violation.min_m), ([1, 2], Some(1.5327)));
+    assert_eq!((violation.pair, violation.min_m), (Pair::new(0, 1), 1.5327));
 }
 
 #[test]

@@ -1,24 +1,38 @@
 //! The judgement and its reasons.
 
-use super::words::{metres, metres_below, seconds};
-use super::{Findings, Verdict};
-use crate::audit::Status;
+use serde::{Deserialize, Serialize};
 
-/// Passes where the audit is clear, both detectors agree, the formation is reached and the run was flown to its end.
-pub(super) fn verdict(findings: &Findings<'_>) -> Verdict {
-    let reasons: Vec<_> = [
-        violation(findings),
-        disagreement(findings),
-        undecided(findings),
-        broken_certificate(findings),
-        ended_early(findings),
-        not_reached(findings),
-        too_flat(findings),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    Verdict { pass: reasons.is_empty(), reasons }
+use super::findings::Findings;
+use crate::audit::Status;
+use crate::text::{metres, metres_below, seconds};
+
+/// The judgement.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verdict {
+    /// Clear, reached, and flown to its end.
+    pub pass: bool,
+    /// Why it did not pass, a sentence each; empty where it did.
+    pub reasons: Vec<String>,
+}
+
+impl Verdict {
+    /// Passes where the audit is clear, both detectors agree, the formation is reached and the run was flown to its end.
+    pub(super) fn of(findings: &Findings<'_>) -> Self {
+        let reasons: Vec<_> = [
+            violation(findings),
+            disagreement(findings),
+            undecided(findings),
+            broken_certificate(findings),
+            ended_early(findings),
+            not_reached(findings),
+            too_flat(findings),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        Self { pass: reasons.is_empty(), reasons }
+    }
 }
 
 fn violation(findings: &Findings<'_>) -> Option<String> {

@@ -2,37 +2,10 @@
 
 use std::fmt::Write as _;
 
+use super::flight::Report;
 use super::verdict::breaks_certificate;
-use super::{Report, Status};
-use crate::swarm::at_least;
-
-/// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or
-/// fill a line.
-pub(super) fn metres(number: f64) -> String {
-    if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { format!("{number:.3}") } else { format!("{number:.1e}") }
-}
-
-/// A number with so many decimals, or in powers of ten where that would fill a line.
-pub(super) fn fixed(number: f64, decimals: usize) -> String {
-    if number.abs() < 1e15 { format!("{number:.decimals$}") } else { format!("{number:e}") }
-}
-
-/// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller.
-pub(super) fn metres_below(number: f64, limit_m: f64) -> String {
-    (3..=17)
-        .find(|&decimals| fixed(number, decimals) != fixed(limit_m, decimals))
-        .map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
-}
-
-/// So many of a thing.
-pub(super) fn counted(count: u64, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
-}
-
-/// A time with its unit.
-pub(super) fn seconds(time_s: f64) -> String {
-    format!("{} s", fixed(time_s, 2))
-}
+use crate::audit::Status;
+use crate::text::{at_least, counted, metres, metres_below, seconds};
 
 impl Report {
     /// The verdict in one line.

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use super::claim::{Claim, Kind};
 use super::flights::{engine_to_any_end, times, with_step};
 use super::starts::{COUNTS, RandomStart, random_starts};
-use super::words::bound;
 use super::{Progress, ValidateError};
 use crate::continuous::{self, IdealError, Tolerances};
 use crate::formation::Formation;
@@ -13,6 +12,7 @@ use crate::law::{EdgeTension, EdgeTensionKeys, Law, LawSpec, ParameterError};
 use crate::scenario::{Precision, Scenario};
 use crate::sim::Ending;
 use crate::swarm::{ClosestApproach, Swarm};
+use crate::text::bound;
 
 /// Random starts.
 pub(super) const STARTS: usize = 500;

@@ -4,7 +4,7 @@ use super::claim::{Claim, Kind};
 use super::flights::{builtin, engine};
 use super::{Progress, ValidateError};
 use crate::audit::Status;
-use crate::figures::Course;
+use crate::figures::RunHistory;
 use crate::metrics::Metrics;
 use crate::sim::Flight;
 use crate::swarm::Pair;
@@ -24,7 +24,7 @@ const CIRCLE_MIN_M: f64 = 1.238_135;
 pub(super) struct Flown {
     pub(super) delta_m: f64,
     pub(super) flight: Flight,
-    pub(super) course: Course,
+    pub(super) history: RunHistory,
     reached_at_s: Option<f64>,
 }
 
@@ -39,13 +39,13 @@ pub(super) struct Flights {
 fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, ValidateError> {
     let scenario = builtin(name)?;
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
-    let mut course = Course::new();
+    let mut history = RunHistory::new();
     let flight = engine(&scenario, |sample| {
         metrics.observe(sample);
-        course.observe(sample);
+        history.observe(sample);
     })?;
     progress.advance(1);
-    Ok(Flown { delta_m: scenario.delta_m, reached_at_s: metrics.finish().reached_at_s, flight, course })
+    Ok(Flown { delta_m: scenario.delta_m, reached_at_s: metrics.finish().reached_at_s, flight, history })
 }
 
 /// Pairs in violation by the closed form, in index order.

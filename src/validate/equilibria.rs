@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::claim::{Claim, Kind};
-use super::words::bound;
 use super::{Progress, ValidateError};
 use crate::continuous::{self, Tolerances};
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::scenario::{Scenario, Space, offset, random, scatter};
 use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::text::bound;
 
 /// Orderings of five vehicles on a line, counted up to their mirror image.
 const ORDERINGS: u64 = 60;

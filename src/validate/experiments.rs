@@ -5,12 +5,12 @@ use rayon::prelude::*;
 
 use super::claim::{Claim, Kind};
 use super::flights::{builtin, continuous, reached_at_s, times};
-use super::words::bound;
 use super::{Progress, ValidateError};
 use crate::continuous::Solution;
 use crate::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use crate::scenario::Scenario;
 use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::text::bound;
 
 /// Length of the paper's flights \[s\].
 const DURATION_S: f64 = 120.0;

@@ -3,31 +3,31 @@
 use super::detectors::{Flights, Flown};
 use super::ladder::Rung;
 use super::{ValidateError, tension};
-use crate::figures::{self, Figure, FigureError, Step};
+use crate::figures::{self, Figure, Step};
 
 /// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the ladder.
 pub(super) fn draw(flights: &Flights, ladder: &[Rung]) -> Result<Vec<Figure>, ValidateError> {
     let steps: Vec<Step> =
         ladder.iter().map(|&Rung { dt_s, double_m, single_m, .. }| Step { dt_s, double_m, single_m }).collect();
-    let mut drawn = vec![named("figure-1", figures::tension_curve(&tension::of_figure_1()?, "Fig. 1: edge tension")?)];
-    drawn.extend(of_flight(&flights.pentagon, ["figure-2a", "figure-2b", "figure-2c"], "Fig. 2", "pentagon")?);
-    drawn.extend(of_flight(&flights.circle, ["figure-3a", "figure-3b", "figure-3c"], "Fig. 3", "circle")?);
+    let mut drawn = vec![named("figure-1", figures::tension_curve(&tension::of_figure_1()?, "Fig. 1: edge tension"))];
+    drawn.extend(of_flight(&flights.pentagon, ["figure-2a", "figure-2b", "figure-2c"], "Fig. 2", "pentagon"));
+    drawn.extend(of_flight(&flights.circle, ["figure-3a", "figure-3b", "figure-3c"], "Fig. 3", "circle"));
     let baseline = &flights.baseline;
-    let distances = figures::distances(&baseline.course, baseline.delta_m, None, "Fig. 4: pentagon without avoidance")?;
+    let distances = figures::distances(&baseline.history, baseline.delta_m, None, "Fig. 4: pentagon without avoidance");
     drawn.push(named("figure-4", distances));
-    drawn.push(figures::convergence(&steps, "Rapier against continuous time")?);
+    drawn.push(figures::convergence(&steps, "Rapier against continuous time"));
     Ok(drawn)
 }
 
 /// Paths, control effort and distances.
-fn of_flight(flown: &Flown, names: [&str; 3], number: &str, flight: &str) -> Result<[Figure; 3], FigureError> {
+fn of_flight(flown: &Flown, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
     let [a, b, c] = names;
-    let (course, certified_m) = (&flown.course, flown.flight.certificate.certified_m);
-    Ok([
-        named(a, figures::paths(course, &format!("{number}(a): {flight}, paths"))?),
-        named(b, figures::control(course, &format!("{number}(b): {flight}, control effort"))?),
-        named(c, figures::distances(course, flown.delta_m, certified_m, &format!("{number}(c): {flight}, distances"))?),
-    ])
+    let (history, certified_m) = (&flown.history, flown.flight.certificate.certified_m);
+    [
+        named(a, figures::paths(history, &format!("{number}(a): {flight}, paths"))),
+        named(b, figures::control(history, &format!("{number}(b): {flight}, control effort"))),
+        named(c, figures::distances(history, flown.delta_m, certified_m, &format!("{number}(c): {flight}, distances"))),
+    ]
 }
 
 fn named(name: &str, figure: Figure) -> Figure {

@@ -21,19 +21,12 @@ impl Validation {
         let convergence = |name: &str| name == "convergence";
         let (of_ladder, of_paper): (Vec<_>, Vec<_>) =
             self.figures.iter().cloned().partition(|figure| convergence(&figure.name));
-        sections.push(Section {
-            heading: "Convergence ladder".to_owned(),
-            blocks: vec![Block::Table(ladder(&self.ladder)), Block::Figures(of_ladder)],
-        });
-        sections.push(Section { heading: "The paper's figures".to_owned(), blocks: vec![Block::Figures(of_paper)] });
-        sections.push(Section {
-            heading: "What was assumed".to_owned(),
-            blocks: vec![Block::List(ASSUMED.map(str::to_owned).to_vec())],
-        });
-        sections.push(Section {
-            heading: "Repeat it".to_owned(),
-            blocks: vec![Block::Command("tautline validate".to_owned())],
-        });
+        sections.extend([
+            Section::new("Convergence ladder", vec![Block::Table(ladder(&self.ladder)), Block::Figures(of_ladder)]),
+            Section::new("The paper's figures", vec![Block::Figures(of_paper)]),
+            Section::new("What was assumed", vec![Block::List(ASSUMED.map(str::to_owned).to_vec())]),
+            Section::new("Repeat it", vec![Block::Command("tautline validate".to_owned())]),
+        ]);
         Page {
             title: "Validation".to_owned(),
             kind: "Every claim, ours and the paper's, judged by measurement".to_owned(),
@@ -54,7 +47,7 @@ fn section(group: &Group) -> Section {
         columns: vec![Column::words("Claim"), Column::words("Measured"), Column::words("Outcome")],
         rows: group.claims.iter().map(row).collect(),
     };
-    Section { heading: group.title.to_owned(), blocks: vec![Block::Table(table)] }
+    Section::new(group.title, vec![Block::Table(table)])
 }
 
 fn caption(group: &Group) -> String {

@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use super::claim::{Claim, Kind};
 use super::flights::{builtin, continuous, engine, times, with_step};
-use super::words::bound;
 use super::{Progress, ValidateError};
 use crate::plant::{Path, rapier};
 use crate::scenario::{Precision, Scenario};
 use crate::swarm::{Rows, Swarm, mean_row, row, set_row};
+use crate::text::bound;
 
 /// Steps per second of the ladder, from coarse to fine.
 pub(super) const STEPS_HZ: [f64; 9] = [60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0, 7680.0, 15360.0];

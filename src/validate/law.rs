@@ -4,13 +4,13 @@ use nalgebra::Vector3;
 
 use super::claim::{Claim, Kind};
 use super::starts::{RandomStart, random_starts};
-use super::words::bound;
 use super::{Progress, ValidateError};
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law as _};
 use crate::observation::Observation;
 use crate::swarm::{Rows, Swarm, mean_row, row, set_row};
+use crate::text::bound;
 
 /// Random states that each claim is tried on; every one with each kind of graph.
 const STATES: usize = 200;

@@ -21,7 +21,6 @@ mod page;
 mod rates;
 mod starts;
 mod tension;
-mod words;
 
 pub use claim::{Claim, Kind, Values};
 pub use ladder::Rung;
@@ -32,7 +31,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::continuous::IdealError;
-use crate::figures::{Figure, FigureError};
+use crate::figures::Figure;
 use crate::law::{LawError, ParameterError, TensionError};
 use crate::plant::PlantError;
 use crate::scenario::ScenarioError;
@@ -109,9 +108,6 @@ pub(crate) enum ValidateError {
     /// A plant could not carry out a step.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// A figure cannot be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
     /// A flight failed.
     #[error(transparent)]
     Sim(#[from] SimError),

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::claim::{Claim, Kind};
 use super::flights::{engine, engine_to_any_end, with_step};
-use super::words::bound;
 use super::{Progress, ValidateError};
 use crate::continuous::{self, Tolerances};
 use crate::formation::{Formation, largest_edge_error_m};
@@ -13,6 +12,7 @@ use crate::graph::Graph;
 use crate::scenario::{Precision, Scenario, Space};
 use crate::sim::Ending;
 use crate::swarm::{Rows, Swarm, set_row};
+use crate::text::bound;
 
 const A22_PER_S: f64 = 0.1;
 /// The hexagon of the paper's second example.

@@ -1,9 +1,9 @@
 //! The edge tension (5), (6): its minimum and its derivatives.
 
 use super::claim::{Claim, Kind};
-use super::words::bound;
 use super::{Progress, ValidateError};
 use crate::law::{EdgeTension, TensionError};
+use crate::text::bound;
 
 /// Figure 1 plots the tension for alpha = K = 1 and delta = 0.5 m, and prints the constant of delta = 1 m.
 const FIGURE_1_DELTA_M: f64 = 0.5;

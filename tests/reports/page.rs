@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use tautline::figures::{self, Course};
+use tautline::figures::{self, RunHistory};
 use tautline::report::page::{Badge, Block, Cell, Column, Page, Section, Table, Warning};
 
 const HOSTILE: &str = "</title></pre><script>alert(\"x\")</script>&amp;<img src=x onerror='y'>";
@@ -17,7 +17,7 @@ fn hostile_page() -> Page {
         columns: vec![Column::words(HOSTILE), Column::numbers(HOSTILE)],
         rows: vec![vec![Cell::Noted(text(), text()), Cell::Badge(Badge { word: text(), ..Badge::judged(true) })]],
     };
-    let figure = figures::paths(&Course::new(), HOSTILE).expect("a figure");
+    let figure = figures::paths(&RunHistory::new(), HOSTILE);
     Page {
         title: text(),
         kind: text(),

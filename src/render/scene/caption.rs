@@ -3,7 +3,8 @@
 use super::placing::{Placing, width};
 use super::world::MOST_EDGES;
 use super::{Colour, Mark, Painting, Scene, Theme};
-use crate::swarm::{Pair, at_least};
+use crate::swarm::Pair;
+use crate::text::at_least;
 
 /// Most vehicles whose names are written on them; of more, those that are closer than delta to another are named.
 const NAMED: usize = 64;

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::placing::{Placing, width};
 use super::{Colour, Line, Painting, Scene, single};
+use crate::text::decimals_of;
 
 /// Most lines of the ground in each direction.
 const MOST_LINES: u32 = 60;
@@ -119,8 +120,7 @@ fn lines(length: f64, step: f64) -> u32 {
 
 /// A multiple of a step with as many decimals as the step has.
 fn plain(metres: f64, step: f64) -> String {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 9")]
-    let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    let decimals = decimals_of(step, 9);
     // Adding 0 turns a negative zero into zero.
     format!("{:.decimals$}", (metres / step).round() * step + 0.0)
 }

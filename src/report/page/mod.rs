@@ -161,6 +161,14 @@ impl Column {
     }
 }
 
+impl Section {
+    /// Blocks under a heading.
+    #[must_use]
+    pub fn new(heading: &str, blocks: Vec<Block>) -> Self {
+        Self { heading: heading.to_owned(), blocks }
+    }
+}
+
 impl<T: Into<String>> From<T> for Cell {
     fn from(text: T) -> Self {
         Self::Text(text.into())

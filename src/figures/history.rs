@@ -1,5 +1,6 @@
 //! A run thinned to what a figure can show.
 
+use super::axis::{Axis, extent};
 use crate::record::mcap::Entry;
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::swarm::{ClosestApproach, Rows, row, separation};
@@ -16,16 +17,16 @@ const BYTES_PER_VEHICLE: usize = 32;
 /// Up to this many vehicles every pair has a line of its own in a figure.
 pub(super) const FEW_VEHICLES: usize = 12;
 
-/// The course of a run, folded from its samples in bounded memory.
+/// What figures need of a run, folded from its samples in bounded memory.
 ///
 /// Time is cut into spans of equally many samples; when there are too many, neighbours are merged. A span keeps the
 /// state at its start and the extremes within: the closest approach, the largest energy, control effort and velocity
 /// disagreement. So what a figure must show, the extreme, is never thinned out. Memory is at most some 32 MiB for up
 /// to 16 000 vehicles, whatever the length of the run.
 ///
-/// A course is a [`Sink`]: it can watch a run as it is flown, or [`Course::read`] a recording.
+/// It is a [`Sink`]: it can watch a run as it is flown, or [`RunHistory::read`] a recording.
 #[derive(Clone, Debug, Default)]
-pub struct Course {
+pub struct RunHistory {
     vehicles: usize,
     most_spans: usize,
     samples_per_span: u64,
@@ -56,25 +57,25 @@ pub(super) struct Span {
     pub(super) pair_min_m: Vec<f64>,
 }
 
-impl Course {
-    /// A course without samples.
+impl RunHistory {
+    /// A history without samples.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The course of a recording, read one sample at a time.
+    /// The history of a recording, read one sample at a time.
     ///
     /// # Errors
     /// The first error of the recording.
     pub fn read(recording: impl IntoIterator<Item = Result<Entry, RecordError>>) -> Result<Self, RecordError> {
-        let mut course = Self::new();
+        let mut history = Self::new();
         for entry in recording {
             if let Entry::Sample(sample) = entry? {
-                course.observe(&sample.as_sample());
+                history.observe(&sample.as_sample());
             }
         }
-        Ok(course)
+        Ok(history)
     }
 
     /// Takes one sample, in the order of time. One of another number of vehicles than the first is passed over.
@@ -110,15 +111,13 @@ impl Course {
 
     /// Merges every two spans into one.
     fn halve(&mut self) {
-        let mut merged = Vec::with_capacity(self.most_spans);
         let mut spans = std::mem::take(&mut self.spans).into_iter();
         while let Some(mut span) = spans.next() {
             if let Some(next) = spans.next() {
                 span.absorb(&next);
             }
-            merged.push(span);
+            self.spans.push(span);
         }
-        self.spans = merged;
         self.samples_per_span *= 2;
     }
 
@@ -157,6 +156,11 @@ impl Course {
         self.spans.iter().chain(&self.last)
     }
 
+    /// The axis of time \[s\].
+    pub(super) fn time_axis(&self) -> Axis {
+        Axis::time(self.spans().next().map_or(0.0, |span| span.time_s), self.end_s())
+    }
+
     /// At most `most` of the spans (at least two), evenly spread, the first and the last among them.
     pub(super) fn spread(&self, most: usize) -> Vec<&Span> {
         let all: Vec<_> = self.spans().collect();
@@ -175,20 +179,13 @@ impl Course {
         z <= FLATNESS * x.max(y)
     }
 
-    /// Smallest and largest coordinate along an axis \[m\]; none where nothing is finite.
+    /// Smallest and largest coordinate along an axis \[m\]; none where nothing has a place on one.
     pub(super) fn extent(&self, axis: usize) -> Option<(f64, f64)> {
-        let mut extent: Option<(f64, f64)> = None;
-        for span in self.spans() {
-            for x in span.positions_m.column(axis).iter().copied().filter(|x| x.is_finite()) {
-                let (low, high) = extent.unwrap_or((x, x));
-                extent = Some((low.min(x), high.max(x)));
-            }
-        }
-        extent
+        extent(self.spans().flat_map(|span| (0..self.vehicles).map(move |i| span.positions_m[(i, axis)])))
     }
 }
 
-impl Sink for Course {
+impl Sink for RunHistory {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.observe(sample);
         Ok(())
@@ -220,6 +217,11 @@ impl Span {
         }
     }
 
+    /// Control efforts that are numbers \[m/s^2\].
+    pub(super) fn finite_control(&self) -> impl Iterator<Item = f64> {
+        self.control_m_s2.iter().copied().filter(|effort| effort.is_finite())
+    }
+
     /// Takes in the extremes of a later span.
     fn absorb(&mut self, later: &Self) {
         let raise = |kept: &mut f64, other: f64| *kept = kept.max(other);
@@ -239,15 +241,19 @@ pub(super) fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> + Clon
     (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }
 
+/// The `k`-th of numbers below `count` that fill them evenly and follow no order of theirs: multiples of the golden ratio
+/// spread over the unit interval.
+pub(super) fn evenly(k: usize, count: usize) -> usize {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+    let number = ((golden * k as f64).fract() * count as f64) as usize;
+    number.min(count - 1)
+}
+
 /// The closer approach; the first of equals, and never one that is not a number.
 fn closer(a: Option<ClosestApproach>, b: Option<ClosestApproach>) -> Option<ClosestApproach> {
-    let mut closest: Option<ClosestApproach> = None;
-    for candidate in [a, b].into_iter().flatten().filter(|candidate| candidate.separation_m.is_finite()) {
-        if closest.is_none_or(|closest| candidate.separation_m < closest.separation_m) {
-            closest = Some(candidate);
-        }
-    }
-    closest
+    let known = [a, b].into_iter().flatten().filter(|closest| closest.separation_m.is_finite());
+    known.reduce(|first, second| if second.separation_m < first.separation_m { second } else { first })
 }
 
 #[cfg(test)]
@@ -256,15 +262,15 @@ mod tests {
     use crate::swarm::{Pair, Swarm};
 
     /// Two vehicles on the x axis, sampled every 0.01 s; sample `k` has distance, energy and effort of `f(k)`.
-    fn course(samples: u64, f: impl Fn(u64) -> f64) -> Course {
-        let mut course = Course::new();
+    fn history(samples: u64, f: impl Fn(u64) -> f64) -> RunHistory {
+        let mut history = RunHistory::new();
         for k in 0..samples {
             let value = f(k);
             let time_s = k as f64 * 0.01;
             let swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, value, 0.0, 0.0]));
             let control = Rows::from_row_slice(&[value, 0.0, 0.0, 0.0, 1.0, 0.0]);
             let separation = ClosestApproach { pair: Pair::new(0, 1), separation_m: value, time_s };
-            course.observe(&Sample {
+            history.observe(&Sample {
                 time_s,
                 step: k,
                 swarm: &swarm,
@@ -274,14 +280,14 @@ mod tests {
                 channels: &[],
             });
         }
-        course
+        history
     }
 
     #[test]
     fn a_long_run_keeps_a_bounded_number_of_spans_and_both_of_its_ends() {
         for samples in [1, 2, 2047, 2048, 2049, 100_000] {
-            let course = course(samples, |_| 3.0);
-            let spans: Vec<_> = course.spans().collect();
+            let history = history(samples, |_| 3.0);
+            let spans: Vec<_> = history.spans().collect();
             assert!(spans.len() <= MOST_SPANS + 1, "{} spans of {samples} samples", spans.len());
             assert_eq!(spans[0].time_s, 0.0);
             assert_eq!(spans[spans.len() - 1].time_s, (samples - 1) as f64 * 0.01);
@@ -293,32 +299,32 @@ mod tests {
     fn an_extreme_of_one_sample_survives_every_thinning() {
         let samples = 50_000;
         for at in [1, 777, 12_345, samples - 1] {
-            let low = course(samples, |k| if k == at { 0.5 } else { 3.0 });
+            let low = history(samples, |k| if k == at { 0.5 } else { 3.0 });
             let smallest = low.spans().map(|span| span.pair_min_m[0]).fold(f64::INFINITY, f64::min);
             assert_eq!(smallest, 0.5);
             assert_eq!(
                 low.closest().map(|closest| (closest.separation_m, closest.time_s)),
                 Some((0.5, at as f64 * 0.01))
             );
-            let high = course(samples, |k| if k == at { 9.0 } else { 3.0 });
+            let high = history(samples, |k| if k == at { 9.0 } else { 3.0 });
             assert_eq!(high.spans().map(|span| span.control_m_s2[0]).fold(0.0, f64::max), 9.0);
             assert_eq!(high.spans().filter_map(|span| span.energy).fold(0.0, f64::max), 9.0);
         }
     }
 
     #[test]
-    fn a_course_without_samples_has_nothing() {
-        let course = Course::new();
-        assert_eq!((course.vehicles(), course.samples(), course.end_s()), (0, 0, 0.0));
-        assert!(course.spans().next().is_none() && course.spread(8).is_empty() && course.extent(0).is_none());
-        assert!(course.is_level());
+    fn a_history_without_samples_has_nothing() {
+        let history = RunHistory::new();
+        assert_eq!((history.vehicles(), history.samples(), history.end_s()), (0, 0, 0.0));
+        assert!(history.spans().next().is_none() && history.spread(8).is_empty() && history.extent(0).is_none());
+        assert!(history.is_level());
     }
 
     #[test]
     fn samples_of_another_swarm_and_numbers_that_are_not_finite_are_passed_over() {
-        let mut course = course(3, |k| if k == 1 { f64::NAN } else { 3.0 });
+        let mut history = history(3, |k| if k == 1 { f64::NAN } else { 3.0 });
         let (swarm, control) = (Swarm::at_rest(Rows::zeros(5)), Rows::zeros(0));
-        course.observe(&Sample {
+        history.observe(&Sample {
             time_s: 9.0,
             step: 9,
             swarm: &swarm,
@@ -327,8 +333,8 @@ mod tests {
             energy: None,
             channels: &[],
         });
-        assert_eq!((course.samples(), course.end_s()), (3, 0.02));
-        assert_eq!(course.closest().map(|closest| closest.separation_m), Some(3.0));
-        assert_eq!(course.extent(0), Some((0.0, 3.0)));
+        assert_eq!((history.samples(), history.end_s()), (3, 0.02));
+        assert_eq!(history.closest().map(|closest| closest.separation_m), Some(3.0));
+        assert_eq!(history.extent(0), Some((0.0, 3.0)));
     }
 }

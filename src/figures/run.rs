@@ -1,0 +1,49 @@
+//! All figures of a run.
+
+use super::distances::distances;
+use super::figure::Figure;
+use super::history::RunHistory;
+use super::paths::{paths, paths_in_space};
+use super::scalars::{control, disagreement, energy, shape_error};
+use crate::formation::Formation;
+use crate::graph::Graph;
+
+/// What the figures of a run are measured by.
+#[derive(Clone, Copy, Debug)]
+pub struct Criteria<'a> {
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
+    /// Distance that the law's certificate promised \[m\].
+    pub certified_m: Option<f64>,
+    /// The formation, and the graph whose edges it is judged by.
+    pub shape: Option<(&'a Formation, &'a Graph)>,
+    /// Largest edge error that counts as reached \[m\].
+    pub edge_error_m: Option<f64>,
+    /// Largest velocity disagreement that counts as reached \[m/s\].
+    pub disagreement_m_s: Option<f64>,
+}
+
+/// Every figure that a run has data for, in the order in which they are best read.
+#[must_use]
+pub fn of_run(history: &RunHistory, criteria: &Criteria<'_>) -> Vec<Figure> {
+    let mut figures = vec![paths(history, "Paths from above")];
+    if !history.is_level() {
+        figures.push(paths_in_space(history, "Paths in space"));
+    }
+    if history.vehicles() > 1 {
+        figures.push(distances(history, criteria.delta_m, criteria.certified_m, "Distances between vehicles"));
+    }
+    figures.push(control(history, "Control effort"));
+    if history.energy_initial().is_some() {
+        figures.push(energy(history, "Energy"));
+    }
+    if let Some((formation, graph)) = criteria.shape {
+        figures.push(shape_error(history, formation, graph, criteria.edge_error_m, "Shape error"));
+    }
+    figures.push(disagreement(history, criteria.disagreement_m_s, "Velocity disagreement"));
+    figures
+}
+
+/// Names of all figures that [`of_run`] can draw.
+pub const NAMES_OF_RUN: [&str; 7] =
+    ["paths", "paths-3d", "distances", "control", "energy", "shape-error", "disagreement"];

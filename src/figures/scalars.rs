@@ -1,0 +1,115 @@
+//! Single numbers of a run over time.
+
+use super::axis::Axis;
+use super::chart::{Band, Chart};
+use super::distances::quantile;
+use super::figure::Figure;
+use super::history::{FEW_VEHICLES, RunHistory, Span};
+use super::svg::{INK, PALETTE, Stroke};
+use crate::formation::{Formation, largest_edge_error_m};
+use crate::graph::Graph;
+
+/// Distances that are computed for the shape error, at most.
+const DISTANCES: usize = 16_000_000;
+/// Fewest instants that its curve is drawn through.
+const FEWEST_INSTANTS: usize = 48;
+
+/// Control effort |u| \[m/s^2\] over time \[s\]: a line for each of up to 12 vehicles; of more vehicles the largest
+/// effort, the median and the band that holds nine tenths of them.
+#[must_use]
+pub fn control(history: &RunHistory, title: &str) -> Figure {
+    let count = history.vehicles();
+    let peak = history.spans().flat_map(|span| &span.control_m_s2).copied().fold(0.0, f64::max);
+    let y =
+        Axis::linear("control effort |u| [m/s²]", history.spans().flat_map(Span::finite_control).chain([0.0]), true);
+    let mut chart = Chart::new(history.time_axis(), y);
+    if count <= FEW_VEHICLES {
+        for i in 0..count {
+            let points = history.spans().map(|span| (span.time_s, span.control_m_s2[i])).collect();
+            chart.line(points, Stroke::of_line(i), format!("vehicle {}", i + 1));
+        }
+    } else {
+        let ranks = history.spans().map(|span| {
+            let mut efforts: Vec<_> = span.finite_control().collect();
+            (span.time_s, [0.05, 0.5, 0.95, 1.0].map(|share| quantile(&mut efforts, share)))
+        });
+        let ranks: Vec<_> = ranks.collect();
+        let points = |k: usize| ranks.iter().map(|(time_s, ranks)| (*time_s, ranks[k])).collect();
+        chart.line(points(3), Stroke::solid(PALETTE[1], 1.5), "largest");
+        chart.line(points(1), Stroke::solid(PALETTE[0], 1.5), "median");
+        let points = ranks.iter().map(|&(time_s, [low, _, high, _])| (time_s, low, high)).collect();
+        chart.bands.push(Band { points, colour: PALETTE[0], opacity: 0.2, label: Some("5 to 95 %".to_owned()) });
+    }
+    let description = format!("Control effort of {count} vehicles over time; at most {peak:.3} m/s².");
+    chart.figure("control", title, &description)
+}
+
+/// The law's energy \[m^2/s^2\] over time \[s\] with E(0), which on a complete graph it never exceeds.
+#[must_use]
+pub fn energy(history: &RunHistory, title: &str) -> Figure {
+    let points: Vec<_> = history.spans().filter_map(|span| Some((span.time_s, span.energy?))).collect();
+    let initial = history.energy_initial();
+    let y = Axis::linear("energy E [m²/s²]", points.iter().map(|&(_, y)| y).chain(initial).chain([0.0]), true);
+    let largest = points.iter().map(|&(_, y)| y).fold(f64::NAN, f64::max);
+    let mut chart = Chart::new(history.time_axis(), y);
+    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "E(t)");
+    let mut comparison = String::new();
+    if let Some(initial) = initial {
+        chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
+        let excess = largest / initial - 1.0;
+        comparison = if excess > 0.0 {
+            format!(" It exceeds E(0), {initial:.4} m²/s², by a share of {excess:.1e}.")
+        } else {
+            format!(" It never exceeds E(0), {initial:.4} m²/s².")
+        };
+    }
+    chart.figure("energy", title, &format!("The law's energy over time.{comparison}"))
+}
+
+/// Largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\].
+///
+/// `allowed_m` is what counts as reached.
+#[must_use]
+pub fn shape_error(
+    history: &RunHistory,
+    formation: &Formation,
+    graph: &Graph,
+    allowed_m: Option<f64>,
+    title: &str,
+) -> Figure {
+    let fits = formation.count() == history.vehicles() && graph.count() == history.vehicles();
+    let instants = history.spread((DISTANCES / graph.edge_count().max(1)).max(FEWEST_INSTANTS));
+    let error = |span: &&Span| (span.time_s, largest_edge_error_m(&span.positions_m, formation, graph));
+    let points = if fits { instants.iter().map(error).collect() } else { Vec::new() };
+    decay(history, "shape-error", title, "largest edge error", "m", points, allowed_m)
+}
+
+/// Largest speed relative to the swarm's mean velocity \[m/s\], on a logarithmic axis, over time \[s\].
+///
+/// `allowed_m_s` is what counts as reached.
+#[must_use]
+pub fn disagreement(history: &RunHistory, allowed_m_s: Option<f64>, title: &str) -> Figure {
+    let points = history.spans().map(|span| (span.time_s, span.disagreement_m_s)).collect();
+    decay(history, "disagreement", title, "velocity disagreement", "m/s", points, allowed_m_s)
+}
+
+/// A number that should vanish, on a logarithmic axis, with the largest value that counts as vanished.
+fn decay(
+    history: &RunHistory,
+    name: &str,
+    title: &str,
+    what: &str,
+    unit: &str,
+    points: Vec<(f64, f64)>,
+    allowed: Option<f64>,
+) -> Figure {
+    let y = Axis::log(&format!("{what} [{unit}]"), points.iter().map(|&(_, y)| y).chain(allowed));
+    let at_end = points.last().map_or(f64::NAN, |&(_, y)| y);
+    let mut chart = Chart::new(history.time_axis(), y);
+    chart.line(points, Stroke::solid(PALETTE[0], 1.8), what);
+    if let Some(allowed) = allowed {
+        chart.level(allowed, Stroke::dashed(INK, 1.3), format!("counts as reached: {allowed} {unit}"));
+    }
+    let description = format!("The {what} over time on a logarithmic axis; {at_end:.2e} {unit} at the end.");
+    chart.figure(name, title, &description)
+}

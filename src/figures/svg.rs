@@ -1,0 +1,228 @@
+//! A drawing in SVG: its colours, strokes, shapes and words.
+
+use std::fmt::Write as _;
+
+use maud::{PreEscaped, html};
+
+use super::figure::Figure;
+
+/// A place on the drawing, to the right and down \[px\].
+pub(super) type Point = (f64, f64);
+
+/// Font sizes \[px\].
+pub(super) const TEXT: f64 = 13.0;
+const HEADING: f64 = 14.0;
+/// Where the title stands \[px\].
+const TITLE_BASELINE: f64 = 19.0;
+const MARK_WIDTH: f64 = 1.6;
+
+/// A colour on light paper and on dark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Colour {
+    light: &'static str,
+    dark: &'static str,
+}
+
+const fn colour(light: &'static str, dark: &'static str) -> Colour {
+    Colour { light, dark }
+}
+
+const PAPER: Colour = colour("#FFFFFF", "#14191F");
+pub(super) const INK: Colour = colour("#1B1F24", "#E6EAEF");
+pub(super) const SOFT_INK: Colour = colour("#57606A", "#9AA4AF");
+pub(super) const GRID: Colour = colour("#E1E4E8", "#2A323B");
+
+/// Colours that colour-blind people tell apart (after Okabe and Ito), each with a contrast of at least 3 on both papers.
+pub(super) const PALETTE: [Colour; 6] = [
+    colour("#0072B2", "#56A8E0"),
+    colour("#D55E00", "#F07F2E"),
+    colour("#00936C", "#2FBF94"),
+    colour("#B85F95", "#DB8DBB"),
+    colour("#9A7600", "#CBA42B"),
+    colour("#7D858E", "#A5ADB6"),
+];
+
+/// The style sheet that exchanges the colours on dark pages.
+fn style() -> String {
+    let exchange = [PAPER, INK, SOFT_INK, GRID].into_iter().chain(PALETTE).flat_map(|Colour { light, dark }| {
+        ["fill", "stroke"].map(|paint| format!(".tautline-figure [{paint}=\"{light}\"]{{{paint}:{dark}}}"))
+    });
+    format!("@media (prefers-color-scheme:dark){{{}}}", exchange.collect::<String>())
+}
+
+/// How a line is stroked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stroke {
+    pub(super) colour: Colour,
+    width: f64,
+    opacity: f64,
+    /// Lengths of dashes and of gaps; none for a solid line.
+    dashes: Option<&'static str>,
+}
+
+const DASHED: Option<&str> = Some("6 4");
+const DOTTED: Option<&str> = Some("2 3");
+
+impl Stroke {
+    pub(super) fn solid(colour: Colour, width: f64) -> Self {
+        Self { colour, width, opacity: 1.0, dashes: None }
+    }
+
+    pub(super) fn dashed(colour: Colour, width: f64) -> Self {
+        Self { dashes: DASHED, ..Self::solid(colour, width) }
+    }
+
+    /// The stroke of the `k`-th of several lines: colours first, then dashes.
+    pub(super) fn of_line(k: usize) -> Self {
+        let dashes = [None, DASHED, DOTTED][(k / PALETTE.len()) % 3];
+        Self { dashes, ..Self::solid(PALETTE[k % PALETTE.len()], 1.5) }
+    }
+
+    /// The same, seen through.
+    pub(super) fn faint(self, opacity: f64) -> Self {
+        Self { opacity, ..self }
+    }
+
+    fn opacity(self) -> Option<f64> {
+        (self.opacity < 1.0).then_some(self.opacity)
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Marker {
+    Cross,
+    Ring,
+}
+
+/// Which point of a text is put in its place: left, centre or right, and below (first letter), middle or above.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Align(&'static str, &'static str);
+
+impl Align {
+    pub(super) const LEFT_BELOW: Self = Self("start", "0");
+    pub(super) const LEFT: Self = Self("start", "0.35em");
+    pub(super) const CENTRE_BELOW: Self = Self("middle", "0");
+    pub(super) const CENTRE_ABOVE: Self = Self("middle", "0.76em");
+    pub(super) const RIGHT: Self = Self("end", "0.35em");
+    pub(super) const RIGHT_ABOVE: Self = Self("end", "0.76em");
+}
+
+/// A drawing on its way.
+#[derive(Clone, Debug)]
+pub(super) struct Canvas {
+    size: (f64, f64),
+    title: String,
+    shapes: String,
+}
+
+impl Canvas {
+    /// Paper of a size \[px\] under a title, centred about `middle`.
+    pub(super) fn new(size: (f64, f64), title: &str, middle: f64) -> Self {
+        let title = printable(title);
+        let shapes = html! {
+            rect width="100%" height="100%" fill=(PAPER.light) {}
+            text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.light) { (title) }
+        };
+        Self { size, title, shapes: shapes.into_string() }
+    }
+
+    /// A line through points; a dot where it is only one.
+    pub(super) fn line(&mut self, points: &[Point], stroke: Stroke) {
+        let Stroke { colour, width, dashes, .. } = stroke;
+        let shape = match *points {
+            [] => return,
+            [(x, y)] => html! {
+                circle cx=(px(x)) cy=(px(y)) r=(width) fill=(colour.light) opacity=[stroke.opacity()] {}
+            },
+            _ => html! {
+                polyline points=(corners(points)) stroke=(colour.light) stroke-width=(width) stroke-dasharray=[dashes]
+                    opacity=[stroke.opacity()] {}
+            },
+        };
+        self.shapes += &shape.into_string();
+    }
+
+    /// A filled area within corners.
+    pub(super) fn area(&mut self, points: &[Point], colour: Colour, opacity: f64) {
+        let shape = html! { polygon points=(corners(points)) fill=(colour.light) opacity=(opacity) {} };
+        self.shapes += &shape.into_string();
+    }
+
+    /// A marker of a radius \[px\].
+    pub(super) fn marker(&mut self, marker: Marker, (x, y): Point, radius: f64, colour: Colour) {
+        match marker {
+            Marker::Ring => {
+                let shape = html! {
+                    circle cx=(px(x)) cy=(px(y)) r=(radius) stroke=(colour.light) stroke-width=(MARK_WIDTH) {}
+                };
+                self.shapes += &shape.into_string();
+            }
+            Marker::Cross => {
+                for down in [radius, -radius] {
+                    self.line(&[(x - radius, y - down), (x + radius, y + down)], Stroke::solid(colour, MARK_WIDTH));
+                }
+            }
+        }
+    }
+
+    /// A text beside a marker: to the lower left of a cross and to the upper right of a ring, so that the numbers of one
+    /// that ends where it started stay apart.
+    pub(super) fn text_beside(&mut self, marker: Marker, (x, y): Point, words: &str) {
+        match marker {
+            Marker::Cross => self.text((x - 5.0, y + 4.0), Align::RIGHT_ABOVE, words),
+            Marker::Ring => self.text((x + 6.0, y - 3.0), Align::LEFT_BELOW, words),
+        }
+    }
+
+    pub(super) fn text(&mut self, (x, y): Point, Align(anchor, dy): Align, words: &str) {
+        let shape =
+            html! { text x=(px(x)) y=(px(y)) text-anchor=(anchor) dy=(dy) fill=(INK.light) { (printable(words)) } };
+        self.shapes += &shape.into_string();
+    }
+
+    /// A text that is read upwards.
+    pub(super) fn text_upwards(&mut self, (x, y): Point, words: &str) {
+        let turned = format!("translate({} {}) rotate(-90)", px(x), px(y));
+        let shape = html! { text transform=(turned) text-anchor="middle" fill=(INK.light) { (words) } };
+        self.shapes += &shape.into_string();
+    }
+
+    /// The figure, with a description for people who cannot see it.
+    pub(super) fn figure(self, name: &str, description: &str) -> Figure {
+        let Self { size: (width, height), title, shapes } = self;
+        let description = printable(description);
+        let label = format!("{title}. {description}");
+        let svg = html! {
+            svg xmlns="http://www.w3.org/2000/svg" class="tautline-figure" width=(width) height=(height)
+                viewBox=(format!("0 0 {width} {height}")) fill="none" font-family="sans-serif" font-size=(TEXT)
+                role="img" aria-label=(label) {
+                title { (title) }
+                desc { (description) }
+                style { (PreEscaped(style())) }
+                (PreEscaped(shapes))
+            }
+        };
+        Figure { name: name.to_owned(), title, description, svg: svg.into_string() }
+    }
+}
+
+/// The same text without control characters, which XML does not allow.
+fn printable(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).collect()
+}
+
+/// A length to a tenth of a pixel.
+fn px(length: f64) -> f64 {
+    // Adding 0 turns -0 into 0.
+    (length * 10.0).round() / 10.0 + 0.0
+}
+
+fn corners(points: &[Point]) -> String {
+    let mut text = String::with_capacity(12 * points.len());
+    for &(x, y) in points {
+        let space = if text.is_empty() { "" } else { " " };
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{space}{},{}", px(x), px(y));
+    }
+    text
+}

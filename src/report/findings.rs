@@ -1,0 +1,103 @@
+//! What a report is made of.
+
+use serde::{Deserialize, Serialize};
+
+use crate::audit::AuditOutcome;
+use crate::law::Certificate;
+use crate::metrics::Summary;
+use crate::target::Arrival;
+
+/// Everything that a report is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Findings<'a> {
+    /// Name of the scenario.
+    pub scenario_name: &'a str,
+    /// SHA-256 of the resolved scenario, 64 hexadecimal digits.
+    pub scenario_sha256: &'a str,
+    /// Safety distance delta that was judged by \[m\].
+    pub delta_m: f64,
+    /// What counted as reached.
+    pub judge: Arrival,
+    /// Dimension of the flat that the start never leaves, where the formation does not fit into it: 0 point, 1 line,
+    /// 2 plane.
+    pub trap_dimension: Option<usize>,
+    /// Dimension of the smallest flat that holds the formation.
+    pub formation_dimension: usize,
+    /// What the law promised.
+    pub certificate: &'a Certificate,
+    /// What the judge found.
+    pub audit: &'a AuditOutcome,
+    /// Pairs whose keep-out balls the engine's own collision detection saw overlap; none for a plant without one.
+    pub engine_contact_pairs: Option<u64>,
+    /// Numbers of the samples.
+    pub summary: &'a Summary,
+    /// Facts of the run.
+    pub run: &'a Run,
+    /// Wall-clock times.
+    pub performance: Performance,
+    /// How the run ended, if before its time.
+    pub ended_early: Option<EndedEarly<'a>>,
+}
+
+/// A run that ended before its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndedEarly<'a> {
+    /// When \[s\].
+    pub time_s: f64,
+    /// Why, such as `interrupted`.
+    pub reason: &'a str,
+}
+
+/// Facts of the run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Time flown \[s\].
+    pub duration_s: f64,
+    /// Control and physics step \[s\].
+    pub dt_s: f64,
+    /// Steps flown.
+    pub steps: u64,
+    /// Number of vehicles N.
+    pub vehicles: usize,
+    /// [`crate::record::StateHash`] of the recorded states.
+    pub state_hash: String,
+}
+
+/// Wall-clock times. Work done side by side counts in each kind.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Performance {
+    /// From first to last step \[s\].
+    pub wall_s: Option<f64>,
+    /// Time flown over `wall_s`.
+    pub real_time_factor: Option<f64>,
+    /// In the law \[s\].
+    pub law_s: Option<f64>,
+    /// In the plant \[s\].
+    pub physics_s: Option<f64>,
+    /// In the judge \[s\].
+    pub audit_s: Option<f64>,
+    /// In the recorders \[s\].
+    pub record_s: Option<f64>,
+}
+
+impl Performance {
+    /// The same without what is no finite number.
+    pub(super) fn finite(self) -> Self {
+        let finite = |number: Option<f64>| number.and_then(finite);
+        Self {
+            wall_s: finite(self.wall_s),
+            real_time_factor: finite(self.real_time_factor),
+            law_s: finite(self.law_s),
+            physics_s: finite(self.physics_s),
+            audit_s: finite(self.audit_s),
+            record_s: finite(self.record_s),
+        }
+    }
+}
+
+/// None for what is no finite number.
+pub(super) fn finite(number: f64) -> Option<f64> {
+    Some(number).filter(|number| number.is_finite())
+}

@@ -1,0 +1,252 @@
+//! `report.json`.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::artefact::{ArtefactError, write_atomically};
+use super::findings::{Findings, Performance, Run, finite};
+use super::verdict::Verdict;
+use crate::audit::{Status, Violation};
+
+/// Version of the keys: raised when one is renamed, removed or changes its meaning.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The content of `report.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Report {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// What was flown.
+    pub scenario: ScenarioIdentity,
+    /// What flew it.
+    pub tool: Tool,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// How close vehicles came.
+    pub separation: Separation,
+    /// What the judgement rests on.
+    pub audit: Audit,
+    /// How near the formation was at the end.
+    pub formation: FormationNumbers,
+    /// The law's energy.
+    pub energy: Energy,
+    /// Commanded accelerations.
+    pub control: Control,
+    /// Velocities at the end.
+    pub velocity: Velocity,
+    /// Facts of the run.
+    pub run: Run,
+    /// Wall-clock times, the only part that differs between two runs of one scenario.
+    pub performance: Performance,
+}
+
+/// Which scenario it was.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScenarioIdentity {
+    /// Name of the scenario.
+    pub name: String,
+    /// SHA-256 of the resolved scenario, 64 hexadecimal digits.
+    pub sha256: String,
+}
+
+/// Which program it was.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tool {
+    /// Name of the program.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+}
+
+/// How close vehicles came.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Separation {
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
+    /// Smallest distance of two centres over the whole run \[m\].
+    pub min_m: Option<f64>,
+    /// When it occurred \[s\].
+    pub min_at_s: Option<f64>,
+    /// Which pair.
+    pub min_pair: Option<[usize; 2]>,
+    /// Distance that the law's certificate promised before the first step \[m\].
+    pub certified_m: Option<f64>,
+    /// Why the certificate is void, a sentence each; empty where it holds.
+    pub certificate_void: Vec<String>,
+}
+
+/// What the judgement rests on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Audit {
+    /// The judge's verdict on separation.
+    pub status: Status,
+    /// Every time that a pair was closer than delta.
+    pub violations: Vec<Violation>,
+    /// Steps swept.
+    pub steps: u64,
+    /// Pairs swept, summed over all steps.
+    pub pairs_checked: u64,
+    /// The closed-form sweep, which decides.
+    pub closed_form: ClosedForm,
+    /// The shape cast, which must agree.
+    pub parry: Parry,
+    /// The engine's own collision detection, which is evidence alone.
+    pub rapier: Rapier,
+}
+
+/// The closed-form sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClosedForm {
+    /// Smallest distance of two centres \[m\].
+    pub min_m: Option<f64>,
+}
+
+/// The shape cast.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parry {
+    /// Earliest contact of two keep-out balls \[s\]; null where there was none.
+    pub min_toi_s: Option<f64>,
+    /// Casts that contradict the closed form.
+    pub disagreements: u64,
+}
+
+/// The engine's own collision detection.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rapier {
+    /// Pairs whose keep-out balls it saw overlap at the end of some step; null for a plant without one.
+    pub contact_pairs: Option<u64>,
+}
+
+/// How near the formation was.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FormationNumbers {
+    /// Whether it was reached and kept to the end.
+    pub reached: bool,
+    /// From when on \[s\].
+    pub reached_at_s: Option<f64>,
+    /// Largest error of a desired distance at the end \[m\].
+    pub max_edge_error_m: Option<f64>,
+    /// Root mean square distance from the best-placed formation at the end \[m\].
+    pub rms_position_error_m: Option<f64>,
+}
+
+/// The law's energy \[m^2/s^2\].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Energy {
+    /// At the start.
+    pub initial: Option<f64>,
+    /// At the end.
+    #[serde(rename = "final")]
+    pub at_end: Option<f64>,
+    /// Largest over the samples, as a ratio to the initial one.
+    pub max_over_initial: Option<f64>,
+}
+
+/// Commanded accelerations, the largest of any vehicle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Control {
+    /// Over all samples \[m/s^2\].
+    pub peak_m_s2: Option<f64>,
+    /// At the end \[m/s^2\].
+    pub final_m_s2: Option<f64>,
+}
+
+/// Velocities at the end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Velocity {
+    /// Largest speed relative to the swarm's mean velocity \[m/s\].
+    pub disagreement_m_s: Option<f64>,
+    /// Speed of the mean velocity \[m/s\].
+    pub common_m_s: Option<f64>,
+}
+
+impl Report {
+    /// The report on what was found.
+    #[must_use]
+    pub fn new(findings: &Findings<'_>) -> Self {
+        let Findings { audit, summary, certificate, .. } = findings;
+        let closest = audit.closest;
+        Self {
+            schema_version: SCHEMA_VERSION,
+            scenario: ScenarioIdentity {
+                name: findings.scenario_name.to_owned(),
+                sha256: findings.scenario_sha256.to_owned(),
+            },
+            tool: Tool { name: env!("CARGO_PKG_NAME").to_owned(), version: env!("CARGO_PKG_VERSION").to_owned() },
+            verdict: Verdict::of(findings),
+            separation: Separation {
+                delta_m: findings.delta_m,
+                min_m: closest.and_then(|closest| finite(closest.separation_m)),
+                min_at_s: closest.and_then(|closest| finite(closest.time_s)),
+                min_pair: closest.map(|closest| closest.pair.numbers()),
+                certified_m: certificate.certified_m.and_then(finite),
+                certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+            },
+            audit: Audit {
+                status: audit.status,
+                violations: audit.violations.clone(),
+                steps: audit.steps,
+                pairs_checked: audit.pairs_checked,
+                closed_form: ClosedForm { min_m: closest.and_then(|closest| finite(closest.separation_m)) },
+                parry: Parry {
+                    min_toi_s: audit.parry.min_toi_s.and_then(finite),
+                    disagreements: audit.parry.disagreements,
+                },
+                rapier: Rapier { contact_pairs: findings.engine_contact_pairs },
+            },
+            formation: FormationNumbers {
+                reached: summary.reached_at_s.is_some(),
+                reached_at_s: summary.reached_at_s.and_then(finite),
+                max_edge_error_m: finite(summary.max_edge_error_m),
+                rms_position_error_m: finite(summary.rms_position_error_m),
+            },
+            energy: Energy {
+                initial: summary.energy_initial.and_then(finite),
+                at_end: summary.energy_final.and_then(finite),
+                max_over_initial: summary.energy_max_over_initial.and_then(finite),
+            },
+            control: Control {
+                peak_m_s2: finite(summary.peak_control_m_s2),
+                final_m_s2: finite(summary.final_control_m_s2),
+            },
+            velocity: Velocity {
+                disagreement_m_s: finite(summary.disagreement_m_s),
+                common_m_s: finite(summary.common_m_s),
+            },
+            run: findings.run.clone(),
+            performance: findings.performance.finite(),
+        }
+    }
+
+    /// The report as indented JSON with a line end.
+    ///
+    /// # Errors
+    /// None in practice: every key is a string and every value has a JSON form.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        let mut json = serde_json::to_string_pretty(self)?;
+        json.push('\n');
+        Ok(json)
+    }
+
+    /// Writes the report as JSON to `path`: whole, or not at all.
+    ///
+    /// # Errors
+    /// [`ArtefactError`] when the system refuses.
+    pub fn write(&self, path: &Path) -> Result<(), ArtefactError> {
+        let json = self.to_json().map_err(|error| ArtefactError::new(path, error.into()))?;
+        write_atomically(path, json.as_bytes())
+    }
+}

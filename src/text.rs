@@ -1,0 +1,102 @@
+//! Numbers as people read them.
+
+/// A number with so many decimals, or in powers of ten where that would fill a line.
+pub(crate) fn fixed(number: f64, decimals: usize) -> String {
+    const LONG: f64 = 1e15;
+    if number.abs() < LONG { format!("{number:.decimals$}") } else { format!("{number:e}") }
+}
+
+/// Like [`fixed`], rounded down: what is said to be "never closer than" this never is.
+pub(crate) fn at_least(number: f64, decimals: u8) -> String {
+    let places = usize::from(decimals);
+    let shown = fixed(number, places);
+    match shown.parse::<f64>() {
+        Ok(rounded) if rounded > number => fixed(rounded - 0.1_f64.powi(i32::from(decimals)), places),
+        _ => shown,
+    }
+}
+
+/// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller.
+pub(crate) fn metres_below(number: f64, limit_m: f64) -> String {
+    let differs = |&decimals: &usize| fixed(number, decimals) != fixed(limit_m, decimals);
+    (3..=17).find(differs).map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
+}
+
+/// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or fill a line.
+pub(crate) fn metres(number: f64) -> String {
+    if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { format!("{number:.3}") } else { format!("{number:.1e}") }
+}
+
+/// A time with its unit.
+pub(crate) fn seconds(time_s: f64) -> String {
+    format!("{} s", fixed(time_s, 2))
+}
+
+/// A number to so many significant digits, at most 8 of them behind the point.
+pub(crate) fn significant(number: f64, digits: u8) -> String {
+    let magnitude = if number == 0.0 { 0.0 } else { number.abs().log10().floor() };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 8")]
+    let decimals = (f64::from(digits) - 1.0 - magnitude).clamp(0.0, 8.0) as usize;
+    format!("{number:.decimals$}")
+}
+
+/// Decimals that the multiples of a step of 1, 2 or 5 times a power of ten need, at most so many.
+pub(crate) fn decimals_of(step: f64, most: u8) -> usize {
+    /// Rounding must not take a step for the next smaller power.
+    const ROUNDING: f64 = 1.000_001;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and most")]
+    let decimals = (-(step * ROUNDING).log10().floor()).clamp(0.0, f64::from(most)) as usize;
+    decimals
+}
+
+/// A rounding or truncation error beside what is allowed, as `below 1e-9`: its exact size differs between machines.
+pub(crate) fn bound(error: f64, allowed: f64) -> String {
+    if error.abs() <= allowed {
+        format!("below {allowed:e}")
+    } else {
+        format!("{error:.1e}, which is not below {allowed:e}")
+    }
+}
+
+/// So many of a thing.
+pub(crate) fn counted(count: u64, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_length_is_never_shown_longer_than_it_is_and_less_than_a_digit_shorter() {
+        let lengths_m =
+            [1.999_999_9, 2.46, 1.001, 0.305_304_9, 0.1 + 0.2, 0.2 - 4.0 * f64::EPSILON, 0.0, -0.5, 123_456.789_9];
+        for (decimals, digit) in [(3, 1e-3), (6, 1e-6)] {
+            for length_m in lengths_m {
+                let shown: f64 = at_least(length_m, decimals).parse().expect("a number");
+                assert!(shown <= length_m && length_m - shown < digit * (1.0 + 1e-9), "{length_m:?}: {shown}");
+            }
+        }
+        assert_eq!([2.46, 1.001, 1.999_999].map(|length_m| at_least(length_m, 3)), ["2.460", "1.001", "1.999"]);
+        assert_eq!([1e300, f64::INFINITY].map(|length_m| at_least(length_m, 3)), ["1e300", "inf"]);
+    }
+
+    #[test]
+    fn an_error_is_said_to_be_below_what_is_allowed_only_where_it_is() {
+        assert_eq!(bound(0.0, 1e-12), "below 1e-12");
+        assert_eq!(bound(-1e-12, 1e-12), "below 1e-12");
+        assert_eq!(bound(2e-12, 1e-12), "2.0e-12, which is not below 1e-12");
+        assert_eq!(bound(f64::NAN, 1e-9), "NaN, which is not below 1e-9");
+    }
+
+    #[test]
+    fn significant_digits_are_counted_from_the_first_that_is_not_zero() {
+        assert_eq!([0.0, 0.3, 1.5, 123.456].map(|number| significant(number, 3)), ["0.00", "0.300", "1.50", "123"]);
+        assert_eq!(significant(1_234_567.8, 6), "1234568");
+    }
+
+    #[test]
+    fn multiples_of_a_step_have_the_decimals_of_the_step() {
+        assert_eq!([20.0, 1.0, 0.5, 0.1, 0.05, 1e-7].map(|step| decimals_of(step, 4)), [0, 0, 1, 1, 2, 4]);
+    }
+}
