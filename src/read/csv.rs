@@ -8,10 +8,10 @@ use nalgebra::Vector3;
 use super::clock::{Probe, Stamp};
 use super::error::{Fault, Place, ReadError};
 use super::names::Names;
-use super::order::{BATCH, Row, Rows};
+use super::order::{BATCH, Ordered, Row, Rows};
 use super::source::{Lines, Source};
 use super::table::{Body, Layout, Shape};
-use super::{ColumnNames, Format};
+use super::{ColumnNames, Format, ReadOptions, Recording};
 
 /// What stands between two fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,13 +23,13 @@ enum Separator {
 }
 
 /// A table in text.
-pub(super) struct Table {
+struct Table {
     source: Source,
     lines: Lines,
     separator: Separator,
     has_header: bool,
     header: Vec<String>,
-    pub(super) layout: Layout,
+    layout: Layout,
     names: Names,
     fields: Fields,
     /// Text and value of the last time.
@@ -38,9 +38,16 @@ pub(super) struct Table {
     vehicle: usize,
 }
 
+/// Opens a table.
+pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let table = Table::open(source.clone(), format, &options.columns)?;
+    let about = options.about(source, table.layout.unit, table.layout.notes(), Fault::HeaderOnly);
+    Ok(Box::new(Ordered::open(table, about)?))
+}
+
 impl Table {
     /// Opens a table and reads its header.
-    pub(super) fn open(source: Source, format: Format, columns: &ColumnNames) -> Result<Self, ReadError> {
+    fn open(source: Source, format: Format, columns: &ColumnNames) -> Result<Self, ReadError> {
         let mut lines = Lines::new(&source)?;
         if !next_line(&mut lines, true)? {
             return Err(source.error(Fault::Empty));
@@ -255,10 +262,6 @@ impl Rows for Table {
 
     fn settle_names(&mut self) {
         self.names.settle();
-    }
-
-    fn error(&self, fault: Fault) -> ReadError {
-        self.source.error(fault)
     }
 
     fn place(&self, number: u64) -> Place {

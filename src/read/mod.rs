@@ -37,7 +37,7 @@ use std::path::Path;
 
 use crate::track::Tracks;
 use clock::KnownUnit;
-use order::{About, Ordered};
+use order::About;
 use source::Source;
 
 /// A recording being read.
@@ -189,9 +189,9 @@ impl ReadOptions {
     }
 
     /// What is known of a recording: what the user says of the unit of time goes before what the file says.
-    fn about(&self, said: Option<TimeUnit>, notes: Vec<String>, none: Fault) -> About {
+    fn about(&self, source: &Source, said: Option<TimeUnit>, notes: Vec<String>, none: Fault) -> About {
         let unit = self.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given);
-        About { unit, epoch_ns: 0, scale: self.scale, notes, none }
+        About { source: source.clone(), unit, epoch_ns: 0, scale: self.scale, notes, none }
     }
 }
 
@@ -212,17 +212,11 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         return Err(source.error(Fault::content(problem, format!("leave {option} away"))));
     }
     match recognised.format {
-        format @ (Format::Csv | Format::Text) => table(source, format, options),
+        format @ (Format::Csv | Format::Text) => csv::open(&source, format, options),
         Format::Crazyflie => crazyflie::open(path, options),
         Format::Mcap => mcap::open(&source, options),
         Format::Npz => npz::open(&source, options),
         Format::Parquet => parquet::open(&source, options),
         Format::Skybrush => skybrush::open(&source, options),
     }
-}
-
-fn table(source: Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let table = csv::Table::open(source, format, &options.columns)?;
-    let about = options.about(table.layout.unit, table.layout.notes(), Fault::HeaderOnly);
-    Ok(Box::new(Ordered::open(table, about)?))
 }

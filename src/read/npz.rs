@@ -72,7 +72,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let rows =
         Instants { source: source.clone(), name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::content("it holds no position", "save at least one instant of one vehicle");
-    let mut about = options.about(unit, notes, none);
+    let mut about = options.about(source, unit, notes, none);
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
         about.epoch_ns = epoch;
     }
@@ -353,16 +353,8 @@ impl Rows for Instants {
         self.names.all()
     }
 
-    fn error(&self, fault: Fault) -> ReadError {
-        self.source.error(fault)
-    }
-
     fn place(&self, number: u64) -> Place {
         let vehicles = self.table.vehicles().max(1) as u64;
         Place::Part(format!("{}[{}, {}]", self.name, number / vehicles, number % vehicles))
-    }
-
-    fn is_wide(&self) -> bool {
-        true
     }
 }

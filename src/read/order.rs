@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::clock::{KnownUnit, Probe, Stamp, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
+use super::source::Source;
 use crate::track::{Clock, Item, Sample, Tracks};
 
 /// Rows given out at a time.
@@ -38,14 +39,13 @@ pub(super) trait Rows {
     /// Puts the names in their final order, once all have been met.
     fn settle_names(&mut self) {}
 
-    /// An error of the file.
-    fn error(&self, fault: Fault) -> ReadError;
-
     /// The place that a row's number means.
     fn place(&self, number: u64) -> Place;
 
     /// Whether each time is a row of the file, so that time can only run forwards.
-    fn is_wide(&self) -> bool;
+    fn is_wide(&self) -> bool {
+        true
+    }
 
     /// Looks at all times and names; none where there are no rows.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
@@ -67,6 +67,7 @@ pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, Re
 
 /// What is known of a recording beside its rows.
 pub(super) struct About {
+    pub(super) source: Source,
     pub(super) unit: KnownUnit,
     /// What the times are counted from, as the file says it \[ns\].
     pub(super) epoch_ns: i64,
@@ -82,6 +83,7 @@ pub(super) struct About {
 /// A recording with a row for each time is streamed, and must not run backwards. One with a row for each vehicle and
 /// time is surveyed first: it is streamed where time never runs backwards, and sorted in memory where it does.
 pub(super) struct Ordered<R> {
+    source: Source,
     rows: R,
     timing: Timing,
     notes: Vec<String>,
@@ -100,7 +102,7 @@ pub(super) struct Ordered<R> {
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { unit, epoch_ns, scale, mut notes, none } = about;
+        let About { source, unit, epoch_ns, scale, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -116,7 +118,7 @@ impl<R: Rows> Ordered<R> {
         } else {
             rows.survey()?
         };
-        let Some(probe) = probe else { return Err(rows.error(none)) };
+        let Some(probe) = probe else { return Err(source.error(none)) };
         let (mut timing, note) = Timing::settle(&probe, unit);
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
         notes.extend(note);
@@ -131,7 +133,11 @@ impl<R: Rows> Ordered<R> {
             ended = true;
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
-        Ok(Self { rows, timing, notes, scale, batch: first, given: 0, ended, now: None, last: Vec::new() })
+        Ok(Self { source, rows, timing, notes, scale, batch: first, given: 0, ended, now: None, last: Vec::new() })
+    }
+
+    fn error(&self, row: &Row, fault: Fault) -> ReadError {
+        self.source.error(fault).at(self.rows.place(row.place))
     }
 
     fn time_of(&mut self, row: &Row) -> Result<f64, ReadError> {
@@ -142,8 +148,7 @@ impl<R: Rows> Ordered<R> {
         };
         let time_s = self.timing.seconds(row.stamp);
         if time_s < before {
-            let fault = Fault::TimeBackwards { time_s, before_s: before };
-            return Err(self.rows.error(fault).at(self.rows.place(row.place)));
+            return Err(self.error(row, Fault::TimeBackwards { time_s, before_s: before }));
         }
         self.now = Some((row.stamp, time_s));
         Ok(time_s)
@@ -167,7 +172,7 @@ impl<R: Rows> Ordered<R> {
                 None
             };
             if let Some(fault) = fault {
-                return Err(self.rows.error(fault).at(self.rows.place(row.place)));
+                return Err(self.error(row, fault));
             }
         }
         let sample = Sample {
@@ -182,8 +187,7 @@ impl<R: Rows> Ordered<R> {
             return Ok(sample);
         }
         let remedy = "look at --scale and at the numbers themselves";
-        let fault = Fault::content("its numbers leave the range of numbers", remedy);
-        Err(self.rows.error(fault).at(self.rows.place(row.place)))
+        Err(self.error(row, Fault::content("its numbers leave the range of numbers", remedy)))
     }
 }
 

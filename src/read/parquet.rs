@@ -60,7 +60,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
     let epoch_ns = epoch_ns.and_then(|pair| pair.value.as_deref()).and_then(|value| value.parse().ok());
-    let mut about = options.about(unit, layout.notes(), Fault::HeaderOnly);
+    let mut about = options.about(source, unit, layout.notes(), Fault::HeaderOnly);
     about.epoch_ns = epoch_ns.unwrap_or(0);
     let names = match &layout.shape {
         Shape::Long { .. } => Names::default(),
@@ -438,10 +438,6 @@ impl Rows for Table {
 
     fn settle_names(&mut self) {
         self.names.settle();
-    }
-
-    fn error(&self, fault: Fault) -> ReadError {
-        self.source.error(fault)
     }
 
     fn place(&self, number: u64) -> Place {

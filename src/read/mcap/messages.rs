@@ -1,9 +1,10 @@
 //! Messages of others that hold positions: Foxglove in protobuf and JSON, ROS 2 in CDR.
 
-use byteorder::{BigEndian, LittleEndian};
 use nalgebra::{Vector3, vector};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+
+use crate::record::mcap::topic::{CDR, decode as cdr};
 
 /// Message types that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +49,7 @@ impl Encoding {
         match name {
             "protobuf" => Some(Self::Protobuf),
             "json" => Some(Self::Json),
-            "cdr" => Some(Self::Cdr),
+            CDR => Some(Self::Cdr),
             _ => None,
         }
     }
@@ -106,12 +107,7 @@ fn ros<T: DeserializeOwned>(encoding: Encoding, bytes: &[u8]) -> Result<T, Strin
     if encoding != Encoding::Cdr {
         return Err("ROS 2 messages are read in CDR alone".to_owned());
     }
-    let message = match bytes {
-        [0, 1, _, _, body @ ..] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
-        [0, 0, _, _, body @ ..] => cdr_encoding::from_bytes::<T, BigEndian>(body),
-        _ => return Err("it does not begin as CDR does".to_owned()),
-    };
-    message.map(|(message, _)| message).map_err(|error| error.to_string())
+    cdr(bytes)
 }
 
 #[derive(Clone, PartialEq, prost::Message, Deserialize)]

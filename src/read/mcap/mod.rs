@@ -14,65 +14,39 @@
 pub(crate) mod exported;
 mod foreign;
 mod messages;
-mod own;
+mod run;
 
 use super::error::{Fault, Place, ReadError};
 use super::source::Source;
 use super::{ReadOptions, Recording};
-use crate::record::ReadFault;
-use crate::record::mcap::framing::{Fields, Record, RecordReader, Trouble};
-use mcap::records::op;
+use crate::record::mcap::topic::{Part, TopicReader};
+use crate::record::{ReadFault, RecordError};
 
-/// Opens a recording, going by the first channel that is known.
+/// Opens a recording, going by the first schema that is known.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    match first_known_schema(source, options)? {
-        Some(Known::Run) => own::open_run(source, options),
-        Some(Known::Exported) => own::open_exported(source, options),
-        Some(Known::Foreign) => foreign::open(source, options),
-        None => {
-            let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
-                          geometry_msgs/msg/PoseArray or tf2_msgs/msg/TFMessage are read";
-            Err(source.error(Fault::content("it has no topic with positions", remedy)))
-        }
-    }
-}
-
-enum Known {
-    Run,
-    Exported,
-    Foreign,
-}
-
-fn first_known_schema(source: &Source, options: &ReadOptions) -> Result<Option<Known>, ReadError> {
-    let mut records = records(source)?;
-    while let Some(Record { opcode, body, .. }) = records.next().map_err(|trouble| error_of(source, trouble))? {
-        if opcode != op::SCHEMA {
-            continue;
-        }
-        let mut fields = Fields(body);
-        let (Some(_), Some(name)) = (fields.u16(), fields.str()) else { continue };
-        match name {
-            "tautline_msgs/msg/Swarm" => return Ok(Some(Known::Run)),
-            name if name == exported::TRACKS.schema => return Ok(Some(Known::Exported)),
-            name if messages::Kind::of_schema(name).is_some() => return Ok(Some(Known::Foreign)),
+    let error = |error| error_of(source, error);
+    let mut topics = TopicReader::open(&source.path).map_err(error)?;
+    while let Some(part) = topics.next().map_err(error)? {
+        match part {
+            Part::Schema("tautline_msgs/msg/Swarm") => return run::open(source, options),
+            Part::Schema(name) if name == exported::TRACKS.schema_name => return exported::open(source, options),
+            Part::Schema(name) if messages::Kind::of_schema(name).is_some() => return foreign::open(source, options),
             _ => {}
         }
     }
-    accept_unfinished(source, records.is_complete(), options).map(|_| None)
+    accept_unfinished(source, topics.is_complete(), options)?;
+    let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
+                  geometry_msgs/msg/PoseArray or tf2_msgs/msg/TFMessage are read";
+    Err(source.error(Fault::content("it has no topic with positions", remedy)))
 }
 
-fn records(source: &Source) -> Result<RecordReader, ReadError> {
-    RecordReader::open(&source.path).map_err(|trouble| error_of(source, trouble))
-}
-
-fn error_of(source: &Source, trouble: Trouble) -> ReadError {
-    match trouble {
-        Trouble::System(error) => source.error(Fault::System(error)),
-        Trouble::Fault(fault) => fault_of(source, fault),
-    }
-}
-
-fn fault_of(source: &Source, fault: ReadFault) -> ReadError {
+fn error_of(source: &Source, error: RecordError) -> ReadError {
+    let fault = match error {
+        RecordError::Write { source: error, .. } | RecordError::Open { source: error, .. } => {
+            return source.error(Fault::System(error));
+        }
+        RecordError::Read { fault, .. } => fault,
+    };
     match fault {
         ReadFault::Empty => source.error(Fault::Empty),
         ReadFault::NotMcap => source.error(Fault::WrongFormat {
