@@ -18,6 +18,7 @@ mod crazyflie;
 mod csv;
 mod curves;
 mod error;
+mod layout;
 pub(crate) mod mcap;
 mod names;
 mod npy;
