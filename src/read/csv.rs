@@ -5,7 +5,7 @@ use std::str;
 use csv_core::ReadRecordResult;
 
 use super::clock::Stamp;
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, FaultAt, Place};
 use super::layout::Layout;
 use super::names::Names;
 use super::source::{Lines, Source};
@@ -36,13 +36,13 @@ struct Text {
 }
 
 /// Opens a table.
-pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, FaultAt> {
     let mut lines = Lines::new(source)?;
     if !next_line(&mut lines, true)? {
-        return Err(source.error(Fault::Empty));
+        return Err(Fault::Empty.into());
     }
     let place = Place::Line(lines.number());
-    let at = |fault: Fault| source.error(fault).at(place.clone());
+    let at = |fault: Fault| fault.at(place.clone());
     if let Some(value) = decimal_comma(lines.line()) {
         return Err(at(Fault::DecimalComma { column: "1".to_owned(), value }));
     }
@@ -111,7 +111,7 @@ impl Cells for Text {
         &self.header
     }
 
-    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), ReadError> {
+    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), FaultAt> {
         self.wanted = columns.last().filter(|_| !all).map(|last| last + 1);
         self.lines = Lines::new(&self.source)?;
         if self.has_header {
@@ -122,11 +122,11 @@ impl Cells for Text {
     }
 
     #[inline]
-    fn advance(&mut self) -> Result<bool, ReadError> {
+    fn advance(&mut self) -> Result<bool, FaultAt> {
         if !next_line(&mut self.lines, !self.has_header)? {
             return Ok(false);
         }
-        self.split().map(|()| true).map_err(|fault| self.source.error(fault).at(Self::place(self.row())))
+        self.split().map(|()| true).map_err(|fault| fault.at(Self::place(self.row())))
     }
 
     #[inline]
@@ -180,7 +180,7 @@ impl Cells for Text {
 /// Goes to the next line that is not blank, nor a comment where there may be `comments`: below a header the first field
 /// may be a name that begins with `#`.
 #[inline]
-fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
+fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, FaultAt> {
     loop {
         if !lines.advance()? {
             return Ok(false);

@@ -38,7 +38,9 @@ use std::path::Path;
 
 use crate::track::Tracks;
 use clock::KnownUnit;
+use error::FaultAt;
 use order::About;
+use recognise::{Recognised, recognise};
 use source::Source;
 
 /// A recording being read.
@@ -192,7 +194,7 @@ impl ReadOptions {
     /// What is known of a recording: what the user says of the unit of time goes before what the file says.
     fn about(&self, source: &Source, said: Option<TimeUnit>, notes: Vec<String>, none: Fault) -> About {
         let unit = self.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given);
-        About { source: source.clone(), unit, epoch_ns: 0, scale: self.scale, notes, none }
+        About { path: source.path.clone(), unit, epoch_ns: 0, scale: self.scale, notes, none }
     }
 }
 
@@ -201,23 +203,26 @@ impl ReadOptions {
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is of no known format, or is wrong where it was looked at so far.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
+    try_open(path, options).map_err(|fault| fault.of(path))
+}
+
+fn try_open(path: &Path, options: &ReadOptions) -> Result<Recording, FaultAt> {
     if !(options.scale.is_finite() && options.scale > 0.0) {
         let problem = format!("its lengths cannot be scaled by {}", options.scale);
-        let fault = Fault::content(problem, "give a positive number of metres per unit of length");
-        return Err(ReadError::new(path, fault));
+        return Err(Fault::content(problem, "give a positive number of metres per unit of length").into());
     }
-    let recognised = recognise::recognise(path, options.format)?;
-    let source = Source { path: path.to_owned(), gzip: recognised.gzip };
-    if let Some((option, why)) = options.needless_for(recognised.format) {
-        let problem = format!("{} {why}", recognised.format.title());
-        return Err(source.error(Fault::content(problem, format!("leave {option} away"))));
+    let Recognised { format, gzip } = recognise(path, options.format)?;
+    if let Some((option, why)) = options.needless_for(format) {
+        let problem = format!("{} {why}", format.title());
+        return Err(Fault::content(problem, format!("leave {option} away")).into());
     }
-    match recognised.format {
-        format @ (Format::Csv | Format::Text) => csv::open(&source, format, options),
+    let source = &Source { path: path.to_owned(), gzip };
+    match format {
+        Format::Csv | Format::Text => csv::open(source, format, options),
         Format::Crazyflie => crazyflie::open(path, options),
-        Format::Mcap => mcap::open(&source, options),
-        Format::Npz => npz::open(&source, options),
-        Format::Parquet => parquet::open(&source, options),
-        Format::Skybrush => skybrush::open(&source, options),
+        Format::Mcap => mcap::open(source, options),
+        Format::Npz => npz::open(source, options),
+        Format::Parquet => parquet::open(source, options),
+        Format::Skybrush => skybrush::open(source, options),
     }
 }

@@ -1,10 +1,11 @@
 //! Rows of a recording in the order of its file, given out in the order of time.
 
+use std::path::PathBuf;
+
 use nalgebra::Vector3;
 
 use super::clock::{KnownUnit, Probe, Stamp, Timing};
-use super::error::{Fault, Place, ReadError, quoted};
-use super::source::Source;
+use super::error::{Fault, FaultAt, Place, ReadError, quoted};
 use crate::track::{Clock, Item, Sample, Tracks};
 
 /// Rows given out at a time.
@@ -26,10 +27,10 @@ pub(super) struct Row {
 /// A recording that holds samples, row by row.
 pub(super) trait Rows {
     /// Appends some [`BATCH`] rows in the order of the file; `false` when there was none to append.
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt>;
 
     /// Starts again with the first row. Nothing to do where time only runs forwards, so that rows are read once.
-    fn rewind(&mut self) -> Result<(), ReadError> {
+    fn rewind(&mut self) -> Result<(), FaultAt> {
         Ok(())
     }
 
@@ -48,13 +49,13 @@ pub(super) trait Rows {
     }
 
     /// Looks at all times and names; none where there are no rows.
-    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
         survey(self)
     }
 }
 
 /// Looks at all times by reading all rows.
-pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
+pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, FaultAt> {
     let mut probe: Option<Probe> = None;
     let mut batch = Vec::new();
     while rows.next(&mut batch)? {
@@ -67,7 +68,7 @@ pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, Re
 
 /// What is known of a recording beside its rows.
 pub(super) struct About {
-    pub(super) source: Source,
+    pub(super) path: PathBuf,
     pub(super) unit: KnownUnit,
     /// What the times are counted from, as the file says it \[ns\].
     pub(super) epoch_ns: i64,
@@ -83,7 +84,7 @@ pub(super) struct About {
 /// A recording with a row for each time is streamed, and must not run backwards. One with a row for each vehicle and
 /// time is surveyed first: it is streamed where time never runs backwards, and sorted in memory where it does.
 pub(super) struct Ordered<R> {
-    source: Source,
+    path: PathBuf,
     rows: R,
     timing: Timing,
     notes: Vec<String>,
@@ -101,8 +102,8 @@ pub(super) struct Ordered<R> {
 
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
-    pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { source, unit, epoch_ns, scale, mut notes, none } = about;
+    pub(super) fn open(mut rows: R, about: About) -> Result<Self, FaultAt> {
+        let About { path, unit, epoch_ns, scale, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -118,7 +119,7 @@ impl<R: Rows> Ordered<R> {
         } else {
             rows.survey()?
         };
-        let Some(probe) = probe else { return Err(source.error(none)) };
+        let Some(probe) = probe else { return Err(none.into()) };
         let (mut timing, note) = Timing::settle(&probe, unit);
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
         notes.extend(note);
@@ -133,14 +134,14 @@ impl<R: Rows> Ordered<R> {
             ended = true;
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
-        Ok(Self { source, rows, timing, notes, scale, batch: first, given: 0, ended, now: None, last: Vec::new() })
+        Ok(Self { path, rows, timing, notes, scale, batch: first, given: 0, ended, now: None, last: Vec::new() })
     }
 
-    fn error(&self, row: &Row, fault: Fault) -> ReadError {
-        self.source.error(fault).at(self.rows.place(row.place))
+    fn error(&self, row: &Row, fault: Fault) -> FaultAt {
+        fault.at(self.rows.place(row.place))
     }
 
-    fn time_of(&mut self, row: &Row) -> Result<f64, ReadError> {
+    fn time_of(&mut self, row: &Row) -> Result<f64, FaultAt> {
         let before = match self.now {
             Some((stamp, time_s)) if stamp == row.stamp => return Ok(time_s),
             Some((_, time_s)) => time_s,
@@ -154,7 +155,7 @@ impl<R: Rows> Ordered<R> {
         Ok(time_s)
     }
 
-    fn sample(&mut self, row: &Row) -> Result<Sample, ReadError> {
+    fn sample(&mut self, row: &Row) -> Result<Sample, FaultAt> {
         let time_s = self.time_of(row)?;
         if row.vehicle >= self.last.len() {
             self.last.resize(row.vehicle + 1, None);
@@ -189,16 +190,8 @@ impl<R: Rows> Ordered<R> {
         let remedy = "look at --scale and at the numbers themselves";
         Err(self.error(row, Fault::content("its numbers leave the range of numbers", remedy)))
     }
-}
 
-impl<R: Rows> Tracks for Ordered<R> {
-    type Error = ReadError;
-
-    fn vehicles(&self) -> &[String] {
-        self.rows.vehicles()
-    }
-
-    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+    fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, FaultAt> {
         if self.given == self.batch.len() && !self.ended {
             self.batch.clear();
             self.given = 0;
@@ -213,6 +206,18 @@ impl<R: Rows> Tracks for Ordered<R> {
             self.given += 1;
         }
         Ok(count > 0)
+    }
+}
+
+impl<R: Rows> Tracks for Ordered<R> {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        self.rows.vehicles()
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        self.try_read(items).map_err(|fault| fault.of(&self.path))
     }
 
     fn clock(&self) -> &Clock {

@@ -15,7 +15,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use super::clock::Stamp;
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, FaultAt, Place};
 use super::layout::Layout;
 use super::names::Names;
 use super::order::BATCH;
@@ -27,41 +27,36 @@ use super::{ReadOptions, Recording, TimeUnit};
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";
 
 /// Opens a table.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let file = File::open(&source.path).map_err(|error| source.error(Fault::System(error)))?;
-    let bytes = file.metadata().map_err(|error| source.error(Fault::System(error)))?.len();
-    if bytes < 12 {
-        return Err(source.error(Fault::Truncated { what: "the end of the file is missing".to_owned() }));
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let file = File::open(&source.path)?;
+    if file.metadata()?.len() < 12 {
+        return Err(Fault::Truncated { what: "the end of the file is missing".to_owned() }.into());
     }
-    let at = |fault| source.error(fault);
-    let reader = guarded(|| SerializedFileReader::new(file)).map_err(at)?;
+    let reader = guarded(|| SerializedFileReader::new(file))?;
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
     let header: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let layout = Layout::of(&header, &options.columns).map_err(at)?;
+    let layout = Layout::of(&header, &options.columns)?;
     let unit = unit_of(&schema.column(layout.time));
     for &column in &layout.columns() {
         let descriptor = schema.column(column);
         if descriptor.max_rep_level() > 0 {
             let problem = format!("column `{}` holds lists", header[column]);
-            return Err(at(Fault::content(problem, "save a number in each cell")));
+            return Err(Fault::content(problem, "save a number in each cell").into());
         }
         if let Some(what) = other_than_numbers(&descriptor) {
             let problem = format!("column `{}` holds {what}", header[column]);
-            return Err(at(Fault::content(
-                problem,
-                "save numbers as double, and time as double, int64 or time stamps",
-            )));
+            let remedy = "save numbers as double, and time as double, int64 or time stamps";
+            return Err(Fault::content(problem, remedy).into());
         }
         if let Some(packed) = packed_otherwise(&reader, column) {
             let problem = format!("column `{}` is packed by {packed}, which is not read", header[column]);
-            return Err(at(Fault::content(problem, "save it plain, or packed by snappy, gzip, lz4 or zstd")));
+            return Err(Fault::content(problem, "save it plain, or packed by snappy, gzip, lz4 or zstd").into());
         }
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
     let epoch_ns = epoch_ns.and_then(|pair| pair.value.as_deref()).and_then(|value| value.parse().ok());
     let groups = Groups {
-        source: source.clone(),
         reader,
         header,
         wanted: Vec::new(),
@@ -233,7 +228,6 @@ struct Column {
 
 /// A table, group of rows by group of rows.
 struct Groups {
-    source: Source,
     reader: SerializedFileReader<File>,
     header: Vec<String>,
     /// Columns that are read.
@@ -301,18 +295,18 @@ impl Cells for Groups {
         &self.header
     }
 
-    fn restart(&mut self, columns: &[usize], _all: bool) -> Result<(), ReadError> {
+    fn restart(&mut self, columns: &[usize], _all: bool) -> Result<(), FaultAt> {
         self.wanted = columns.to_vec();
         (self.group, self.rows_left, self.count, self.at, self.rows_before) = (0, 0, 0, 0, 0);
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<bool, ReadError> {
+    fn advance(&mut self) -> Result<bool, FaultAt> {
         self.at += 1;
         if self.at >= self.count {
             self.rows_before += self.count as u64;
             (self.count, self.at) = (0, 0);
-            self.count = self.fill().map_err(|fault| self.source.error(fault).at(Self::place(self.row())))?;
+            self.count = self.fill().map_err(|fault| fault.at(Self::place(self.row())))?;
         }
         Ok(self.count > 0)
     }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, FaultAt, Place};
 use super::layout::{Body, Layout, Shape};
 use super::names::Names;
 use super::order::{About, BATCH, Ordered, Row, Rows};
@@ -17,10 +17,10 @@ pub(super) trait Cells {
 
     /// Goes before the first row. Of each row these columns are asked, in rising order; where not `all` that a table
     /// needs are among them, no more is looked at.
-    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), ReadError>;
+    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), FaultAt>;
 
     /// Goes to the next row; `false` behind the last one.
-    fn advance(&mut self) -> Result<bool, ReadError>;
+    fn advance(&mut self) -> Result<bool, FaultAt>;
 
     /// Number of the current row.
     fn row(&self) -> u64;
@@ -44,7 +44,6 @@ fn empty(cells: &impl Cells, column: usize) -> Fault {
 
 /// A table, long or wide.
 struct Table<C> {
-    source: Source,
     cells: C,
     layout: Layout,
     names: Names,
@@ -60,20 +59,20 @@ pub(super) fn open<C: Cells + 'static>(
     unit: Option<TimeUnit>,
     epoch_ns: i64,
     options: &ReadOptions,
-) -> Result<Recording, ReadError> {
+) -> Result<Recording, FaultAt> {
     let about = options.about(source, unit.or(layout.unit), layout.notes(), Fault::HeaderOnly);
     let names = match &layout.shape {
         Shape::Long { .. } => Names::default(),
         Shape::Wide { names, .. } => Names::from_list(names.clone()),
     };
     cells.restart(&layout.columns(), true)?;
-    let table = Table { source: source.clone(), cells, layout, names, vehicle: 0 };
+    let table = Table { cells, layout, names, vehicle: 0 };
     Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
 }
 
 impl<C: Cells> Table<C> {
-    fn at_row(&self, fault: Fault) -> ReadError {
-        self.source.error(fault).at(C::place(self.cells.row()))
+    fn at_row(&self, fault: Fault) -> FaultAt {
+        fault.at(C::place(self.cells.row()))
     }
 
     #[inline]
@@ -141,7 +140,7 @@ fn vector(cells: &impl Cells, columns: &[Option<usize>; 3]) -> Result<Option<Vec
 }
 
 impl<C: Cells> Rows for Table<C> {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
         let before = rows.len();
         while rows.len() < before + BATCH && self.cells.advance()? {
             self.append(rows).map_err(|fault| self.at_row(fault))?;
@@ -149,7 +148,7 @@ impl<C: Cells> Rows for Table<C> {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), ReadError> {
+    fn rewind(&mut self) -> Result<(), FaultAt> {
         self.cells.restart(&self.layout.columns(), true)
     }
 
@@ -170,7 +169,7 @@ impl<C: Cells> Rows for Table<C> {
     }
 
     /// Only times and names are looked at, which is several times faster than reading everything.
-    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
         let Shape::Long { id, .. } = self.layout.shape else { return Ok(None) };
         let mut columns = [self.layout.time, id];
         columns.sort_unstable();

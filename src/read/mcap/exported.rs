@@ -8,16 +8,18 @@
 #![doc = include_str!("tracks.msg")]
 //! ```
 
+use std::path::PathBuf;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::super::clock::Stamp;
-use super::super::error::{Fault, Place, ReadError};
+use super::super::error::{Fault, FaultAt, Place};
 use super::super::names::Names;
 use super::super::order::{BATCH, Ordered, Row, Rows};
 use super::super::source::Source;
 use super::super::{ReadOptions, Recording, TimeUnit};
-use super::{accept_unfinished, error_of};
+use super::accept_unfinished;
 use crate::record::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 
 /// Where the vehicles are named.
@@ -44,11 +46,11 @@ pub(crate) struct Instant {
     pub(crate) radii_m: Vec<f64>,
 }
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let topics = TopicReader::open(&source.path).map_err(|error| error_of(source, error))?;
-    let notes = accept_unfinished(source, topics.is_complete(), options)?;
-    let instants = Instants { source: source.clone(), names: Names::default(), epoch_ns: 0, count: 0 };
-    let mut exported = Exported { topics, instants };
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let topics = TopicReader::open(&source.path)?;
+    let notes = accept_unfinished(topics.is_complete(), options)?;
+    let instants = Instants { names: Names::default(), epoch_ns: 0, count: 0 };
+    let mut exported = Exported { path: source.path.clone(), topics, instants };
     exported.next(&mut Vec::new())?;
     let none = Fault::content("it holds no instant", "export again");
     let mut about = options.about(source, Some(TimeUnit::Seconds), notes, none);
@@ -59,13 +61,13 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
 
 /// An exported recording.
 struct Exported {
+    path: PathBuf,
     topics: TopicReader,
     instants: Instants,
 }
 
 /// What the messages so far amount to.
 struct Instants {
-    source: Source,
     names: Names,
     epoch_ns: i64,
     count: u64,
@@ -115,14 +117,14 @@ fn take(instant: &Instant, vehicles: usize, number: u64, rows: &mut Vec<Row>) ->
 }
 
 impl Rows for Exported {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let (source, before) = (&self.instants.source.clone(), rows.len());
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+        let before = rows.len();
         while rows.len() < before + BATCH {
-            match self.topics.next().map_err(|error| error_of(source, error))? {
-                Some(Part::Message(message)) => self
-                    .instants
-                    .take(&message, rows)
-                    .map_err(|reason| source.error(Fault::Damaged { reason }).at(Place::Byte(message.offset)))?,
+            match self.topics.next()? {
+                Some(Part::Message(message)) => {
+                    let damaged = |reason| Fault::Damaged { reason }.at(Place::Byte(message.offset));
+                    self.instants.take(&message, rows).map_err(damaged)?;
+                }
                 Some(_) => {}
                 None => break,
             }
@@ -130,9 +132,8 @@ impl Rows for Exported {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), ReadError> {
-        let source = &self.instants.source;
-        self.topics = TopicReader::open(&source.path).map_err(|error| error_of(source, error))?;
+    fn rewind(&mut self) -> Result<(), FaultAt> {
+        self.topics = TopicReader::open(&self.path)?;
         (self.instants.names, self.instants.count) = (Names::default(), 0);
         Ok(())
     }

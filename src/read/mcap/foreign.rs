@@ -1,22 +1,22 @@
 //! Recordings of others.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 use super::super::clock::{Probe, Stamp};
-use super::super::error::{Fault, Place, ReadError, quoted};
+use super::super::error::{Fault, FaultAt, Place, quoted};
 use super::super::names::Names;
 use super::super::order::{BATCH, Ordered, Row, Rows, survey};
 use super::super::source::Source;
 use super::super::{ReadOptions, Recording, TimeUnit};
-use super::messages::{self, Encoding, Kind, Seen, Who};
-use super::{accept_unfinished, error_of};
-use crate::record::mcap::topic::{Declared, Message, Part, TopicReader};
+use super::accept_unfinished;
+use super::messages::{self, Seen, Who};
+use crate::record::mcap::topic::{CDR, Declared, Message, Part, TopicReader};
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let topics = TopicReader::open(&source.path).map_err(|error| error_of(source, error))?;
-    let notes = accept_unfinished(source, topics.is_complete(), options)?;
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let topics = TopicReader::open(&source.path)?;
+    let notes = accept_unfinished(topics.is_complete(), options)?;
     let poses = Poses {
-        source: source.clone(),
         stamped: BTreeSet::new(),
         logged: BTreeSet::new(),
         wanted_frame: options.frame.clone(),
@@ -33,11 +33,12 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         None => Fault::content("its topics with positions have no message", "record again"),
     };
     let about = options.about(source, Some(TimeUnit::Nanoseconds), notes, none);
-    Ok(Box::new(Ordered::open(Foreign { topics, poses, shown: Vec::new() }, about)?))
+    Ok(Box::new(Ordered::open(Foreign { path: source.path.clone(), topics, poses, shown: Vec::new() }, about)?))
 }
 
 /// A recording of others.
 struct Foreign {
+    path: PathBuf,
     topics: TopicReader,
     poses: Poses,
     /// The names of the vehicles as they are shown.
@@ -46,7 +47,6 @@ struct Foreign {
 
 /// Positions out of messages.
 struct Poses {
-    source: Source,
     /// Channels with a message that says its time, and those with one that was taken at the time of logging.
     stamped: BTreeSet<u16>,
     logged: BTreeSet<u16>,
@@ -63,20 +63,19 @@ struct Poses {
     listed: bool,
 }
 
-/// How the messages with positions of a topic are read; none where it has no such messages.
-fn reading(topic: &Declared) -> Option<(Kind, Encoding)> {
-    Kind::of_schema(&topic.schema).zip(Encoding::of_name(&topic.encoding))
+/// What reads the messages of a topic, where they hold positions.
+fn reader_of(topic: &Declared) -> Option<messages::Reader> {
+    messages::reader_of(&topic.schema).filter(|_| matches!(&*topic.encoding, "protobuf" | "json" | CDR))
 }
 
 impl Poses {
     /// Appends the rows of a message.
-    fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), ReadError> {
-        let Some((kind, encoding)) = reading(message.of) else { return Ok(()) };
+    fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), FaultAt> {
+        let Declared { topic, encoding, .. } = message.of;
+        let Some(reader) = reader_of(message.of) else { return Ok(()) };
         self.messages += 1;
-        self.append(messages::decode(kind, encoding, message.bytes), message, rows).map_err(|fault| {
-            let place = format!("message {} on topic `{}`", self.messages, message.of.topic);
-            self.source.error(fault).at(Place::Part(place))
-        })
+        self.append(reader(encoding, message.bytes), message, rows)
+            .map_err(|fault| fault.at(Place::Part(format!("message {} on topic `{topic}`", self.messages))))
     }
 
     fn append(
@@ -142,14 +141,14 @@ impl Poses {
 }
 
 impl Rows for Foreign {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
         let before = rows.len();
         while rows.len() < before + BATCH {
-            match self.topics.next().map_err(|error| error_of(&self.poses.source, error))? {
+            match self.topics.next()? {
                 Some(Part::Message(message)) => self.poses.take(&message, rows)?,
                 Some(Part::Topic(topic)) => {
-                    let is_list = |(kind, _)| matches!(kind, Kind::PosesInFrame | Kind::PoseArray);
-                    self.poses.listed &= reading(topic).is_none_or(is_list);
+                    let is_list = matches!(&*topic.schema, "foxglove.PosesInFrame" | "geometry_msgs/msg/PoseArray");
+                    self.poses.listed &= is_list || reader_of(topic).is_none();
                 }
                 Some(_) => {}
                 None => break,
@@ -158,9 +157,8 @@ impl Rows for Foreign {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), ReadError> {
-        let source = &self.poses.source;
-        self.topics = TopicReader::open(&source.path).map_err(|error| error_of(source, error))?;
+    fn rewind(&mut self) -> Result<(), FaultAt> {
+        self.topics = TopicReader::open(&self.path)?;
         self.poses.messages = 0;
         Ok(())
     }
@@ -197,7 +195,7 @@ impl Rows for Foreign {
     }
 
     /// Whether a channel says its times is known when all of it has been read.
-    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
         let probe = survey(self)?;
         if self.poses.stamped.is_disjoint(&self.poses.logged) {
             return Ok(probe);

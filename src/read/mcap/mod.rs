@@ -16,61 +16,62 @@ mod foreign;
 mod messages;
 mod run;
 
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, FaultAt, Place};
 use super::source::Source;
-use super::{ReadOptions, Recording};
+use super::{Format, ReadOptions, Recording};
 use crate::record::mcap::topic::{Part, TopicReader};
 use crate::record::{ReadFault, RecordError};
 
 /// Opens a recording, going by the first schema that is known.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let error = |error| error_of(source, error);
-    let mut topics = TopicReader::open(&source.path).map_err(error)?;
-    while let Some(part) = topics.next().map_err(error)? {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let mut topics = TopicReader::open(&source.path)?;
+    while let Some(part) = topics.next()? {
         match part {
             Part::Schema("tautline_msgs/msg/Swarm") => return run::open(source, options),
             Part::Schema(name) if name == exported::TRACKS.schema_name => return exported::open(source, options),
-            Part::Schema(name) if messages::Kind::of_schema(name).is_some() => return foreign::open(source, options),
+            Part::Schema(name) if messages::reader_of(name).is_some() => return foreign::open(source, options),
             _ => {}
         }
     }
-    accept_unfinished(source, topics.is_complete(), options)?;
+    accept_unfinished(topics.is_complete(), options)?;
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
                   geometry_msgs/msg/PoseArray or tf2_msgs/msg/TFMessage are read";
-    Err(source.error(Fault::content("it has no topic with positions", remedy)))
+    Err(Fault::content("it has no topic with positions", remedy).into())
 }
 
-fn error_of(source: &Source, error: RecordError) -> ReadError {
-    let fault = match error {
-        RecordError::Write { source: error, .. } | RecordError::Open { source: error, .. } => {
-            return source.error(Fault::System(error));
+impl From<RecordError> for FaultAt {
+    fn from(error: RecordError) -> Self {
+        let fault = match error {
+            RecordError::Write { source, .. } | RecordError::Open { source, .. } => {
+                return Fault::System(source).into();
+            }
+            RecordError::Read { fault, .. } => fault,
+        };
+        match fault {
+            ReadFault::Empty => Fault::Empty.into(),
+            ReadFault::NotMcap => {
+                let reason = "it does not begin as MCAP files do".to_owned();
+                Fault::WrongFormat { format: Format::Mcap, reason }.into()
+            }
+            ReadFault::TooLong { offset, bytes, limit } => {
+                let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
+                Fault::Damaged { reason }.at(Place::Byte(offset))
+            }
+            ReadFault::Damaged { offset, reason } => Fault::Damaged { reason }.at(Place::Byte(offset)),
+            ReadFault::Message { topic, reason } => {
+                Fault::Damaged { reason }.at(Place::Part(format!("topic `{topic}`")))
+            }
+            other => Fault::damaged(other).into(),
         }
-        RecordError::Read { fault, .. } => fault,
-    };
-    match fault {
-        ReadFault::Empty => source.error(Fault::Empty),
-        ReadFault::NotMcap => source.error(Fault::WrongFormat {
-            format: super::Format::Mcap,
-            reason: "it does not begin as MCAP files do".to_owned(),
-        }),
-        ReadFault::TooLong { offset, bytes, limit } => {
-            let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
-            source.error(Fault::Damaged { reason }).at(Place::Byte(offset))
-        }
-        ReadFault::Damaged { offset, reason } => source.error(Fault::Damaged { reason }).at(Place::Byte(offset)),
-        ReadFault::Message { topic, reason } => {
-            source.error(Fault::Damaged { reason }).at(Place::Part(format!("topic `{topic}`")))
-        }
-        other => source.error(Fault::damaged(other)),
     }
 }
 
 /// What is to be said of a file that was not closed, or the error that it is.
-fn accept_unfinished(source: &Source, complete: bool, options: &ReadOptions) -> Result<Vec<String>, ReadError> {
+fn accept_unfinished(complete: bool, options: &ReadOptions) -> Result<Vec<String>, Fault> {
     let note = "the recording was not closed: it is read up to the last part that was written";
     match (complete, options.allow_unfinished) {
         (true, _) => Ok(Vec::new()),
         (false, true) => Ok(vec![note.to_owned()]),
-        (false, false) => Err(source.error(Fault::Unfinished)),
+        (false, false) => Err(Fault::Unfinished),
     }
 }

@@ -1,19 +1,19 @@
 //! `run.mcap`.
 
 use super::super::clock::Stamp;
-use super::super::error::{Fault, Place, ReadError};
+use super::super::error::{Fault, FaultAt, Place};
 use super::super::names::Names;
 use super::super::order::{BATCH, Ordered, Row, Rows};
 use super::super::source::Source;
 use super::super::{ReadOptions, Recording, TimeUnit};
-use super::{accept_unfinished, error_of};
+use super::accept_unfinished;
 use crate::record::mcap::{Entry, McapRecording};
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let recording = McapRecording::open(&source.path).map_err(|error| error_of(source, error))?;
-    let notes = accept_unfinished(source, recording.is_complete(), options)?;
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let recording = McapRecording::open(&source.path)?;
+    let notes = accept_unfinished(recording.is_complete(), options)?;
     let vehicles = recording.header().vehicles;
-    let run = Run { source: source.clone(), recording, vehicles, names: Names::default(), samples: 0 };
+    let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
     let none = Fault::content("it holds no sample", "record again");
     let about = options.about(source, Some(TimeUnit::Seconds), notes, none);
     Ok(Box::new(Ordered::open(run, about)?))
@@ -21,7 +21,6 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
 
 /// The samples of a run.
 struct Run {
-    source: Source,
     recording: McapRecording,
     /// Number of vehicles, as the header claims.
     vehicles: usize,
@@ -30,11 +29,11 @@ struct Run {
 }
 
 impl Rows for Run {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             let Some(entry) = self.recording.next() else { break };
-            let Entry::Sample(sample) = entry.map_err(|error| error_of(&self.source, error))? else { continue };
+            let Entry::Sample(sample) = entry? else { continue };
             if self.names.all().is_empty() {
                 // The sample really holds as many: the number is no longer a claim.
                 self.names = Names::numbered(self.vehicles);
