@@ -1,4 +1,7 @@
 //! Tables in text: CSV with a header, and columns of plain numbers.
+//!
+//! Lines are found and split here: the reader of `csv` takes as much memory as a line is long, without a limit, reads on
+//! over the end of a line where a quote is left open, and knows no fields between any number of blanks.
 
 use std::str;
 

@@ -1,6 +1,7 @@
 //! Arrays in the `.npy` format of `NumPy`: a header in the words of a Python dictionary, then plain numbers.
 //!
-//! The header is read here because a file may lie about its lengths: memory grows only with bytes that are there.
+//! The header is read here because a file may lie about its lengths: memory grows only with bytes that are there, where
+//! `npyz` reserves up to 4 GiB that a header claims for itself, and costs a cold build 22 core-seconds and 17 crates.
 
 use std::io::{self, Read};
 
