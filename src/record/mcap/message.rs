@@ -303,7 +303,7 @@ impl EventMessage<String> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
         let number = self.value as usize;
         let leg = number.checked_sub(1).filter(|_| self.value.fract() == 0.0);
-        leg.ok_or_else(|| Topic::Events.fault(format!("there is no leg {}", self.value)))
+        leg.ok_or_else(|| Own::Events.fault(format!("there is no leg {}", self.value)))
     }
 }
 
