@@ -11,6 +11,9 @@ use zip::{CompressionMethod, ZipArchive};
 use super::error::{Fault, FaultAt, Place};
 use super::source::Growing;
 
+/// Longest end of an archive: its last record with the longest comment \[bytes\].
+const END_LIMIT_BYTES: u64 = 22 + 65_535;
+
 /// An archive opened for reading.
 pub(super) struct Archive {
     path: PathBuf,
@@ -19,7 +22,12 @@ pub(super) struct Archive {
 
 impl Archive {
     pub(super) fn open(path: &Path) -> Result<Self, Fault> {
-        let zip = ZipArchive::new(BufReader::new(File::open(path)?)).map_err(zip_fault)?;
+        let zip = ZipArchive::new(BufReader::new(File::open(path)?)).map_err(|error| match error {
+            ZipError::InvalidArchive(_) if !has_end(path) => {
+                Fault::Truncated { what: "the end of the archive is missing".to_owned() }
+            }
+            other => zip_fault(other),
+        })?;
         Ok(Self { path: path.to_owned(), zip })
     }
 
@@ -77,6 +85,16 @@ fn place(name: &str) -> Place {
     Place::Part(format!("entry `{name}`"))
 }
 
+/// Whether the record that every archive ends with is among the last bytes of a file.
+fn has_end(path: &Path) -> bool {
+    let tail = File::open(path).and_then(|mut file| {
+        let (bytes, mut tail) = (file.metadata()?.len(), Vec::new());
+        file.seek(SeekFrom::Start(bytes.saturating_sub(END_LIMIT_BYTES)))?;
+        file.read_to_end(&mut tail).map(|_| tail)
+    });
+    tail.is_ok_and(|tail| memchr::memmem::find(&tail, b"PK\x05\x06").is_some())
+}
+
 fn zip_fault(error: ZipError) -> Fault {
     match error {
         ZipError::Io(error) => error.into(),
@@ -85,9 +103,6 @@ fn zip_fault(error: ZipError) -> Fault {
             format!("the archive needs what is not supported: {what}"),
             "make it with deflate or unpacked",
         ),
-        ZipError::InvalidArchive(what) if what.contains("EOCD") || what.contains("end") => {
-            Fault::Truncated { what: "the end of the archive is missing".to_owned() }
-        }
         other => Fault::damaged(other),
     }
 }

@@ -3,8 +3,8 @@
 //! Columns are flat: numbers, text or whole numbers for the vehicle, and for time numbers or time stamps, whose unit is
 //! then known. What time counts from may stand under `epoch_ns` in the metadata of the file.
 
-use std::cell::Cell;
 use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit};
@@ -26,11 +26,21 @@ use super::{ReadOptions, Recording, TimeUnit};
 /// Key of the metadata that says what time counts from \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";
 
+/// Most cells that are read at a time: some 20 MB.
+const BATCH_CELLS: usize = 640_000;
+
 /// Opens a table.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
-    let file = File::open(&source.path)?;
+    let mut file = File::open(&source.path)?;
     if file.metadata()?.len() < 12 {
         return Err(Fault::Truncated { what: "the end of the file is missing".to_owned() }.into());
+    }
+    let mut end = [0; 4];
+    file.seek(SeekFrom::End(-4))?;
+    file.read_exact(&mut end)?;
+    if end != *b"PAR1" && end != *b"PARE" {
+        let what = "the end of the file, where its columns are described, is missing".to_owned();
+        return Err(Fault::Truncated { what }.into());
     }
     let reader = guarded(|| SerializedFileReader::new(file))?;
     let metadata = reader.metadata().file_metadata();
@@ -71,7 +81,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
 }
 
 thread_local! {
-    static GUARDED: Cell<bool> = const { Cell::new(false) };
+    static GUARDED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
 }
 
 /// Whether this thread is in a call whose panic becomes an error: a panic hook has nothing to say about it.
@@ -88,9 +98,6 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault
     match outcome {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated { what }),
-        Ok(Err(error)) if error.to_string().contains("Invalid Parquet file") => Err(Fault::Truncated {
-            what: "the end of the file, where its columns are described, is missing".to_owned(),
-        }),
         Ok(Err(error)) => Err(Fault::damaged(error)),
         Err(_) => Err(Fault::damaged("its pages contradict each other")),
     }
@@ -144,76 +151,49 @@ fn is_unsigned(column: &ColumnDescriptor) -> bool {
     }
 }
 
-/// Some cells of a column; none where a cell is null.
-enum Batch {
+/// A cell of a column.
+enum Cell {
+    Empty,
     /// Wide enough for all of 64 bits, with and without a sign.
-    Whole(Vec<Option<i128>>),
-    Real(Vec<Option<f64>>),
-    Text(Vec<Option<ByteArray>>),
+    Whole(i128),
+    Real(f64),
+    Text(ByteArray),
 }
 
-impl Batch {
-    fn len(&self) -> usize {
-        match self {
-            Self::Whole(cells) => cells.len(),
-            Self::Real(cells) => cells.len(),
-            Self::Text(cells) => cells.len(),
-        }
+/// The next cells of the column of this name.
+fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>, Fault> {
+    let (present, unsigned) = (column.present, column.unsigned);
+    match &mut column.reader {
+        ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count, Cell::Real),
+        ColumnReader::FloatColumnReader(reader) => cells(reader, present, count, |cell| Cell::Real(cell.into())),
+        ColumnReader::Int64ColumnReader(reader) => cells(reader, present, count, |cell| {
+            Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
+        }),
+        ColumnReader::Int32ColumnReader(reader) => cells(reader, present, count, |cell| {
+            Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
+        }),
+        ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count, Cell::Text),
+        _ => Err(Fault::content(
+            format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
+            "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
+        )),
     }
-
-    /// The next cells of the column of this name.
-    fn read(column: &mut Column, name: &str, count: usize) -> Result<Self, Fault> {
-        let (present, unsigned) = (column.present, column.unsigned);
-        match &mut column.reader {
-            ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count).map(Self::Real),
-            ColumnReader::FloatColumnReader(reader) => {
-                cells(reader, present, count).map(|cells| Self::Real(each(cells, f64::from)))
-            }
-            ColumnReader::Int64ColumnReader(reader) => {
-                let wide = |cell: i64| if unsigned { cell.cast_unsigned().into() } else { cell.into() };
-                cells(reader, present, count).map(|cells| Self::Whole(each(cells, wide)))
-            }
-            ColumnReader::Int32ColumnReader(reader) => {
-                let wide = |cell: i32| if unsigned { cell.cast_unsigned().into() } else { cell.into() };
-                cells(reader, present, count).map(|cells| Self::Whole(each(cells, wide)))
-            }
-            ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count).map(Self::Text),
-            _ => Err(Fault::content(
-                format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
-                "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
-            )),
-        }
-    }
-
-    /// The number in a cell, or the text that is there instead.
-    fn number(&self, row: usize) -> Result<Option<f64>, String> {
-        match self {
-            Self::Real(cells) => Ok(cells[row]),
-            Self::Whole(cells) => Ok(cells[row].map(|whole| whole as f64)),
-            Self::Text(cells) => match &cells[row] {
-                Some(text) => Err(String::from_utf8_lossy(text.data()).into_owned()),
-                None => Ok(None),
-            },
-        }
-    }
-}
-
-fn each<A, B>(cells: Vec<Option<A>>, change: impl Fn(A) -> B) -> Vec<Option<B>> {
-    cells.into_iter().map(|cell| cell.map(&change)).collect()
 }
 
 fn cells<D: DataType>(
     reader: &mut ColumnReaderImpl<D>,
     present: i16,
     count: usize,
-) -> Result<Vec<Option<D::T>>, Fault> {
+    cell: impl Fn(D::T) -> Cell,
+) -> Result<Vec<Cell>, Fault> {
     let (mut values, mut levels) = (Vec::new(), Vec::new());
     guarded(|| reader.read_records(count, Some(&mut levels), None, &mut values))?;
+    let mut cells = values.into_iter().map(cell);
     if present == 0 {
-        return Ok(values.into_iter().map(Some).collect());
+        return Ok(cells.collect());
     }
-    let mut values = values.into_iter();
-    Ok(levels.into_iter().map(|level| if level == present { values.next() } else { None }).collect())
+    let next = |level| if level == present { cells.next() } else { None };
+    Ok(levels.into_iter().map(next).map(|cell| cell.unwrap_or(Cell::Empty)).collect())
 }
 
 /// A column of the current group of rows.
@@ -223,7 +203,7 @@ struct Column {
     present: i16,
     unsigned: bool,
     reader: ColumnReader,
-    cells: Batch,
+    cells: Vec<Cell>,
 }
 
 /// A table, group of rows by group of rows.
@@ -256,7 +236,7 @@ impl Groups {
             let column = guarded(|| reader.get_row_group(group)?.get_column_reader(number))?;
             let descriptor = schema.column(number);
             let (present, unsigned) = (descriptor.max_def_level(), is_unsigned(&descriptor));
-            columns.push(Column { number, present, unsigned, reader: column, cells: Batch::Whole(Vec::new()) });
+            columns.push(Column { number, present, unsigned, reader: column, cells: Vec::new() });
         }
         let rows = self.reader.metadata().row_group(self.group).num_rows();
         self.rows_left = usize::try_from(rows).map_err(|_| Fault::damaged("a group has less than no rows"))?;
@@ -272,9 +252,9 @@ impl Groups {
                 return Ok(0);
             }
         }
-        let count = self.rows_left.min(BATCH);
+        let count = self.rows_left.min(BATCH).min((BATCH_CELLS / self.wanted.len()).max(1));
         for column in &mut self.columns {
-            column.cells = Batch::read(column, &self.header[column.number], count)?;
+            column.cells = read_cells(column, &self.header[column.number], count)?;
             if column.cells.len() != count {
                 let what = format!("column `{}` has fewer cells than its group has rows", self.header[column.number]);
                 return Err(Fault::Truncated { what });
@@ -284,9 +264,10 @@ impl Groups {
         Ok(count)
     }
 
-    fn cells(&self, number: usize) -> Option<&Batch> {
-        let at = self.columns.binary_search_by_key(&number, |column| column.number).ok()?;
-        Some(&self.columns[at].cells)
+    /// The cell of the current row in a column that is read.
+    fn cell(&self, number: usize) -> &Cell {
+        let at = self.columns.binary_search_by_key(&number, |column| column.number);
+        at.ok().and_then(|at| self.columns[at].cells.get(self.at)).unwrap_or(&Cell::Empty)
     }
 }
 
@@ -321,32 +302,34 @@ impl Cells for Groups {
 
     fn number(&self, column: usize) -> Result<Option<f64>, Fault> {
         let name = || self.header[column].clone();
-        match self.cells(column).map_or(Ok(None), |cells| cells.number(self.at)) {
-            Ok(Some(number)) if !number.is_finite() => {
-                Err(Fault::NotFinite { column: name(), value: number.to_string() })
+        match self.cell(column) {
+            Cell::Empty => Ok(None),
+            Cell::Whole(whole) => Ok(Some(*whole as f64)),
+            Cell::Real(number) if number.is_finite() => Ok(Some(*number)),
+            Cell::Real(number) => Err(Fault::NotFinite { column: name(), value: number.to_string() }),
+            Cell::Text(text) => {
+                let value = String::from_utf8_lossy(text.data()).into_owned();
+                Err(Fault::NotANumber { column: name(), value })
             }
-            Ok(number) => Ok(number),
-            Err(text) => Err(Fault::NotANumber { column: name(), value: text }),
         }
     }
 
     fn stamp(&mut self, column: usize) -> Result<Option<Stamp>, Fault> {
-        if let Some(Batch::Whole(cells)) = self.cells(column) {
-            let stamp = |whole: i128| i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole);
-            return Ok(cells[self.at].map(stamp));
+        match self.cell(column) {
+            &Cell::Whole(whole) => Ok(Some(i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole))),
+            _ => Ok(self.number(column)?.map(Stamp::Real)),
         }
-        Ok(self.number(column)?.map(Stamp::Real))
     }
 
     fn vehicle(&self, column: usize, names: &mut Names, before: usize) -> Result<Option<usize>, Fault> {
-        match self.cells(column) {
-            Some(Batch::Text(cells)) => {
-                let name =
-                    cells[self.at].as_ref().map(|text| text.as_utf8().map_err(|_| Fault::NotUtf8)).transpose()?;
-                Ok(name.map(|name| names.index(name, before)))
+        match self.cell(column) {
+            Cell::Empty => Ok(None),
+            Cell::Whole(number) => Ok(Some(names.index(&number.to_string(), before))),
+            Cell::Text(text) => {
+                let name = text.as_utf8().map_err(|_| Fault::NotUtf8)?;
+                Ok(Some(names.index(name, before)))
             }
-            Some(Batch::Whole(cells)) => Ok(cells[self.at].map(|number| names.index(&number.to_string(), before))),
-            _ => {
+            Cell::Real(_) => {
                 let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
                 Err(Fault::content(problem, "save vehicles as text or as whole numbers"))
             }
