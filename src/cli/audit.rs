@@ -10,7 +10,7 @@ use super::console::{self, Console};
 use super::events;
 use super::obstacles;
 use super::outputs;
-use super::reading::{FormatArgument, ReadArguments};
+use super::reading::{self, ReadArguments};
 use super::{Exit, Failure};
 use crate::audit::recorded::{Approach, History, Judge, Motion, Outcome, Question, RecordedError, Terms, Who};
 use crate::figures::{self, Encounter, Figure};
@@ -35,8 +35,8 @@ pub(super) struct AuditArguments {
     #[command(flatten)]
     reading: ReadArguments,
     /// Format of the recording [default: recognised by its content].
-    #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
-    format: Option<FormatArgument>,
+    #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
+    format: Option<Format>,
 
     /// Safety distance between two centres [m], by default that of a recording of tautline; with --ellipsoid a scaled
     /// distance, by default 2.
@@ -209,7 +209,7 @@ impl AuditArguments {
     fn own_delta_m(&self) -> Option<f64> {
         let path = &self.reading.recording;
         let silent = self.delta.is_none() && self.radius.is_empty() && self.ellipsoid.is_none();
-        let may_be_ours = path.is_file() && self.format.is_none_or(|format| format.format() == Format::Mcap);
+        let may_be_ours = path.is_file() && self.format.is_none_or(|format| format == Format::Mcap);
         let ours = if silent && may_be_ours { McapRecording::open(path).ok()? } else { return None };
         Some(ours.header().delta_m)
     }

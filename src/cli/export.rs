@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::console::Console;
-use super::reading::{FormatArgument, ReadArguments};
+use super::reading::{self, ReadArguments, one_of};
 use super::run::interruption;
 use super::{Exit, Failure, outputs};
 use crate::export::{self, ExportOptions, Format};
@@ -23,8 +23,8 @@ pub(super) struct ExportArguments {
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
     /// Format to write [default: by the extension of the file].
-    #[arg(long, value_name = "FORMAT")]
-    format: Option<TargetArgument>,
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(Format::ALL.map(|format| (format.name().into(), format)).into()))]
+    format: Option<Format>,
     /// How often curves are sampled [Hz]; what is between the samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     sample_hz: Option<f64>,
@@ -38,27 +38,8 @@ pub(super) struct ExportArguments {
     #[command(flatten)]
     reading: ReadArguments,
     /// Format of the recording [default: recognised by its content].
-    #[arg(long, value_name = "FORMAT")]
-    input_format: Option<FormatArgument>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum TargetArgument {
-    Csv,
-    Parquet,
-    Npz,
-    Mcap,
-}
-
-impl TargetArgument {
-    fn format(self) -> Format {
-        match self {
-            Self::Csv => Format::Csv,
-            Self::Parquet => Format::Parquet,
-            Self::Npz => Format::Npz,
-            Self::Mcap => Format::Mcap,
-        }
-    }
+    #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
+    input_format: Option<read::Format>,
 }
 
 /// A recording that ends with an error once the user has had enough, so that no unfinished file is left behind.
@@ -95,7 +76,7 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options(arguments.input_format)?;
     let path = &arguments.output;
     let by_extension = || Format::from_name(path.extension()?.to_str()?);
-    let format = arguments.format.map(TargetArgument::format).or_else(by_extension).ok_or_else(|| {
+    let format = arguments.format.or_else(by_extension).ok_or_else(|| {
         let message = format!("the name `{}` does not tell a format", path.display());
         Failure::input(message, "name the format with --format csv, parquet, npz or mcap")
     })?;

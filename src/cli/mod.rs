@@ -97,7 +97,7 @@ fn quiet_guarded_panics() {
     let speak = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         #[cfg(feature = "viewer")]
-        if view::is_lost_display(panic) {
+        if crate::render::in_window_library() {
             std::process::exit(view::lose_display() as i32);
         }
         if !read::is_guarded() {

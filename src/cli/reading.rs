@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::Failure;
 use crate::read::{AxisOrder, ColumnNames, Format, ReadOptions, TimeUnit};
@@ -15,8 +16,8 @@ pub(super) struct ReadArguments {
     #[arg(value_name = "RECORDING")]
     pub(super) recording: PathBuf,
     /// Unit of time of the recording [default: what it says, or its numbers suggest].
-    #[arg(long, value_name = "UNIT")]
-    time_unit: Option<UnitArgument>,
+    #[arg(long, value_name = "UNIT", value_parser = unit())]
+    time_unit: Option<TimeUnit>,
     /// Metres per unit of length of the recording.
     #[arg(long, value_name = "METRES", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
@@ -24,8 +25,8 @@ pub(super) struct ReadArguments {
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
     columns: Vec<(String, String)>,
     /// Which axis of the positions of an NPZ archive comes first, where its shape does not tell.
-    #[arg(long, value_name = "ORDER")]
-    axis_order: Option<AxisArgument>,
+    #[arg(long, value_name = "ORDER", value_parser = axis_order())]
+    axis_order: Option<AxisOrder>,
     /// The frame whose positions are read, where an MCAP file gives several.
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
@@ -36,7 +37,7 @@ pub(super) struct ReadArguments {
 
 impl ReadArguments {
     /// The options of the library, with the format if it is given.
-    pub(super) fn options(&self, format: Option<FormatArgument>) -> Result<ReadOptions, Failure> {
+    pub(super) fn options(&self, format: Option<Format>) -> Result<ReadOptions, Failure> {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             let message = format!("--scale is {}", self.scale);
             return Err(Failure::input(message, "give a positive number of metres, such as 0.001 for millimetres"));
@@ -46,11 +47,11 @@ impl ReadArguments {
             columns.set(role, name);
         }
         Ok(ReadOptions {
-            format: format.map(FormatArgument::format),
-            time_unit: self.time_unit.map(UnitArgument::unit),
+            format,
+            time_unit: self.time_unit,
             scale: self.scale,
             columns,
-            axis_order: self.axis_order.map(AxisArgument::order),
+            axis_order: self.axis_order,
             frame: self.frame.clone(),
             allow_unfinished: self.allow_unfinished,
         })
@@ -68,69 +69,35 @@ fn column(text: &str) -> Result<(String, String), String> {
     }
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum UnitArgument {
-    S,
-    Ms,
-    Us,
-    Ns,
+/// A parser of these names, each with what it stands for.
+pub(super) fn one_of<T: Clone + Send + Sync + 'static>(
+    choices: Vec<(PossibleValue, T)>,
+) -> impl TypedValueParser<Value = T> {
+    let names = choices.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    PossibleValuesParser::new(names).try_map(move |given| {
+        let chosen = choices.iter().find(|(name, _)| name.get_name() == given);
+        chosen.map(|(_, value)| value.clone()).ok_or("it is none of the possible values")
+    })
 }
 
-impl UnitArgument {
-    fn unit(self) -> TimeUnit {
-        match self {
-            Self::S => TimeUnit::Seconds,
-            Self::Ms => TimeUnit::Milliseconds,
-            Self::Us => TimeUnit::Microseconds,
-            Self::Ns => TimeUnit::Nanoseconds,
-        }
-    }
+fn unit() -> impl TypedValueParser<Value = TimeUnit> {
+    one_of(TimeUnit::ALL.map(|unit| (unit.name().into(), unit)).into())
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum AxisArgument {
-    TimeFirst,
-    VehicleFirst,
-}
-
-impl AxisArgument {
-    fn order(self) -> AxisOrder {
-        match self {
-            Self::TimeFirst => AxisOrder::TimeFirst,
-            Self::VehicleFirst => AxisOrder::VehicleFirst,
-        }
-    }
+fn axis_order() -> impl TypedValueParser<Value = AxisOrder> {
+    one_of(vec![("time-first".into(), AxisOrder::TimeFirst), ("vehicle-first".into(), AxisOrder::VehicleFirst)])
 }
 
 /// A format that is read.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum FormatArgument {
-    /// A table in text with a header.
-    Csv,
-    /// Numbers between blanks: t x y z x y z ...
-    Text,
-    /// A table in Parquet.
-    Parquet,
-    /// Arrays t and positions, as numpy.savez saves them.
-    Npz,
-    /// MCAP: our own, Foxglove or ROS 2 messages.
-    Mcap,
-    /// A folder of Crazyflie polynomials.
-    Crazyflie,
-    /// A Skybrush show.
-    Skybrush,
-}
-
-impl FormatArgument {
-    pub(super) fn format(self) -> Format {
-        match self {
-            Self::Csv => Format::Csv,
-            Self::Text => Format::Text,
-            Self::Parquet => Format::Parquet,
-            Self::Npz => Format::Npz,
-            Self::Mcap => Format::Mcap,
-            Self::Crazyflie => Format::Crazyflie,
-            Self::Skybrush => Format::Skybrush,
-        }
-    }
+pub(super) fn format() -> impl TypedValueParser<Value = Format> {
+    let help = |format| match format {
+        Format::Csv => "A table in text with a header",
+        Format::Text => "Numbers between blanks: t x y z x y z ...",
+        Format::Parquet => "A table in Parquet",
+        Format::Npz => "Arrays t and positions, as numpy.savez saves them",
+        Format::Mcap => "MCAP: our own, Foxglove or ROS 2 messages",
+        Format::Crazyflie => "A folder of Crazyflie polynomials",
+        Format::Skybrush => "A Skybrush show",
+    };
+    one_of(Format::ALL.map(|format| (PossibleValue::new(format.name()).help(help(format)), format)).into())
 }

@@ -11,7 +11,7 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use super::console::Console;
 use super::drawing;
 use super::outputs::{self, Called};
-use super::reading::{FormatArgument, ReadArguments};
+use super::reading::{self, ReadArguments};
 use super::{Exit, Failure};
 use crate::render::scene::Stage;
 use crate::render::{
@@ -34,8 +34,8 @@ pub(super) struct RenderArguments {
     #[command(flatten)]
     reading: ReadArguments,
     /// Format of the recording [default: recognised by its content].
-    #[arg(long, value_name = "FORMAT", help_heading = "Reading")]
-    input_format: Option<FormatArgument>,
+    #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
+    input_format: Option<crate::read::Format>,
     /// Safety distance for a recording that has none: shells of half of it, and violations of straight lines
     /// between samples [m].
     #[arg(long, value_name = "M", allow_negative_numbers = true)]

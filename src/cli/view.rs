@@ -1,7 +1,6 @@
 //! `tautline view`: a window on a recording, or on a scenario that is flown while it is watched.
 
 use std::ops::ControlFlow;
-use std::panic::PanicHookInfo;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -18,9 +17,6 @@ use crate::sim::{self, Parts};
 
 /// Samples of a flight in the air that wait for the window.
 const WAITING: usize = 256;
-
-/// Libraries that speak to the window system.
-const WINDOW_CRATES: [&str; 4] = ["winit", "x11rb", "wayland-client", "calloop"];
 
 /// Arguments of `tautline view`.
 #[derive(Debug, Args)]
@@ -123,24 +119,11 @@ impl Sink for Downlink {
     }
 }
 
-/// Whether a panic is that of the library of windows: it has no other words for a display that went away.
-pub(super) fn is_lost_display(panic: &PanicHookInfo<'_>) -> bool {
-    panic.location().is_some_and(|place| is_of_windows(place.file()))
-}
-
 /// Says that the display is gone. Nothing that belongs to it can be put away any more: the program is to end at once.
 pub(super) fn lose_display() -> Exit {
     Failure::machine("the display is gone, and the window with it")
         .with_help("open it again on a display that stays, or draw without one: tautline render RECORDING")
         .show()
-}
-
-fn is_of_windows(source: &str) -> bool {
-    Path::new(source).components().filter_map(|part| part.as_os_str().to_str()).any(|folder| {
-        WINDOW_CRATES
-            .iter()
-            .any(|name| folder.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('-')))
-    })
 }
 
 impl From<WindowError> for Failure {
@@ -151,23 +134,6 @@ impl From<WindowError> for Failure {
                 .with_help("run it on a machine with a screen, or draw without one: tautline render RECORDING"),
             WindowError::Refused(_) => Self::machine(message),
             WindowError::Gpu(error) => error.into(),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn panics_of_the_library_of_windows_are_told_from_our_own() {
-        for source in
-            ["/home/me/.cargo/registry/src/index/winit-0.30.13/src/platform_impl/linux/x11/mod.rs", "v/x11rb/a.rs"]
-        {
-            assert!(is_of_windows(source), "{source}");
-        }
-        for source in ["src/render/window/mod.rs", "/home/winitfan/tautline/src/cli/view.rs"] {
-            assert!(!is_of_windows(source), "{source}");
         }
     }
 }

@@ -5,7 +5,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
-use super::{About, ExportError, Source};
+use super::{About, Column, ExportError, POSITION, Source};
 
 /// From here on a reader counts times from an epoch again \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;
@@ -16,28 +16,18 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     let absolute = epoch_s >= EPOCH_FROM_S && rest_ns == 0;
     let epoch_s = if absolute { epoch_s } else { 0 };
     let mut out = BufWriter::new(file);
-    out.write_all(b"t_s,id,x,y,z")?;
-    if about.velocities {
-        out.write_all(b",vx,vy,vz")?;
-    }
-    if about.radii {
-        out.write_all(b",radius")?;
-    }
-    out.write_all(b"\n")?;
+    let columns: Vec<&Column> = POSITION.iter().chain(about.optional_columns()).collect();
+    let header: String = columns.iter().map(|column| format!(",{}", column.name)).collect();
+    writeln!(out, "t_s,id{header}")?;
     source.each_instant(|instant| {
         let time = instant.first().map_or_else(String::new, |first| time_text(epoch_s, first.time_s));
         for sample in instant {
-            let [x, y, z] = sample.position_m.into();
-            write!(out, "{time},{},{x:?},{y:?},{z:?}", names[sample.vehicle])?;
-            match sample.velocity_m_s.map(<[f64; 3]>::from) {
-                Some([x, y, z]) => write!(out, ",{x:?},{y:?},{z:?}")?,
-                None if about.velocities => out.write_all(b",,,")?,
-                None => {}
-            }
-            match sample.radius_m {
-                Some(radius) => write!(out, ",{radius:?}")?,
-                None if about.radii => out.write_all(b",")?,
-                None => {}
+            write!(out, "{time},{}", names[sample.vehicle])?;
+            for column in &columns {
+                match (column.of)(sample) {
+                    Some(number) => write!(out, ",{number:?}")?,
+                    None => out.write_all(b",")?,
+                }
             }
             out.write_all(b"\n")?;
         }

@@ -165,6 +165,37 @@ struct About {
     radii: bool,
 }
 
+/// A column of numbers of a long table.
+struct Column {
+    name: &'static str,
+    /// What stands in it; none where the cell is empty.
+    of: fn(&Sample) -> Option<f64>,
+}
+
+/// The columns that every sample fills.
+const POSITION: [Column; 3] = [
+    Column { name: "x", of: |sample| Some(sample.position_m.x) },
+    Column { name: "y", of: |sample| Some(sample.position_m.y) },
+    Column { name: "z", of: |sample| Some(sample.position_m.z) },
+];
+
+const VELOCITY: [Column; 3] = [
+    Column { name: "vx", of: |sample| sample.velocity_m_s.map(|v| v.x) },
+    Column { name: "vy", of: |sample| sample.velocity_m_s.map(|v| v.y) },
+    Column { name: "vz", of: |sample| sample.velocity_m_s.map(|v| v.z) },
+];
+
+const RADIUS: [Column; 1] = [Column { name: "radius", of: |sample| sample.radius_m }];
+
+impl About {
+    /// The columns that some samples fill and others may not.
+    fn optional_columns(&self) -> impl Iterator<Item = &'static Column> {
+        let velocities: &[_] = if self.velocities { &VELOCITY } else { &[] };
+        let radii: &[_] = if self.radii { &RADIUS } else { &[] };
+        velocities.iter().chain(radii)
+    }
+}
+
 impl Source<'_> {
     fn survey(&self) -> Result<About, ExportError> {
         let mut about = About::default();

@@ -11,7 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::{About, ExportError, Source};
+use super::{About, ExportError, POSITION, Source};
 use crate::read::parquet::EPOCH_KEY;
 use crate::track::Sample;
 
@@ -56,13 +56,11 @@ fn schema(about: &About) -> Result<TypePtr, ParquetError> {
         double("t_s", Repetition::REQUIRED)?,
         column("id", Physical::BYTE_ARRAY, Repetition::REQUIRED, Some(LogicalType::String))?,
     ];
-    for name in ["x", "y", "z"] {
-        columns.push(double(name, Repetition::REQUIRED)?);
+    for position in &POSITION {
+        columns.push(double(position.name, Repetition::REQUIRED)?);
     }
-    let velocities: &[_] = if about.velocities { &["vx", "vy", "vz"] } else { &[] };
-    let radii: &[_] = if about.radii { &["radius"] } else { &[] };
-    for name in velocities.iter().chain(radii) {
-        columns.push(double(name, Repetition::OPTIONAL)?);
+    for optional in about.optional_columns() {
+        columns.push(double(optional.name, Repetition::OPTIONAL)?);
     }
     Type::group_type_builder("samples").with_fields(columns).build().map(Arc::new)
 }
@@ -76,16 +74,8 @@ fn write_group(
     let mut group = writer.next_row_group()?;
     write_column::<DoubleType>(&mut group, rows, |sample| Some(sample.time_s))?;
     write_column::<ByteArrayType>(&mut group, rows, |sample| Some(names[sample.vehicle].clone()))?;
-    for axis in 0..3 {
-        write_column::<DoubleType>(&mut group, rows, |sample| Some(sample.position_m[axis]))?;
-    }
-    if about.velocities {
-        for axis in 0..3 {
-            write_column::<DoubleType>(&mut group, rows, |sample| sample.velocity_m_s.map(|v| v[axis]))?;
-        }
-    }
-    if about.radii {
-        write_column::<DoubleType>(&mut group, rows, |sample| sample.radius_m)?;
+    for column in POSITION.iter().chain(about.optional_columns()) {
+        write_column::<DoubleType>(&mut group, rows, column.of)?;
     }
     group.close().map(drop)
 }

@@ -2,25 +2,33 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
+use std::path::{Path, PathBuf};
 
 use flate2::bufread::DeflateDecoder;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::error::{Fault, Place, ReadError};
-use super::source::{Growing, Source, fault_of};
+use super::error::{Fault, FaultAt, Place};
+use super::source::Growing;
+
+/// Longest end of an archive: its last record with the longest comment \[bytes\].
+const END_LIMIT_BYTES: u64 = 22 + 65_535;
 
 /// An archive opened for reading.
 pub(super) struct Archive {
-    source: Source,
+    path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
 }
 
 impl Archive {
-    pub(super) fn open(source: &Source) -> Result<Self, ReadError> {
-        let file = File::open(&source.path).map_err(|error| source.error(Fault::System(error)))?;
-        let zip = ZipArchive::new(BufReader::new(file)).map_err(|error| source.error(zip_fault(error)))?;
-        Ok(Self { source: source.clone(), zip })
+    pub(super) fn open(path: &Path) -> Result<Self, Fault> {
+        let zip = ZipArchive::new(BufReader::new(File::open(path)?)).map_err(|error| match error {
+            ZipError::InvalidArchive(_) if !has_end(path) => {
+                Fault::Truncated { what: "the end of the archive is missing".to_owned() }
+            }
+            other => zip_fault(other),
+        })?;
+        Ok(Self { path: path.to_owned(), zip })
     }
 
     /// Whether there is an entry of this name.
@@ -34,18 +42,21 @@ impl Archive {
     }
 
     /// The bytes of an entry, unpacked and compared with their checksum.
-    pub(super) fn entry(&mut self, name: &str) -> Result<Box<dyn Read>, ReadError> {
-        let at = |fault| self.source.error(fault).at(Place::Part(format!("entry `{name}`")));
-        let index = self.zip.index_for_name(name).ok_or_else(|| at(zip_fault(ZipError::FileNotFound)))?;
-        let entry = self.zip.by_index_raw(index).map_err(|error| at(zip_fault(error)))?;
+    pub(super) fn entry(&mut self, name: &str) -> Result<Box<dyn Read>, FaultAt> {
+        self.try_entry(name).map_err(|fault| fault.at(place(name)))
+    }
+
+    fn try_entry(&mut self, name: &str) -> Result<Box<dyn Read>, Fault> {
+        let index = self.zip.index_for_name(name).ok_or_else(|| zip_fault(ZipError::FileNotFound))?;
+        let entry = self.zip.by_index_raw(index).map_err(zip_fault)?;
         let (method, start, crc) = (entry.compression(), entry.data_start(), entry.crc32());
         let packed_bytes = entry.compressed_size();
         if entry.encrypted() {
-            return Err(at(Fault::content("it is encrypted", "give an archive without a password")));
+            return Err(Fault::content("it is encrypted", "give an archive without a password"));
         }
-        let start = start.ok_or_else(|| at(Fault::damaged("the entry has no place in the archive")))?;
-        let mut file = File::open(&self.source.path).map_err(|error| at(Fault::System(error)))?;
-        file.seek(SeekFrom::Start(start)).map_err(|error| at(Fault::System(error)))?;
+        let start = start.ok_or_else(|| Fault::damaged("the entry has no place in the archive"))?;
+        let mut file = File::open(&self.path)?;
+        file.seek(SeekFrom::Start(start))?;
         // What the archive says of its lengths is no more than a claim: an entry cannot be longer than its file.
         let file_bytes = file.metadata().map_or(0, |data| data.len());
         let packed = BufReader::new(file.take(packed_bytes));
@@ -53,35 +64,45 @@ impl Archive {
         Ok(match method {
             CompressionMethod::Stored => Box::new(Checked::new(packed, crc)),
             CompressionMethod::Deflated => {
-                Box::new(Checked::new(Growing::new(DeflateDecoder::new(packed), move || packed_bytes), crc))
+                Box::new(Checked::new(Growing::new(DeflateDecoder::new(packed), packed_bytes), crc))
             }
             other => {
                 let remedy = "make the archive with deflate or unpacked, as numpy.savez does";
-                return Err(at(Fault::content(format!("it is packed by {other}"), remedy)));
+                return Err(Fault::content(format!("it is packed by {other}"), remedy));
             }
         })
     }
 
     /// All bytes of an entry, unpacked.
-    pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, ReadError> {
+    pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, FaultAt> {
         let mut bytes = Vec::new();
-        let read = self.entry(name)?.read_to_end(&mut bytes);
-        read.map_err(|error| self.source.error(fault_of(error)).at(Place::Part(format!("entry `{name}`"))))?;
+        self.entry(name)?.read_to_end(&mut bytes).map_err(|error| Fault::from(error).at(place(name)))?;
         Ok(bytes)
     }
 }
 
+fn place(name: &str) -> Place {
+    Place::Part(format!("entry `{name}`"))
+}
+
+/// Whether the record that every archive ends with is among the last bytes of a file.
+fn has_end(path: &Path) -> bool {
+    let tail = File::open(path).and_then(|mut file| {
+        let (bytes, mut tail) = (file.metadata()?.len(), Vec::new());
+        file.seek(SeekFrom::Start(bytes.saturating_sub(END_LIMIT_BYTES)))?;
+        file.read_to_end(&mut tail).map(|_| tail)
+    });
+    tail.is_ok_and(|tail| memchr::memmem::find(&tail, b"PK\x05\x06").is_some())
+}
+
 fn zip_fault(error: ZipError) -> Fault {
     match error {
-        ZipError::Io(error) => fault_of(error),
+        ZipError::Io(error) => error.into(),
         ZipError::FileNotFound => Fault::content("the entry is missing", "make the archive again"),
         ZipError::UnsupportedArchive(what) => Fault::content(
             format!("the archive needs what is not supported: {what}"),
             "make it with deflate or unpacked",
         ),
-        ZipError::InvalidArchive(what) if what.contains("EOCD") || what.contains("end") => {
-            Fault::Truncated { what: "the end of the archive is missing".to_owned() }
-        }
         other => Fault::damaged(other),
     }
 }

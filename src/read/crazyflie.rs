@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 
 use super::curves::{Curves, piece};
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, FaultAt, Place};
 use super::source::{Lines, Source};
 use super::{ReadOptions, Recording};
 use crate::track::Item;
@@ -23,13 +23,13 @@ use crate::track::Item;
 const HIGHEST_POWER: usize = 15;
 
 /// Opens a folder of polynomials, or the file of a single vehicle.
-pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<Recording, FaultAt> {
     let mut notes = Vec::new();
     let mut vehicles = Vec::new();
     for (name, files) in vehicles_of(path)? {
         let mut curve = Curve { vehicle: vehicles.len(), time_s: 0.0, scale: options.scale, items: Vec::new() };
         for file in &files {
-            curve.append(file)?;
+            curve.append(file).map_err(|fault| fault.in_file(file))?;
         }
         if files.len() > 1 && notes.is_empty() {
             notes.push(format!("`{name}` and others fly the files of their folders one after the other"));
@@ -40,7 +40,7 @@ pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<Recording, Read
 }
 
 /// Names and files of the vehicles, in order.
-fn vehicles_of(path: &Path) -> Result<Vec<(String, Vec<PathBuf>)>, ReadError> {
+fn vehicles_of(path: &Path) -> Result<Vec<(String, Vec<PathBuf>)>, FaultAt> {
     if path.is_file() {
         return Ok(vec![(stem(path), vec![path.to_owned()])]);
     }
@@ -57,14 +57,14 @@ fn vehicles_of(path: &Path) -> Result<Vec<(String, Vec<PathBuf>)>, ReadError> {
     }
     if vehicles.is_empty() {
         let remedy = "give a folder with a polynomial file (.csv) for each vehicle, or one with a folder for each";
-        return Err(ReadError::new(path, Fault::content("there is no .csv file in the folder", remedy)));
+        return Err(Fault::content("there is no .csv file in the folder", remedy).into());
     }
     Ok(vehicles)
 }
 
 /// CSV files and folders of a folder, each in natural order.
-fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), ReadError> {
-    let error = |source| ReadError::new(folder, Fault::System(source));
+fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), FaultAt> {
+    let error = |source| FaultAt::from(Fault::System(source)).in_file(folder);
     let (mut files, mut folders) = (Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).map_err(error)? {
         let path = entry.map_err(error)?.path();
@@ -158,13 +158,12 @@ struct Curve {
 }
 
 impl Curve {
-    fn append(&mut self, path: &Path) -> Result<(), ReadError> {
-        let source = Source { path: path.to_owned(), gzip: false };
-        let mut lines = Lines::new(&source)?;
+    fn append(&mut self, path: &Path) -> Result<(), FaultAt> {
+        let mut lines = Lines::new(&Source { path: path.to_owned(), gzip: false })?;
         let mut columns = None;
         let before = self.items.len();
         while lines.advance()? {
-            let at = |fault| source.error(fault).at(Place::Line(lines.number()));
+            let at = |fault: Fault| fault.at(Place::Line(lines.number()));
             let line = std::str::from_utf8(lines.line()).map_err(|_| at(Fault::NotUtf8))?;
             match &columns {
                 _ if line.trim().is_empty() || line.starts_with('#') => {}
@@ -173,7 +172,7 @@ impl Curve {
             }
         }
         if self.items.len() == before {
-            return Err(source.error(if columns.is_some() { Fault::HeaderOnly } else { Fault::Empty }));
+            return Err(if columns.is_some() { Fault::HeaderOnly } else { Fault::Empty }.into());
         }
         Ok(())
     }

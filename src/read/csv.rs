@@ -1,17 +1,19 @@
 //! Tables in text: CSV with a header, and columns of plain numbers.
+//!
+//! Lines are found and split here: the reader of `csv` takes as much memory as a line is long, without a limit, reads on
+//! over the end of a line where a quote is left open, and knows no fields between any number of blanks.
 
 use std::str;
 
 use csv_core::ReadRecordResult;
-use nalgebra::Vector3;
 
-use super::clock::{Probe, Stamp};
-use super::error::{Fault, Place, ReadError};
+use super::clock::Stamp;
+use super::error::{Fault, FaultAt, Place};
+use super::layout::Layout;
 use super::names::Names;
-use super::order::{BATCH, Row, Rows};
 use super::source::{Lines, Source};
-use super::table::{Body, Layout, Shape};
-use super::{ColumnNames, Format};
+use super::table::{self, Cells};
+use super::{Format, ReadOptions, Recording};
 
 /// What stands between two fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,95 +25,59 @@ enum Separator {
 }
 
 /// A table in text.
-pub(super) struct Table {
+struct Text {
     source: Source,
     lines: Lines,
     separator: Separator,
     has_header: bool,
     header: Vec<String>,
-    pub(super) layout: Layout,
-    names: Names,
     fields: Fields,
+    /// Fields that are looked at; all have to be there where no number says how many.
+    wanted: Option<usize>,
     /// Text and value of the last time.
     time: (Vec<u8>, Stamp),
-    /// Vehicle of the last row.
-    vehicle: usize,
 }
 
-impl Table {
-    /// Opens a table and reads its header.
-    pub(super) fn open(source: Source, format: Format, columns: &ColumnNames) -> Result<Self, ReadError> {
-        let mut lines = Lines::new(&source)?;
-        if !next_line(&mut lines, true)? {
-            return Err(source.error(Fault::Empty));
-        }
-        if let Some(value) = decimal_comma(lines.line()) {
-            let fault = Fault::DecimalComma { column: "1".to_owned(), value };
-            return Err(source.error(fault).at(Place::Line(lines.number())));
-        }
-        let separator = separator(lines.line(), format);
-        let mut fields = Fields::default();
-        let place = Place::Line(lines.number());
-        let at = |fault: Fault| source.error(fault).at(place.clone());
-        fields.split(lines.line(), separator, usize::MAX).map_err(at)?;
-        let mut header = Vec::new();
-        for index in 0..fields.count() {
-            header.push(fields.text(lines.line(), index).map_err(at)?.trim().to_owned());
-        }
-        let numeric = header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
-        let has_header = !(numeric && format == Format::Text);
-        let layout = if has_header {
-            if numeric {
-                return Err(at(Fault::NoHeader));
-            }
-            Layout::of(&header, columns).map_err(at)?
-        } else {
-            let fault = || {
-                let problem =
-                    format!("it has {} numbers where time and three for each vehicle are expected", header.len());
-                Fault::content(problem, "write t x y z x y z ..., a line for each time")
-            };
-            Layout::without_header(header.len()).ok_or_else(fault).map_err(at)?
-        };
-        if !has_header {
-            header = (1..=header.len()).map(|number| number.to_string()).collect();
-        }
-        let names = match &layout.shape {
-            Shape::Long { .. } => Names::default(),
-            Shape::Wide { names, .. } => Names::from_list(names.clone()),
-        };
-        let mut table = Self {
-            source,
-            lines,
-            separator,
-            has_header,
-            header,
-            layout,
-            names,
-            fields,
-            time: (Vec::new(), Stamp::Whole(0)),
-            vehicle: 0,
-        };
-        if !has_header {
-            table.rewind()?;
-        }
-        Ok(table)
+/// Opens a table.
+pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let mut lines = Lines::new(source)?;
+    if !next_line(&mut lines, true)? {
+        return Err(Fault::Empty.into());
     }
-
-    fn at_line(&self, fault: Fault) -> ReadError {
-        self.source.error(fault).at(Place::Line(self.lines.number()))
+    let place = Place::Line(lines.number());
+    let at = |fault: Fault| fault.at(place.clone());
+    if let Some(value) = decimal_comma(lines.line()) {
+        return Err(at(Fault::DecimalComma { column: "1".to_owned(), value }));
     }
-
-    /// The number in a column; none where the cell is empty.
-    #[inline]
-    fn number(&self, column: usize) -> Result<Option<f64>, Fault> {
-        let bytes = self.fields.bytes(self.lines.line(), column);
-        match str::from_utf8(bytes).ok().and_then(|text| text.parse::<f64>().ok()) {
-            Some(number) if number.is_finite() => Ok(Some(number)),
-            _ => self.odd_number(column),
+    let separator = separator(lines.line(), format);
+    let mut fields = Fields::default();
+    fields.split(lines.line(), separator, usize::MAX).map_err(at)?;
+    let mut header = Vec::new();
+    for index in 0..fields.count() {
+        header.push(fields.text(lines.line(), index).map_err(at)?.trim().to_owned());
+    }
+    let numeric = header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
+    let has_header = !(numeric && format == Format::Text);
+    let layout = if has_header {
+        if numeric {
+            return Err(at(Fault::NoHeader));
         }
-    }
+        Layout::of(&header, &options.columns).map_err(at)?
+    } else {
+        let count = header.len();
+        header = (1..=count).map(|number| number.to_string()).collect();
+        let fault = || {
+            let problem = format!("it has {count} numbers where time and three for each vehicle are expected");
+            at(Fault::content(problem, "write t x y z x y z ..., a line for each time"))
+        };
+        Layout::without_header(count).ok_or_else(fault)?
+    };
+    let time = (Vec::new(), Stamp::Whole(0));
+    let text = Text { source: source.clone(), lines, separator, has_header, header, fields, wanted: None, time };
+    table::open(source, text, layout, None, 0, options)
+}
 
+impl Text {
     /// The number in a cell that is not a plain finite number.
     #[cold]
     fn odd_number(&self, column: usize) -> Result<Option<f64>, Fault> {
@@ -128,119 +94,28 @@ impl Table {
         }
     }
 
-    /// The time of the current line.
+    /// Splits the current line.
     #[inline]
-    fn stamp(&mut self) -> Result<Stamp, Fault> {
-        let bytes = self.fields.bytes(self.lines.line(), self.layout.time);
-        if bytes == self.time.0 && !bytes.is_empty() {
-            return Ok(self.time.1);
-        }
-        let column = self.layout.time;
-        let stamp = str::from_utf8(bytes).ok().and_then(|text| Stamp::parse(text.trim()));
-        let stamp = match stamp {
-            Some(stamp) if stamp.approximately().is_finite() => stamp,
-            _ => match self.odd_number(column).map_err(Fault::of_time)? {
-                Some(number) => Stamp::Real(number),
-                None => return Err(Fault::EmptyCell { column: self.header[column].clone() }),
-            },
-        };
-        self.time.0.clear();
-        self.time.0.extend_from_slice(self.fields.bytes(self.lines.line(), column));
-        self.time.1 = stamp;
-        Ok(stamp)
-    }
-
-    /// The vehicle of the current line.
-    #[inline]
-    fn vehicle(&mut self, id: usize) -> Result<usize, Fault> {
-        if let Some(next) = self.names.next_if(self.fields.bytes(self.lines.line(), id), self.vehicle) {
-            self.vehicle = next;
-            return Ok(next);
-        }
-        let name = self.fields.text(self.lines.line(), id)?.trim();
-        if name.is_empty() {
-            return Err(Fault::EmptyCell { column: self.header[id].clone() });
-        }
-        self.vehicle = self.names.index(name, self.vehicle);
-        Ok(self.vehicle)
-    }
-
-    fn split(&mut self, limit: usize) -> Result<(), Fault> {
-        self.fields.split(self.lines.line(), self.separator, limit)
-    }
-
-    /// The row of a vehicle on the current line; none where the vehicle was not seen.
-    #[inline]
-    fn row(&self, stamp: Stamp, vehicle: usize, body: &Body) -> Result<Option<Row>, Fault> {
-        let Some(position) = self.vector(&body.position)? else { return Ok(None) };
-        let velocity = body.velocity.as_ref().map(|columns| self.vector(columns)).transpose()?.flatten();
-        let radius = body.radius.map(|column| self.number(column)).transpose()?.flatten();
-        if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
-            let problem = format!("column `{}` holds {radius}, a negative radius", self.header[column]);
-            return Err(Fault::content(problem, "write 0 or more"));
-        }
-        Ok(Some(Row { stamp, place: self.lines.number(), vehicle, position, velocity, radius }))
-    }
-
-    /// Three numbers, none where all cells are empty.
-    #[inline]
-    fn vector(&self, columns: &[Option<usize>; 3]) -> Result<Option<Vector3<f64>>, Fault> {
-        let mut vector = Vector3::zeros();
-        let (mut filled, mut empty) = (false, None);
-        for (axis, column) in columns.iter().enumerate() {
-            let Some(column) = *column else { continue };
-            match self.number(column)? {
-                Some(number) => (vector[axis], filled) = (number, true),
-                None => empty = empty.or(Some(column)),
-            }
-        }
-        match empty {
-            None => Ok(Some(vector)),
-            Some(_) if !filled => Ok(None),
-            Some(column) => Err(Fault::EmptyCell { column: self.header[column].clone() }),
-        }
-    }
-
-    fn rows_of_line(&mut self, shape: &Shape, rows: &mut Vec<Row>) -> Result<(), Fault> {
-        self.split(usize::MAX)?;
+    fn split(&mut self) -> Result<(), Fault> {
+        self.fields.split(self.lines.line(), self.separator, self.wanted.unwrap_or(usize::MAX))?;
         let (expected, found) = (self.header.len(), self.fields.count());
-        if expected != found {
-            return Err(Fault::FieldCount { expected, found, commas: self.separator == Separator::Byte(b',') });
-        }
-        let stamp = self.stamp()?;
-        match shape {
-            Shape::Long { id, body } => {
-                let vehicle = self.vehicle(*id)?;
-                rows.extend(self.row(stamp, vehicle, body)?);
+        match self.wanted {
+            None if found != expected => {
+                Err(Fault::FieldCount { expected, found, commas: self.separator == Separator::Byte(b',') })
             }
-            Shape::Wide { bodies, .. } => {
-                for (vehicle, body) in bodies.iter().enumerate() {
-                    rows.extend(self.row(stamp, vehicle, body)?);
-                }
-            }
+            Some(wanted) if found < wanted => Err(Fault::FieldCount { expected, found, commas: false }),
+            _ => Ok(()),
         }
-        Ok(())
     }
 }
 
-impl Rows for Table {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        // Taken out for the time of the loop, so that the columns can be read while the table changes.
-        let shape = std::mem::replace(&mut self.layout.shape, Shape::Wide { names: Vec::new(), bodies: Vec::new() });
-        let before = rows.len();
-        let mut done = Ok(());
-        while done.is_ok() && rows.len() < before + BATCH {
-            match next_line(&mut self.lines, !self.has_header) {
-                Ok(true) => done = self.rows_of_line(&shape, rows).map_err(|fault| self.at_line(fault)),
-                Ok(false) => break,
-                Err(error) => done = Err(error),
-            }
-        }
-        self.layout.shape = shape;
-        done.map(|()| rows.len() > before)
+impl Cells for Text {
+    fn header(&self) -> &[String] {
+        &self.header
     }
 
-    fn rewind(&mut self) -> Result<(), ReadError> {
+    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), FaultAt> {
+        self.wanted = columns.last().filter(|_| !all).map(|last| last + 1);
         self.lines = Lines::new(&self.source)?;
         if self.has_header {
             next_line(&mut self.lines, true)?;
@@ -249,52 +124,66 @@ impl Rows for Table {
         Ok(())
     }
 
-    fn vehicles(&self) -> &[String] {
-        self.names.all()
-    }
-
-    fn settle_names(&mut self) {
-        self.names.settle();
-    }
-
-    fn error(&self, fault: Fault) -> ReadError {
-        self.source.error(fault)
-    }
-
-    fn place(&self, number: u64) -> Place {
-        Place::Line(number)
-    }
-
-    fn is_wide(&self) -> bool {
-        matches!(self.layout.shape, Shape::Wide { .. })
-    }
-
-    /// Only times and names are looked at, which is several times faster than reading everything.
-    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
-        let Shape::Long { id, .. } = self.layout.shape else { return Ok(None) };
-        let last = id.max(self.layout.time);
-        let mut probe: Option<Probe> = None;
-        while next_line(&mut self.lines, !self.has_header)? {
-            let row = self.split(last + 1).and_then(|()| {
-                let found = self.fields.count();
-                if found <= last {
-                    return Err(Fault::FieldCount { expected: self.header.len(), found, commas: false });
-                }
-                let stamp = self.stamp()?;
-                self.vehicle(id)?;
-                Ok(stamp)
-            });
-            let stamp = row.map_err(|fault| self.at_line(fault))?;
-            probe.get_or_insert_with(|| Probe::new(stamp)).see(stamp);
+    #[inline]
+    fn advance(&mut self) -> Result<bool, FaultAt> {
+        if !next_line(&mut self.lines, !self.has_header)? {
+            return Ok(false);
         }
-        Ok(probe)
+        self.split().map(|()| true).map_err(|fault| fault.at(Self::place(self.row())))
+    }
+
+    #[inline]
+    fn row(&self) -> u64 {
+        self.lines.number()
+    }
+
+    fn place(row: u64) -> Place {
+        Place::Line(row)
+    }
+
+    #[inline]
+    fn number(&self, column: usize) -> Result<Option<f64>, Fault> {
+        let bytes = self.fields.bytes(self.lines.line(), column);
+        match str::from_utf8(bytes).ok().and_then(|text| text.parse::<f64>().ok()) {
+            Some(number) if number.is_finite() => Ok(Some(number)),
+            _ => self.odd_number(column),
+        }
+    }
+
+    #[inline]
+    fn stamp(&mut self, column: usize) -> Result<Option<Stamp>, Fault> {
+        let bytes = self.fields.bytes(self.lines.line(), column);
+        if bytes == self.time.0 && !bytes.is_empty() {
+            return Ok(Some(self.time.1));
+        }
+        let stamp = str::from_utf8(bytes).ok().and_then(|text| Stamp::parse(text.trim()));
+        let stamp = match stamp {
+            Some(stamp) if stamp.approximately().is_finite() => stamp,
+            _ => match self.odd_number(column)? {
+                Some(number) => Stamp::Real(number),
+                None => return Ok(None),
+            },
+        };
+        self.time.0.clear();
+        self.time.0.extend_from_slice(bytes);
+        self.time.1 = stamp;
+        Ok(Some(stamp))
+    }
+
+    #[inline]
+    fn vehicle(&self, column: usize, names: &mut Names, before: usize) -> Result<Option<usize>, Fault> {
+        if let Some(next) = names.next_if(self.fields.bytes(self.lines.line(), column), before) {
+            return Ok(Some(next));
+        }
+        let name = self.fields.text(self.lines.line(), column)?.trim();
+        Ok((!name.is_empty()).then(|| names.index(name, before)))
     }
 }
 
 /// Goes to the next line that is not blank, nor a comment where there may be `comments`: below a header the first field
 /// may be a name that begins with `#`.
 #[inline]
-fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
+fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, FaultAt> {
     loop {
         if !lines.advance()? {
             return Ok(false);

@@ -2,9 +2,10 @@
 
 use std::fmt;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::read::Format;
+use super::Format;
+use super::source::Grown;
 
 /// Longest value that a message repeats \[characters\].
 const LONGEST_QUOTE: usize = 60;
@@ -29,12 +30,6 @@ impl ReadError {
         Self { file: file.display().to_string(), place: None, fault }
     }
 
-    /// The same error in a certain place.
-    #[must_use]
-    pub fn at(self, place: Place) -> Self {
-        Self { place: Some(place), ..self }
-    }
-
     /// What helps, as a sentence without a full stop.
     #[must_use]
     pub fn help(&self) -> String {
@@ -54,6 +49,34 @@ impl ReadError {
 
     fn comma_place(&self) -> String {
         self.place.as_ref().map_or_else(String::new, |place| format!(", {place}"))
+    }
+}
+
+/// What is wrong, and where; who knows the file makes a [`ReadError`] of it.
+#[derive(Debug)]
+pub(super) struct FaultAt {
+    /// Another file than that of the recording.
+    file: Option<PathBuf>,
+    place: Option<Place>,
+    fault: Fault,
+}
+
+impl FaultAt {
+    /// The same in another file than that of the recording.
+    pub(super) fn in_file(self, file: &Path) -> Self {
+        Self { file: Some(file.to_owned()), ..self }
+    }
+
+    /// The error of the recording.
+    pub(super) fn of(self, recording: &Path) -> ReadError {
+        let file = self.file.as_deref().unwrap_or(recording);
+        ReadError { file: file.display().to_string(), place: self.place, fault: self.fault }
+    }
+}
+
+impl<F: Into<Fault>> From<F> for FaultAt {
+    fn from(fault: F) -> Self {
+        Self { file: None, place: None, fault: fault.into() }
     }
 }
 
@@ -228,7 +251,25 @@ pub enum Fault {
     },
 }
 
+impl From<io::Error> for Fault {
+    /// What reading went wrong with, as a fault of the content where it is one.
+    fn from(error: io::Error) -> Self {
+        if let Some(grown) = error.get_ref().and_then(|inner| inner.downcast_ref::<Grown>()) {
+            return Self::Bomb { inflated_bytes: grown.inflated_bytes, packed_bytes: grown.packed_bytes };
+        }
+        match error.kind() {
+            io::ErrorKind::UnexpectedEof => Self::Truncated { what: "the end of its data is missing".to_owned() },
+            io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::Other => Self::damaged(error),
+            _ => Self::System(error),
+        }
+    }
+}
+
 impl Fault {
+    pub(super) fn at(self, place: Place) -> FaultAt {
+        FaultAt { place: Some(place), ..self.into() }
+    }
+
     pub(super) fn content(problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Content { problem: problem.into(), remedy: remedy.into() }
     }

@@ -18,6 +18,7 @@ mod crazyflie;
 mod csv;
 mod curves;
 mod error;
+mod layout;
 pub(crate) mod mcap;
 mod names;
 mod npy;
@@ -37,7 +38,9 @@ use std::path::Path;
 
 use crate::track::Tracks;
 use clock::KnownUnit;
-use order::{About, Ordered};
+use error::FaultAt;
+use order::About;
+use recognise::{Recognised, recognise};
 use source::Source;
 
 /// A recording being read.
@@ -189,9 +192,9 @@ impl ReadOptions {
     }
 
     /// What is known of a recording: what the user says of the unit of time goes before what the file says.
-    fn about(&self, said: Option<TimeUnit>, notes: Vec<String>, none: Fault) -> About {
+    fn about(&self, source: &Source, said: Option<TimeUnit>, notes: Vec<String>, none: Fault) -> About {
         let unit = self.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given);
-        About { unit, epoch_ns: 0, scale: self.scale, notes, none }
+        About { path: source.path.clone(), unit, epoch_ns: 0, scale: self.scale, notes, none }
     }
 }
 
@@ -200,29 +203,26 @@ impl ReadOptions {
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is of no known format, or is wrong where it was looked at so far.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
-    if !(options.scale.is_finite() && options.scale > 0.0) {
-        let problem = format!("its lengths cannot be scaled by {}", options.scale);
-        let fault = Fault::content(problem, "give a positive number of metres per unit of length");
-        return Err(ReadError::new(path, fault));
-    }
-    let recognised = recognise::recognise(path, options.format)?;
-    let source = Source { path: path.to_owned(), gzip: recognised.gzip };
-    if let Some((option, why)) = options.needless_for(recognised.format) {
-        let problem = format!("{} {why}", recognised.format.title());
-        return Err(source.error(Fault::content(problem, format!("leave {option} away"))));
-    }
-    match recognised.format {
-        format @ (Format::Csv | Format::Text) => table(source, format, options),
-        Format::Crazyflie => crazyflie::open(path, options),
-        Format::Mcap => mcap::open(&source, options),
-        Format::Npz => npz::open(&source, options),
-        Format::Parquet => parquet::open(&source, options),
-        Format::Skybrush => skybrush::open(&source, options),
-    }
+    try_open(path, options).map_err(|fault| fault.of(path))
 }
 
-fn table(source: Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let table = csv::Table::open(source, format, &options.columns)?;
-    let about = options.about(table.layout.unit, table.layout.notes(), Fault::HeaderOnly);
-    Ok(Box::new(Ordered::open(table, about)?))
+fn try_open(path: &Path, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    if !(options.scale.is_finite() && options.scale > 0.0) {
+        let problem = format!("its lengths cannot be scaled by {}", options.scale);
+        return Err(Fault::content(problem, "give a positive number of metres per unit of length").into());
+    }
+    let Recognised { format, gzip } = recognise(path, options.format)?;
+    if let Some((option, why)) = options.needless_for(format) {
+        let problem = format!("{} {why}", format.title());
+        return Err(Fault::content(problem, format!("leave {option} away")).into());
+    }
+    let source = &Source { path: path.to_owned(), gzip };
+    match format {
+        Format::Csv | Format::Text => csv::open(source, format, options),
+        Format::Crazyflie => crazyflie::open(path, options),
+        Format::Mcap => mcap::open(source, options),
+        Format::Npz => npz::open(source, options),
+        Format::Parquet => parquet::open(source, options),
+        Format::Skybrush => skybrush::open(source, options),
+    }
 }

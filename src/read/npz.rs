@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 
 use super::archive::Archive;
 use super::clock::Stamp;
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, FaultAt, Place};
 use super::names::Names;
 use super::npy::Array;
 use super::order::{BATCH, Ordered, Row, Rows};
@@ -30,8 +30,8 @@ const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
 const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
 
 /// Opens an archive.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let mut arrays = Arrays::open(source)?;
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let mut arrays = Arrays { archive: Archive::open(&source.path)? };
     let time = options.columns.time.clone().or_else(|| arrays.first_of(&TIMES));
     let time = time.filter(|name| arrays.holds(name)).ok_or_else(|| arrays.missing("times", "t"))?;
     let positions = options.columns.position[0].clone().or_else(|| arrays.first_of(&POSITIONS));
@@ -48,7 +48,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             }
             stamp => Ok(stamp),
         });
-        times.push(stamp.map_err(|fault| source.error(fault).at(Place::Part(format!("{time}[{k}]"))))?);
+        times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
     }
     let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?;
     let order = options.axis_order.or_else(|| match axes?.first()?.as_str() {
@@ -61,18 +61,16 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let seen = arrays.optional("seen", |arrays| arrays.like(&table, "seen", 2))?;
     let radii = arrays.optional("radii", |arrays| arrays.radii(&table))?;
     let names = arrays.optional("names", |arrays| arrays.names(table.vehicles()))?;
-    let epoch_ns = arrays
-        .optional("epoch_ns", |arrays| arrays.array("epoch_ns")?.next_stamp().map_err(|fault| source.error(fault)))?;
+    let epoch_ns = arrays.optional("epoch_ns", |arrays| Ok(arrays.array("epoch_ns")?.next_stamp()?))?;
 
     let names = names.map_or_else(Names::default, Names::from_list);
     let mut notes = Vec::new();
     if table.axes() == 2 {
         notes.push("positions have two columns: z is taken as 0".to_owned());
     }
-    let rows =
-        Instants { source: source.clone(), name: positions, times, at: 0, table, velocities, seen, radii, names };
+    let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::content("it holds no position", "save at least one instant of one vehicle");
-    let mut about = options.about(unit, notes, none);
+    let mut about = options.about(source, unit, notes, none);
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
         about.epoch_ns = epoch;
     }
@@ -81,15 +79,15 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
 
 /// The arrays of an archive.
 struct Arrays {
-    source: Source,
     archive: Archive,
 }
 
-impl Arrays {
-    fn open(source: &Source) -> Result<Self, ReadError> {
-        Ok(Self { source: source.clone(), archive: Archive::open(source)? })
-    }
+/// A fault of an array.
+fn in_array(name: &str) -> impl Fn(Fault) -> FaultAt {
+    move |fault| fault.at(Place::Part(format!("array `{name}`")))
+}
 
+impl Arrays {
     fn holds(&self, name: &str) -> bool {
         self.archive.holds(&format!("{name}.npy"))
     }
@@ -101,56 +99,51 @@ impl Arrays {
         candidates.find(|name| self.holds(name))
     }
 
-    fn missing(&self, role: &str, usual: &str) -> ReadError {
+    fn missing(&self, role: &str, usual: &str) -> Fault {
         let names = self.archive.names();
         let names: Vec<_> =
             names.iter().filter_map(|name| name.strip_suffix(".npy")).map(super::error::quoted).collect();
         let option = if usual == "t" { "t" } else { "x" };
         let problem = format!("there is no array of {role}; its arrays are {}", names.join(", "));
         let remedy = format!("save it as `{usual}`, or name it with --column {option}=NAME");
-        self.source.error(Fault::content(problem, remedy))
+        Fault::content(problem, remedy)
     }
 
-    fn at<'a>(&'a self, name: &'a str) -> impl Fn(Fault) -> ReadError + 'a {
-        move |fault| self.source.error(fault).at(Place::Part(format!("array `{name}`")))
-    }
-
-    fn array(&mut self, name: &str) -> Result<Array, ReadError> {
-        let bytes = self.archive.entry(&format!("{name}.npy"))?;
-        Array::open(bytes).map_err(self.at(name))
+    fn array(&mut self, name: &str) -> Result<Array, FaultAt> {
+        Array::open(self.archive.entry(&format!("{name}.npy"))?).map_err(in_array(name))
     }
 
     fn optional<T>(
         &mut self,
         name: &str,
-        read: impl FnOnce(&mut Self) -> Result<T, ReadError>,
-    ) -> Result<Option<T>, ReadError> {
+        read: impl FnOnce(&mut Self) -> Result<T, FaultAt>,
+    ) -> Result<Option<T>, FaultAt> {
         if self.holds(name) { read(self).map(Some) } else { Ok(None) }
     }
 
-    fn radii(&mut self, positions: &Table) -> Result<Radii, ReadError> {
+    /// Radii of all vehicles, instant by instant: the array has them once, or each time.
+    fn radii(&mut self, positions: &Table) -> Result<Numbers, FaultAt> {
         let mut array = self.array("radii")?;
-        let vehicles = positions.vehicles();
-        if array.shape != [vehicles] {
-            return self.like(positions, "radii", 2).map(Radii::Each);
+        if array.shape != [positions.vehicles()] {
+            return self.like(positions, "radii", 2);
         }
-        let radii = (0..vehicles).map(|_| array.next_number()).collect::<Result<_, _>>();
-        radii.map(Radii::Same).map_err(self.at("radii"))
+        let radii = (0..array.count()).map(|_| array.next_number()).collect::<Result<Vec<_>, _>>();
+        Ok(Box::new(radii.map_err(in_array("radii"))?.into_iter().cycle().map(Ok)))
     }
 
     /// The numbers of an array whose axes are the first `axes` of those of the positions.
-    fn like(&mut self, positions: &Table, name: &str, axes: usize) -> Result<Numbers, ReadError> {
+    fn like(&mut self, positions: &Table, name: &str, axes: usize) -> Result<Numbers, FaultAt> {
         let array = self.array(name)?;
         let expected = &positions.shape[..axes];
         if array.shape != expected {
             let problem = format!("it is of shape {:?} where {expected:?} belongs to the positions", array.shape);
-            return Err(self.at(name)(Fault::content(problem, "save arrays of one recording together")));
+            return Err(in_array(name)(Fault::content(problem, "save arrays of one recording together")));
         }
-        Numbers::of(array, positions.order).map_err(self.at(name))
+        numbers(array, positions.order).map_err(in_array(name))
     }
 
     /// Names of as many vehicles.
-    fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
+    fn names(&mut self, vehicles: usize) -> Result<Vec<String>, FaultAt> {
         let names = self.texts("names")?;
         let different: BTreeSet<_> = names.iter().collect();
         let problem = match different.len() {
@@ -158,22 +151,22 @@ impl Arrays {
             count if count < vehicles => "two vehicles have the same name".to_owned(),
             _ => return Ok(names),
         };
-        Err(self.at("names")(Fault::content(problem, "save a name of its own for each vehicle, or leave `names` out")))
+        Err(in_array("names")(Fault::content(problem, "save a name of its own for each vehicle, or leave `names` out")))
     }
 
-    fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
+    fn texts(&mut self, name: &str) -> Result<Vec<String>, FaultAt> {
         let mut array = self.array(name)?;
         let mut texts = Vec::new();
         for _ in 0..array.count() {
-            texts.push(array.next_text().map_err(self.at(name))?);
+            texts.push(array.next_text().map_err(in_array(name))?);
         }
         Ok(texts)
     }
 
     /// An array of vectors with `times` instants.
-    fn table(&mut self, name: &str, times: usize, order: Option<AxisOrder>) -> Result<Table, ReadError> {
+    fn table(&mut self, name: &str, times: usize, order: Option<AxisOrder>) -> Result<Table, FaultAt> {
         let array = self.array(name)?;
-        let at = self.at(name);
+        let at = in_array(name);
         let &[first, second, axes @ (2 | 3)] = array.shape.as_slice() else {
             let problem = format!("it is of shape {:?}", array.shape);
             return Err(at(Fault::content(problem, "save positions as T x N x 3 or N x T x 3")));
@@ -197,7 +190,7 @@ impl Arrays {
             }
         };
         let shape = [first, second, axes];
-        Ok(Table { shape, order, numbers: Numbers::of(array, order).map_err(at)? })
+        Ok(Table { shape, order, numbers: numbers(array, order).map_err(at)? })
     }
 }
 
@@ -220,75 +213,54 @@ impl Table {
 }
 
 /// The numbers of an array of times and vehicles, instant by instant.
-enum Numbers {
-    Streamed(Array),
-    Sorted(std::vec::IntoIter<f64>),
+type Numbers = Box<dyn Iterator<Item = Result<f64, Fault>>>;
+
+/// The numbers of an array whose first two axes are time and vehicle in this order.
+fn numbers(mut array: Array, order: AxisOrder) -> Result<Numbers, Fault> {
+    if order == AxisOrder::TimeFirst && !array.fortran_order {
+        return Ok(Box::new(std::iter::repeat_with(move || array.next_number())));
+    }
+    let stored = (0..array.count()).map(|_| array.next_number()).collect::<Result<Vec<_>, _>>()?;
+    let (first, second) = (array.shape[0], array.shape[1]);
+    let axes = array.shape[2..].iter().product();
+    let index = |a: usize, b: usize, axis: usize| {
+        if array.fortran_order { a + first * (b + second * axis) } else { (a * second + b) * axes + axis }
+    };
+    let mut sorted = Vec::with_capacity(stored.len());
+    let (times, vehicles) = if order == AxisOrder::TimeFirst { (first, second) } else { (second, first) };
+    for k in 0..times {
+        for i in 0..vehicles {
+            let (a, b) = if order == AxisOrder::TimeFirst { (k, i) } else { (i, k) };
+            sorted.extend((0..axes).map(|axis| stored[index(a, b, axis)]));
+        }
+    }
+    Ok(Box::new(sorted.into_iter().map(Ok)))
 }
 
-impl Numbers {
-    /// The numbers of an array whose first two axes are time and vehicle in this order.
-    fn of(mut array: Array, order: AxisOrder) -> Result<Self, Fault> {
-        if order == AxisOrder::TimeFirst && !array.fortran_order {
-            return Ok(Self::Streamed(array));
-        }
-        let stored = (0..array.count()).map(|_| array.next_number()).collect::<Result<Vec<_>, _>>()?;
-        let (first, second) = (array.shape[0], array.shape[1]);
-        let axes = array.shape[2..].iter().product();
-        let index = |a: usize, b: usize, axis: usize| {
-            if array.fortran_order { a + first * (b + second * axis) } else { (a * second + b) * axes + axis }
-        };
-        let mut sorted = Vec::with_capacity(stored.len());
-        let (times, vehicles) = if order == AxisOrder::TimeFirst { (first, second) } else { (second, first) };
-        for k in 0..times {
-            for i in 0..vehicles {
-                let (a, b) = if order == AxisOrder::TimeFirst { (k, i) } else { (i, k) };
-                sorted.extend((0..axes).map(|axis| stored[index(a, b, axis)]));
-            }
-        }
-        Ok(Self::Sorted(sorted.into_iter()))
-    }
-
-    fn next(&mut self) -> Result<f64, Fault> {
-        match self {
-            Self::Streamed(array) => array.next_number(),
-            Self::Sorted(numbers) => Ok(numbers.next().unwrap_or(f64::NAN)),
-        }
-    }
-
-    /// The next vector of so many axes; what is missing is 0.
-    fn next_vector(&mut self, axes: usize) -> Result<Vector3<f64>, Fault> {
-        let mut vector = Vector3::zeros();
-        for x in vector.iter_mut().take(axes) {
-            *x = self.next()?;
-        }
-        Ok(vector)
-    }
+fn next(numbers: &mut Numbers) -> Result<f64, Fault> {
+    numbers.next().unwrap_or(Ok(f64::NAN))
 }
 
-/// Radii of the vehicles, NaN where unknown.
-enum Radii {
-    /// The same at all times.
-    Same(Vec<f64>),
-    /// Of each time and vehicle.
-    Each(Numbers),
+/// The next vector of so many axes; what is missing is 0.
+fn next_vector(numbers: &mut Numbers, axes: usize) -> Result<Vector3<f64>, Fault> {
+    let mut vector = Vector3::zeros();
+    for x in vector.iter_mut().take(axes) {
+        *x = next(numbers)?;
+    }
+    Ok(vector)
 }
 
-impl Radii {
-    fn next(&mut self, vehicle: usize) -> Result<Option<f64>, Fault> {
-        let radius = match self {
-            Self::Same(radii) => radii[vehicle],
-            Self::Each(radii) => radii.next()?,
-        };
-        if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
-            return Ok(Some(radius).filter(|radius| !radius.is_nan()));
-        }
-        Err(Fault::content(format!("the radius is {radius}"), "radii are finite and 0 or more, or NaN where unknown"))
+/// The next radius; none where it is unknown.
+fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
+    let radius = next(numbers)?;
+    if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
+        return Ok(Some(radius).filter(|radius| !radius.is_nan()));
     }
+    Err(Fault::content(format!("the radius is {radius}"), "radii are finite and 0 or more, or NaN where unknown"))
 }
 
 /// The rows of an archive.
 struct Instants {
-    source: Source,
     /// Name of the array of positions.
     name: String,
     times: Vec<Stamp>,
@@ -297,17 +269,17 @@ struct Instants {
     table: Table,
     velocities: Option<Numbers>,
     seen: Option<Numbers>,
-    radii: Option<Radii>,
+    radii: Option<Numbers>,
     names: Names,
 }
 
 impl Instants {
     fn row(&mut self, stamp: Stamp, vehicle: usize) -> Result<Option<Row>, Fault> {
         let axes = self.table.axes();
-        let position = self.table.numbers.next_vector(axes)?;
-        let velocity = self.velocities.as_mut().map(|velocities| velocities.next_vector(axes)).transpose()?;
-        let radius = self.radii.as_mut().map(|radii| radii.next(vehicle)).transpose()?.flatten();
-        let seen = self.seen.as_mut().map(Numbers::next).transpose()?.is_none_or(|seen| seen != 0.0);
+        let position = next_vector(&mut self.table.numbers, axes)?;
+        let velocity = self.velocities.as_mut().map(|numbers| next_vector(numbers, axes)).transpose()?;
+        let radius = self.radii.as_mut().map(next_radius).transpose()?.flatten();
+        let seen = self.seen.as_mut().map(next).transpose()?.is_none_or(|seen| seen != 0.0);
         if !seen {
             return Ok(None);
         }
@@ -329,15 +301,13 @@ impl Instants {
 }
 
 impl Rows for Instants {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             let Some(&stamp) = self.times.get(self.at) else { break };
             for vehicle in 0..self.table.vehicles() {
-                let row = self.row(stamp, vehicle).map_err(|fault| {
-                    let place = self.place((self.at * self.table.vehicles() + vehicle) as u64);
-                    self.source.error(fault).at(place)
-                })?;
+                let place = (self.at * self.table.vehicles() + vehicle) as u64;
+                let row = self.row(stamp, vehicle).map_err(|fault| fault.at(self.place(place)))?;
                 rows.extend(row);
             }
             if self.names.all().is_empty() {
@@ -353,16 +323,8 @@ impl Rows for Instants {
         self.names.all()
     }
 
-    fn error(&self, fault: Fault) -> ReadError {
-        self.source.error(fault)
-    }
-
     fn place(&self, number: u64) -> Place {
         let vehicles = self.table.vehicles().max(1) as u64;
         Place::Part(format!("{}[{}, {}]", self.name, number / vehicles, number % vehicles))
-    }
-
-    fn is_wide(&self) -> bool {
-        true
     }
 }

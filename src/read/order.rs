@@ -1,9 +1,11 @@
 //! Rows of a recording in the order of its file, given out in the order of time.
 
+use std::path::PathBuf;
+
 use nalgebra::Vector3;
 
 use super::clock::{KnownUnit, Probe, Stamp, Timing};
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{Fault, FaultAt, Place, ReadError, quoted};
 use crate::track::{Clock, Item, Sample, Tracks};
 
 /// Rows given out at a time.
@@ -25,10 +27,10 @@ pub(super) struct Row {
 /// A recording that holds samples, row by row.
 pub(super) trait Rows {
     /// Appends some [`BATCH`] rows in the order of the file; `false` when there was none to append.
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt>;
 
     /// Starts again with the first row. Nothing to do where time only runs forwards, so that rows are read once.
-    fn rewind(&mut self) -> Result<(), ReadError> {
+    fn rewind(&mut self) -> Result<(), FaultAt> {
         Ok(())
     }
 
@@ -38,23 +40,22 @@ pub(super) trait Rows {
     /// Puts the names in their final order, once all have been met.
     fn settle_names(&mut self) {}
 
-    /// An error of the file.
-    fn error(&self, fault: Fault) -> ReadError;
-
     /// The place that a row's number means.
     fn place(&self, number: u64) -> Place;
 
     /// Whether each time is a row of the file, so that time can only run forwards.
-    fn is_wide(&self) -> bool;
+    fn is_wide(&self) -> bool {
+        true
+    }
 
     /// Looks at all times and names; none where there are no rows.
-    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
         survey(self)
     }
 }
 
 /// Looks at all times by reading all rows.
-pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
+pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, FaultAt> {
     let mut probe: Option<Probe> = None;
     let mut batch = Vec::new();
     while rows.next(&mut batch)? {
@@ -67,6 +68,7 @@ pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, Re
 
 /// What is known of a recording beside its rows.
 pub(super) struct About {
+    pub(super) path: PathBuf,
     pub(super) unit: KnownUnit,
     /// What the times are counted from, as the file says it \[ns\].
     pub(super) epoch_ns: i64,
@@ -82,6 +84,7 @@ pub(super) struct About {
 /// A recording with a row for each time is streamed, and must not run backwards. One with a row for each vehicle and
 /// time is surveyed first: it is streamed where time never runs backwards, and sorted in memory where it does.
 pub(super) struct Ordered<R> {
+    path: PathBuf,
     rows: R,
     timing: Timing,
     notes: Vec<String>,
@@ -99,8 +102,8 @@ pub(super) struct Ordered<R> {
 
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
-    pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { unit, epoch_ns, scale, mut notes, none } = about;
+    pub(super) fn open(mut rows: R, about: About) -> Result<Self, FaultAt> {
+        let About { path, unit, epoch_ns, scale, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -116,7 +119,7 @@ impl<R: Rows> Ordered<R> {
         } else {
             rows.survey()?
         };
-        let Some(probe) = probe else { return Err(rows.error(none)) };
+        let Some(probe) = probe else { return Err(none.into()) };
         let (mut timing, note) = Timing::settle(&probe, unit);
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
         notes.extend(note);
@@ -131,10 +134,14 @@ impl<R: Rows> Ordered<R> {
             ended = true;
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
-        Ok(Self { rows, timing, notes, scale, batch: first, given: 0, ended, now: None, last: Vec::new() })
+        Ok(Self { path, rows, timing, notes, scale, batch: first, given: 0, ended, now: None, last: Vec::new() })
     }
 
-    fn time_of(&mut self, row: &Row) -> Result<f64, ReadError> {
+    fn error(&self, row: &Row, fault: Fault) -> FaultAt {
+        fault.at(self.rows.place(row.place))
+    }
+
+    fn time_of(&mut self, row: &Row) -> Result<f64, FaultAt> {
         let before = match self.now {
             Some((stamp, time_s)) if stamp == row.stamp => return Ok(time_s),
             Some((_, time_s)) => time_s,
@@ -142,14 +149,13 @@ impl<R: Rows> Ordered<R> {
         };
         let time_s = self.timing.seconds(row.stamp);
         if time_s < before {
-            let fault = Fault::TimeBackwards { time_s, before_s: before };
-            return Err(self.rows.error(fault).at(self.rows.place(row.place)));
+            return Err(self.error(row, Fault::TimeBackwards { time_s, before_s: before }));
         }
         self.now = Some((row.stamp, time_s));
         Ok(time_s)
     }
 
-    fn sample(&mut self, row: &Row) -> Result<Sample, ReadError> {
+    fn sample(&mut self, row: &Row) -> Result<Sample, FaultAt> {
         let time_s = self.time_of(row)?;
         if row.vehicle >= self.last.len() {
             self.last.resize(row.vehicle + 1, None);
@@ -167,7 +173,7 @@ impl<R: Rows> Ordered<R> {
                 None
             };
             if let Some(fault) = fault {
-                return Err(self.rows.error(fault).at(self.rows.place(row.place)));
+                return Err(self.error(row, fault));
             }
         }
         let sample = Sample {
@@ -182,19 +188,10 @@ impl<R: Rows> Ordered<R> {
             return Ok(sample);
         }
         let remedy = "look at --scale and at the numbers themselves";
-        let fault = Fault::content("its numbers leave the range of numbers", remedy);
-        Err(self.rows.error(fault).at(self.rows.place(row.place)))
-    }
-}
-
-impl<R: Rows> Tracks for Ordered<R> {
-    type Error = ReadError;
-
-    fn vehicles(&self) -> &[String] {
-        self.rows.vehicles()
+        Err(self.error(row, Fault::content("its numbers leave the range of numbers", remedy)))
     }
 
-    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+    fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, FaultAt> {
         if self.given == self.batch.len() && !self.ended {
             self.batch.clear();
             self.given = 0;
@@ -209,6 +206,18 @@ impl<R: Rows> Tracks for Ordered<R> {
             self.given += 1;
         }
         Ok(count > 0)
+    }
+}
+
+impl<R: Rows> Tracks for Ordered<R> {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        self.rows.vehicles()
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        self.try_read(items).map_err(|fault| fault.of(&self.path))
     }
 
     fn clock(&self) -> &Clock {

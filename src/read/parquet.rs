@@ -3,11 +3,10 @@
 //! Columns are flat: numbers, text or whole numbers for the vehicle, and for time numbers or time stamps, whose unit is
 //! then known. What time counts from may stand under `epoch_ns` in the metadata of the file.
 
-use std::cell::Cell;
 use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use nalgebra::Vector3;
 use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
@@ -15,74 +14,74 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use super::clock::{Probe, Stamp};
-use super::error::{Fault, Place, ReadError};
+use super::clock::Stamp;
+use super::error::{Fault, FaultAt, Place};
+use super::layout::Layout;
 use super::names::Names;
-use super::order::{BATCH, Ordered, Row, Rows};
+use super::order::BATCH;
 use super::source::Source;
-use super::table::{Body, Layout, Shape};
+use super::table::{self, Cells};
 use super::{ReadOptions, Recording, TimeUnit};
 
 /// Key of the metadata that says what time counts from \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";
 
+/// Most cells that are read at a time: some 20 MB.
+const BATCH_CELLS: usize = 640_000;
+
 /// Opens a table.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let file = File::open(&source.path).map_err(|error| source.error(Fault::System(error)))?;
-    let bytes = file.metadata().map_err(|error| source.error(Fault::System(error)))?.len();
-    if bytes < 12 {
-        return Err(source.error(Fault::Truncated { what: "the end of the file is missing".to_owned() }));
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let mut file = File::open(&source.path)?;
+    if file.metadata()?.len() < 12 {
+        return Err(Fault::Truncated { what: "the end of the file is missing".to_owned() }.into());
     }
-    let at = |fault| source.error(fault);
-    let reader = guarded(|| SerializedFileReader::new(file)).map_err(at)?;
+    let mut end = [0; 4];
+    file.seek(SeekFrom::End(-4))?;
+    file.read_exact(&mut end)?;
+    if end != *b"PAR1" && end != *b"PARE" {
+        let what = "the end of the file, where its columns are described, is missing".to_owned();
+        return Err(Fault::Truncated { what }.into());
+    }
+    let reader = guarded(|| SerializedFileReader::new(file))?;
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
     let header: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let layout = Layout::of(&header, &options.columns).map_err(at)?;
-    let unit = unit_of(&schema.column(layout.time)).or(layout.unit);
-    for &column in &columns_of(&layout) {
+    let layout = Layout::of(&header, &options.columns)?;
+    let unit = unit_of(&schema.column(layout.time));
+    for &column in &layout.columns() {
         let descriptor = schema.column(column);
         if descriptor.max_rep_level() > 0 {
             let problem = format!("column `{}` holds lists", header[column]);
-            return Err(at(Fault::content(problem, "save a number in each cell")));
+            return Err(Fault::content(problem, "save a number in each cell").into());
         }
         if let Some(what) = other_than_numbers(&descriptor) {
             let problem = format!("column `{}` holds {what}", header[column]);
-            return Err(at(Fault::content(
-                problem,
-                "save numbers as double, and time as double, int64 or time stamps",
-            )));
+            let remedy = "save numbers as double, and time as double, int64 or time stamps";
+            return Err(Fault::content(problem, remedy).into());
         }
         if let Some(packed) = packed_otherwise(&reader, column) {
             let problem = format!("column `{}` is packed by {packed}, which is not read", header[column]);
-            return Err(at(Fault::content(problem, "save it plain, or packed by snappy, gzip, lz4 or zstd")));
+            return Err(Fault::content(problem, "save it plain, or packed by snappy, gzip, lz4 or zstd").into());
         }
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
     let epoch_ns = epoch_ns.and_then(|pair| pair.value.as_deref()).and_then(|value| value.parse().ok());
-    let mut about = options.about(unit, layout.notes(), Fault::HeaderOnly);
-    about.epoch_ns = epoch_ns.unwrap_or(0);
-    let names = match &layout.shape {
-        Shape::Long { .. } => Names::default(),
-        Shape::Wide { names, .. } => Names::from_list(names.clone()),
-    };
-    let table = Table {
-        source: source.clone(),
+    let groups = Groups {
         reader,
         header,
-        layout,
-        names,
+        wanted: Vec::new(),
         group: 0,
         columns: Vec::new(),
         rows_left: 0,
-        rows_read: 0,
-        vehicle: 0,
+        count: 0,
+        at: 0,
+        rows_before: 0,
     };
-    Ok(Box::new(Ordered::open(table, about)?))
+    table::open(source, groups, layout, unit, epoch_ns.unwrap_or(0), options)
 }
 
 thread_local! {
-    static GUARDED: Cell<bool> = const { Cell::new(false) };
+    static GUARDED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
 }
 
 /// Whether this thread is in a call whose panic becomes an error: a panic hook has nothing to say about it.
@@ -99,9 +98,6 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault
     match outcome {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated { what }),
-        Ok(Err(error)) if error.to_string().contains("Invalid Parquet file") => Err(Fault::Truncated {
-            what: "the end of the file, where its columns are described, is missing".to_owned(),
-        }),
         Ok(Err(error)) => Err(Fault::damaged(error)),
         Err(_) => Err(Fault::damaged("its pages contradict each other")),
     }
@@ -155,95 +151,49 @@ fn is_unsigned(column: &ColumnDescriptor) -> bool {
     }
 }
 
-/// The columns that are read, each once.
-fn columns_of(layout: &Layout) -> Vec<usize> {
-    let of = |body: &Body| {
-        let velocity = body.velocity.unwrap_or_default();
-        body.position.into_iter().chain(velocity).chain([body.radius]).flatten().collect::<Vec<_>>()
-    };
-    let mut columns = vec![layout.time];
-    match &layout.shape {
-        Shape::Long { id, body } => {
-            columns.push(*id);
-            columns.extend(of(body));
-        }
-        Shape::Wide { bodies, .. } => columns.extend(bodies.iter().flat_map(of)),
-    }
-    columns.sort_unstable();
-    columns.dedup();
-    columns
-}
-
-/// Some cells of a column; none where a cell is null.
-enum Cells {
+/// A cell of a column.
+enum Cell {
+    Empty,
     /// Wide enough for all of 64 bits, with and without a sign.
-    Whole(Vec<Option<i128>>),
-    Real(Vec<Option<f64>>),
-    Text(Vec<Option<ByteArray>>),
+    Whole(i128),
+    Real(f64),
+    Text(ByteArray),
 }
 
-impl Cells {
-    fn len(&self) -> usize {
-        match self {
-            Self::Whole(cells) => cells.len(),
-            Self::Real(cells) => cells.len(),
-            Self::Text(cells) => cells.len(),
-        }
+/// The next cells of the column of this name.
+fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>, Fault> {
+    let (present, unsigned) = (column.present, column.unsigned);
+    match &mut column.reader {
+        ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count, Cell::Real),
+        ColumnReader::FloatColumnReader(reader) => cells(reader, present, count, |cell| Cell::Real(cell.into())),
+        ColumnReader::Int64ColumnReader(reader) => cells(reader, present, count, |cell| {
+            Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
+        }),
+        ColumnReader::Int32ColumnReader(reader) => cells(reader, present, count, |cell| {
+            Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
+        }),
+        ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count, Cell::Text),
+        _ => Err(Fault::content(
+            format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
+            "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
+        )),
     }
-
-    /// The next cells of the column of this name.
-    fn read(column: &mut Column, name: &str, count: usize) -> Result<Self, Fault> {
-        let (present, unsigned) = (column.present, column.unsigned);
-        match &mut column.reader {
-            ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count).map(Self::Real),
-            ColumnReader::FloatColumnReader(reader) => {
-                cells(reader, present, count).map(|cells| Self::Real(each(cells, f64::from)))
-            }
-            ColumnReader::Int64ColumnReader(reader) => {
-                let wide = |cell: i64| if unsigned { cell.cast_unsigned().into() } else { cell.into() };
-                cells(reader, present, count).map(|cells| Self::Whole(each(cells, wide)))
-            }
-            ColumnReader::Int32ColumnReader(reader) => {
-                let wide = |cell: i32| if unsigned { cell.cast_unsigned().into() } else { cell.into() };
-                cells(reader, present, count).map(|cells| Self::Whole(each(cells, wide)))
-            }
-            ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count).map(Self::Text),
-            _ => Err(Fault::content(
-                format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
-                "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
-            )),
-        }
-    }
-
-    /// The number in a cell, or the text that is there instead.
-    fn number(&self, row: usize) -> Result<Option<f64>, String> {
-        match self {
-            Self::Real(cells) => Ok(cells[row]),
-            Self::Whole(cells) => Ok(cells[row].map(|whole| whole as f64)),
-            Self::Text(cells) => match &cells[row] {
-                Some(text) => Err(String::from_utf8_lossy(text.data()).into_owned()),
-                None => Ok(None),
-            },
-        }
-    }
-}
-
-fn each<A, B>(cells: Vec<Option<A>>, change: impl Fn(A) -> B) -> Vec<Option<B>> {
-    cells.into_iter().map(|cell| cell.map(&change)).collect()
 }
 
 fn cells<D: DataType>(
     reader: &mut ColumnReaderImpl<D>,
     present: i16,
     count: usize,
-) -> Result<Vec<Option<D::T>>, Fault> {
+    cell: impl Fn(D::T) -> Cell,
+) -> Result<Vec<Cell>, Fault> {
     let (mut values, mut levels) = (Vec::new(), Vec::new());
     guarded(|| reader.read_records(count, Some(&mut levels), None, &mut values))?;
+    let mut cells = values.into_iter().map(cell);
     if present == 0 {
-        return Ok(values.into_iter().map(Some).collect());
+        return Ok(cells.collect());
     }
-    let mut values = values.into_iter();
-    Ok(levels.into_iter().map(|level| if level == present { values.next() } else { None }).collect())
+    let next = |level| if level == present { cells.next() } else { None };
+    Ok(levels.into_iter().map(next).map(|cell| cell.unwrap_or(Cell::Empty)).collect())
 }
 
 /// A column of the current group of rows.
@@ -253,39 +203,40 @@ struct Column {
     present: i16,
     unsigned: bool,
     reader: ColumnReader,
-    cells: Cells,
+    cells: Vec<Cell>,
 }
 
-/// The rows of a table.
-struct Table {
-    source: Source,
+/// A table, group of rows by group of rows.
+struct Groups {
     reader: SerializedFileReader<File>,
     header: Vec<String>,
-    layout: Layout,
-    names: Names,
+    /// Columns that are read.
+    wanted: Vec<usize>,
     /// Number of the next group of rows.
     group: usize,
     columns: Vec<Column>,
     /// Rows of the current group that have not been read.
     rows_left: usize,
-    rows_read: u64,
-    vehicle: usize,
+    /// Rows in the cells that were read, which one of them is the current one, and how many came before them.
+    count: usize,
+    at: usize,
+    rows_before: u64,
 }
 
-impl Table {
+impl Groups {
     /// Goes to the next group of rows; `false` behind the last.
-    fn open_group(&mut self, wanted: &[usize]) -> Result<bool, Fault> {
+    fn open_group(&mut self) -> Result<bool, Fault> {
         if self.group >= self.reader.num_row_groups() {
             return Ok(false);
         }
         let schema = self.reader.metadata().file_metadata().schema_descr_ptr();
         let (group, reader) = (self.group, &self.reader);
         let mut columns = Vec::new();
-        for &number in wanted {
+        for &number in &self.wanted {
             let column = guarded(|| reader.get_row_group(group)?.get_column_reader(number))?;
             let descriptor = schema.column(number);
             let (present, unsigned) = (descriptor.max_def_level(), is_unsigned(&descriptor));
-            columns.push(Column { number, present, unsigned, reader: column, cells: Cells::Whole(Vec::new()) });
+            columns.push(Column { number, present, unsigned, reader: column, cells: Vec::new() });
         }
         let rows = self.reader.metadata().row_group(self.group).num_rows();
         self.rows_left = usize::try_from(rows).map_err(|_| Fault::damaged("a group has less than no rows"))?;
@@ -294,16 +245,16 @@ impl Table {
         Ok(true)
     }
 
-    /// Reads some rows of these columns; 0 at the end.
-    fn fill(&mut self, wanted: &[usize]) -> Result<usize, Fault> {
+    /// Reads some rows; 0 at the end.
+    fn fill(&mut self) -> Result<usize, Fault> {
         while self.rows_left == 0 {
-            if !self.open_group(wanted)? {
+            if !self.open_group()? {
                 return Ok(0);
             }
         }
-        let count = self.rows_left.min(BATCH);
+        let count = self.rows_left.min(BATCH).min((BATCH_CELLS / self.wanted.len()).max(1));
         for column in &mut self.columns {
-            column.cells = Cells::read(column, &self.header[column.number], count)?;
+            column.cells = read_cells(column, &self.header[column.number], count)?;
             if column.cells.len() != count {
                 let what = format!("column `{}` has fewer cells than its group has rows", self.header[column.number]);
                 return Err(Fault::Truncated { what });
@@ -313,162 +264,75 @@ impl Table {
         Ok(count)
     }
 
-    fn cells(&self, number: usize) -> Option<&Cells> {
-        let at = self.columns.binary_search_by_key(&number, |column| column.number).ok()?;
-        Some(&self.columns[at].cells)
-    }
-
-    fn number(&self, column: usize, row: usize) -> Result<Option<f64>, Fault> {
-        let name = || self.header[column].clone();
-        match self.cells(column).map_or(Ok(None), |cells| cells.number(row)) {
-            Ok(Some(number)) if !number.is_finite() => {
-                Err(Fault::NotFinite { column: name(), value: number.to_string() })
-            }
-            Ok(number) => Ok(number),
-            Err(text) => Err(Fault::NotANumber { column: name(), value: text }),
-        }
-    }
-
-    fn stamp(&self, row: usize) -> Result<Stamp, Fault> {
-        let column = self.layout.time;
-        let stamp = match self.cells(column) {
-            Some(Cells::Whole(cells)) => {
-                cells[row].map(|whole| i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole))
-            }
-            _ => self.number(column, row).map_err(Fault::of_time)?.map(Stamp::Real),
-        };
-        stamp.ok_or_else(|| Fault::EmptyCell { column: self.header[column].clone() })
-    }
-
-    fn vehicle(&mut self, id: usize, row: usize) -> Result<usize, Fault> {
-        let empty = || Fault::EmptyCell { column: self.header[id].clone() };
-        let owned;
-        let name = match self.cells(id) {
-            Some(Cells::Text(cells)) => {
-                let text = cells[row].as_ref().ok_or_else(empty)?;
-                owned = text.as_utf8().map_err(|_| Fault::NotUtf8)?.to_owned();
-                owned.as_str()
-            }
-            Some(Cells::Whole(cells)) => {
-                owned = cells[row].ok_or_else(empty)?.to_string();
-                owned.as_str()
-            }
-            _ => {
-                let problem = format!("column `{}` holds numbers with decimals", self.header[id]);
-                return Err(Fault::content(problem, "save vehicles as text or as whole numbers"));
-            }
-        };
-        self.vehicle = self.names.index(name, self.vehicle);
-        Ok(self.vehicle)
-    }
-
-    fn vector(&self, columns: &[Option<usize>; 3], row: usize) -> Result<Option<Vector3<f64>>, Fault> {
-        let mut vector = Vector3::zeros();
-        let (mut filled, mut empty) = (false, None);
-        for (axis, column) in columns.iter().enumerate() {
-            let Some(column) = *column else { continue };
-            match self.number(column, row)? {
-                Some(number) => (vector[axis], filled) = (number, true),
-                None => empty = empty.or(Some(column)),
-            }
-        }
-        match empty {
-            None => Ok(Some(vector)),
-            Some(_) if !filled => Ok(None),
-            Some(column) => Err(Fault::EmptyCell { column: self.header[column].clone() }),
-        }
-    }
-
-    fn row(&self, stamp: Stamp, vehicle: usize, body: &Body, row: usize) -> Result<Option<Row>, Fault> {
-        let Some(position) = self.vector(&body.position, row)? else { return Ok(None) };
-        let velocity = body.velocity.as_ref().map(|columns| self.vector(columns, row)).transpose()?.flatten();
-        let radius = body.radius.map(|column| self.number(column, row)).transpose()?.flatten();
-        if radius.is_some_and(|radius| radius < 0.0) {
-            return Err(Fault::content("a radius is negative", "write 0 or more"));
-        }
-        Ok(Some(Row { stamp, place: self.rows_read + row as u64 + 1, vehicle, position, velocity, radius }))
-    }
-
-    fn rows_of(&mut self, row: usize, shape: &Shape, rows: &mut Vec<Row>) -> Result<(), Fault> {
-        let stamp = self.stamp(row)?;
-        match shape {
-            Shape::Long { id, body } => {
-                let vehicle = self.vehicle(*id, row)?;
-                rows.extend(self.row(stamp, vehicle, body, row)?);
-            }
-            Shape::Wide { bodies, .. } => {
-                for (vehicle, body) in bodies.iter().enumerate() {
-                    rows.extend(self.row(stamp, vehicle, body, row)?);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn at_row(&self, row: usize, fault: Fault) -> ReadError {
-        self.source.error(fault).at(Place::Row(self.rows_read + row as u64 + 1))
+    /// The cell of the current row in a column that is read.
+    fn cell(&self, number: usize) -> &Cell {
+        let at = self.columns.binary_search_by_key(&number, |column| column.number);
+        at.ok().and_then(|at| self.columns[at].cells.get(self.at)).unwrap_or(&Cell::Empty)
     }
 }
 
-impl Rows for Table {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        let (wanted, shape) = (columns_of(&self.layout), self.layout.shape.clone());
-        while rows.len() < before + BATCH {
-            let count = self.fill(&wanted).map_err(|fault| self.at_row(0, fault))?;
-            if count == 0 {
-                break;
-            }
-            for row in 0..count {
-                self.rows_of(row, &shape, rows).map_err(|fault| self.at_row(row, fault))?;
-            }
-            self.rows_read += count as u64;
-        }
-        Ok(rows.len() > before)
+impl Cells for Groups {
+    fn header(&self) -> &[String] {
+        &self.header
     }
 
-    fn rewind(&mut self) -> Result<(), ReadError> {
-        (self.group, self.rows_left, self.rows_read) = (0, 0, 0);
+    fn restart(&mut self, columns: &[usize], _all: bool) -> Result<(), FaultAt> {
+        self.wanted = columns.to_vec();
+        (self.group, self.rows_left, self.count, self.at, self.rows_before) = (0, 0, 0, 0, 0);
         Ok(())
     }
 
-    fn vehicles(&self) -> &[String] {
-        self.names.all()
+    fn advance(&mut self) -> Result<bool, FaultAt> {
+        self.at += 1;
+        if self.at >= self.count {
+            self.rows_before += self.count as u64;
+            (self.count, self.at) = (0, 0);
+            self.count = self.fill().map_err(|fault| fault.at(Self::place(self.row())))?;
+        }
+        Ok(self.count > 0)
     }
 
-    fn settle_names(&mut self) {
-        self.names.settle();
+    fn row(&self) -> u64 {
+        self.rows_before + self.at as u64 + 1
     }
 
-    fn error(&self, fault: Fault) -> ReadError {
-        self.source.error(fault)
+    fn place(row: u64) -> Place {
+        Place::Row(row)
     }
 
-    fn place(&self, number: u64) -> Place {
-        Place::Row(number)
-    }
-
-    fn is_wide(&self) -> bool {
-        matches!(self.layout.shape, Shape::Wide { .. })
-    }
-
-    /// Only times and names are looked at.
-    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
-        let Shape::Long { id, .. } = self.layout.shape else { return Ok(None) };
-        let mut wanted = [self.layout.time, id];
-        wanted.sort_unstable();
-        let mut probe: Option<Probe> = None;
-        loop {
-            let count = self.fill(&wanted).map_err(|fault| self.at_row(0, fault))?;
-            if count == 0 {
-                return Ok(probe);
+    fn number(&self, column: usize) -> Result<Option<f64>, Fault> {
+        let name = || self.header[column].clone();
+        match self.cell(column) {
+            Cell::Empty => Ok(None),
+            Cell::Whole(whole) => Ok(Some(*whole as f64)),
+            Cell::Real(number) if number.is_finite() => Ok(Some(*number)),
+            Cell::Real(number) => Err(Fault::NotFinite { column: name(), value: number.to_string() }),
+            Cell::Text(text) => {
+                let value = String::from_utf8_lossy(text.data()).into_owned();
+                Err(Fault::NotANumber { column: name(), value })
             }
-            for row in 0..count {
-                let stamp = self.vehicle(id, row).and_then(|_| self.stamp(row));
-                let stamp = stamp.map_err(|fault| self.at_row(row, fault))?;
-                probe.get_or_insert_with(|| Probe::new(stamp)).see(stamp);
+        }
+    }
+
+    fn stamp(&mut self, column: usize) -> Result<Option<Stamp>, Fault> {
+        match self.cell(column) {
+            &Cell::Whole(whole) => Ok(Some(i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole))),
+            _ => Ok(self.number(column)?.map(Stamp::Real)),
+        }
+    }
+
+    fn vehicle(&self, column: usize, names: &mut Names, before: usize) -> Result<Option<usize>, Fault> {
+        match self.cell(column) {
+            Cell::Empty => Ok(None),
+            Cell::Whole(number) => Ok(Some(names.index(&number.to_string(), before))),
+            Cell::Text(text) => {
+                let name = text.as_utf8().map_err(|_| Fault::NotUtf8)?;
+                Ok(Some(names.index(name, before)))
             }
-            self.rows_read += count as u64;
+            Cell::Real(_) => {
+                let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
+                Err(Fault::content(problem, "save vehicles as text or as whole numbers"))
+            }
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Which format a file is in, going by its content.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Read;
 use std::path::Path;
 
 use super::Format;
-use super::error::{Fault, ReadError};
-use super::source::{GZIP_MAGIC, Source, fault_of};
+use super::error::Fault;
+use super::source::{GZIP_MAGIC, Source};
 
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;
@@ -22,44 +22,41 @@ pub(super) struct Recognised {
 }
 
 /// Recognises a file or folder.
-pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognised, ReadError> {
-    let error = |fault| ReadError::new(path, fault);
-    let data = fs::metadata(path).map_err(|source| error(Fault::System(source)))?;
+pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognised, Fault> {
+    let data = fs::metadata(path)?;
     if data.is_dir() {
         return Ok(Recognised { format: Format::Crazyflie, gzip: false });
     }
     if !data.is_file() {
         let problem = "it is a pipe or a device, and a recording is read more than once";
-        return Err(error(Fault::content(problem, "save it to a file first, and give the file")));
+        return Err(Fault::content(problem, "save it to a file first, and give the file"));
     }
     let mut source = Source { path: path.to_owned(), gzip: false };
-    let mut head = Vec::new();
-    let file = File::open(path).map_err(|source| error(Fault::System(source)))?;
-    file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|source| error(Fault::System(source)))?;
-    if head.is_empty() {
-        return Err(error(Fault::Empty));
-    }
+    let mut head = head_of(&source)?;
     source.gzip = head.starts_with(&GZIP_MAGIC);
     if source.gzip {
-        head.clear();
-        source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head).map_err(|source| error(fault_of(source)))?;
-        if head.is_empty() {
-            return Err(error(Fault::Empty));
-        }
+        head = head_of(&source)?;
     }
     let format = match forced {
         Some(format) if first_bytes(format).is_some_and(|bytes| !head.starts_with(bytes)) => {
             let reason = "it does not begin as one does".to_owned();
-            return Err(error(Fault::WrongFormat { format, reason }));
+            return Err(Fault::WrongFormat { format, reason });
         }
         Some(format) => format,
-        None => format_of(&head, path)?,
+        None => format_of(&head)?,
     };
     if source.gzip && !matches!(format, Format::Csv | Format::Text) {
         let problem = format!("it is {} inside gzip", format.title());
-        return Err(error(Fault::content(problem, "unpack it first, with gunzip")));
+        return Err(Fault::content(problem, "unpack it first, with gunzip"));
     }
     Ok(Recognised { format, gzip: source.gzip })
+}
+
+/// The first bytes, unpacked.
+fn head_of(source: &Source) -> Result<Vec<u8>, Fault> {
+    let mut head = Vec::new();
+    source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    if head.is_empty() { Err(Fault::Empty) } else { Ok(head) }
 }
 
 /// How every file of a format begins, if they all begin alike.
@@ -72,8 +69,7 @@ fn first_bytes(format: Format) -> Option<&'static [u8]> {
     }
 }
 
-fn format_of(head: &[u8], path: &Path) -> Result<Format, ReadError> {
-    let error = |fault| ReadError::new(path, fault);
+fn format_of(head: &[u8]) -> Result<Format, Fault> {
     if head.starts_with(PARQUET_MAGIC) {
         return Ok(Format::Parquet);
     }
@@ -87,14 +83,14 @@ fn format_of(head: &[u8], path: &Path) -> Result<Format, ReadError> {
     }
     if head.starts_with(b"\x93NUMPY") {
         let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
-        return Err(error(Fault::content("it is a single NumPy array, which tells no times", remedy)));
+        return Err(Fault::content("it is a single NumPy array, which tells no times", remedy));
     }
     if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return Err(error(Fault::NotUtf8));
+        return Err(Fault::NotUtf8);
     }
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
     if memchr::memchr(0, text).is_some() {
-        return Err(error(Fault::UnknownFormat));
+        return Err(Fault::UnknownFormat);
     }
     if text.starts_with(b"{") {
         return Ok(Format::Skybrush);

@@ -13,8 +13,8 @@ use serde::{Deserialize, Deserializer};
 
 use super::archive::Archive;
 use super::curves::{Curves, distinct, piece};
-use super::error::{Fault, Place, ReadError};
-use super::source::{Source, fault_of};
+use super::error::{Fault, FaultAt, Place};
+use super::source::Source;
 use super::{ReadOptions, Recording};
 use crate::track::{Item, Piece, Sample};
 
@@ -91,26 +91,37 @@ impl<'de> Deserialize<'de> for Point {
 }
 
 /// Opens a show.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
     let mut head = [0; 2];
     let is_archive = source.bytes()?.read(&mut head).is_ok_and(|bytes| bytes == 2 && head == *b"PK");
-    let mut documents = Documents { source, archive: is_archive.then(|| Archive::open(source)).transpose()? };
-    let show: Show = documents.show()?;
+    let mut archive = is_archive.then(|| Archive::open(&source.path)).transpose()?;
+    let show: Show = match &mut archive {
+        Some(archive) if archive.holds(SHOW) => parse(&archive.whole(SHOW)?, Some(SHOW))?,
+        Some(_) => {
+            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays");
+            return Err(Fault::content(problem, "give a .skyc or .npz file").into());
+        }
+        None => {
+            let mut bytes = Vec::new();
+            source.bytes()?.read_to_end(&mut bytes)?;
+            parse(&bytes, None)?
+        }
+    };
     let mut names = Vec::new();
     let mut curves = Vec::new();
     for (index, drone) in show.swarm.map_or_else(Vec::new, |swarm| swarm.drones).into_iter().enumerate() {
         let mut settings = drone.settings.unwrap_or_default();
         if let Some(elsewhere) = &settings.elsewhere {
-            settings = documents.referenced(elsewhere)?;
+            settings = referenced(archive.as_mut(), elsewhere)?;
         }
         let mut trajectory = settings.trajectory.unwrap_or_default();
         if let Some(elsewhere) = &trajectory.elsewhere {
-            trajectory = documents.referenced(elsewhere)?;
+            trajectory = referenced(archive.as_mut(), elsewhere)?;
         }
         let name = settings.name.unwrap_or_else(|| (index + 1).to_string());
         let items = items(&trajectory, index, options.scale).map_err(|(point, fault)| {
             let place = point.map_or(format!("drone `{name}`"), |point| format!("drone `{name}`, point {}", point + 1));
-            source.error(fault).at(Place::Part(place))
+            fault.at(Place::Part(place))
         })?;
         names.push(name);
         curves.push(items);
@@ -118,7 +129,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     stand_throughout(&mut curves);
     if curves.iter().all(Vec::is_empty) {
         let remedy = "export the show with its trajectories";
-        return Err(source.error(Fault::content("the show has no drone with a trajectory", remedy)));
+        return Err(Fault::content("the show has no drone with a trajectory", remedy).into());
     }
     Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
 }
@@ -137,55 +148,30 @@ fn stand_throughout(curves: &mut [Vec<Item>]) {
     }
 }
 
-/// The JSON documents of a show.
-struct Documents<'a> {
-    source: &'a Source,
-    archive: Option<Archive>,
+/// The document behind `$ref`.
+fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &str) -> Result<T, FaultAt> {
+    let name = reference.split('#').next().unwrap_or_default();
+    let name = name.trim_start_matches("./");
+    let Some(archive) = archive.filter(|archive| archive.holds(name)) else {
+        let problem = format!("it refers to `{reference}`, which is not there");
+        return Err(Fault::content(problem, "give the .skyc file that holds all parts of the show").into());
+    };
+    parse(&archive.whole(name)?, Some(name))
 }
 
-impl Documents<'_> {
-    fn show<T: DeserializeOwned>(&mut self) -> Result<T, ReadError> {
-        let Some(archive) = &mut self.archive else {
-            let mut bytes = Vec::new();
-            self.source.bytes()?.read_to_end(&mut bytes).map_err(|error| self.source.error(fault_of(error)))?;
-            return self.parse(&bytes, None);
+fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, FaultAt> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    serde_json::from_slice(text).map_err(|error| {
+        let line = u64::try_from(error.line()).unwrap_or(0);
+        let place = entry.map_or(Place::Line(line), |entry| Place::Part(format!("entry `{entry}`, line {line}")));
+        let fault = if error.is_eof() {
+            Fault::Truncated { what: "the JSON ends before it is complete".to_owned() }
+        } else {
+            let remedy = "give a show as Skybrush exports it";
+            Fault::content(format!("it is not the JSON of a Skybrush show: {error}"), remedy)
         };
-        if !archive.holds(SHOW) {
-            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays");
-            return Err(self.source.error(Fault::content(problem, "give a .skyc or .npz file")));
-        }
-        let bytes = archive.whole(SHOW)?;
-        self.parse(&bytes, Some(SHOW))
-    }
-
-    /// The document behind `$ref`.
-    fn referenced<T: DeserializeOwned>(&mut self, reference: &str) -> Result<T, ReadError> {
-        let name = reference.split('#').next().unwrap_or_default();
-        let name = name.trim_start_matches("./");
-        let Some(archive) = self.archive.as_mut().filter(|archive| archive.holds(name)) else {
-            let problem = format!("it refers to `{reference}`, which is not there");
-            return Err(self
-                .source
-                .error(Fault::content(problem, "give the .skyc file that holds all parts of the show")));
-        };
-        let bytes = archive.whole(name)?;
-        self.parse(&bytes, Some(name))
-    }
-
-    fn parse<T: DeserializeOwned>(&self, bytes: &[u8], entry: Option<&str>) -> Result<T, ReadError> {
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        serde_json::from_slice(text).map_err(|error| {
-            let line = u64::try_from(error.line()).unwrap_or(0);
-            let place = entry.map_or(Place::Line(line), |entry| Place::Part(format!("entry `{entry}`, line {line}")));
-            let fault = if error.is_eof() {
-                Fault::Truncated { what: "the JSON ends before it is complete".to_owned() }
-            } else {
-                let remedy = "give a show as Skybrush exports it";
-                Fault::content(format!("it is not the JSON of a Skybrush show: {error}"), remedy)
-            };
-            self.source.error(fault).at(place)
-        })
-    }
+        fault.at(place)
+    })
 }
 
 /// The curve of a drone, or the number of the point that is wrong.

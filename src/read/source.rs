@@ -1,14 +1,12 @@
 //! Files as streams of bytes and of lines, with limits on what they may grow to.
 
-use std::cell::Cell;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::PathBuf;
-use std::rc::Rc;
 
 use flate2::read::MultiGzDecoder;
 
-use super::error::{Fault, ReadError};
+use super::error::{Fault, FaultAt, Place};
 
 /// Longest line that is read \[bytes\]: an instant of a hundred thousand vehicles.
 pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
@@ -33,84 +31,44 @@ pub(super) struct Source {
 }
 
 impl Source {
-    pub(super) fn error(&self, fault: Fault) -> ReadError {
-        ReadError::new(&self.path, fault)
-    }
-
     /// The bytes of the file, unpacked.
-    pub(super) fn bytes(&self) -> Result<Box<dyn Read>, ReadError> {
-        let file = File::open(&self.path).map_err(|error| self.error(Fault::System(error)))?;
+    pub(super) fn bytes(&self) -> io::Result<Box<dyn Read>> {
+        let file = File::open(&self.path)?;
         if !self.gzip {
             return Ok(Box::new(file));
         }
-        let packed = Rc::new(Cell::new(0));
-        let counted = Counted { inner: BufReader::new(file), count: Rc::clone(&packed) };
-        Ok(Box::new(Growing::new(MultiGzDecoder::new(counted), move || packed.get())))
-    }
-}
-
-/// What reading went wrong with, as a fault of the content where it is one.
-pub(super) fn fault_of(error: io::Error) -> Fault {
-    if let Some(Grown { inflated_bytes, packed_bytes }) = error.get_ref().and_then(|inner| inner.downcast_ref()) {
-        return Fault::Bomb { inflated_bytes: *inflated_bytes, packed_bytes: *packed_bytes };
-    }
-    match error.kind() {
-        io::ErrorKind::UnexpectedEof => Fault::Truncated { what: "the end of its data is missing".to_owned() },
-        io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::Other => Fault::damaged(error),
-        _ => Fault::System(error),
-    }
-}
-
-struct Counted<R> {
-    inner: R,
-    count: Rc<Cell<u64>>,
-}
-
-impl<R: Read> Read for Counted<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let bytes = self.inner.read(buffer)?;
-        self.count.set(self.count.get() + bytes as u64);
-        Ok(bytes)
-    }
-}
-
-impl<R: io::BufRead> io::BufRead for Counted<R> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        self.inner.fill_buf()
-    }
-
-    fn consume(&mut self, bytes: usize) {
-        self.count.set(self.count.get() + bytes as u64);
-        self.inner.consume(bytes);
+        let packed_bytes = file.metadata()?.len();
+        Ok(Box::new(Growing::new(MultiGzDecoder::new(BufReader::new(file)), packed_bytes)))
     }
 }
 
 /// Unpacked data that are refused once they grow beyond all measure.
-pub(super) struct Growing<R, F> {
+pub(super) struct Growing<R> {
     inner: R,
-    packed_bytes: F,
+    packed_bytes: u64,
     inflated_bytes: u64,
 }
 
+/// Data grow beyond all measure.
 #[derive(Debug, thiserror::Error)]
 #[error("it grows to more than {inflated_bytes} bytes out of {packed_bytes}")]
-struct Grown {
-    inflated_bytes: u64,
-    packed_bytes: u64,
+pub(super) struct Grown {
+    pub(super) inflated_bytes: u64,
+    pub(super) packed_bytes: u64,
 }
 
-impl<R: Read, F: Fn() -> u64> Growing<R, F> {
-    /// `packed_bytes` says how much was taken from the file so far \[bytes\].
-    pub(super) fn new(inner: R, packed_bytes: F) -> Self {
+impl<R: Read> Growing<R> {
+    /// What is packed takes so much of the file \[bytes\].
+    pub(super) fn new(inner: R, packed_bytes: u64) -> Self {
         Self { inner, packed_bytes, inflated_bytes: 0 }
     }
 }
 
-impl<R: Read, F: Fn() -> u64> Read for Growing<R, F> {
+impl<R: Read> Read for Growing<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let bytes = self.inner.read(buffer)?;
         self.inflated_bytes += bytes as u64;
-        let (inflated_bytes, packed_bytes) = (self.inflated_bytes, (self.packed_bytes)());
+        let Self { inflated_bytes, packed_bytes, .. } = *self;
         if inflated_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT)) {
             return Err(io::Error::other(Grown { inflated_bytes, packed_bytes }));
         }
@@ -121,7 +79,6 @@ impl<R: Read, F: Fn() -> u64> Read for Growing<R, F> {
 /// The lines of a text, one in memory at a time.
 pub(super) struct Lines {
     input: Box<dyn Read>,
-    path: PathBuf,
     buffer: Vec<u8>,
     /// The current line without its end.
     line: std::ops::Range<usize>,
@@ -133,10 +90,9 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    pub(super) fn new(source: &Source) -> Result<Self, ReadError> {
+    pub(super) fn new(source: &Source) -> io::Result<Self> {
         Ok(Self {
             input: source.bytes()?,
-            path: source.path.clone(),
             buffer: vec![0; BLOCK_BYTES],
             line: 0..0,
             next: 0,
@@ -158,7 +114,7 @@ impl Lines {
 
     /// Goes to the next line; `false` behind the last one.
     #[inline]
-    pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
+    pub(super) fn advance(&mut self) -> Result<bool, FaultAt> {
         let mut searched = self.next;
         loop {
             if let Some(at) = memchr::memchr(b'\n', &self.buffer[searched..self.filled]) {
@@ -189,15 +145,14 @@ impl Lines {
     }
 
     /// Reads more bytes behind those of the unfinished line and gives by how much that line was moved down.
-    fn refill(&mut self) -> Result<usize, ReadError> {
+    fn refill(&mut self) -> Result<usize, FaultAt> {
         let moved = self.next;
         self.buffer.copy_within(self.next..self.filled, 0);
         self.filled -= moved;
         self.next = 0;
         self.line = 0..0;
         if self.filled >= LINE_LIMIT_BYTES {
-            let fault = Fault::LineTooLong { limit: LINE_LIMIT_BYTES };
-            return Err(ReadError::new(&self.path, fault).at(super::Place::Line(self.number + 1)));
+            return Err(Fault::LineTooLong { limit: LINE_LIMIT_BYTES }.at(Place::Line(self.number + 1)));
         }
         if self.filled == self.buffer.len() {
             self.buffer.resize((2 * self.buffer.len()).min(LINE_LIMIT_BYTES), 0);
@@ -208,8 +163,7 @@ impl Lines {
                 read => break read,
             }
         };
-        let bytes = bytes
-            .map_err(|error| ReadError::new(&self.path, fault_of(error)).at(super::Place::Line(self.number + 1)))?;
+        let bytes = bytes.map_err(|error| Fault::from(error).at(Place::Line(self.number + 1)))?;
         self.ended = bytes == 0;
         self.filled += bytes;
         Ok(moved)

@@ -296,7 +296,7 @@ pub enum ReadFault {
     #[error("a {topic} message is wrong: {reason}")]
     Message {
         /// The channel's topic.
-        topic: &'static str,
+        topic: String,
         /// What is wrong with it.
         reason: String,
     },

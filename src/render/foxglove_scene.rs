@@ -2,17 +2,17 @@
 
 use std::io;
 
-use foxglove::Encode as _;
 use foxglove::messages::line_primitive::Type as LineType;
 use foxglove::messages::{
     Color, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3,
 };
+use foxglove::{Encode as _, Schema};
 
 use super::footage::Plan;
 use super::footage::stretch::Stretch;
 use super::scene::{Colour, Theme};
 use crate::record::Sample;
-use crate::record::mcap::{Channel, Companion};
+use crate::record::mcap::{ExtraTopic, Topic};
 use crate::scenario::Scenario;
 use crate::swarm::{Pair, Rows, row};
 
@@ -36,6 +36,7 @@ pub struct FoxgloveScene {
     radius_m: Vec<f64>,
     delta_m: f64,
     next_s: f64,
+    schema: Option<Schema>,
 }
 
 impl FoxgloveScene {
@@ -47,6 +48,7 @@ impl FoxgloveScene {
             radius_m: scenario.hull_radius_m.clone(),
             delta_m: scenario.delta_m,
             next_s: f64::NEG_INFINITY,
+            schema: SceneUpdate::get_schema(),
         }
     }
 
@@ -101,18 +103,14 @@ impl FoxgloveScene {
     }
 }
 
-impl Companion for FoxgloveScene {
-    fn channel(&self) -> Channel {
-        let schema = SceneUpdate::get_schema();
-        let (name, encoding, data) =
-            schema.map(|schema| (schema.name, schema.encoding, schema.data.into_owned())).unwrap_or_default();
-        Channel {
-            topic: "/scene".to_owned(),
-            message_encoding: SceneUpdate::get_message_encoding(),
-            schema_name: name,
-            schema_encoding: encoding,
-            schema: data,
-        }
+impl ExtraTopic for FoxgloveScene {
+    fn topic(&self) -> Topic<'_> {
+        let (schema_name, schema_encoding, schema) = self
+            .schema
+            .as_ref()
+            .map(|schema| (schema.name.as_str(), schema.encoding.as_str(), &*schema.data))
+            .unwrap_or_default();
+        Topic { name: "/scene", message_encoding: "protobuf", schema_name, schema_encoding, schema }
     }
 
     fn message(&mut self, sample: &Sample<'_>, message: &mut Vec<u8>) -> io::Result<bool> {
@@ -184,12 +182,12 @@ mod tests {
         assert_eq!(entity.spheres[0].size.map(|size| size.x), Some(0.5));
         assert_eq!(entity.spheres[0].pose.and_then(|pose| pose.position).map(|at| (at.x, at.y)), Some((3.0, -0.05)));
         assert_eq!(entity.spheres[5].size.map(|size| size.x), Some(2.0));
-        let channel = scene.channel();
+        let topic = scene.topic();
         assert_eq!(
-            (channel.schema_name.as_str(), channel.message_encoding.as_str()),
-            ("foxglove.SceneUpdate", "protobuf")
+            (topic.schema_name, topic.message_encoding),
+            ("foxglove.SceneUpdate", SceneUpdate::get_message_encoding().as_str())
         );
-        assert!(!channel.schema.is_empty());
+        assert!(!topic.schema.is_empty());
     }
 
     #[test]

@@ -31,4 +31,4 @@ pub use gpu::{AdapterChoice, GpuError, Renderer, ShootError};
 pub use picture::{Picture, PictureError, contact_sheet, data_uri};
 pub use scene::{CameraError, CameraSpec, Layers, Scene, Theme, View};
 pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
-pub use window::{Fed, WindowError, show};
+pub use window::{Fed, WindowError, in_window_library, show};

@@ -1,4 +1,4 @@
-//! The messages that an exported recording consists of.
+//! Recordings that were exported, and the messages that they consist of.
 //!
 //! ```text
 #![doc = include_str!("vehicles.msg")]
@@ -8,24 +8,26 @@
 #![doc = include_str!("tracks.msg")]
 //! ```
 
-use byteorder::LittleEndian;
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// A channel of an exported recording.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Channel {
-    pub(crate) topic: &'static str,
-    pub(crate) schema: &'static str,
-    pub(crate) text: &'static str,
-}
+use super::super::clock::Stamp;
+use super::super::error::{Fault, FaultAt, Place};
+use super::super::names::Names;
+use super::super::order::{BATCH, Ordered, Row, Rows};
+use super::super::source::Source;
+use super::super::{ReadOptions, Recording, TimeUnit};
+use super::accept_unfinished;
+use crate::record::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 
 /// Where the vehicles are named.
-pub(crate) const VEHICLES: Channel =
-    Channel { topic: "/vehicles", schema: "tautline_msgs/msg/Vehicles", text: include_str!("vehicles.msg") };
+pub(crate) const VEHICLES: Topic<'_> =
+    Topic::cdr("/vehicles", "tautline_msgs/msg/Vehicles", include_str!("vehicles.msg"));
 
 /// Where the motion is.
-pub(crate) const TRACKS: Channel =
-    Channel { topic: "/tracks", schema: "tautline_msgs/msg/Tracks", text: include_str!("tracks.msg") };
+pub(crate) const TRACKS: Topic<'_> = Topic::cdr("/tracks", "tautline_msgs/msg/Tracks", include_str!("tracks.msg"));
 
 /// The fields of `vehicles.msg`, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -44,18 +46,103 @@ pub(crate) struct Instant {
     pub(crate) radii_m: Vec<f64>,
 }
 
-/// How ROS 2 marks plain little-endian CDR at the head of each message.
-const CDR_LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
-
-/// A message in CDR.
-pub(crate) fn encode(message: &impl Serialize) -> Result<Vec<u8>, cdr_encoding::Error> {
-    let mut bytes = CDR_LITTLE_ENDIAN.to_vec();
-    cdr_encoding::to_writer::<_, LittleEndian, _>(&mut bytes, message)?;
-    Ok(bytes)
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let topics = TopicReader::open(&source.path)?;
+    let notes = accept_unfinished(topics.is_complete(), options)?;
+    let instants = Instants { names: Names::default(), epoch_ns: 0, count: 0 };
+    let mut exported = Exported { path: source.path.clone(), topics, instants };
+    exported.next(&mut Vec::new())?;
+    let none = Fault::content("it holds no instant", "export again");
+    let mut about = options.about(source, Some(TimeUnit::Seconds), notes, none);
+    about.epoch_ns = exported.instants.epoch_ns;
+    exported.rewind()?;
+    Ok(Box::new(Ordered::open(exported, about)?))
 }
 
-/// A message out of CDR; the error says what is wrong with it.
-pub(super) fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, String> {
-    let body = bytes.strip_prefix(&CDR_LITTLE_ENDIAN).ok_or("it does not begin as little-endian CDR does")?;
-    cdr_encoding::from_bytes::<T, LittleEndian>(body).map(|(message, _)| message).map_err(|error| error.to_string())
+/// An exported recording.
+struct Exported {
+    path: PathBuf,
+    topics: TopicReader,
+    instants: Instants,
+}
+
+/// What the messages so far amount to.
+struct Instants {
+    names: Names,
+    epoch_ns: i64,
+    count: u64,
+}
+
+impl Instants {
+    /// Appends the rows of a message; the error says what is wrong with it.
+    fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), String> {
+        if message.of.schema == TRACKS.schema_name {
+            self.count += 1;
+            return take(&decode(message.bytes)?, self.names.all().len(), self.count, rows);
+        }
+        if message.of.schema == VEHICLES.schema_name {
+            let Vehicles { names, epoch_ns } = decode(message.bytes)?;
+            if !names.starts_with(self.names.all()) {
+                return Err("the vehicles are not those of before".to_owned());
+            }
+            self.names = Names::from_list(names);
+            self.epoch_ns = epoch_ns;
+        }
+        Ok(())
+    }
+}
+
+/// Appends the rows of an instant; the error says what is wrong with it.
+fn take(instant: &Instant, vehicles: usize, number: u64, rows: &mut Vec<Row>) -> Result<(), String> {
+    let count = instant.vehicles.len();
+    let fits = |length: usize, each: usize| length == each * count;
+    let velocities = !instant.velocities_m_s.is_empty();
+    let radii = !instant.radii_m.is_empty();
+    if !(fits(instant.positions_m.len(), 3)
+        && (!velocities || fits(instant.velocities_m_s.len(), 3))
+        && (!radii || fits(instant.radii_m.len(), 1)))
+    {
+        return Err(format!("its arrays do not belong to {count} vehicles"));
+    }
+    let vector = |numbers: &[f64], k: usize| Vector3::from_column_slice(&numbers[3 * k..3 * k + 3]);
+    for (k, &vehicle) in instant.vehicles.iter().enumerate() {
+        let vehicle = usize::try_from(vehicle).ok().filter(|&vehicle| vehicle < vehicles);
+        let vehicle = vehicle.ok_or("it speaks of a vehicle without a name")?;
+        let velocity = velocities.then(|| vector(&instant.velocities_m_s, k)).filter(|v| !v.x.is_nan());
+        let radius = radii.then(|| instant.radii_m[k]).filter(|radius| !radius.is_nan());
+        let stamp = Stamp::Real(instant.time_s);
+        rows.push(Row { stamp, place: number, vehicle, position: vector(&instant.positions_m, k), velocity, radius });
+    }
+    Ok(())
+}
+
+impl Rows for Exported {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+        let before = rows.len();
+        while rows.len() < before + BATCH {
+            match self.topics.next()? {
+                Some(Part::Message(message)) => {
+                    let damaged = |reason| Fault::Damaged { reason }.at(Place::Byte(message.offset));
+                    self.instants.take(&message, rows).map_err(damaged)?;
+                }
+                Some(_) => {}
+                None => break,
+            }
+        }
+        Ok(rows.len() > before)
+    }
+
+    fn rewind(&mut self) -> Result<(), FaultAt> {
+        self.topics = TopicReader::open(&self.path)?;
+        (self.instants.names, self.instants.count) = (Names::default(), 0);
+        Ok(())
+    }
+
+    fn vehicles(&self) -> &[String] {
+        self.instants.names.all()
+    }
+
+    fn place(&self, number: u64) -> Place {
+        Place::Part(format!("message {number} of topic `{}`", TRACKS.name))
+    }
 }

@@ -1,57 +1,27 @@
 //! Messages of others that hold positions: Foxglove in protobuf and JSON, ROS 2 in CDR.
 
-use byteorder::{BigEndian, LittleEndian};
 use nalgebra::{Vector3, vector};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-/// Message types that are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    PoseInFrame,
-    PosesInFrame,
-    FrameTransform,
-    FrameTransforms,
-    PoseStamped,
-    PoseArray,
-    TransformStamped,
-    TfMessage,
-}
+use crate::record::mcap::topic::{CDR, decode};
 
-impl Kind {
-    /// The type of this schema.
-    pub(super) fn of_schema(name: &str) -> Option<Self> {
-        Some(match name {
-            "foxglove.PoseInFrame" => Self::PoseInFrame,
-            "foxglove.PosesInFrame" => Self::PosesInFrame,
-            "foxglove.FrameTransform" => Self::FrameTransform,
-            "foxglove.FrameTransforms" => Self::FrameTransforms,
-            "geometry_msgs/msg/PoseStamped" => Self::PoseStamped,
-            "geometry_msgs/msg/PoseArray" => Self::PoseArray,
-            "geometry_msgs/msg/TransformStamped" => Self::TransformStamped,
-            "tf2_msgs/msg/TFMessage" => Self::TfMessage,
-            _ => return None,
-        })
-    }
-}
+/// Reads a message in an encoding; the error says what is wrong with it.
+pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String>;
 
-/// How the messages of a channel are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Encoding {
-    Protobuf,
-    Json,
-    Cdr,
-}
-
-impl Encoding {
-    pub(super) fn of_name(name: &str) -> Option<Self> {
-        match name {
-            "protobuf" => Some(Self::Protobuf),
-            "json" => Some(Self::Json),
-            "cdr" => Some(Self::Cdr),
-            _ => None,
-        }
-    }
+/// What reads the messages of a schema, where they hold positions.
+pub(super) fn reader_of(schema: &str) -> Option<Reader> {
+    Some(match schema {
+        "foxglove.PoseInFrame" => foxglove::<PoseInFrame>,
+        "foxglove.PosesInFrame" => foxglove::<PosesInFrame>,
+        "foxglove.FrameTransform" => foxglove::<FrameTransform>,
+        "foxglove.FrameTransforms" => foxglove::<FrameTransforms>,
+        "geometry_msgs/msg/PoseStamped" => ros::<PoseStamped>,
+        "geometry_msgs/msg/PoseArray" => ros::<PoseArray>,
+        "geometry_msgs/msg/TransformStamped" => ros::<TransformStamped>,
+        "tf2_msgs/msg/TFMessage" => ros::<TfMessage>,
+        _ => return None,
+    })
 }
 
 /// A position as a message says it.
@@ -74,44 +44,25 @@ pub(super) enum Who {
     Named(String),
 }
 
-/// Reads a message; the error says what is wrong with it.
-pub(super) fn decode(kind: Kind, encoding: Encoding, bytes: &[u8]) -> Result<Vec<Seen>, String> {
-    match kind {
-        Kind::PoseInFrame => foxglove::<PoseInFrame>(encoding, bytes).map(PoseInFrame::seen),
-        Kind::PosesInFrame => foxglove::<PosesInFrame>(encoding, bytes).map(PosesInFrame::seen),
-        Kind::FrameTransform => foxglove::<FrameTransform>(encoding, bytes).map(|message| vec![message.seen()]),
-        Kind::FrameTransforms => foxglove::<FrameTransforms>(encoding, bytes)
-            .map(|message| message.transforms.into_iter().map(FrameTransform::seen).collect()),
-        Kind::PoseStamped => ros::<PoseStamped>(encoding, bytes)
-            .map(|message| vec![message.header.seen(Who::Topic, &message.pose.position)]),
-        Kind::PoseArray => ros::<PoseArray>(encoding, bytes).map(|message| {
-            let seen = |(k, pose): (usize, &RosPose)| message.header.seen(Who::Listed(k + 1), &pose.position);
-            message.poses.iter().enumerate().map(seen).collect()
-        }),
-        Kind::TransformStamped => ros::<TransformStamped>(encoding, bytes).map(|message| vec![message.seen()]),
-        Kind::TfMessage => ros::<TfMessage>(encoding, bytes)
-            .map(|message| message.transforms.into_iter().map(TransformStamped::seen).collect()),
-    }
+/// A message with positions.
+trait Positions {
+    fn seen(self) -> Vec<Seen>;
 }
 
-fn foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: Encoding, bytes: &[u8]) -> Result<T, String> {
-    match encoding {
-        Encoding::Protobuf => T::decode(bytes).map_err(|error| error.to_string()),
-        Encoding::Json => serde_json::from_slice(bytes).map_err(|error| error.to_string()),
-        Encoding::Cdr => Err("Foxglove messages are read in protobuf and JSON, not in CDR".to_owned()),
-    }
-}
-
-fn ros<T: DeserializeOwned>(encoding: Encoding, bytes: &[u8]) -> Result<T, String> {
-    if encoding != Encoding::Cdr {
-        return Err("ROS 2 messages are read in CDR alone".to_owned());
-    }
-    let message = match bytes {
-        [0, 1, _, _, body @ ..] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
-        [0, 0, _, _, body @ ..] => cdr_encoding::from_bytes::<T, BigEndian>(body),
-        _ => return Err("it does not begin as CDR does".to_owned()),
+fn foxglove<T: prost::Message + Default + DeserializeOwned + Positions>(
+    encoding: &str,
+    bytes: &[u8],
+) -> Result<Vec<Seen>, String> {
+    let message = match encoding {
+        "protobuf" => T::decode(bytes).map_err(|error| error.to_string()),
+        "json" => serde_json::from_slice(bytes).map_err(|error| error.to_string()),
+        _ => Err("Foxglove messages are read in protobuf and JSON, not in CDR".to_owned()),
     };
-    message.map(|(message, _)| message).map_err(|error| error.to_string())
+    message.map(T::seen)
+}
+
+fn ros<T: DeserializeOwned + Positions>(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String> {
+    if encoding == CDR { decode(bytes).map(T::seen) } else { Err("ROS 2 messages are read in CDR alone".to_owned()) }
 }
 
 #[derive(Clone, PartialEq, prost::Message, Deserialize)]
@@ -168,7 +119,7 @@ struct PoseInFrame {
     pose: Option<Pose>,
 }
 
-impl PoseInFrame {
+impl Positions for PoseInFrame {
     fn seen(self) -> Vec<Seen> {
         let position = point(self.pose.as_ref().and_then(|pose| pose.position.as_ref()));
         let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
@@ -187,7 +138,7 @@ struct PosesInFrame {
     poses: Vec<Pose>,
 }
 
-impl PosesInFrame {
+impl Positions for PosesInFrame {
     fn seen(self) -> Vec<Seen> {
         let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
         let seen = |(k, pose): (usize, &Pose)| Seen {
@@ -213,11 +164,11 @@ struct FrameTransform {
     translation: Option<Vec3>,
 }
 
-impl FrameTransform {
-    fn seen(self) -> Seen {
+impl Positions for FrameTransform {
+    fn seen(self) -> Vec<Seen> {
         let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
         let position = point(self.translation.as_ref());
-        Seen { who: Who::Named(self.child_frame_id), frame: self.parent_frame_id, stamp_ns, position }
+        vec![Seen { who: Who::Named(self.child_frame_id), frame: self.parent_frame_id, stamp_ns, position }]
     }
 }
 
@@ -226,6 +177,12 @@ impl FrameTransform {
 struct FrameTransforms {
     #[prost(message, repeated, tag = "1")]
     transforms: Vec<FrameTransform>,
+}
+
+impl Positions for FrameTransforms {
+    fn seen(self) -> Vec<Seen> {
+        self.transforms.into_iter().flat_map(FrameTransform::seen).collect()
+    }
 }
 
 #[derive(Deserialize)]
@@ -260,10 +217,23 @@ struct PoseStamped {
     pose: RosPose,
 }
 
+impl Positions for PoseStamped {
+    fn seen(self) -> Vec<Seen> {
+        vec![self.header.seen(Who::Topic, &self.pose.position)]
+    }
+}
+
 #[derive(Deserialize)]
 struct PoseArray {
     header: RosHeader,
     poses: Vec<RosPose>,
+}
+
+impl Positions for PoseArray {
+    fn seen(self) -> Vec<Seen> {
+        let seen = |(k, pose): (usize, &RosPose)| self.header.seen(Who::Listed(k + 1), &pose.position);
+        self.poses.iter().enumerate().map(seen).collect()
+    }
 }
 
 #[derive(Deserialize)]
@@ -273,13 +243,19 @@ struct TransformStamped {
     transform: RosPose,
 }
 
-impl TransformStamped {
-    fn seen(self) -> Seen {
-        self.header.seen(Who::Named(self.child_frame_id.clone()), &self.transform.position)
+impl Positions for TransformStamped {
+    fn seen(self) -> Vec<Seen> {
+        vec![self.header.seen(Who::Named(self.child_frame_id), &self.transform.position)]
     }
 }
 
 #[derive(Deserialize)]
 struct TfMessage {
     transforms: Vec<TransformStamped>,
+}
+
+impl Positions for TfMessage {
+    fn seen(self) -> Vec<Seen> {
+        self.transforms.into_iter().flat_map(TransformStamped::seen).collect()
+    }
 }

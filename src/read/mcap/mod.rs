@@ -14,89 +14,64 @@
 pub(crate) mod exported;
 mod foreign;
 mod messages;
-mod own;
+mod run;
 
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, FaultAt, Place};
 use super::source::Source;
-use super::{ReadOptions, Recording};
-use crate::record::ReadFault;
-use crate::record::mcap::framing::{Fields, Record, RecordReader, Trouble};
-use mcap::records::op;
+use super::{Format, ReadOptions, Recording};
+use crate::record::mcap::topic::{Part, TopicReader};
+use crate::record::{ReadFault, RecordError};
 
-/// Opens a recording, going by the first channel that is known.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    match first_known_schema(source, options)? {
-        Some(Known::Run) => own::open_run(source, options),
-        Some(Known::Exported) => own::open_exported(source, options),
-        Some(Known::Foreign) => foreign::open(source, options),
-        None => {
-            let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
-                          geometry_msgs/msg/PoseArray or tf2_msgs/msg/TFMessage are read";
-            Err(source.error(Fault::content("it has no topic with positions", remedy)))
-        }
-    }
-}
-
-enum Known {
-    Run,
-    Exported,
-    Foreign,
-}
-
-fn first_known_schema(source: &Source, options: &ReadOptions) -> Result<Option<Known>, ReadError> {
-    let mut records = records(source)?;
-    while let Some(Record { opcode, body, .. }) = records.next().map_err(|trouble| error_of(source, trouble))? {
-        if opcode != op::SCHEMA {
-            continue;
-        }
-        let mut fields = Fields(body);
-        let (Some(_), Some(name)) = (fields.u16(), fields.str()) else { continue };
-        match name {
-            "tautline_msgs/msg/Swarm" => return Ok(Some(Known::Run)),
-            name if name == exported::TRACKS.schema => return Ok(Some(Known::Exported)),
-            name if messages::Kind::of_schema(name).is_some() => return Ok(Some(Known::Foreign)),
+/// Opens a recording, going by the first schema that is known.
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+    let mut topics = TopicReader::open(&source.path)?;
+    while let Some(part) = topics.next()? {
+        match part {
+            Part::Schema("tautline_msgs/msg/Swarm") => return run::open(source, options),
+            Part::Schema(name) if name == exported::TRACKS.schema_name => return exported::open(source, options),
+            Part::Schema(name) if messages::reader_of(name).is_some() => return foreign::open(source, options),
             _ => {}
         }
     }
-    accept_unfinished(source, records.is_complete(), options).map(|_| None)
+    accept_unfinished(topics.is_complete(), options)?;
+    let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
+                  geometry_msgs/msg/PoseArray or tf2_msgs/msg/TFMessage are read";
+    Err(Fault::content("it has no topic with positions", remedy).into())
 }
 
-fn records(source: &Source) -> Result<RecordReader, ReadError> {
-    RecordReader::open(&source.path).map_err(|trouble| error_of(source, trouble))
-}
-
-fn error_of(source: &Source, trouble: Trouble) -> ReadError {
-    match trouble {
-        Trouble::System(error) => source.error(Fault::System(error)),
-        Trouble::Fault(fault) => fault_of(source, fault),
-    }
-}
-
-fn fault_of(source: &Source, fault: ReadFault) -> ReadError {
-    match fault {
-        ReadFault::Empty => source.error(Fault::Empty),
-        ReadFault::NotMcap => source.error(Fault::WrongFormat {
-            format: super::Format::Mcap,
-            reason: "it does not begin as MCAP files do".to_owned(),
-        }),
-        ReadFault::TooLong { offset, bytes, limit } => {
-            let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
-            source.error(Fault::Damaged { reason }).at(Place::Byte(offset))
+impl From<RecordError> for FaultAt {
+    fn from(error: RecordError) -> Self {
+        let fault = match error {
+            RecordError::Write { source, .. } | RecordError::Open { source, .. } => {
+                return Fault::System(source).into();
+            }
+            RecordError::Read { fault, .. } => fault,
+        };
+        match fault {
+            ReadFault::Empty => Fault::Empty.into(),
+            ReadFault::NotMcap => {
+                let reason = "it does not begin as MCAP files do".to_owned();
+                Fault::WrongFormat { format: Format::Mcap, reason }.into()
+            }
+            ReadFault::TooLong { offset, bytes, limit } => {
+                let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
+                Fault::Damaged { reason }.at(Place::Byte(offset))
+            }
+            ReadFault::Damaged { offset, reason } => Fault::Damaged { reason }.at(Place::Byte(offset)),
+            ReadFault::Message { topic, reason } => {
+                Fault::Damaged { reason }.at(Place::Part(format!("topic `{topic}`")))
+            }
+            other => Fault::damaged(other).into(),
         }
-        ReadFault::Damaged { offset, reason } => source.error(Fault::Damaged { reason }).at(Place::Byte(offset)),
-        ReadFault::Message { topic, reason } => {
-            source.error(Fault::Damaged { reason }).at(Place::Part(format!("topic `{topic}`")))
-        }
-        other => source.error(Fault::damaged(other)),
     }
 }
 
 /// What is to be said of a file that was not closed, or the error that it is.
-fn accept_unfinished(source: &Source, complete: bool, options: &ReadOptions) -> Result<Vec<String>, ReadError> {
+fn accept_unfinished(complete: bool, options: &ReadOptions) -> Result<Vec<String>, Fault> {
     let note = "the recording was not closed: it is read up to the last part that was written";
     match (complete, options.allow_unfinished) {
         (true, _) => Ok(Vec::new()),
         (false, true) => Ok(vec![note.to_owned()]),
-        (false, false) => Err(source.error(Fault::Unfinished)),
+        (false, false) => Err(Fault::Unfinished),
     }
 }

@@ -11,7 +11,7 @@ use std::path::Path;
 use mcap::MAGIC;
 use mcap::records::op;
 
-use crate::record::ReadFault;
+use crate::record::{ReadFault, RecordError};
 
 /// Longest record that is read \[bytes\]: a sample of three million vehicles.
 const RECORD_LIMIT_BYTES: u64 = 256 * 1024 * 1024;
@@ -23,9 +23,19 @@ const HEAD_BYTES: usize = 9;
 const FOOTER_BYTES: u64 = 20;
 
 /// The system's error or the file's fault.
-pub(crate) enum Trouble {
+pub(super) enum Trouble {
     System(io::Error),
     Fault(ReadFault),
+}
+
+impl Trouble {
+    pub(super) fn of(self, path: &Path) -> RecordError {
+        let path = path.display().to_string();
+        match self {
+            Self::System(source) => RecordError::Open { path, source },
+            Self::Fault(fault) => RecordError::Read { path, fault },
+        }
+    }
 }
 
 impl From<io::Error> for Trouble {
@@ -41,15 +51,15 @@ impl From<ReadFault> for Trouble {
 }
 
 /// One record: what it is and what it holds.
-pub(crate) struct Record<'a> {
+pub(super) struct Record<'a> {
     /// Where in the file it, or the chunk around it, begins \[bytes\].
-    pub(crate) offset: u64,
-    pub(crate) opcode: u8,
-    pub(crate) body: &'a [u8],
+    pub(super) offset: u64,
+    pub(super) opcode: u8,
+    pub(super) body: &'a [u8],
 }
 
 /// Reads the data section of an MCAP file record by record and goes into its chunks.
-pub(crate) struct RecordReader {
+pub(super) struct RecordReader {
     file: BufReader<File>,
     /// Whether the file ends as a closed recording does.
     complete: bool,
@@ -64,7 +74,7 @@ pub(crate) struct RecordReader {
 }
 
 impl RecordReader {
-    pub(crate) fn open(path: &Path) -> Result<Self, Trouble> {
+    pub(super) fn open(path: &Path) -> Result<Self, Trouble> {
         let mut file = File::open(path)?;
         let mut magic = Vec::new();
         (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic)?;
@@ -87,13 +97,13 @@ impl RecordReader {
         })
     }
 
-    pub(crate) fn is_complete(&self) -> bool {
+    pub(super) fn is_complete(&self) -> bool {
         self.complete
     }
 
     /// The next record, chunks taken apart; `None` at the end of the data section or where a file that was not closed
     /// breaks off.
-    pub(crate) fn next(&mut self) -> Result<Option<Record<'_>>, Trouble> {
+    pub(super) fn next(&mut self) -> Result<Option<Record<'_>>, Trouble> {
         while self.chunk.is_empty() {
             let Some(opcode) = self.read_record()? else { return Ok(None) };
             match opcode {
@@ -232,12 +242,12 @@ fn unpack(compression: &str, packed: &[u8], unpacked_bytes: u64) -> Result<Vec<u
     read.map(|_| records).map_err(|_| "the packed content of the chunk is wrong")
 }
 
-pub(crate) fn damaged(offset: u64, reason: &str) -> ReadFault {
+pub(super) fn damaged(offset: u64, reason: &str) -> ReadFault {
     ReadFault::Damaged { offset, reason: reason.to_owned() }
 }
 
 /// Takes the fields of a record off its front; `None` where it is too short.
-pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
+pub(super) struct Fields<'a>(pub(super) &'a [u8]);
 
 impl<'a> Fields<'a> {
     fn head(mut self) -> Option<(u8, u64)> {
@@ -251,19 +261,19 @@ impl<'a> Fields<'a> {
         Some(*array)
     }
 
-    pub(crate) fn u16(&mut self) -> Option<u16> {
+    pub(super) fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
-    pub(crate) fn u32(&mut self) -> Option<u32> {
+    pub(super) fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
-    pub(crate) fn u64(&mut self) -> Option<u64> {
+    pub(super) fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_le_bytes)
     }
 
-    pub(crate) fn str(&mut self) -> Option<&'a str> {
+    pub(super) fn str(&mut self) -> Option<&'a str> {
         let bytes = usize::try_from(self.u32()?).ok()?;
         let (text, rest) = self.0.split_at_checked(bytes)?;
         self.0 = rest;

@@ -1,80 +1,62 @@
-//! The messages of a recording: what each channel carries, to CDR and back.
+//! The messages of a recording: what each topic carries, to CDR and back.
 
-use byteorder::LittleEndian;
+use std::sync::Arc;
+
 use serde::ser::SerializeSeq;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::Header;
-use crate::record::{Event, OwnedSample, ReadFault, Sample};
+use super::topic::Topic;
+use crate::record::{Channel, Event, OwnedSample, ReadFault, Sample};
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
-/// How ROS 2 marks plain little-endian CDR at the head of each message.
-const CDR_LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
-
-/// Message encoding of every channel.
-pub(super) const MESSAGE_ENCODING: &str = "cdr";
-/// Schema encoding of every channel.
-pub(super) const SCHEMA_ENCODING: &str = "ros2msg";
-
-/// A channel of a recording.
+/// A topic that every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Topic {
+pub(super) enum Own {
     Scenario,
     Swarm,
     Summary,
     Events,
 }
 
-impl Topic {
+impl Own {
     /// In the order in which a recorder declares them.
     pub(super) const ALL: [Self; 4] = [Self::Scenario, Self::Swarm, Self::Summary, Self::Events];
 
-    pub(super) fn name(self) -> &'static str {
+    pub(super) const fn topic(self) -> Topic<'static> {
         match self {
-            Self::Scenario => "/scenario",
-            Self::Swarm => "/swarm",
-            Self::Summary => "/summary",
-            Self::Events => "/events",
+            Self::Scenario => Topic::cdr("/scenario", "tautline_msgs/msg/Scenario", include_str!("scenario.msg")),
+            Self::Swarm => Topic::cdr("/swarm", "tautline_msgs/msg/Swarm", include_str!("swarm.msg")),
+            Self::Summary => Topic::cdr("/summary", "tautline_msgs/msg/Summary", include_str!("summary.msg")),
+            Self::Events => Topic::cdr("/events", "tautline_msgs/msg/Event", include_str!("event.msg")),
         }
     }
 
-    pub(super) fn schema_name(self) -> &'static str {
-        match self {
-            Self::Scenario => "tautline_msgs/msg/Scenario",
-            Self::Swarm => "tautline_msgs/msg/Swarm",
-            Self::Summary => "tautline_msgs/msg/Summary",
-            Self::Events => "tautline_msgs/msg/Event",
-        }
-    }
-
-    pub(super) fn schema_text(self) -> &'static str {
-        match self {
-            Self::Scenario => include_str!("scenario.msg"),
-            Self::Swarm => include_str!("swarm.msg"),
-            Self::Summary => include_str!("summary.msg"),
-            Self::Events => include_str!("event.msg"),
-        }
+    /// The topic of this name.
+    pub(super) fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|own| own.topic().name == name)
     }
 
     fn fault(self, reason: impl Into<String>) -> ReadFault {
-        ReadFault::Message { topic: self.name(), reason: reason.into() }
+        fault(self.topic().name, reason)
     }
 }
 
-/// Replaces the content of `bytes` by the message in CDR.
-pub(super) fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> Result<(), cdr_encoding::Error> {
-    bytes.clear();
-    bytes.extend_from_slice(&CDR_LITTLE_ENDIAN);
-    cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)
+pub(super) fn fault(topic: &str, reason: impl Into<String>) -> ReadFault {
+    ReadFault::Message { topic: topic.to_owned(), reason: reason.into() }
 }
 
-/// Reads a message of a topic. Bytes behind its last field are ignored, so that fields can be added later.
-pub(super) fn decode<'a, T: Deserialize<'a>>(topic: Topic, bytes: &'a [u8]) -> Result<T, ReadFault> {
-    let body = bytes
-        .strip_prefix(&CDR_LITTLE_ENDIAN)
-        .ok_or_else(|| topic.fault("it does not begin as little-endian CDR does"))?;
-    let (message, _) = cdr_encoding::from_bytes::<T, LittleEndian>(body).map_err(|e| topic.fault(e.to_string()))?;
-    Ok(message)
+/// Name of the schema of every channel.
+pub(super) const CHANNEL_SCHEMA: &str = "tautline_msgs/msg/Channel";
+
+/// The name of a channel's topic.
+pub(super) fn channel_topic(channel: &str) -> String {
+    format!("/vehicles/{channel}")
+}
+
+/// The topic of a channel.
+pub(super) fn topic_of_channel(name: &str) -> Topic<'_> {
+    Topic::cdr(name, CHANNEL_SCHEMA, include_str!("channel.msg"))
 }
 
 /// The fields of `scenario.msg`, in order.
@@ -105,7 +87,7 @@ impl ScenarioMessage<String> {
             scenario_name: self.name,
             scenario_toml: self.toml,
             scenario_sha256: self.sha256,
-            vehicles: usize::try_from(self.vehicles).map_err(|_| Topic::Scenario.fault("too many vehicles"))?,
+            vehicles: usize::try_from(self.vehicles).map_err(|_| Own::Scenario.fault("too many vehicles"))?,
             delta_m: self.delta_m,
         })
     }
@@ -139,11 +121,12 @@ impl SwarmMessage<Vec<f64>> {
         self.positions_m.len() / 3
     }
 
-    /// The sample of `vehicles` vehicles, with the summary where it is of the same step.
+    /// The sample of `vehicles` vehicles, with what came before it and is of the same step.
     pub(super) fn into_sample(
         self,
         vehicles: usize,
         summary: Option<&SummaryMessage>,
+        channels: Vec<ChannelMessage<String, Vec<String>, Vec<f64>>>,
     ) -> Result<OwnedSample, ReadFault> {
         for (name, numbers) in [
             ("positions_m", &self.positions_m),
@@ -154,10 +137,11 @@ impl SwarmMessage<Vec<f64>> {
             if Some(numbers.len()) != vehicles.checked_mul(3) && !without_command {
                 let reason =
                     format!("{name} has {} numbers, which is not 3 for each of {vehicles} vehicles", numbers.len());
-                return Err(Topic::Swarm.fault(reason));
+                return Err(Own::Swarm.fault(reason));
             }
         }
         let summary = summary.filter(|summary| summary.step == self.step);
+        let channels = channels.into_iter().filter(|channel| channel.step == self.step);
         Ok(OwnedSample {
             time_s: self.time_s,
             step: self.step,
@@ -168,8 +152,36 @@ impl SwarmMessage<Vec<f64>> {
             control: Rows::from_row_slice(&self.controls_m_s2),
             separation: summary.map(SummaryMessage::separation).transpose()?.flatten(),
             energy: summary.map(|summary| summary.energy_m2_s2).filter(|energy| !energy.is_nan()),
-            channels: Vec::new(),
+            channels: channels.map(|channel| channel.into_channel(vehicles)).collect::<Result<_, _>>()?,
         })
+    }
+}
+
+/// The fields of `channel.msg`, in order.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ChannelMessage<N, C, V> {
+    time_s: f64,
+    step: u64,
+    pub(super) name: N,
+    columns: C,
+    values: V,
+}
+
+impl<'a> ChannelMessage<&'a str, &'a [String], &'a [f64]> {
+    pub(super) fn of(sample: &Sample<'_>, channel: &'a Channel) -> Self {
+        let Channel { name, columns, values } = channel;
+        Self { time_s: sample.time_s, step: sample.step, name, columns, values }
+    }
+}
+
+impl ChannelMessage<String, Vec<String>, Vec<f64>> {
+    fn into_channel(self, vehicles: usize) -> Result<Channel, ReadFault> {
+        let (columns, numbers) = (self.columns.len(), self.values.len());
+        if Some(numbers) != columns.checked_mul(vehicles) {
+            let reason = format!("it has {numbers} numbers, which is not {columns} for each of {vehicles} vehicles");
+            return Err(fault(&channel_topic(&self.name), reason));
+        }
+        Ok(Channel { name: self.name.into(), columns: Arc::from(self.columns), values: self.values })
     }
 }
 
@@ -220,7 +232,7 @@ impl SummaryMessage {
         if self.first_vehicle == 0 {
             return Ok(None);
         }
-        let pair = pair_of(Topic::Summary, [self.first_vehicle, self.second_vehicle])?;
+        let pair = pair_of(Own::Summary, [self.first_vehicle, self.second_vehicle])?;
         Ok(Some(ClosestApproach { pair, separation_m: self.separation_m, time_s: self.separation_time_s }))
     }
 }
@@ -273,7 +285,7 @@ impl From<&Event> for EventMessage<&'static str> {
 impl EventMessage<String> {
     pub(super) fn into_event(self) -> Result<Event, ReadFault> {
         let time_s = self.time_s;
-        let pair = || pair_of(Topic::Events, [self.first_vehicle, self.second_vehicle]);
+        let pair = || pair_of(Own::Events, [self.first_vehicle, self.second_vehicle]);
         Ok(match self.kind.as_str() {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
@@ -281,7 +293,7 @@ impl EventMessage<String> {
             "leg-began" => Event::LegBegan { leg: self.leg()?, time_s },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },
-            unknown => return Err(Topic::Events.fault(format!("unknown kind {unknown:?}"))),
+            unknown => return Err(Own::Events.fault(format!("unknown kind {unknown:?}"))),
         })
     }
 }
@@ -291,7 +303,7 @@ impl EventMessage<String> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
         let number = self.value as usize;
         let leg = number.checked_sub(1).filter(|_| self.value.fract() == 0.0);
-        leg.ok_or_else(|| Topic::Events.fault(format!("there is no leg {}", self.value)))
+        leg.ok_or_else(|| Own::Events.fault(format!("there is no leg {}", self.value)))
     }
 }
 
@@ -300,7 +312,7 @@ fn numbers_of(pair: Option<Pair>) -> [u64; 2] {
     pair.map_or([0, 0], |pair| pair.numbers().map(|number| number as u64))
 }
 
-fn pair_of(topic: Topic, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
+fn pair_of(topic: Own, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
     let index = |number: u64| number.checked_sub(1).and_then(|index| usize::try_from(index).ok());
     match numbers.map(index) {
         [Some(first), Some(second)] if first != second => Ok(Pair::new(first, second)),

@@ -1,7 +1,7 @@
 //! `run.mcap`: a run as an [MCAP](https://mcap.dev/spec) file.
 //!
 //! Messages are in CDR (little-endian, as ROS 2 writes it), schemas are ROS 2 message definitions in plain text, so
-//! general MCAP tools show every field without knowing this program. Four channels:
+//! general MCAP tools show every field without knowing this program. Four topics:
 //!
 //! | topic | schema | when | holds |
 //! | --- | --- | --- | --- |
@@ -10,7 +10,9 @@
 //! | `/swarm` | `tautline_msgs/msg/Swarm` | each sample | positions, velocities, controls |
 //! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
 //!
-//! A [`Companion`] may add a channel of its own, such as the 3-D scene on `/scene`; readers pass over it.
+//! Each [`Channel`](super::Channel) of the samples has a topic `/vehicles/<name>` of `tautline_msgs/msg/Channel`, declared
+//! with its first values. An [`ExtraTopic`] may add one of another kind, such as the 3-D scene on `/scene`; readers pass
+//! over it.
 //!
 //! The fields, with their units, are in the schemas themselves:
 //!
@@ -30,21 +32,27 @@
 #![doc = include_str!("event.msg")]
 //! ```
 //!
+//! ```text
+#![doc = include_str!("channel.msg")]
+//! ```
+//!
 //! `log_time` and `publish_time` are simulated nanoseconds since the start; nothing in the file depends on the clock
-//! or the machine, so two recordings of one run are equal byte for byte. The two messages of a sample are always in the
-//! same chunk, `/summary` first.
+//! or the machine, so two recordings of one run are equal byte for byte. The messages of a sample are always in the
+//! same chunk, `/summary` first and `/swarm` behind the channels.
 //!
 //! A chunk is kept in memory until it is complete and is then handed to the system at once: when a message is
 //! [`FLUSH_PERIOD_S`] or more after the last chunk, or when [`FLUSH_BYTES`] are waiting. A process that is killed leaves
 //! every chunk up to then readable, and [`McapRecording`] reads such a file.
 
-pub(crate) mod framing;
+mod framing;
 mod message;
 mod reader;
+pub(crate) mod topic;
 mod writer;
 
 pub use reader::{Entry, McapRecording};
-pub use writer::{Channel, Companion, FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
+pub use topic::Topic;
+pub use writer::{ExtraTopic, FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
 
 use super::sha256_hex;
 

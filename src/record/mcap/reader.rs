@@ -1,13 +1,15 @@
 //! Reading `run.mcap` back.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::path::{Path, PathBuf};
+use std::collections::VecDeque;
+use std::path::Path;
 
-use mcap::records::op;
+use serde::de::DeserializeOwned;
 
 use super::Header;
-use super::framing::{Fields, Record, RecordReader, Trouble, damaged};
-use super::message::{EventMessage, MESSAGE_ENCODING, ScenarioMessage, SummaryMessage, SwarmMessage, Topic, decode};
+use super::message::{
+    CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, ScenarioMessage, SummaryMessage, SwarmMessage, fault,
+};
+use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
 use crate::record::{Event, OwnedSample, ReadFault, RecordError};
 
 /// What a recording gives back, in the order in which it was written.
@@ -24,8 +26,7 @@ pub enum Entry {
 /// A file that was not closed gives everything up to where it breaks off. Damage gives an error, after which the
 /// iterator ends.
 pub struct McapRecording {
-    path: PathBuf,
-    records: RecordReader,
+    topics: TopicReader,
     contents: Contents,
     header: Header,
     failed: bool,
@@ -38,20 +39,18 @@ impl McapRecording {
     /// [`RecordError::Open`] when the system refuses; [`RecordError::Read`] when the file is empty, is not MCAP, has no
     /// `/scenario` message or no `/swarm` channel, or is damaged.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
-        Self::try_open(path).map_err(|trouble| record_error(path, trouble))
-    }
-
-    fn try_open(path: &Path) -> Result<Self, Trouble> {
-        let mut records = RecordReader::open(path)?;
+        let mut topics = TopicReader::open(path)?;
         let mut contents = Contents::default();
-        while contents.header.is_none() || !contents.declares(Topic::Swarm) {
-            if !contents.advance(&mut records)? {
-                let missing = if contents.declares(Topic::Swarm) { Topic::Scenario } else { Topic::Swarm };
-                return Err(ReadFault::NoChannel { topic: missing.name() }.into());
+        let header = loop {
+            if let Some(header) = contents.header.clone().filter(|_| contents.has_swarm) {
+                break header;
             }
-        }
-        let header = contents.header.clone().ok_or(ReadFault::NoChannel { topic: Topic::Scenario.name() })?;
-        Ok(Self { path: path.to_owned(), records, contents, header, failed: false })
+            if !contents.advance(&mut topics)? {
+                let missing = if contents.has_swarm { Own::Scenario } else { Own::Swarm };
+                return Err(topics.fault(ReadFault::NoChannel { topic: missing.topic().name }));
+            }
+        };
+        Ok(Self { topics, contents, header, failed: false })
     }
 
     /// What the recording says about the run as a whole.
@@ -64,7 +63,7 @@ impl McapRecording {
     /// everything up to the last chunk that was written.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        self.records.is_complete()
+        self.topics.is_complete()
     }
 
     /// All remaining samples and events, each in order.
@@ -82,12 +81,12 @@ impl McapRecording {
         Ok((samples, events))
     }
 
-    fn try_next(&mut self) -> Result<Option<Entry>, Trouble> {
+    fn try_next(&mut self) -> Result<Option<Entry>, RecordError> {
         loop {
             if let Some(entry) = self.contents.ready.pop_front() {
                 return Ok(Some(entry));
             }
-            if !self.contents.advance(&mut self.records)? {
+            if !self.contents.advance(&mut self.topics)? {
                 return Ok(None);
             }
         }
@@ -101,101 +100,76 @@ impl Iterator for McapRecording {
         if self.failed {
             return None;
         }
-        self.try_next()
-            .map_err(|trouble| {
-                self.failed = true;
-                record_error(&self.path, trouble)
-            })
-            .transpose()
+        let next = self.try_next();
+        self.failed = next.is_err();
+        next.transpose()
     }
 }
 
-fn record_error(path: &Path, trouble: Trouble) -> RecordError {
-    let path = path.display().to_string();
-    match trouble {
-        Trouble::System(source) => RecordError::Open { path, source },
-        Trouble::Fault(fault) => RecordError::Read { path, fault },
-    }
-}
-
-/// What the records read so far amount to.
+/// What was read so far amounts to.
 #[derive(Default)]
 struct Contents {
-    /// Name of each schema by its number.
-    schemas: BTreeMap<u16, String>,
-    /// The channels that matter here by their number.
-    channels: BTreeMap<u16, Topic>,
+    /// Whether the topic of states is declared.
+    has_swarm: bool,
     header: Option<Header>,
     summary: Option<SummaryMessage>,
+    /// The last message of each channel since the last state.
+    channels: Vec<ChannelMessage<String, Vec<String>, Vec<f64>>>,
     ready: VecDeque<Entry>,
 }
 
 impl Contents {
-    fn declares(&self, topic: Topic) -> bool {
-        self.channels.values().any(|&declared| declared == topic)
-    }
-
-    /// Takes in one record; `false` when there is none.
-    fn advance(&mut self, records: &mut RecordReader) -> Result<bool, Trouble> {
-        let Some(Record { offset, opcode, body }) = records.next()? else { return Ok(false) };
-        let known = match opcode {
-            op::SCHEMA => self.schema(Fields(body)),
-            op::CHANNEL => self.channel(Fields(body)).transpose()?,
-            op::MESSAGE => self.message(Fields(body)).transpose()?,
-            _ => Some(()),
+    /// Takes in one part; `false` when there is none.
+    fn advance(&mut self, topics: &mut TopicReader) -> Result<bool, RecordError> {
+        let taken = match topics.next()? {
+            Some(Part::Topic(declared)) => self.declare(declared),
+            Some(Part::Message(message)) => self.take(&message),
+            Some(Part::Schema(_) | Part::Other) => Ok(()),
+            None => return Ok(false),
         };
-        known.ok_or_else(|| damaged(offset, "a record is shorter than its fields"))?;
-        Ok(true)
+        taken.map(|()| true).map_err(|fault| topics.fault(fault))
     }
 
-    fn schema(&mut self, mut fields: Fields<'_>) -> Option<()> {
-        let (number, name) = (fields.u16()?, fields.str()?);
-        self.schemas.insert(number, name.to_owned());
-        Some(())
-    }
-
-    fn channel(&mut self, mut fields: Fields<'_>) -> Option<Result<(), ReadFault>> {
-        let (number, schema, name, encoding) = (fields.u16()?, fields.u16()?, fields.str()?, fields.str()?);
-        let Some(topic) = Topic::ALL.into_iter().find(|topic| topic.name() == name) else { return Some(Ok(())) };
-        let schema = self.schemas.get(&schema).map_or("no schema", String::as_str);
-        if schema != topic.schema_name() || encoding != MESSAGE_ENCODING {
-            let (topic, expected) = (topic.name(), topic.schema_name());
-            return Some(Err(ReadFault::ForeignChannel {
-                topic,
-                found: format!("{schema} in {encoding} encoding"),
-                expected,
-            }));
+    fn declare(&mut self, declared: &Declared) -> Result<(), ReadFault> {
+        let Some(own) = Own::of(&declared.topic) else { return Ok(()) };
+        let Topic { name: topic, schema_name: expected, message_encoding, .. } = own.topic();
+        if declared.schema != expected || declared.encoding != message_encoding {
+            let schema = if declared.schema.is_empty() { "no schema" } else { &declared.schema };
+            let found = format!("{schema} in {} encoding", declared.encoding);
+            return Err(ReadFault::ForeignChannel { topic, found, expected });
         }
-        self.channels.insert(number, topic);
-        Some(Ok(()))
+        self.has_swarm |= own == Own::Swarm;
+        Ok(())
     }
 
-    fn message(&mut self, mut fields: Fields<'_>) -> Option<Result<(), ReadFault>> {
-        let channel = fields.u16()?;
-        let _sequence = fields.u32()?;
-        let _times = (fields.u64()?, fields.u64()?);
-        let Some(&topic) = self.channels.get(&channel) else { return Some(Ok(())) };
-        Some(self.content(topic, fields.0))
-    }
-
-    fn content(&mut self, topic: Topic, bytes: &[u8]) -> Result<(), ReadFault> {
-        match topic {
-            Topic::Scenario => {
-                let header = decode::<ScenarioMessage<String>>(topic, bytes)?.into_header()?;
+    fn take(&mut self, message: &Message<'_>) -> Result<(), ReadFault> {
+        let Declared { topic, schema, encoding, .. } = message.of;
+        match Own::of(topic) {
+            Some(Own::Scenario) => {
+                let header = content::<ScenarioMessage<String>>(message)?.into_header()?;
                 self.header.get_or_insert(header);
             }
-            Topic::Summary => self.summary = Some(decode(topic, bytes)?),
-            Topic::Swarm => {
-                let message = decode::<SwarmMessage<Vec<f64>>>(topic, bytes)?;
-                let vehicles = self.header.as_ref().map_or(message.vehicles(), |header| header.vehicles);
-                let sample = message.into_sample(vehicles, self.summary.as_ref())?;
-                self.ready.push_back(Entry::Sample(sample));
+            Some(Own::Summary) => self.summary = Some(content(message)?),
+            Some(Own::Swarm) => {
+                let state = content::<SwarmMessage<Vec<f64>>>(message)?;
+                let vehicles = self.header.as_ref().map_or(state.vehicles(), |header| header.vehicles);
+                let channels = std::mem::take(&mut self.channels);
+                self.ready.push_back(Entry::Sample(state.into_sample(vehicles, self.summary.as_ref(), channels)?));
             }
-            Topic::Events => {
-                let event = decode::<EventMessage<String>>(topic, bytes)?.into_event()?;
-                self.ready.push_back(Entry::Event(event));
+            Some(Own::Events) => {
+                self.ready.push_back(Entry::Event(content::<EventMessage<String>>(message)?.into_event()?));
             }
+            None if schema == CHANNEL_SCHEMA && encoding == CDR => {
+                let channel = content::<ChannelMessage<String, Vec<String>, Vec<f64>>>(message)?;
+                self.channels.retain(|before| before.name != channel.name);
+                self.channels.push(channel);
+            }
+            None => {}
         }
         Ok(())
     }
+}
+
+fn content<T: DeserializeOwned>(message: &Message<'_>) -> Result<T, ReadFault> {
+    decode(message.bytes).map_err(|reason| fault(&message.of.topic, reason))
 }

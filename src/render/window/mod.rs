@@ -5,6 +5,7 @@ mod player;
 
 pub use player::Fed;
 
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -46,6 +47,35 @@ pub enum WindowError {
     Gpu(#[from] GpuError),
 }
 
+thread_local! {
+    /// Whether the library of windows runs on this thread, and not what it calls.
+    static IN_LIBRARY: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether this thread is in the library of windows, whose panics mean that the display went away: it has no other
+/// words for it.
+#[must_use]
+pub fn in_window_library() -> bool {
+    IN_LIBRARY.get()
+}
+
+/// Says whose code runs until it is dropped.
+struct Running {
+    before: bool,
+}
+
+impl Running {
+    fn library(in_library: bool) -> Self {
+        Self { before: IN_LIBRARY.replace(in_library) }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        IN_LIBRARY.set(self.before);
+    }
+}
+
 /// Opens a window on a flight and stays until it is closed.
 ///
 /// `feed` brings samples of a flight that is still in the air. Pictures that the person asks for are written into the
@@ -59,6 +89,7 @@ pub fn show(
     theme: Theme,
     adapter: AdapterChoice,
 ) -> Result<(), WindowError> {
+    let _library = Running::library(true);
     let events = EventLoop::new().map_err(|error| WindowError::NoDisplay(reason(&error)))?;
     let mut shell = Shell {
         adapter,
@@ -109,6 +140,7 @@ struct Open {
 
 impl ApplicationHandler for Shell {
     fn resumed(&mut self, events: &ActiveEventLoop) {
+        let _ours = Running::library(false);
         if self.open.is_none() {
             match self.open_window(events) {
                 Ok(open) => self.open = Some(open),
@@ -118,6 +150,7 @@ impl ApplicationHandler for Shell {
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let _ours = Running::library(false);
         let Some(open) = &mut self.open else { return };
         let response = open.input.on_window_event(&open.window, &event);
         match event {
@@ -139,6 +172,7 @@ impl ApplicationHandler for Shell {
     }
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        let _ours = Running::library(false);
         let Some(open) = &self.open else { return };
         let came = self.player.receive();
         if self.player.playing || came {
