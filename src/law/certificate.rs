@@ -22,6 +22,8 @@ pub enum Void {
     NoBarrier,
     /// Some pair is not joined by an edge.
     GraphNotComplete,
+    /// Each vehicle is fed more than it is braked: the energy may grow.
+    VelocityUndamped,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
     StartRefused(LawError),
 }
@@ -41,6 +43,7 @@ impl Void {
         match self {
             Self::NoBarrier => "no-barrier",
             Self::GraphNotComplete => "graph-not-complete",
+            Self::VelocityUndamped => "velocity-undamped",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
         }
@@ -54,6 +57,9 @@ impl fmt::Display for Void {
             Self::GraphNotComplete => f.write_str(
                 "The graph is not complete: pairs without an edge are not kept apart, and the energy may grow.",
             ),
+            Self::VelocityUndamped => {
+                f.write_str("The vehicles are fed more than the law brakes them: the energy may grow.")
+            }
             Self::StartRefused(fault) => write!(f, "The law has no answer for the start: {fault}."),
         }
     }
@@ -70,17 +76,21 @@ mod tests {
         let reasons = [
             Void::NoBarrier,
             Void::GraphNotComplete,
+            Void::VelocityUndamped,
             Void::StartRefused(collision),
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
         ];
         let codes = reasons.map(|reason| reason.code());
-        assert_eq!(codes, ["no-barrier", "graph-not-complete", "start-too-close", "start-refused"]);
+        assert_eq!(
+            codes,
+            ["no-barrier", "graph-not-complete", "velocity-undamped", "start-too-close", "start-refused"]
+        );
         for reason in reasons {
             let sentence = reason.to_string();
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[2].to_string(),
+            reasons[3].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

@@ -6,6 +6,7 @@ use super::edge_tension::EdgeTensionKeys;
 use super::error::ParameterError;
 use super::interface::Law;
 use super::laplacian::LaplacianKeys;
+use super::potential::PotentialKeys;
 use super::setting::{Gain, Setting};
 
 macro_rules! laws {
@@ -46,4 +47,6 @@ laws! {
     EdgeTension(EdgeTensionKeys),
     /// The Laplacian baseline: converges from every start and avoids nothing.
     Laplacian(LaplacianKeys),
+    /// A potential field: consensus on the slots, repulsion from whoever is near, each vehicle braking itself.
+    Potential(PotentialKeys),
 }

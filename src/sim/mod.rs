@@ -8,6 +8,7 @@
 mod controller;
 mod ending;
 mod motion;
+mod parts;
 mod simulation;
 
 use std::ops::ControlFlow;
@@ -15,7 +16,8 @@ use std::time::Instant;
 
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub use motion::Motion;
-pub use simulation::{Parts, Saved, Simulation};
+pub use parts::Parts;
+pub use simulation::{Saved, Simulation};
 
 use crate::record::{Event, RecordError, Sink};
 use crate::scenario::Scenario;

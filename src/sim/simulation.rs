@@ -5,15 +5,15 @@ use std::time::{Duration, Instant};
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError};
 use super::motion::Motion;
+use super::parts::Parts;
 use crate::audit::{Auditor, StepFinding, Violation, swept_separation_m};
 use crate::continuous::Feedback as _;
-use crate::law::{Certificate, Law};
-use crate::link::{Direct, Link};
+use crate::law::Certificate;
 use crate::plant::Path;
 use crate::record::{Event, Sample};
 use crate::scenario::{MAX_HALVINGS, Scenario};
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, first_row_not_finite, row};
-use crate::target::{CurrentTarget, Schedule, Supervisor};
+use crate::target::CurrentTarget;
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
@@ -69,35 +69,6 @@ pub struct Simulation {
 /// A [`Simulation`] as it was at one instant.
 #[derive(Clone)]
 pub struct Saved(Simulation);
-
-/// What a flight is made of beside its scenario.
-pub struct Parts {
-    /// The control law.
-    pub law: Box<dyn Law>,
-    /// What moves the vehicles.
-    pub motion: Motion,
-    /// What lies between truth and law.
-    pub link: Box<dyn Link>,
-    /// Who changes the target.
-    pub supervisor: Box<dyn Supervisor>,
-}
-
-impl Parts {
-    /// What the scenario asks for.
-    ///
-    /// # Errors
-    /// [`SimError::Law`] where its law does not exist, which a validated scenario rules out but for memory.
-    pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
-        Ok(Self::under(scenario, scenario.law()?))
-    }
-
-    /// What the scenario asks for, under another law.
-    #[must_use]
-    pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
-        let supervisor = Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival);
-        Self { law, motion: Motion::of(scenario), link: Box::new(Direct), supervisor: Box::new(supervisor) }
-    }
-}
 
 impl Simulation {
     /// The scenario at its start, with its own law and vehicles. The scenario must be one that [`Scenario::validate`]

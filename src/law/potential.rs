@@ -1,0 +1,223 @@
+//! An artificial potential field: consensus on the formation, repulsion from whoever is near, each vehicle braking itself.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::certificate::{Certificate, Void};
+use super::consensus::{add_heard, add_laplacian_product, check_observation, check_range, check_state};
+use super::error::{LawError, ParameterError};
+use super::interface::{Law, VelocityMargin};
+use super::setting::{Gain, Setting};
+use crate::graph::Graph;
+use crate::observation::Observation;
+use crate::swarm::{Pair, Rows, row, set_row};
+
+/// Keys of `[law]` with `kind = "potential"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct PotentialKeys {
+    /// Gain on positions over links in 1/s^2.
+    pub k_per_s2: f64,
+    /// Braking of each vehicle's own velocity in 1/s.
+    pub c_per_s: f64,
+    /// Scale of the repulsion in m^4/s^2.
+    pub eta_m4_per_s2: f64,
+}
+
+impl Default for PotentialKeys {
+    fn default() -> Self {
+        Self { k_per_s2: 1.0, c_per_s: 2.0, eta_m4_per_s2: 1.0 }
+    }
+}
+
+impl PotentialKeys {
+    /// No key follows from others.
+    pub(super) fn complete(&mut self, _a22_per_s: f64) {}
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        vec![
+            Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
+            Gain::positive("law.c_per_s", "the braking c", self.c_per_s),
+            Gain::positive("law.eta_m4_per_s2", "the scale eta", self.eta_m4_per_s2),
+        ]
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<PotentialLaw, ParameterError> {
+        PotentialLaw::new(setting, self.clone())
+    }
+}
+
+/// The potential field of Khatib (1986) between vehicles, on an undirected graph of N vehicles: with `e_i = p_i - h_i`
+/// and the clearance rho = l - delta,
+///
+/// ```text
+/// u_i = -(k/N) sum_{j in N_i} (e_i - e_j) - c v_i - sum_{j : l_ij < R} grad_i U(l_ij)
+/// U(l) = (eta/2) (1/rho - 1/rho_R)^2,    R = smallest distance of two slots,    rho_R = R - delta
+/// ```
+///
+/// Vehicles repel each other while they are nearer than slots are, whether they are linked or not.
+///
+/// # Energy
+/// ```text
+/// E = 1/2 sum |v_i|^2 + (k/2N) sum over links of |e_i - e_j|^2 + sum over near pairs of U,   dE/dt = (a22 - c) sum |v_i|^2
+/// ```
+///
+/// # Certificate
+/// For c >= a22 the energy never grows, so U(l) <= E(0) for *every* pair, on every graph. It assumes exact knowledge of
+/// links and near pairs, no saturation, no disturbance, continuous time.
+///
+/// # Cost
+/// O(links + near pairs) a step without allocation.
+#[derive(Clone, Debug)]
+pub struct PotentialLaw {
+    graph: Graph,
+    keys: PotentialKeys,
+    delta_m: f64,
+    a22_per_s: f64,
+    /// R \[m\].
+    range_m: f64,
+    /// Scratch: `p_i - h_i`.
+    errors_m: Rows,
+}
+
+impl PotentialLaw {
+    /// The law on these links, with the smallest slot distance as its range.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
+    /// is not finite.
+    pub fn new(setting: &Setting<'_>, keys: PotentialKeys) -> Result<Self, ParameterError> {
+        let gains = [("k", keys.k_per_s2), ("c", keys.c_per_s), ("eta", keys.eta_m4_per_s2)];
+        ParameterError::check(setting.links, setting.formation, &gains)?;
+        Ok(Self {
+            graph: setting.links.clone(),
+            keys,
+            delta_m: setting.delta_m,
+            a22_per_s: setting.a22_per_s,
+            range_m: setting.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m),
+            errors_m: Rows::zeros(setting.links.count()),
+        })
+    }
+
+    /// 1/rho - 1/rho_R \[1/m\] and 1/rho at a distance \[m\] within the range.
+    fn steepness(&self, pair: Pair, separation_m: f64) -> Result<(f64, f64), LawError> {
+        if separation_m <= self.delta_m {
+            return Err(LawError::Collision { pair, separation_m, delta_m: self.delta_m });
+        }
+        let inverse = 1.0 / (separation_m - self.delta_m);
+        Ok((inverse - 1.0 / (self.range_m - self.delta_m), inverse))
+    }
+
+    /// What vehicle `i` makes of vehicle `j` whom it sees.
+    fn repulsion(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<Vector3<f64>, LawError> {
+        let apart_m = row(&at.own.positions_m, i) - at.seen(i, j).position_m;
+        let separation_m = apart_m.norm();
+        if separation_m >= self.range_m {
+            return Ok(Vector3::zeros());
+        }
+        let (steep, inverse) = self.steepness(Pair::new(i, j), separation_m)?;
+        Ok(apart_m * (self.keys.eta_m4_per_s2 * steep * inverse * inverse / separation_m))
+    }
+
+    fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
+        check_state(self.graph.count(), at.own)?;
+        let (positions_m, slots_m) = (&at.own.positions_m, &at.target.formation.slots_m);
+        let error_m = |i| row(positions_m, i) - row(slots_m, i);
+        let attraction: f64 = self.graph.edges().map(|(i, j)| (error_m(i) - error_m(j)).norm_squared()).sum();
+        let mut repulsion = 0.0;
+        for i in 0..at.own.count() {
+            for j in i + 1..at.own.count() {
+                let separation_m = (row(positions_m, j) - row(positions_m, i)).norm();
+                if separation_m < self.range_m {
+                    let (steep, _) = self.steepness(Pair::new(i, j), separation_m)?;
+                    repulsion += 0.5 * self.keys.eta_m4_per_s2 * steep * steep;
+                }
+            }
+        }
+        let kinetic = 0.5 * at.own.velocities_m_s.norm_squared();
+        let energy = kinetic + 0.5 * self.keys.k_per_s2 / at.own.count().max(1) as f64 * attraction + repulsion;
+        if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
+    }
+}
+
+impl Law for PotentialLaw {
+    fn name(&self) -> &'static str {
+        "potential"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), at, command)?;
+        command.copy_from(&at.own.velocities_m_s);
+        *command *= -self.keys.c_per_s;
+        let (slots_m, gain) = (&at.target.formation.slots_m, -self.keys.k_per_s2 / at.own.count().max(1) as f64);
+        if let Some(swarm) = at.shared() {
+            self.errors_m.copy_from(&swarm.positions_m);
+            self.errors_m -= slots_m;
+            add_laplacian_product(&self.graph, &self.errors_m, gain, command);
+        } else {
+            add_heard(at, command, |i, own, j, heard| {
+                Ok(gain * ((own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j))))
+            })?;
+        }
+        for &(a, b) in at.near {
+            for (i, j) in [(a, b), (b, a)] {
+                let sum = row(command, i) + self.repulsion(at, i, j)?;
+                set_row(command, i, sum);
+            }
+        }
+        check_range(command)
+    }
+
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        self.try_energy(at).ok()
+    }
+
+    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+        let mut void = Vec::new();
+        if self.keys.c_per_s < self.a22_per_s {
+            void.push(Void::VelocityUndamped);
+        }
+        let energy = self.try_energy(start).map_err(|fault| void.push(Void::StartRefused(fault))).ok();
+        let certified_m = energy.filter(|_| void.is_empty() && start.own.count() > 1).map(|energy| {
+            // U(l) = E(0) for the clearance rho.
+            let steep = (2.0 * energy / self.keys.eta_m4_per_s2).sqrt();
+            self.delta_m + 1.0 / (steep + 1.0 / (self.range_m - self.delta_m))
+        });
+        Certificate { certified_m, energy_initial: energy, void }
+    }
+
+    fn barrier_m(&self) -> Option<f64> {
+        Some(self.delta_m)
+    }
+
+    fn sensing_range_m(&self) -> Option<f64> {
+        Some(self.range_m)
+    }
+
+    /// The links add at most k to omega^2. A near pair adds at most U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3 at
+    /// `nearest_m` along its line (and less across it), a vehicle has at most as many near ones as balls of that diameter
+    /// fit around it within R + `nearest_m`/2, and the eigenvalues of a sum over pairs are at most twice the sum at a
+    /// vehicle.
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, a22_per_s: f64) -> Option<f64> {
+        let nearest_m = nearest_m?.min(self.range_m);
+        let (steep, inverse) = self.steepness(Pair::new(0, 1), nearest_m).ok()?;
+        let curvature = self.keys.eta_m4_per_s2 * inverse.powi(3) * (2.0 * steep + inverse);
+        let packed = (1.0 + 2.0 * self.range_m / nearest_m).powi(3) - 1.0;
+        let near = packed.min(self.graph.count().saturating_sub(1) as f64);
+        let omega = (self.keys.k_per_s2 + 2.0 * near * curvature).sqrt();
+        Some(omega.max((self.keys.c_per_s - a22_per_s).abs()))
+    }
+
+    fn velocity_margin(&self, _connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
+        let terms_per_s = self.keys.c_per_s + a22_per_s.abs();
+        Some(VelocityMargin { per_s: self.keys.c_per_s - a22_per_s, terms_per_s })
+    }
+
+    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
+        a22_per_s - self.keys.c_per_s
+    }
+}
+
+#[cfg(test)]
+mod tests;

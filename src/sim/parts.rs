@@ -1,0 +1,37 @@
+//! What a flight is made of beside its scenario.
+
+use super::ending::SimError;
+use super::motion::Motion;
+use crate::law::Law;
+use crate::link::{Direct, Link};
+use crate::scenario::Scenario;
+use crate::target::{Schedule, Supervisor};
+
+/// What a flight is made of beside its scenario.
+pub struct Parts {
+    /// The control law.
+    pub law: Box<dyn Law>,
+    /// What moves the vehicles.
+    pub motion: Motion,
+    /// What lies between truth and law.
+    pub link: Box<dyn Link>,
+    /// Who changes the target.
+    pub supervisor: Box<dyn Supervisor>,
+}
+
+impl Parts {
+    /// What the scenario asks for.
+    ///
+    /// # Errors
+    /// [`SimError::Law`] where its law does not exist, which a validated scenario rules out but for memory.
+    pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
+        Ok(Self::under(scenario, scenario.law()?))
+    }
+
+    /// What the scenario asks for, under another law.
+    #[must_use]
+    pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
+        let supervisor = Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival);
+        Self { law, motion: Motion::of(scenario), link: Box::new(Direct), supervisor: Box::new(supervisor) }
+    }
+}
