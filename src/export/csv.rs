@@ -5,7 +5,8 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
-use super::{About, Column, ExportError, POSITION, Source};
+use super::error::ExportError;
+use super::source::{About, Column, POSITION, Source};
 
 /// From here on a reader counts times from an epoch again \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;
