@@ -18,8 +18,9 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     let epoch_s = if absolute { epoch_s } else { 0 };
     let mut out = BufWriter::new(file);
     let columns: Vec<&Column> = POSITION.iter().chain(about.optional_columns()).collect();
-    let header: String = columns.iter().map(|column| format!(",{}", column.name)).collect();
-    writeln!(out, "t_s,id{header}")?;
+    out.write_all(b"t_s,id")?;
+    columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
+    out.write_all(b"\n")?;
     source.each_instant(|instant| {
         let time = instant.first().map_or_else(String::new, |first| time_text(epoch_s, first.time_s));
         for sample in instant {
