@@ -5,7 +5,8 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
-use super::{About, Column, ExportError, POSITION, Source};
+use super::error::ExportError;
+use super::source::{About, Column, POSITION, Source};
 
 /// From here on a reader counts times from an epoch again \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;
@@ -17,8 +18,9 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     let epoch_s = if absolute { epoch_s } else { 0 };
     let mut out = BufWriter::new(file);
     let columns: Vec<&Column> = POSITION.iter().chain(about.optional_columns()).collect();
-    let header: String = columns.iter().map(|column| format!(",{}", column.name)).collect();
-    writeln!(out, "t_s,id{header}")?;
+    out.write_all(b"t_s,id")?;
+    columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
+    out.write_all(b"\n")?;
     source.each_instant(|instant| {
         let time = instant.first().map_or_else(String::new, |first| time_text(epoch_s, first.time_s));
         for sample in instant {

@@ -5,7 +5,8 @@ use std::io::BufWriter;
 
 use mcap::WriteOptions;
 
-use super::{About, ExportError, Source};
+use super::error::ExportError;
+use super::source::{About, Source};
 use crate::read::mcap::exported::{Instant, TRACKS, VEHICLES, Vehicles};
 use crate::record::mcap::topic::{TopicWriter, encode, log_time_ns};
 use crate::track::Sample;

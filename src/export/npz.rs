@@ -10,7 +10,8 @@ use nalgebra::Vector3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::{About, ExportError, Source};
+use super::error::ExportError;
+use super::source::{About, Source};
 use crate::track::Sample;
 
 /// Headers of arrays end at a multiple of this \[bytes\].

@@ -11,7 +11,8 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::{About, ExportError, POSITION, Source};
+use super::error::ExportError;
+use super::source::{About, POSITION, Source};
 use crate::read::parquet::EPOCH_KEY;
 use crate::track::Sample;
 

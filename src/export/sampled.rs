@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::ExportError;
+use super::error::ExportError;
 use crate::read::ReadError;
 use crate::track::{Item, Piece, Sample, Tracks};
 

@@ -15,8 +15,9 @@ use nalgebra::Vector3;
 
 use super::curves::{Curves, piece};
 use super::error::{Fault, FaultAt, Place};
+use super::options::ReadOptions;
+use super::order::Recording;
 use super::source::{Lines, Source};
-use super::{ReadOptions, Recording};
 use crate::track::Item;
 
 /// Highest power that is read.

@@ -9,11 +9,13 @@ use csv_core::ReadRecordResult;
 
 use super::clock::Stamp;
 use super::error::{Fault, FaultAt, Place};
+use super::format::Format;
 use super::layout::Layout;
 use super::names::Names;
+use super::options::ReadOptions;
+use super::order::Recording;
 use super::source::{Lines, Source};
 use super::table::{self, Cells};
-use super::{Format, ReadOptions, Recording};
 
 /// What stands between two fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

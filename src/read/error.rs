@@ -4,8 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::Format;
-use super::source::Grown;
+use super::format::Format;
 
 /// Longest value that a message repeats \[characters\].
 const LONGEST_QUOTE: usize = 60;
@@ -78,6 +77,14 @@ impl<F: Into<Fault>> From<F> for FaultAt {
     fn from(fault: F) -> Self {
         Self { file: None, place: None, fault: fault.into() }
     }
+}
+
+/// Packed data grow beyond all measure.
+#[derive(Debug, thiserror::Error)]
+#[error("it grows to more than {inflated_bytes} bytes out of {packed_bytes}")]
+pub(super) struct Grown {
+    pub(super) inflated_bytes: u64,
+    pub(super) packed_bytes: u64,
 }
 
 /// A place in a recording.

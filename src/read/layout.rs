@@ -5,9 +5,9 @@
 
 use std::collections::BTreeMap;
 
-use super::ColumnNames;
 use super::clock::TimeUnit;
 use super::error::Fault;
+use super::options::ColumnNames;
 
 /// The columns of a position, and of what else is known of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -18,13 +18,13 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use super::archive::Archive;
-use super::clock::Stamp;
+use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, FaultAt, Place};
 use super::names::Names;
 use super::npy::Array;
-use super::order::{BATCH, Ordered, Row, Rows};
+use super::options::{AxisOrder, ReadOptions};
+use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::Source;
-use super::{AxisOrder, ReadOptions, Recording, TimeUnit};
 
 const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
 const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
@@ -70,7 +70,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     }
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::content("it holds no position", "save at least one instant of one vehicle");
-    let mut about = options.about(source, unit, notes, none);
+    let mut about = About::new(source, options, unit, notes, none);
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
         about.epoch_ns = epoch;
     }

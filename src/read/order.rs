@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
-use super::clock::{KnownUnit, Probe, Stamp, Timing};
+use super::clock::{KnownUnit, Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, FaultAt, Place, ReadError, quoted};
+use super::options::ReadOptions;
+use super::source::Source;
 use crate::track::{Clock, Item, Sample, Tracks};
 
 /// Rows given out at a time.
@@ -66,6 +68,9 @@ pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, Fa
     Ok(probe)
 }
 
+/// A recording being read.
+pub type Recording = Box<dyn Tracks<Error = ReadError>>;
+
 /// What is known of a recording beside its rows.
 pub(super) struct About {
     pub(super) path: PathBuf,
@@ -77,6 +82,20 @@ pub(super) struct About {
     pub(super) notes: Vec<String>,
     /// The fault of a recording without rows.
     pub(super) none: Fault,
+}
+
+impl About {
+    /// What the user says of the unit of time goes before what the file says.
+    pub(super) fn new(
+        source: &Source,
+        options: &ReadOptions,
+        said: Option<TimeUnit>,
+        notes: Vec<String>,
+        none: Fault,
+    ) -> Self {
+        let unit = options.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given);
+        Self { path: source.path.clone(), unit, epoch_ns: 0, scale: options.scale, notes, none }
+    }
 }
 
 /// Samples in order of time.

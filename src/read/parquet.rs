@@ -14,14 +14,14 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use super::clock::Stamp;
+use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, FaultAt, Place};
 use super::layout::Layout;
 use super::names::Names;
-use super::order::BATCH;
+use super::options::ReadOptions;
+use super::order::{BATCH, Recording};
 use super::source::Source;
 use super::table::{self, Cells};
-use super::{ReadOptions, Recording, TimeUnit};
 
 /// Key of the metadata that says what time counts from \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";

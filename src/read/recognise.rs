@@ -4,8 +4,8 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-use super::Format;
 use super::error::Fault;
+use super::format::Format;
 use super::source::{GZIP_MAGIC, Source};
 
 /// Bytes that are looked at.

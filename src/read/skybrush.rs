@@ -14,8 +14,9 @@ use serde::{Deserialize, Deserializer};
 use super::archive::Archive;
 use super::curves::{Curves, distinct, piece};
 use super::error::{Fault, FaultAt, Place};
+use super::options::ReadOptions;
+use super::order::Recording;
 use super::source::Source;
-use super::{ReadOptions, Recording};
 use crate::track::{Item, Piece, Sample};
 
 /// Highest degree of a Bezier segment that is read.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use flate2::read::MultiGzDecoder;
 
-use super::error::{Fault, FaultAt, Place};
+use super::error::{Fault, FaultAt, Grown, Place};
 
 /// Longest line that is read \[bytes\]: an instant of a hundred thousand vehicles.
 pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
@@ -47,14 +47,6 @@ pub(super) struct Growing<R> {
     inner: R,
     packed_bytes: u64,
     inflated_bytes: u64,
-}
-
-/// Data grow beyond all measure.
-#[derive(Debug, thiserror::Error)]
-#[error("it grows to more than {inflated_bytes} bytes out of {packed_bytes}")]
-pub(super) struct Grown {
-    pub(super) inflated_bytes: u64,
-    pub(super) packed_bytes: u64,
 }
 
 impl<R: Read> Growing<R> {

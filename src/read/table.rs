@@ -6,9 +6,9 @@ use super::clock::{Probe, Stamp, TimeUnit};
 use super::error::{Fault, FaultAt, Place};
 use super::layout::{Body, Layout, Shape};
 use super::names::Names;
-use super::order::{About, BATCH, Ordered, Row, Rows};
+use super::options::ReadOptions;
+use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::Source;
-use super::{ReadOptions, Recording};
 
 /// The cells of the current row of a table.
 pub(super) trait Cells {
@@ -60,7 +60,7 @@ pub(super) fn open<C: Cells + 'static>(
     epoch_ns: i64,
     options: &ReadOptions,
 ) -> Result<Recording, FaultAt> {
-    let about = options.about(source, unit.or(layout.unit), layout.notes(), Fault::HeaderOnly);
+    let about = About::new(source, options, unit.or(layout.unit), layout.notes(), Fault::HeaderOnly);
     let names = match &layout.shape {
         Shape::Long { .. } => Names::default(),
         Shape::Wide { names, .. } => Names::from_list(names.clone()),

@@ -13,13 +13,12 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::super::clock::Stamp;
+use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, FaultAt, Place};
 use super::super::names::Names;
-use super::super::order::{BATCH, Ordered, Row, Rows};
+use super::super::options::ReadOptions;
+use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
-use super::super::{ReadOptions, Recording, TimeUnit};
-use super::accept_unfinished;
 use crate::record::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 
 /// Where the vehicles are named.
@@ -48,12 +47,12 @@ pub(crate) struct Instant {
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
     let topics = TopicReader::open(&source.path)?;
-    let notes = accept_unfinished(topics.is_complete(), options)?;
+    let notes = options.accept_unfinished(topics.is_complete())?;
     let instants = Instants { names: Names::default(), epoch_ns: 0, count: 0 };
     let mut exported = Exported { path: source.path.clone(), topics, instants };
     exported.next(&mut Vec::new())?;
     let none = Fault::content("it holds no instant", "export again");
-    let mut about = options.about(source, Some(TimeUnit::Seconds), notes, none);
+    let mut about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
     about.epoch_ns = exported.instants.epoch_ns;
     exported.rewind()?;
     Ok(Box::new(Ordered::open(exported, about)?))

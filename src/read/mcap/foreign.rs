@@ -3,19 +3,18 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use super::super::clock::{Probe, Stamp};
+use super::super::clock::{Probe, Stamp, TimeUnit};
 use super::super::error::{Fault, FaultAt, Place, quoted};
 use super::super::names::Names;
-use super::super::order::{BATCH, Ordered, Row, Rows, survey};
+use super::super::options::ReadOptions;
+use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows, survey};
 use super::super::source::Source;
-use super::super::{ReadOptions, Recording, TimeUnit};
-use super::accept_unfinished;
 use super::messages::{self, Seen, Who};
 use crate::record::mcap::topic::{CDR, Declared, Message, Part, TopicReader};
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
     let topics = TopicReader::open(&source.path)?;
-    let notes = accept_unfinished(topics.is_complete(), options)?;
+    let notes = options.accept_unfinished(topics.is_complete())?;
     let poses = Poses {
         stamped: BTreeSet::new(),
         logged: BTreeSet::new(),
@@ -32,7 +31,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         }
         None => Fault::content("its topics with positions have no message", "record again"),
     };
-    let about = options.about(source, Some(TimeUnit::Nanoseconds), notes, none);
+    let about = About::new(source, options, Some(TimeUnit::Nanoseconds), notes, none);
     Ok(Box::new(Ordered::open(Foreign { path: source.path.clone(), topics, poses, shown: Vec::new() }, about)?))
 }
 

@@ -17,8 +17,10 @@ mod messages;
 mod run;
 
 use super::error::{Fault, FaultAt, Place};
+use super::format::Format;
+use super::options::ReadOptions;
+use super::order::Recording;
 use super::source::Source;
-use super::{Format, ReadOptions, Recording};
 use crate::record::mcap::topic::{Part, TopicReader};
 use crate::record::{ReadFault, RecordError};
 
@@ -33,7 +35,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             _ => {}
         }
     }
-    accept_unfinished(topics.is_complete(), options)?;
+    options.accept_unfinished(topics.is_complete())?;
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
                   geometry_msgs/msg/PoseArray or tf2_msgs/msg/TFMessage are read";
     Err(Fault::content("it has no topic with positions", remedy).into())
@@ -63,15 +65,5 @@ impl From<RecordError> for FaultAt {
             }
             other => Fault::damaged(other).into(),
         }
-    }
-}
-
-/// What is to be said of a file that was not closed, or the error that it is.
-fn accept_unfinished(complete: bool, options: &ReadOptions) -> Result<Vec<String>, Fault> {
-    let note = "the recording was not closed: it is read up to the last part that was written";
-    match (complete, options.allow_unfinished) {
-        (true, _) => Ok(Vec::new()),
-        (false, true) => Ok(vec![note.to_owned()]),
-        (false, false) => Err(Fault::Unfinished),
     }
 }

@@ -1,21 +1,20 @@
 //! `run.mcap`.
 
-use super::super::clock::Stamp;
+use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, FaultAt, Place};
 use super::super::names::Names;
-use super::super::order::{BATCH, Ordered, Row, Rows};
+use super::super::options::ReadOptions;
+use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
-use super::super::{ReadOptions, Recording, TimeUnit};
-use super::accept_unfinished;
 use crate::record::mcap::{Entry, McapRecording};
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
     let recording = McapRecording::open(&source.path)?;
-    let notes = accept_unfinished(recording.is_complete(), options)?;
+    let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
     let none = Fault::content("it holds no sample", "record again");
-    let about = options.about(source, Some(TimeUnit::Seconds), notes, none);
+    let about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
     Ok(Box::new(Ordered::open(run, about)?))
 }
 

@@ -122,14 +122,13 @@ impl McapRecorder {
 
     fn write_channel(&mut self, sample: &Sample<'_>, channel: &Channel) -> Result<(), RecordError> {
         let known = self.channels.iter().find(|(name, _)| *name == channel.name);
-        let topic = match known {
-            Some(&(_, topic)) => topic,
-            None => {
-                let name = channel_topic(&channel.name);
-                let topic = self.with_out(|out| out.declare(&topic_of_channel(&name)))?;
-                self.channels.push((channel.name.clone(), topic));
-                topic
-            }
+        let topic = if let Some(&(_, topic)) = known {
+            topic
+        } else {
+            let name = channel_topic(&channel.name);
+            let topic = self.with_out(|out| out.declare(&topic_of_channel(&name)))?;
+            self.channels.push((channel.name.clone(), topic));
+            topic
         };
         self.write(topic, sample.time_s, &ChannelMessage::of(sample, channel))
     }
