@@ -12,6 +12,7 @@ pub mod recorded;
 mod verdict;
 mod words;
 
+pub use crate::audit::Status;
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
 pub use html::RunPage;
 
@@ -22,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use crate::audit::{self, AuditOutcome};
 use crate::law::Certificate;
 use crate::metrics::Summary;
+use crate::swarm::Pair;
 use crate::target::Arrival;
 
 /// Version of the keys: raised when one is renamed, removed or changes its meaning.
@@ -131,9 +133,9 @@ pub struct Verdict {
 /// How close vehicles came.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Separation {
-    /// Safety distance delta \[m\].
-    pub delta_m: f64,
+pub struct Separation<Delta = f64> {
+    /// Safety distance delta \[m\]; of a recording, none where radii alone were asked about.
+    pub delta_m: Delta,
     /// Smallest distance of two centres over the whole run \[m\].
     pub min_m: Option<f64>,
     /// When it occurred \[s\].
@@ -164,18 +166,6 @@ pub struct Audit {
     pub parry: Parry,
     /// The engine's own collision detection, which is evidence alone.
     pub rapier: Rapier,
-}
-
-/// The judge's verdict on separation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Status {
-    /// No pair came closer than delta.
-    Clear,
-    /// A pair did.
-    Violation,
-    /// It cannot be told.
-    Undecided,
 }
 
 /// A time during which a pair was closer than delta.
@@ -324,8 +314,8 @@ impl Report {
                 certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             },
             audit: Audit {
-                status: audit.status.into(),
-                violations: audit.violations.iter().map(Violation::from).collect(),
+                status: audit.status,
+                violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
                 steps: audit.steps,
                 pairs_checked: audit.pairs_checked,
                 closed_form: ClosedForm { min_m: closest.and_then(|closest| finite(closest.separation_m)) },
@@ -393,24 +383,15 @@ impl Performance {
     }
 }
 
-impl From<audit::Status> for Status {
-    fn from(status: audit::Status) -> Self {
-        match status {
-            audit::Status::Clear => Self::Clear,
-            audit::Status::Violation => Self::Violation,
-            audit::Status::Undecided => Self::Undecided,
-        }
-    }
-}
-
-impl From<&audit::Violation> for Violation {
-    fn from(violation: &audit::Violation) -> Self {
+impl Violation {
+    /// Of two vehicles, whichever audit found it.
+    fn new<P>(pair: Pair, found: &audit::Violation<P>) -> Self {
         Self {
-            pair: violation.pair.numbers(),
-            from_s: finite(violation.from_s),
-            to_s: finite(violation.to_s),
-            min_m: finite(violation.min_m),
-            min_at_s: finite(violation.min_at_s),
+            pair: pair.numbers(),
+            from_s: finite(found.from_s),
+            to_s: finite(found.to_s),
+            min_m: finite(found.min_m),
+            min_at_s: finite(found.min_at_s),
         }
     }
 }
