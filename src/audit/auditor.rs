@@ -27,44 +27,12 @@ pub struct Auditor {
     /// Violations that began, and that ended, in the last step.
     began: Vec<Violation>,
     ended: Vec<Violation>,
-    closest: Option<ClosestApproach>,
-    steps: u64,
-    pairs_checked: u64,
-    pairs_excluded: u64,
-    refused: u64,
-}
-
-/// The closest approach of a step as pairs come in, in their order.
-#[derive(Clone, Copy, Debug)]
-struct StepClosest {
-    pair: (usize, usize),
-    approach: ClosestPoint,
-}
-
-impl StepClosest {
-    const NONE: Self = Self { pair: (0, 0), approach: ClosestPoint { squared: f64::INFINITY, at: 0.0 } };
-
-    /// Keeps the closer one; of equal separations the one that came first.
-    #[inline]
-    fn offer(&mut self, i: usize, j: usize, approach: ClosestPoint) {
-        if approach.squared < self.approach.squared && approach.separation_m() < self.approach.separation_m() {
-            *self = Self { pair: (i, j), approach };
-        }
-    }
-
-    /// The closest approach, if there was a pair.
-    fn over(&self, step: Interval) -> Option<ClosestApproach> {
-        let ((i, j), ClosestPoint { at, .. }) = (self.pair, self.approach);
-        (i != j).then(|| ClosestApproach {
-            pair: Pair::new(i, j),
-            separation_m: self.approach.separation_m(),
-            time_s: step.at(at),
-        })
-    }
+    /// What is counted as steps come, and the closest approach so far.
+    outcome: AuditOutcome,
 }
 
 impl Auditor {
-    /// A judge of so many vehicles by the safety distance delta \[m\]. Fewer than two vehicles are always clear.
+    /// An auditor of so many vehicles by the safety distance delta \[m\]. Fewer than two vehicles are always clear.
     ///
     /// # Errors
     /// [`AuditError::Delta`] unless delta is between 1e-70 m and 1e70 m; [`AuditError::TooManyVehicles`] beyond 2^32 - 1.
@@ -85,11 +53,7 @@ impl Auditor {
             ledger: Ledger::default(),
             began: Vec::new(),
             ended: Vec::new(),
-            closest: None,
-            steps: 0,
-            pairs_checked: 0,
-            pairs_excluded: 0,
-            refused: 0,
+            outcome: AuditOutcome::default(),
         })
     }
 
@@ -118,7 +82,7 @@ impl Auditor {
             Some(previous_s) => self.check(time_s, positions_m).map(|()| previous_s),
         };
         let previous_s = self.admit(checked)?;
-        self.steps += 1;
+        self.outcome.steps += 1;
         Ok(self.sweep(Interval { from_s: previous_s, to_s: time_s }, positions_m))
     }
 
@@ -131,24 +95,15 @@ impl Auditor {
     /// The verdict over everything judged.
     #[must_use]
     pub fn finish(self) -> AuditOutcome {
-        let decided = self.time_s.is_some() && self.refused == 0 && self.ledger.is_decided();
+        let decided = self.time_s.is_some() && self.outcome.refused == 0 && self.ledger.is_decided();
         let Ledger { unresolved, parry, .. } = self.ledger;
         let (violations, _) = self.ledger.into_lists();
-        AuditOutcome {
-            status: Status::new(!violations.is_empty(), decided),
-            closest: self.closest,
-            violations,
-            steps: self.steps,
-            pairs_checked: self.pairs_checked,
-            pairs_excluded: self.pairs_excluded,
-            refused: self.refused,
-            unresolved,
-            parry,
-        }
+        let status = Status::new(!violations.is_empty(), decided);
+        AuditOutcome { status, violations, unresolved, parry, ..self.outcome }
     }
 
     fn admit<T>(&mut self, checked: Result<T, AuditError>) -> Result<T, AuditError> {
-        self.refused += u64::from(checked.is_err());
+        self.outcome.refused += u64::from(checked.is_err());
         checked
     }
 
@@ -177,7 +132,8 @@ impl Auditor {
     /// Sweeps from the positions held to `to`, which must have been checked.
     fn sweep(&mut self, step: Interval, to: &Rows) -> StepFinding<'_> {
         let Self { keep_out, positions_m: from, ledger, began, ended, .. } = self;
-        let mut closest = StepClosest::NONE;
+        // Of equal separations the one that comes first is kept.
+        let (mut pair, mut closest) = ((0, 0), ClosestPoint { squared: f64::INFINITY, at: 0.0 });
         let mut nearest_squared = f64::INFINITY;
         began.clear();
         ended.clear();
@@ -185,13 +141,15 @@ impl Auditor {
         let bound_m = self.nearest_m.max(keep_out.delta_m);
         let swept = self.candidates.cover(from, to, bound_m).for_each(|i, j| {
             let motion = RelativeMotion::new(row(from, j) - row(from, i), row(to, j) - row(to, i));
-            let approach = motion.closest();
-            closest.offer(i, j, approach);
+            let point = motion.closest();
+            if point.squared < closest.squared && point.separation_m() < closest.separation_m() {
+                (pair, closest) = ((i, j), point);
+            }
             nearest_squared = nearest_squared.min(motion.to_squared);
             let contact = keep_out.cast(&motion);
-            if contact.is_some() || keep_out.is_near(&motion, approach) {
+            if contact.is_some() || keep_out.is_near(&motion, point) {
                 let known = ledger.violations.len();
-                if let Some(index) = ledger.near(Pair::new(i, j), step, keep_out, &motion, approach, contact) {
+                if let Some(index) = ledger.near(Pair::new(i, j), step, keep_out, &motion, point, contact) {
                     let violation = ledger.violations[index];
                     if index == known {
                         began.push(violation);
@@ -203,13 +161,15 @@ impl Auditor {
             }
         });
 
-        self.pairs_checked += swept;
-        self.pairs_excluded += pair_count(self.vehicles) - swept;
-        let closest = closest.over(step);
+        self.outcome.pairs_checked += swept;
+        self.outcome.pairs_excluded += pair_count(self.vehicles) - swept;
+        let (separation_m, time_s) = (closest.separation_m(), step.at(closest.at));
+        let pair = (pair.0 != pair.1).then(|| Pair::new(pair.0, pair.1));
+        let closest = pair.map(|pair| ClosestApproach { pair, separation_m, time_s });
         if let Some(new) = closest
-            && self.closest.is_none_or(|old| new.separation_m < old.separation_m)
+            && self.outcome.closest.is_none_or(|old| new.separation_m < old.separation_m)
         {
-            self.closest = closest;
+            self.outcome.closest = closest;
         }
         self.nearest_m = nearest_squared.sqrt();
         self.positions_m.copy_from(to);
@@ -222,8 +182,8 @@ impl Auditor {
 mod tests {
     use super::*;
 
-    /// A judge whose second detector measures with another delta than the first.
-    fn judge_with_a_wrong_second_detector() -> Auditor {
+    /// An auditor whose second detector measures with another delta than the first.
+    fn auditor_with_a_wrong_second_detector() -> Auditor {
         let mut auditor = Auditor::new(2, 2.0).unwrap();
         auditor.keep_out = KeepOut::new(2.1);
         auditor.keep_out.delta_m = 2.0;
@@ -237,7 +197,7 @@ mod tests {
     #[test]
     fn a_pass_that_only_one_detector_calls_contact_is_undecided_and_says_why() {
         let [before, after] = pass(2.05);
-        let mut auditor = judge_with_a_wrong_second_detector();
+        let mut auditor = auditor_with_a_wrong_second_detector();
         auditor.start(0.0, &before).unwrap();
         auditor.step(1.0, &after).unwrap();
         let outcome = auditor.finish();
@@ -252,7 +212,7 @@ mod tests {
     #[test]
     fn entries_at_different_times_are_a_disagreement_beside_the_violation() {
         let [before, after] = pass(1.0);
-        let mut auditor = judge_with_a_wrong_second_detector();
+        let mut auditor = auditor_with_a_wrong_second_detector();
         auditor.start(0.0, &before).unwrap();
         auditor.step(1.0, &after).unwrap();
         let outcome = auditor.finish();
@@ -272,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_judge_can_be_sent_to_another_thread() {
+    fn an_auditor_can_be_sent_to_another_thread() {
         fn is_send<T: Send>(_: &T) {}
         is_send(&Auditor::new(2, 2.0).unwrap());
     }

@@ -1,4 +1,4 @@
-//! What the judge says.
+//! What an audit says.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use crate::swarm::{ClosestApproach, Pair};
 pub const WIDTH_M: f64 = 1e-9;
 
 /// The verdict over everything that was judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     /// No pair came closer than it may, both detectors agree on it, and everything offered was judged.
@@ -20,6 +20,7 @@ pub enum Status {
     Violation,
     /// No violation was found, yet it cannot be called clear: nothing was judged, something was refused or not seen, the
     /// two detectors disagree, or a separation could not be resolved.
+    #[default]
     Undecided,
 }
 
@@ -144,7 +145,7 @@ pub struct StepFinding<'a> {
 }
 
 /// The verdict and what it rests on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct AuditOutcome {
     /// The verdict.
     pub status: Status,

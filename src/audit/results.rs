@@ -9,9 +9,9 @@ pub(super) const KEPT: usize = 10;
 /// The closest approaches of different pairs.
 #[derive(Clone, Debug)]
 pub(super) struct ClosestPairs {
-    kept: Vec<Approach>,
+    pub(super) kept: Vec<Approach>,
     /// What a pair that is not among them must come below to be.
-    threshold: f64,
+    pub(super) threshold: f64,
 }
 
 impl Default for ClosestPairs {
@@ -21,11 +21,6 @@ impl Default for ClosestPairs {
 }
 
 impl ClosestPairs {
-    /// What any pair must come below to change anything.
-    pub(super) fn threshold(&self) -> f64 {
-        self.threshold
-    }
-
     /// What this pair must come below to change anything: where its distance is known by bounds that lie apart, the upper
     /// one can still fall.
     pub(super) fn cutoff(&self, pair: ObjectPair) -> f64 {
@@ -53,10 +48,6 @@ impl ClosestPairs {
         {
             self.threshold = last.lower_m;
         }
-    }
-
-    pub(super) fn into_vec(self) -> Vec<Approach> {
-        self.kept
     }
 }
 
@@ -96,13 +87,13 @@ mod tests {
         for k in 0..12 {
             closest.offer(approach(k, 20.0 - k as f64));
         }
-        assert_eq!(closest.threshold(), 18.0);
+        assert_eq!(closest.threshold, 18.0);
         closest.offer(approach(11, 8.0));
         closest.offer(approach(11, 8.5));
         closest.offer(approach(0, 19.0));
         assert_eq!(closest.cutoff(approach(11, 0.0).pair), 8.0);
         assert_eq!(closest.cutoff(approach(0, 0.0).pair), 18.0);
-        let kept: Vec<_> = closest.into_vec().iter().map(|kept| kept.lower_m).collect();
+        let kept: Vec<_> = closest.kept.iter().map(|kept| kept.lower_m).collect();
         assert_eq!(kept, [8.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0]);
     }
 }

@@ -1,4 +1,4 @@
-//! A vehicle over one segment of time, as the judge holds it.
+//! Motion over an interval of time.
 
 use std::sync::Arc;
 

@@ -413,10 +413,9 @@ impl From<RecordedError> for Failure {
             }
             RecordedError::Obstacle(_) => "mend the file of obstacles",
             RecordedError::Unnamed { .. }
-            | RecordedError::NotFinite { .. }
             | RecordedError::TimeNotIncreasing { .. }
             | RecordedError::OutOfOrder { .. }
-            | RecordedError::Piece { .. } => "mend the recording there, or leave the vehicle out with --ids",
+            | RecordedError::Item { .. } => "mend the recording there, or leave the vehicle out with --ids",
         };
         Self::input(error.to_string(), help)
     }

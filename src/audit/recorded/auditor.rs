@@ -120,7 +120,11 @@ impl TrackAuditor {
     fn turn_to(&mut self, time_s: f64, vehicle: usize) -> Result<(), RecordedError> {
         let name = || self.vehicles.get(vehicle).map(|vehicle| vehicle.name.clone()).unwrap_or_default();
         if !time_s.is_finite() || time_s.abs() > LARGEST {
-            return Err(RecordedError::NotFinite { vehicle: name(), time_s, what: "the time" });
+            return Err(RecordedError::Item {
+                vehicle: name(),
+                time_s,
+                what: "the time is not a finite number below 1e70".to_owned(),
+            });
         }
         if time_s < self.now_s {
             return Err(RecordedError::OutOfOrder { vehicle: name(), previous_s: self.now_s, time_s });
@@ -194,8 +198,8 @@ impl TrackAuditor {
             vehicles: self.vehicles.into_iter().map(|vehicle| vehicle.name).collect(),
             presence,
             span_s,
-            closest: closest.into_vec(),
-            obstacles: obstacles.into_vec(),
+            closest: closest.kept,
+            obstacles: obstacles.kept,
             violations,
             undecided,
             gaps: self.gaps,

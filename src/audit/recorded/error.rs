@@ -61,16 +61,6 @@ pub enum RecordedError {
         /// The vehicle.
         vehicle: usize,
     },
-    /// A number that is not finite, or too large to judge.
-    #[error("vehicle {vehicle} at {time_s:?} s: {what} is not a finite number below 1e70")]
-    NotFinite {
-        /// The vehicle.
-        vehicle: String,
-        /// When \[s\].
-        time_s: f64,
-        /// Which number.
-        what: &'static str,
-    },
     /// A time not later than the one before.
     #[error("vehicle {vehicle}: the time {time_s:?} s is not later than {previous_s:?} s before it")]
     TimeNotIncreasing {
@@ -91,15 +81,15 @@ pub enum RecordedError {
         /// The time \[s\].
         time_s: f64,
     },
-    /// A curve that is none.
+    /// A sample or a curve that is none: a number that is not finite or too large, no coefficients.
     #[error("vehicle {vehicle} at {time_s:?} s: {what}")]
-    Piece {
+    Item {
         /// The vehicle.
         vehicle: String,
-        /// Where the piece begins \[s\].
+        /// When \[s\].
         time_s: f64,
         /// What is wrong with it.
-        what: &'static str,
+        what: String,
     },
     /// A radius that is not the same throughout.
     #[error("vehicle {vehicle} at {time_s:?} s: the radius changes to {radius_m:?} m")]

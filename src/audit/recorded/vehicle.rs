@@ -130,7 +130,7 @@ impl Vehicle {
         if let Some(last) = &self.last
             && time_s - last.time_s < SHORTEST_INTERVAL_S
         {
-            return Err(self.not_increasing(time_s));
+            return Err(self.not_increasing(last.time_s, time_s));
         }
         if self.radius_recorded && sample.radius_m != self.radius_m {
             if self.last.is_some() {
@@ -150,7 +150,11 @@ impl Vehicle {
                         self.keep_straight((from_s, time_s), from, from);
                         self.keep_straight((time_s, time_s), from, to);
                     }
-                    Motion::Bounded => self.keep_bounded(sample.vehicle, *last, Fix::new(time_s, sample)),
+                    Motion::Bounded => {
+                        let (last, fix) = (*last, Fix::new(time_s, sample));
+                        self.compare_with_bound(sample.vehicle, &last, &fix);
+                        self.keep_bounded(&last, &fix);
+                    }
                 }
             }
             last => {
@@ -172,30 +176,25 @@ impl Vehicle {
         let coefficients: Vec<_> = piece.coefficients.iter().map(|c| self.scaled(*c)).collect();
         let segment = self.curve(Curve { from_s, to_s, coefficients, deviation: Deviation::None })?;
         let (start, end) = (segment.from, segment.to);
-        let seen = Fix { time_s: to_s, position_m: end, velocity_m_s: None };
+        let fix = Fix { time_s: to_s, position_m: end, velocity_m_s: None };
         let mut gap = None;
-        match self.last.replace(seen) {
+        match self.last.replace(fix) {
             Some(last) if from_s < last.time_s - SAME_INSTANT_S => {
-                return Err(RecordedError::TimeNotIncreasing {
-                    vehicle: self.name.clone(),
-                    previous_s: last.time_s,
-                    time_s: from_s,
-                });
+                return Err(self.not_increasing(last.time_s, from_s));
             }
             Some(last) if from_s - last.time_s <= self.max_gap_s.max(SAME_INSTANT_S) => {
-                let rests = last.position_m == start && last.time_s == from_s;
-                if !rests {
+                if last.position_m != start || last.time_s != from_s {
                     self.keep_straight((last.time_s.min(from_s), from_s), last.position_m, start);
                 }
             }
             last => gap = last.map(|last| Gap { vehicle: piece.vehicle, from_s: last.time_s, to_s: from_s }),
         }
-        self.keep(&segment);
+        self.keep(segment);
         Ok(gap)
     }
 
     fn curve(&self, curve: Curve) -> Result<Segment, RecordedError> {
-        let wrong = |what| Err(RecordedError::Piece { vehicle: self.name.clone(), time_s: curve.from_s, what });
+        let wrong = |what: &str| Err(self.wrong(curve.from_s, what.to_owned()));
         if curve.coefficients.is_empty() {
             return wrong("the piece has no coefficients");
         }
@@ -210,19 +209,14 @@ impl Vehicle {
         Ok(Segment::curved(curve))
     }
 
+    /// Keeps the chord, or the cubic, between two samples, and how far the vehicle can be from it.
     #[inline(never)]
-    fn keep_bounded(&mut self, index: usize, last: Fix, seen: Fix) {
-        self.compare_with_bound(index, &last, &seen);
-        let segment = self.bounded(&last, &seen);
-        self.keep(&segment);
-    }
-
-    fn bounded(&self, last: &Fix, seen: &Fix) -> Segment {
-        let h = seen.time_s - last.time_s;
-        let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
+    fn keep_bounded(&mut self, last: &Fix, fix: &Fix) {
+        let h = fix.time_s - last.time_s;
+        let (from, to) = (self.scaled(last.position_m), self.scaled(fix.position_m));
         // Lengths are divided by the axes of the ellipsoid, so deviations by its shortest.
         let accel = self.max_accel_m_s2 * self.scale.map_or(1.0, |scale| scale.max());
-        let (coefficients, deviation) = match last.velocity_m_s.zip(seen.velocity_m_s) {
+        let (coefficients, deviation) = match last.velocity_m_s.zip(fix.velocity_m_s) {
             Some((start, end)) => {
                 let (by, start, end) = (to - from, self.scaled(start), self.scaled(end));
                 let second = (by * 3.0 / h - start * 2.0 - end) / h;
@@ -231,15 +225,15 @@ impl Vehicle {
             }
             None => (vec![from, (to - from) / h], Deviation::Chord { peak: accel * h * h / 8.0 }),
         };
-        let curve = Curve { from_s: last.time_s, to_s: seen.time_s, coefficients, deviation };
-        Segment { from, to, ..Segment::curved(curve) }
+        let curve = Curve { from_s: last.time_s, to_s: fix.time_s, coefficients, deviation };
+        self.keep(Segment { from, to, ..Segment::curved(curve) });
     }
 
     /// Notes where two samples, or three without velocities, cannot be joined within the bound.
-    fn compare_with_bound(&mut self, index: usize, last: &Fix, seen: &Fix) {
-        let h = seen.time_s - last.time_s;
-        let mean = (seen.position_m - last.position_m) / h;
-        let rounding = 4.0 * f64::EPSILON * (seen.position_m.norm() + last.position_m.norm()) / (h * h);
+    fn compare_with_bound(&mut self, index: usize, last: &Fix, fix: &Fix) {
+        let h = fix.time_s - last.time_s;
+        let mean = (fix.position_m - last.position_m) / h;
+        let rounding = 4.0 * f64::EPSILON * (fix.position_m.norm() + last.position_m.norm()) / (h * h);
         let mut needs = 0.0_f64;
         if let Some((before, before_s)) = self.last_interval {
             let apart_s = 0.5 * (before_s + h);
@@ -248,16 +242,16 @@ impl Vehicle {
         if let Some(start) = last.velocity_m_s {
             needs = needs.max(2.0 * (mean - start).norm() / h - 2.0 * rounding);
         }
-        if let Some(end) = seen.velocity_m_s {
+        if let Some(end) = fix.velocity_m_s {
             needs = needs.max(2.0 * (end - mean).norm() / h - 2.0 * rounding);
         }
-        if let Some((start, end)) = last.velocity_m_s.zip(seen.velocity_m_s) {
+        if let Some((start, end)) = last.velocity_m_s.zip(fix.velocity_m_s) {
             needs = needs.max((end - start).norm() / h);
         }
         self.last_interval = Some((mean, h));
         let assumed_m_s2 = self.max_accel_m_s2;
         let excess = needs > assumed_m_s2 * (1.0 + ROUNDING);
-        let judged = self.window.from_s <= seen.time_s && last.time_s <= self.window.to_s;
+        let judged = self.window.from_s <= fix.time_s && last.time_s <= self.window.to_s;
         if excess && judged && self.contradiction.is_none_or(|largest| needs > largest.needs_m_s2) {
             self.contradiction =
                 Some(Contradiction { vehicle: index, time_s: last.time_s, needs_m_s2: needs, assumed_m_s2 });
@@ -271,13 +265,13 @@ impl Vehicle {
         if self.window.from_s <= from_s && to_s <= self.window.to_s && self.above_m.is_none() {
             self.segments.push(Segment::straight(from_s, to_s, from, to));
         } else {
-            self.keep(&Segment::straight(from_s, to_s, from, to));
+            self.keep(Segment::straight(from_s, to_s, from, to));
         }
     }
 
     /// Keeps what is asked for of any segment.
     #[inline(never)]
-    fn keep(&mut self, segment: &Segment) {
+    fn keep(&mut self, segment: Segment) {
         let Some(segment) = segment.clipped(self.window) else { return };
         match self.above_m {
             None => self.segments.push(segment),
@@ -298,33 +292,27 @@ impl Vehicle {
 
     #[inline]
     fn check_sample(&self, sample: &Sample) -> Result<(), RecordedError> {
-        if sample.time_s.is_finite()
-            && is_near(&sample.position_m)
-            && sample.velocity_m_s.as_ref().is_none_or(is_near)
-            && sample.radius_m.is_none_or(is_radius)
-        {
-            return Ok(());
-        }
-        Err(self.not_finite(sample))
-    }
-
-    #[cold]
-    fn not_finite(&self, sample: &Sample) -> RecordedError {
         let what = if !sample.time_s.is_finite() {
             "the time"
         } else if !is_near(&sample.position_m) {
             "the position"
-        } else if sample.velocity_m_s.is_some_and(|v| !is_near(&v)) {
+        } else if sample.velocity_m_s.as_ref().is_some_and(|v| !is_near(v)) {
             "the velocity"
-        } else {
+        } else if sample.radius_m.is_some_and(|radius_m| !(0.0..=MAX_LENGTH_M).contains(&radius_m)) {
             "the radius, which must not be below 0 m,"
+        } else {
+            return Ok(());
         };
-        RecordedError::NotFinite { vehicle: self.name.clone(), time_s: sample.time_s, what }
+        Err(self.wrong(sample.time_s, format!("{what} is not a finite number below 1e70")))
     }
 
     #[cold]
-    fn not_increasing(&self, time_s: f64) -> RecordedError {
-        let previous_s = self.last.map_or(f64::NAN, |last| last.time_s);
+    fn wrong(&self, time_s: f64, what: String) -> RecordedError {
+        RecordedError::Item { vehicle: self.name.clone(), time_s, what }
+    }
+
+    #[cold]
+    fn not_increasing(&self, previous_s: f64, time_s: f64) -> RecordedError {
         RecordedError::TimeNotIncreasing { vehicle: self.name.clone(), previous_s, time_s }
     }
 
@@ -342,10 +330,6 @@ impl Vehicle {
 
 fn is_near(v: &Vector3<f64>) -> bool {
     (v.x.abs() <= MAX_LENGTH_M) & (v.y.abs() <= MAX_LENGTH_M) & (v.z.abs() <= MAX_LENGTH_M)
-}
-
-fn is_radius(radius_m: f64) -> bool {
-    (0.0..=MAX_LENGTH_M).contains(&radius_m)
 }
 
 /// Splits a segment where it passes a height and says which parts are on the ground. A jump is on the ground if both ends

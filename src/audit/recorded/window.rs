@@ -108,7 +108,7 @@ impl Windows {
         if count > 1 {
             self.sort();
             let few = count * (count - 1) / 2 <= KEPT;
-            if halvings == 0 && !few && results.closest.threshold() == f64::INFINITY {
+            if halvings == 0 && !few && results.closest.threshold == f64::INFINITY {
                 self.compare_neighbours(vehicles, window, &mut results.closest);
             }
             let segments: usize = self.extents.iter().map(|extent| extent.segments.len()).sum();
@@ -153,7 +153,7 @@ impl Windows {
         let count = self.extents.len();
         let pairs = |apart: u32| (0..).zip(apart..).take(count.saturating_sub(apart as usize));
         let mut neighbours = (1..=FIRST_NEIGHBOURS).flat_map(pairs);
-        while rough.closest.threshold() == f64::INFINITY
+        while rough.closest.threshold == f64::INFINITY
             && let Some((a, b)) = neighbours.next()
         {
             self.sweep_vehicles(vehicles, &Near::new(&self.extents, a, b), window, &mut rough);
@@ -166,7 +166,7 @@ impl Windows {
         let Self { extents, near, limits, .. } = self;
         near.clear();
         let radius = extents.iter().map(|extent| extent.radius).fold(0.0, f64::max);
-        let threshold = results.closest.threshold();
+        let threshold = results.closest.threshold;
         let reach = threshold.max(limits.of_vehicles(radius, radius));
         for (k, a) in (0_u32..).zip(extents.iter()) {
             let until = a.high[0] + reach;
@@ -207,7 +207,7 @@ impl Windows {
 
     fn sweep_obstacles(&self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
         for (index, (obstacle, path)) in self.obstacles.iter().enumerate() {
-            let path = &path[meeting(path, window)];
+            let path = &path[within(path, window)];
             let place = Chord::over(path, window);
             for extent in self.extents.iter().filter(|extent| !extent.grounded) {
                 let pair = ObjectPair::Obstacle { vehicle: extent.vehicle, obstacle: index };
@@ -287,7 +287,7 @@ fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
 }
 
 /// The segments that meet a window; mostly all of them.
-fn meeting(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
+fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
     let all_end_late = segments.first().is_none_or(|part| part.to_s >= from_s);
     let first = if all_end_late { 0 } else { segments.partition_point(|part| part.to_s < from_s) };
     let all_begin_early = segments.last().is_none_or(|part| part.from_s <= to_s);
@@ -299,7 +299,7 @@ impl Extent {
     /// Of the segments of a vehicle that meet the window; `None` if there are none.
     #[inline]
     fn over(vehicle: usize, of: &Vehicle, window: Interval) -> Option<Self> {
-        let segments = meeting(&of.segments, window);
+        let segments = within(&of.segments, window);
         let parts = &of.segments[segments.clone()];
         if parts.is_empty() {
             return None;
@@ -364,8 +364,8 @@ mod tests {
         for ((from_s, to_s), expected) in
             [((0.0, 3.0), 0..3), ((0.5, 1.5), 0..2), ((1.0, 2.0), 0..3), ((2.5, 9.0), 2..3), ((4.0, 9.0), 3..3)]
         {
-            assert_eq!(meeting(&parts, Interval { from_s, to_s }), expected, "{from_s} {to_s}");
+            assert_eq!(within(&parts, Interval { from_s, to_s }), expected, "{from_s} {to_s}");
         }
-        assert_eq!(meeting(&[], Interval { from_s: 0.0, to_s: 1.0 }), 0..0);
+        assert_eq!(within(&[], Interval { from_s: 0.0, to_s: 1.0 }), 0..0);
     }
 }
