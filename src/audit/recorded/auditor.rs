@@ -88,12 +88,22 @@ impl TrackAuditor {
             let max_gap_s = self.settings.max_gap_s.unwrap_or_else(usual);
             self.vehicles.push(Vehicle::new(name, &self.settings, max_gap_s));
         }
-        items.iter().try_for_each(|item| self.take(item))
+        for item in items {
+            match item {
+                Item::Sample(sample) => self.take(sample.vehicle, sample.time_s, |vehicle| vehicle.sample(sample))?,
+                Item::Piece(piece) => self.take(piece.vehicle, piece.from_s, |vehicle| vehicle.piece(piece))?,
+            }
+        }
+        Ok(())
     }
 
     #[inline]
-    fn take(&mut self, item: &Item) -> Result<(), RecordedError> {
-        let (index, time_s) = (item.vehicle(), item.time_s());
+    fn take(
+        &mut self,
+        index: usize,
+        time_s: f64,
+        take: impl FnOnce(&mut Vehicle) -> Result<Option<Gap>, RecordedError>,
+    ) -> Result<(), RecordedError> {
         if time_s != self.now_s {
             self.turn_to(time_s, index)?;
         }
@@ -104,7 +114,7 @@ impl TrackAuditor {
             return Ok(());
         }
         let unseen = vehicle.is_unseen();
-        let gap = vehicle.take(item)?;
+        let gap = take(vehicle)?;
         if unseen {
             vehicle.check(&self.settings)?;
         }

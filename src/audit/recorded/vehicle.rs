@@ -119,8 +119,9 @@ impl Vehicle {
         }
     }
 
+    /// Takes a sample; returns the gap before it, if there is one.
     #[inline]
-    fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
+    pub(super) fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
         let motion = self.motion.unwrap_or(Motion::Linear);
         if motion == Motion::Polynomial {
             return Err(RecordedError::NotACurve { vehicle: self.name.clone() });
@@ -168,7 +169,8 @@ impl Vehicle {
         Ok(gap)
     }
 
-    fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
+    /// Takes a piece of a curve; returns the gap before it, if there is one.
+    pub(super) fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
         if !matches!(self.motion, None | Some(Motion::Polynomial)) {
             return Err(RecordedError::NotSamples { vehicle: self.name.clone() });
         }
@@ -292,18 +294,28 @@ impl Vehicle {
 
     #[inline]
     fn check_sample(&self, sample: &Sample) -> Result<(), RecordedError> {
+        if sample.time_s.is_finite()
+            && is_near(&sample.position_m)
+            && sample.velocity_m_s.as_ref().is_none_or(is_near)
+            && sample.radius_m.is_none_or(is_radius)
+        {
+            return Ok(());
+        }
+        Err(self.not_finite(sample))
+    }
+
+    #[cold]
+    fn not_finite(&self, sample: &Sample) -> RecordedError {
         let what = if !sample.time_s.is_finite() {
             "the time"
         } else if !is_near(&sample.position_m) {
             "the position"
-        } else if sample.velocity_m_s.as_ref().is_some_and(|v| !is_near(v)) {
+        } else if sample.velocity_m_s.is_some_and(|v| !is_near(&v)) {
             "the velocity"
-        } else if sample.radius_m.is_some_and(|radius_m| !(0.0..=MAX_LENGTH_M).contains(&radius_m)) {
-            "the radius, which must not be below 0 m,"
         } else {
-            return Ok(());
+            "the radius, which must not be below 0 m,"
         };
-        Err(self.wrong(sample.time_s, format!("{what} is not a finite number below 1e70")))
+        self.wrong(sample.time_s, format!("{what} is not a finite number below 1e70"))
     }
 
     #[cold]
@@ -330,6 +342,10 @@ impl Vehicle {
 
 fn is_near(v: &Vector3<f64>) -> bool {
     (v.x.abs() <= MAX_LENGTH_M) & (v.y.abs() <= MAX_LENGTH_M) & (v.z.abs() <= MAX_LENGTH_M)
+}
+
+fn is_radius(radius_m: f64) -> bool {
+    (0.0..=MAX_LENGTH_M).contains(&radius_m)
 }
 
 /// Splits a segment where it passes a height and says which parts are on the ground. A jump is on the ground if both ends
