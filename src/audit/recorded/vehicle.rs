@@ -191,7 +191,7 @@ impl Vehicle {
             }
             last => gap = last.map(|last| Gap { vehicle: piece.vehicle, from_s: last.time_s, to_s: from_s }),
         }
-        self.keep(segment);
+        self.keep(&segment);
         Ok(gap)
     }
 
@@ -228,7 +228,7 @@ impl Vehicle {
             None => (vec![from, (to - from) / h], Deviation::Chord { peak: accel * h * h / 8.0 }),
         };
         let curve = Curve { from_s: last.time_s, to_s: fix.time_s, coefficients, deviation };
-        self.keep(Segment { from, to, ..Segment::curved(curve) });
+        self.keep(&Segment { from, to, ..Segment::curved(curve) });
     }
 
     /// Notes where two samples, or three without velocities, cannot be joined within the bound.
@@ -267,13 +267,13 @@ impl Vehicle {
         if self.window.from_s <= from_s && to_s <= self.window.to_s && self.above_m.is_none() {
             self.segments.push(Segment::straight(from_s, to_s, from, to));
         } else {
-            self.keep(Segment::straight(from_s, to_s, from, to));
+            self.keep(&Segment::straight(from_s, to_s, from, to));
         }
     }
 
     /// Keeps what is asked for of any segment.
     #[inline(never)]
-    fn keep(&mut self, segment: Segment) {
+    fn keep(&mut self, segment: &Segment) {
         let Some(segment) = segment.clipped(self.window) else { return };
         match self.above_m {
             None => self.segments.push(segment),
