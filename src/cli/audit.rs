@@ -59,16 +59,16 @@ pub(super) struct AuditArguments {
     /// TOML file of obstacles: balls, boxes, capsules, half-spaces; at rest or moving.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     obstacles: Option<PathBuf>,
-    /// TrackAuditor from here on [s].
+    /// Judge from here on [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     from: Option<f64>,
-    /// TrackAuditor up to here [s].
+    /// Judge up to here [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     to: Option<f64>,
     /// Leave out pairs while both are at or below this height [m].
     #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Question")]
     above: Option<f64>,
-    /// TrackAuditor these vehicles alone; a name with a comma in quotes. May be given several times.
+    /// Judge these vehicles alone; a name with a comma in quotes. May be given several times.
     #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Question")]
     ids: Vec<Listed>,
     /// Add this to the times of a vehicle whose clock was off [s]; may be given several times.
