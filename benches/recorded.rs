@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
-use tautline::audit::recorded::{Approach, Question, Who, judge};
+use tautline::audit::recorded::{Approach, ObjectPair, Settings, audit};
 use tautline::track::{Item, Sample};
 
 /// The show keeps this.
@@ -76,16 +76,16 @@ struct Closest {
 }
 
 fn ours(names: &[String], items: &[Item], delta_m: f64) -> Answer {
-    let outcome = judge(names, items, Question::delta(delta_m)).expect("a show can be judged");
-    let pair = |who: Who| match who {
-        Who::Pair(pair) => (pair.first(), pair.second()),
-        Who::Obstacle { .. } => unreachable!("there are no obstacles"),
+    let outcome = audit(names, items, Settings::delta(delta_m)).expect("a show can be judged");
+    let pair = |who: ObjectPair| match who {
+        ObjectPair::Vehicles(pair) => (pair.first(), pair.second()),
+        ObjectPair::Obstacle { .. } => unreachable!("there are no obstacles"),
     };
     let mut below: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for violation in &outcome.violations {
-        below.entry(pair(violation.who)).or_default().push((violation.from_s, violation.to_s));
+        below.entry(pair(violation.pair)).or_default().push((violation.from_s, violation.to_s));
     }
-    let closest = |of: &Approach| Closest { pair: pair(of.who), distance_m: of.lower_m, time_s: of.time_s };
+    let closest = |of: &Approach| Closest { pair: pair(of.pair), distance_m: of.lower_m, time_s: of.time_s };
     Answer { gaps: outcome.gaps.len(), closest: outcome.closest.iter().map(closest).collect(), below }
 }
 

@@ -14,7 +14,7 @@ const SMALL_SWARM: usize = 32;
 /// due. More makes lists last longer and grow longer.
 const RADIUS_OVER_BOUND: f64 = 1.25;
 /// Budget beyond the step at hand, as a fraction of R. More makes lists last longer and grow longer.
-const SLACK_OVER_RADIUS: f64 = 0.125;
+const SPARE_OVER_RADIUS: f64 = 0.125;
 /// Relative widening of every reach, far above rounding (1e-16) and far below what costs anything.
 const ROUNDING: f64 = 1e-9;
 
@@ -122,7 +122,7 @@ impl Candidates {
         self.budget_m.clear();
         self.budget_m.extend((0..n).map(|i| {
             let needed_m = (row(to, i) - row(from, i)).norm();
-            needed_m * (1.0 + ROUNDING) + SLACK_OVER_RADIUS * radius_m
+            needed_m * (1.0 + ROUNDING) + SPARE_OVER_RADIUS * radius_m
         }));
         self.sort_reaches(radius_m);
         self.radius_m = self.collect_pairs().then_some(radius_m);
@@ -207,12 +207,12 @@ mod tests {
         let mut candidates = Candidates::new();
         let neighbours: Vec<_> = (0..99).map(|i| [i, i + 1]).collect();
         assert_eq!(listed(&mut candidates, &start, &start, SPACING_M).as_ref(), Some(&neighbours));
-        let slack_m = SLACK_OVER_RADIUS * RADIUS_OVER_BOUND * SPACING_M;
+        let spare_m = SPARE_OVER_RADIUS * RADIUS_OVER_BOUND * SPACING_M;
 
-        let within = line(100, |i| if i == 7 { 0.9 * slack_m } else { 0.0 });
+        let within = line(100, |i| if i == 7 { 0.9 * spare_m } else { 0.0 });
         assert_eq!(listed(&mut candidates, &start, &within, SPACING_M).as_ref(), Some(&neighbours));
         assert_eq!(candidates.reference_m, start, "kept");
-        let beyond = line(100, |i| if i == 7 { 1.1 * slack_m } else { 0.0 });
+        let beyond = line(100, |i| if i == 7 { 1.1 * spare_m } else { 0.0 });
         listed(&mut candidates, &within, &beyond, SPACING_M);
         assert_eq!(candidates.reference_m, within, "made anew");
         listed(&mut candidates, &beyond, &beyond, 2.0 * SPACING_M);

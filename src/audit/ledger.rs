@@ -1,102 +1,166 @@
-//! Violation intervals, merged from step to step.
+//! What has been found so far: times below a limit, times that cannot be decided, and what the second detector says.
 
-use super::outcome::Violation;
-use crate::swarm::Pair;
+use std::collections::BTreeMap;
 
-/// What one step adds for a pair that was below delta in it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Below {
-    /// The interval within the step.
-    pub(super) violation: Violation,
-    /// Whether it is below at the very start of the step.
-    pub(super) from_start: bool,
-    /// Whether it is still below at the very end.
-    pub(super) to_end: bool,
+use super::outcome::{Disagreement, ParryEvidence, Undecided, Violation};
+use super::parry::{CrossCheck, KeepOut};
+use super::sweep::{ClosestPoint, Interval, RESOLUTION, RelativeMotion};
+
+/// Coarsest resolution, as a fraction of the limit, at which a pair that seems clear by less than the resolution is still
+/// called clear.
+const NEGLIGIBLE_RESOLUTION: f64 = 1e-8;
+
+/// The findings on pairs that are named by `P`.
+#[derive(Clone, Debug)]
+pub(super) struct Ledger<P> {
+    /// In the order in which they were found.
+    pub(super) violations: Vec<Violation<P>>,
+    /// Indices of each pair's violations, in order of time.
+    of_pair: BTreeMap<P, Vec<usize>>,
+    undecided: BTreeMap<P, Vec<Undecided<P>>>,
+    /// Sweeps that seem clear with less room than rounding.
+    pub(super) unresolved: u64,
+    pub(super) parry: ParryEvidence<P>,
 }
 
-/// All violations so far, and which of them go on.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Ledger {
-    pub(super) violations: Vec<Violation>,
-    pub(super) began: Vec<Violation>,
-    pub(super) ended: Vec<Violation>,
-    /// Indices of the violations that go on, by pair.
-    open: Vec<usize>,
-    still_open: Vec<usize>,
-}
-
-impl Ledger {
-    /// Enters the findings of one step, which must be in the order of pairs.
-    pub(super) fn enter(&mut self, step: &[Below]) {
-        self.began.clear();
-        self.ended.clear();
-        self.still_open.clear();
-        let mut open = self.open.iter().copied().peekable();
-        for below in step {
-            let pair: Pair = below.violation.pair;
-            while let Some(index) = open.next_if(|&index| self.violations[index].pair < pair) {
-                self.ended.push(self.violations[index]);
-            }
-            let goes_on = |index: &usize| below.from_start && self.violations[*index].pair == pair;
-            let index = if let Some(index) = open.next_if(goes_on) {
-                self.violations[index].extend(&below.violation);
-                index
-            } else {
-                self.violations.push(below.violation);
-                self.began.push(below.violation);
-                self.violations.len() - 1
-            };
-            if below.to_end {
-                self.still_open.push(index);
-            } else {
-                self.ended.push(self.violations[index]);
-            }
-        }
-        self.ended.extend(open.map(|index| self.violations[index]));
-        std::mem::swap(&mut self.open, &mut self.still_open);
-    }
-
-    /// All violations, in the order of their beginning and then by pair.
-    pub(super) fn into_violations(mut self) -> Vec<Violation> {
-        self.violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.pair.cmp(&b.pair)));
-        self.violations
-    }
-}
-
-impl Violation {
-    fn extend(&mut self, later: &Violation) {
-        self.to_s = later.to_s;
-        if later.min_m < self.min_m {
-            (self.min_m, self.min_at_s) = (later.min_m, later.min_at_s);
+impl<P> Default for Ledger<P> {
+    fn default() -> Self {
+        Self {
+            violations: Vec::new(),
+            of_pair: BTreeMap::new(),
+            undecided: BTreeMap::new(),
+            unresolved: 0,
+            parry: ParryEvidence::default(),
         }
     }
+}
+
+impl<P: Copy + Ord> Ledger<P> {
+    /// Judges a straight motion that is below the limit, close to it, or in contact by the cast; returns the index of its
+    /// violation, if it is one.
+    #[cold]
+    pub(super) fn near(
+        &mut self,
+        pair: P,
+        over: Interval,
+        keep_out: &KeepOut,
+        motion: &RelativeMotion,
+        approach: ClosestPoint,
+        contact: Option<f64>,
+    ) -> Option<usize> {
+        let (limit_m, min_m) = (keep_out.delta_m, approach.separation_m());
+        let span = (min_m < limit_m).then(|| motion.below(limit_m, approach));
+        let agrees = keep_out.agrees(motion, approach, span, contact);
+        let enter = span.map(|span| span.enter);
+        self.cross_check(pair, over, min_m, enter, CrossCheck { contact, agrees });
+        let Some(span) = span else {
+            if is_coarse(motion, min_m, limit_m) {
+                self.unresolved += 1;
+                let Interval { from_s, to_s } = over;
+                let rate_hz = None;
+                self.undecided(Undecided { pair, from_s, to_s, lower_m: min_m, upper_m: min_m, limit_m, rate_hz });
+            }
+            return None;
+        };
+        let (from_s, to_s, min_at_s) = (over.at(span.enter), over.at(span.exit), over.at(approach.at));
+        let violation = Violation { pair, from_s, to_s, min_m, min_at_s, limit_m };
+        Some(self.violated(violation, motion.from_squared.sqrt() < limit_m))
+    }
+
+    /// Enters a time below the limit, and says whether it is below from the very start of a segment; returns the index of
+    /// the violation that it is a part of. Those of one pair come in order of time, but may come again.
+    pub(super) fn violated(&mut self, new: Violation<P>, from_start: bool) -> usize {
+        let (all, known) = (&mut self.violations, self.of_pair.entry(new.pair).or_default());
+        let mut touching = known.iter().rev().copied().take_while(|&k| all[k].to_s >= new.from_s);
+        let repeated = touching.find(|&k| all[k].from_s <= new.from_s && new.to_s <= all[k].to_s);
+        let continued = || known.last().copied().filter(|&k| from_start && new.from_s <= all[k].to_s);
+        if let Some(k) = repeated.or_else(continued) {
+            let old = &mut all[k];
+            old.to_s = old.to_s.max(new.to_s);
+            if new.min_m < old.min_m {
+                (old.min_m, old.min_at_s) = (new.min_m, new.min_at_s);
+            }
+            return k;
+        }
+        known.push(all.len());
+        all.push(new);
+        all.len() - 1
+    }
+
+    /// Enters a time that cannot be decided; adjacent ones of a pair become one.
+    pub(super) fn undecided(&mut self, new: Undecided<P>) {
+        let known = self.undecided.entry(new.pair).or_default();
+        match known.last_mut() {
+            Some(last) if new.from_s <= last.to_s && last.from_s <= new.to_s => {
+                last.to_s = last.to_s.max(new.to_s);
+                last.lower_m = last.lower_m.min(new.lower_m);
+                last.upper_m = last.upper_m.min(new.upper_m);
+                last.rate_hz = last.rate_hz.zip(new.rate_hz).map(|(a, b)| a.max(b));
+            }
+            _ => known.push(new),
+        }
+    }
+
+    /// Enters what the second detector says of an interval, where the first finds this smallest distance and, at this
+    /// fraction, the first contact.
+    pub(super) fn cross_check(&mut self, pair: P, over: Interval, min_m: f64, enter: Option<f64>, check: CrossCheck) {
+        let [closed_form_s, parry_s] = [enter, check.contact].map(|fraction| fraction.map(|u| over.at(u)));
+        let earlier_s = self.parry.min_toi_s;
+        self.parry.min_toi_s = earlier_s.into_iter().chain(parry_s.filter(|time_s| !time_s.is_nan())).reduce(f64::min);
+        if !check.agrees {
+            let Interval { from_s, to_s } = over;
+            self.parry.disagreements += 1;
+            let new = Disagreement { pair, from_s, to_s, min_m, closed_form_s, parry_s };
+            self.parry.first_disagreement.get_or_insert(new);
+        }
+    }
+
+    /// Whether nothing was left open: no time that cannot be decided, and no contradiction of the two detectors.
+    pub(super) fn is_decided(&self) -> bool {
+        self.undecided.is_empty() && self.parry.disagreements == 0
+    }
+
+    /// Every violation and every undecided time, in the order of their beginning and then by pair.
+    pub(super) fn into_lists(self) -> (Vec<Violation<P>>, Vec<Undecided<P>>) {
+        let (mut violations, mut undecided) =
+            (self.violations, self.undecided.into_values().flatten().collect::<Vec<_>>());
+        violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.pair.cmp(&b.pair)));
+        undecided.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.pair.cmp(&b.pair)));
+        (violations, undecided)
+    }
+}
+
+/// Whether a separation is clear by less than rounding, where that is no longer negligible against the limit.
+pub(super) fn is_coarse(motion: &RelativeMotion, min_m: f64, limit_m: f64) -> bool {
+    let resolution_m = RESOLUTION * motion.from_squared.max(motion.to_squared).sqrt();
+    resolution_m > NEGLIGIBLE_RESOLUTION * limit_m && min_m - limit_m < resolution_m
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::swarm::Pair;
 
-    fn below(pair: Pair, span_s: [f64; 2], min_m: f64, from_start: bool, to_end: bool) -> Below {
+    fn below(pair: Pair, span_s: [f64; 2], min_m: f64) -> Violation {
         let [from_s, to_s] = span_s;
-        Below { violation: Violation { pair, from_s, to_s, min_m, min_at_s: from_s }, from_start, to_end }
+        Violation { pair, from_s, to_s, min_m, min_at_s: from_s, limit_m: 2.0 }
     }
 
     #[test]
     fn pairs_that_go_on_are_merged_and_those_that_begin_between_them_are_not() {
         let (a, b, c) = (Pair::new(0, 1), Pair::new(0, 2), Pair::new(1, 2));
         let mut ledger = Ledger::default();
-        ledger.enter(&[below(a, [0.5, 1.0], 1.0, false, true), below(c, [0.2, 1.0], 1.5, false, true)]);
-        ledger.enter(&[
-            below(a, [1.0, 1.5], 1.2, true, false),
-            below(b, [1.3, 1.4], 0.5, false, false),
-            below(c, [1.0, 2.0], 0.1, true, true),
-        ]);
-        assert_eq!(ledger.began.iter().map(|v| v.pair).collect::<Vec<_>>(), [b]);
-        assert_eq!(ledger.ended.iter().map(|v| v.pair).collect::<Vec<_>>(), [a, b]);
-        ledger.enter(&[]);
-        assert_eq!(ledger.ended.iter().map(|v| v.pair).collect::<Vec<_>>(), [c]);
+        for (pair, span_s, min_m, from_start, index) in [
+            (a, [0.5, 1.0], 1.0, false, 0),
+            (c, [0.2, 1.0], 1.5, false, 1),
+            (a, [1.0, 1.5], 1.2, true, 0),
+            (b, [1.3, 1.4], 0.5, false, 2),
+            (c, [1.0, 2.0], 0.1, true, 1),
+        ] {
+            assert_eq!(ledger.violated(below(pair, span_s, min_m), from_start), index);
+        }
         let found: Vec<_> =
-            ledger.into_violations().iter().map(|v| (v.pair, v.from_s, v.to_s, v.min_m, v.min_at_s)).collect();
+            ledger.into_lists().0.iter().map(|v| (v.pair, v.from_s, v.to_s, v.min_m, v.min_at_s)).collect();
         assert_eq!(found, [(c, 0.2, 2.0, 0.1, 1.0), (a, 0.5, 1.5, 1.0, 0.5), (b, 1.3, 1.4, 0.5, 1.3)]);
     }
 
@@ -104,8 +168,22 @@ mod tests {
     fn a_pair_that_left_and_came_back_at_the_same_instant_is_two_violations() {
         let pair = Pair::new(0, 1);
         let mut ledger = Ledger::default();
-        ledger.enter(&[below(pair, [0.5, 1.0], 1.0, false, false)]);
-        ledger.enter(&[below(pair, [1.0, 1.5], 1.0, false, false)]);
+        ledger.violated(below(pair, [0.5, 1.0], 1.0), false);
+        ledger.violated(below(pair, [1.0, 1.5], 1.0), false);
         assert_eq!(ledger.violations.len(), 2);
+    }
+
+    #[test]
+    fn segments_of_one_violation_are_one_and_a_return_is_another() {
+        let pair = Pair::new(0, 1);
+        let mut ledger = Ledger::default();
+        ledger.violated(below(pair, [0.5, 1.0], 1.5), false);
+        ledger.violated(below(pair, [1.0, 1.5], 1.2), true);
+        ledger.violated(below(pair, [1.0, 1.5], 1.2), true);
+        ledger.violated(below(pair, [1.5, 1.75], 1.9), false);
+        // The border of two windows: what touches it comes again.
+        ledger.violated(below(pair, [1.0, 1.5], 1.2), true);
+        let found: Vec<_> = ledger.violations.iter().map(|v| (v.from_s, v.to_s, v.min_m)).collect();
+        assert_eq!(found, [(0.5, 1.5, 1.2), (1.5, 1.75, 1.9)]);
     }
 }

@@ -1,4 +1,4 @@
-//! What the judge says.
+//! What an audit says.
 
 use std::fmt;
 
@@ -6,33 +6,130 @@ use serde::{Deserialize, Serialize};
 
 use crate::swarm::{ClosestApproach, Pair};
 
+/// Width of the interval in which the smallest distance on a curve is enclosed \[m\]; rounding widens it where coordinates
+/// are large.
+pub const WIDTH_M: f64 = 1e-9;
+
 /// The verdict over everything that was judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// No pair came closer than delta, both detectors agree on it, and every instant offered was judged.
+    /// No pair came closer than it may, both detectors agree on it, and everything offered was judged.
     Clear,
-    /// The closed form found a pair closer than delta, whatever else was found.
+    /// A pair was found closer than it may come, whatever else was found.
     Violation,
-    /// No violation was found, yet it cannot be called clear: nothing was judged, an instant was refused, the two
-    /// detectors disagree, or a separation could not be resolved.
+    /// No violation was found, yet it cannot be called clear: nothing was judged, something was refused or not seen, the
+    /// two detectors disagree, or a separation could not be resolved.
+    #[default]
     Undecided,
 }
 
-/// A time during which a pair was closer than delta without a break.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Violation {
+impl Status {
+    pub(super) fn new(violated: bool, decided: bool) -> Self {
+        match (violated, decided) {
+            (true, _) => Self::Violation,
+            (false, true) => Self::Clear,
+            (false, false) => Self::Undecided,
+        }
+    }
+}
+
+/// A pair of objects that must keep a distance. Indices count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ObjectPair {
+    /// Two vehicles.
+    Vehicles(Pair),
+    /// A vehicle and an obstacle.
+    Obstacle {
+        /// The vehicle.
+        vehicle: usize,
+        /// The obstacle, an index into [`Settings::obstacles`](super::recorded::Settings::obstacles).
+        obstacle: usize,
+    },
+}
+
+impl ObjectPair {
+    /// The two vehicles, if it is two.
+    #[must_use]
+    pub fn vehicles(self) -> Option<Pair> {
+        match self {
+            Self::Vehicles(pair) => Some(pair),
+            Self::Obstacle { .. } => None,
+        }
+    }
+}
+
+/// The closest that two came.
+///
+/// Lengths are distances of two centres, or of a centre from an obstacle's surface, in metres; with an ellipsoid they are
+/// scaled distances.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Approach {
     /// The pair.
-    pub pair: Pair,
-    /// When the separation fell below delta \[s\]; the start if it was below from the start.
+    #[serde(skip)]
+    pub pair: ObjectPair,
+    /// It is at least this \[m\].
+    pub lower_m: f64,
+    /// It is at most this \[m\]; the same as `lower_m` where the motion is exact, and within [`WIDTH_M`] of it on curves.
+    pub upper_m: f64,
+    /// When the motion as drawn is closest \[s\].
+    pub time_s: f64,
+    /// What it must not fall below \[m\].
+    pub limit_m: f64,
+}
+
+impl Approach {
+    /// Whether both bounds are one number, to the width of the enclosure.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.upper_m - self.lower_m <= 2.0 * WIDTH_M
+    }
+
+    /// One number for the smallest distance \[m\]: what is reached where the motion is known, and what it is at least where
+    /// it is not.
+    #[must_use]
+    pub fn certain_m(&self) -> f64 {
+        if self.is_known() { self.upper_m } else { self.lower_m }
+    }
+}
+
+/// A time during which a pair was closer than it may come, without a break.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Violation<P = Pair> {
+    /// The pair.
+    #[serde(skip)]
+    pub pair: P,
+    /// When the distance fell below the limit \[s\]; the start if it was below from the start.
     pub from_s: f64,
-    /// When it was delta again \[s\]; the last instant judged while it still is below.
+    /// When it was back at the limit \[s\]; the last instant judged while it still is below.
     pub to_s: f64,
-    /// Smallest separation within \[m\].
+    /// Smallest distance within \[m\]; under bounded acceleration an upper bound of it.
     pub min_m: f64,
     /// When that was \[s\], the earliest such instant.
     pub min_at_s: f64,
+    /// What the distance must not fall below \[m\].
+    pub limit_m: f64,
+}
+
+/// A time over which it cannot be told whether a pair came too close.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Undecided<P = Pair> {
+    /// The pair.
+    #[serde(skip)]
+    pub pair: P,
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// Their distance is at least this \[m\].
+    pub lower_m: f64,
+    /// Its smallest value is at most this \[m\].
+    pub upper_m: f64,
+    /// What it must not fall below \[m\].
+    pub limit_m: f64,
+    /// The sampling rate that decides where the vehicles fly as drawn between samples \[Hz\]; `None` where the drawn motion
+    /// meets the limit to the last digit, or the limit lies within the width or rounding of an exact motion.
+    pub rate_hz: Option<f64>,
 }
 
 /// What one step (or the start) brought.
@@ -48,7 +145,7 @@ pub struct StepFinding<'a> {
 }
 
 /// The verdict and what it rests on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct AuditOutcome {
     /// The verdict.
     pub status: Status,
@@ -73,32 +170,39 @@ pub struct AuditOutcome {
     pub parry: ParryEvidence,
 }
 
-/// What parry's shape cast found on keep-out balls of radius delta/2.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ParryEvidence {
-    /// Earliest time of contact \[s\]; `None` when there never was one. Touching at exactly delta is a contact to parry and
-    /// not a violation.
+/// What the second detector found on the pairs that it was asked about: parry's shape cast of keep-out balls, and parry's
+/// distances from obstacles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParryEvidence<P = Pair> {
+    /// Earliest time of contact \[s\]; `None` when there never was one. Touching at exactly the limit is a contact to parry
+    /// and not a violation.
     pub min_toi_s: Option<f64>,
-    /// Casts that contradict the closed form by more than rounding explains: each is an error.
+    /// Answers that contradict those of the first detector by more than rounding explains: each is an error.
     pub disagreements: u64,
     /// The first of them.
-    pub first_disagreement: Option<Disagreement>,
+    pub first_disagreement: Option<Disagreement<P>>,
+}
+
+impl<P> Default for ParryEvidence<P> {
+    fn default() -> Self {
+        Self { min_toi_s: None, disagreements: 0, first_disagreement: None }
+    }
 }
 
 /// Two detectors, two answers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Disagreement {
+pub struct Disagreement<P = Pair> {
     /// The pair.
-    pub pair: Pair,
-    /// Start of the step \[s\].
-    pub step_from_s: f64,
-    /// End of the step \[s\].
-    pub step_to_s: f64,
-    /// Smallest separation in the step by the closed form \[m\].
+    pub pair: P,
+    /// Start of the segment of motion, for a flight the step \[s\].
+    pub from_s: f64,
+    /// Its end \[s\].
+    pub to_s: f64,
+    /// Smallest separation within it by the closed form \[m\].
     pub min_m: f64,
-    /// When the pair falls below delta by the closed form \[s\]; `None` when it does not.
+    /// When the pair falls below its limit by the closed form \[s\]; `None` when it does not.
     pub closed_form_s: Option<f64>,
-    /// When the keep-out balls touch by parry \[s\]; `None` when they do not, NaN when it could not tell.
+    /// First contact by parry \[s\]; `None` when there is none, NaN when it could not tell.
     pub parry_s: Option<f64>,
 }
 
@@ -109,78 +213,11 @@ impl fmt::Display for Disagreement {
             f,
             "vehicles {} between {} s and {} s, smallest separation {} m: contact by the closed form {}, by parry {}",
             self.pair,
-            self.step_from_s,
-            self.step_to_s,
+            self.from_s,
+            self.to_s,
             self.min_m,
             answer(self.closed_form_s),
             answer(self.parry_s)
         )
     }
-}
-
-/// Why something could not be judged. Nothing changes then, except that the outcome is no longer clear.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum AuditError {
-    /// The safety distance is not a positive number within range.
-    #[error("the safety distance must be between {min_m:e} m and {max_m:e} m, not {delta_m} m")]
-    Delta {
-        /// The safety distance offered \[m\].
-        delta_m: f64,
-        /// Smallest that is accepted \[m\].
-        min_m: f64,
-        /// Largest that is accepted \[m\].
-        max_m: f64,
-    },
-    /// More vehicles than can be numbered.
-    #[error("{vehicles} vehicles are more than can be judged ({max})", max = u32::MAX)]
-    TooManyVehicles {
-        /// How many were asked for.
-        vehicles: usize,
-    },
-    /// A step came before the start.
-    #[error("a step was offered before the start")]
-    NotStarted,
-    /// A second start came.
-    #[error("a second start was offered")]
-    AlreadyStarted,
-    /// Positions of another number of vehicles.
-    #[error("expected the positions of {expected} vehicles, found {found}")]
-    WrongCount {
-        /// Vehicles that are judged.
-        expected: usize,
-        /// Vehicles offered.
-        found: usize,
-    },
-    /// A time that is not a finite number.
-    #[error("the time {time_s} s is not a finite number")]
-    TimeNotFinite {
-        /// The time offered \[s\].
-        time_s: f64,
-    },
-    /// A time not later than the one before.
-    #[error("the time {time_s} s is not later than the time before, {previous_s} s")]
-    TimeNotIncreasing {
-        /// The time before \[s\].
-        previous_s: f64,
-        /// The time offered \[s\].
-        time_s: f64,
-    },
-    /// A position that is not a finite number.
-    #[error("the position of vehicle {} at {time_s} s is not a finite number", vehicle + 1)]
-    NotFinite {
-        /// The vehicle, from 0.
-        vehicle: usize,
-        /// The time \[s\].
-        time_s: f64,
-    },
-    /// A position whose square could overflow.
-    #[error("the position of vehicle {} at {time_s} s is beyond {limit_m:e} m, too far to judge", vehicle + 1)]
-    TooFar {
-        /// The vehicle, from 0.
-        vehicle: usize,
-        /// The time \[s\].
-        time_s: f64,
-        /// Largest coordinate that is accepted \[m\].
-        limit_m: f64,
-    },
 }

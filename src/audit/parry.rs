@@ -5,7 +5,7 @@ use parry3d_f64::query::ShapeCastOptions;
 use parry3d_f64::query::details::cast_shapes_ball_ball;
 use parry3d_f64::shape::Ball;
 
-use super::sweep::{Approach, RelativeMotion, Span};
+use super::sweep::{ClosestPoint, RelativeMotion, Span};
 
 /// Width of the band around delta in which the two detectors may differ, in units of eps (|r0|^2 + delta^2) of squared
 /// separation.
@@ -21,6 +21,15 @@ const GRAZING_BAND: f64 = 16.0 * f64::EPSILON;
 /// resolves them.
 const NO_MOTION_M: f64 = 1e-100;
 
+/// What the second detector says of a segment of motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CrossCheck {
+    /// Fraction of the segment at which it sees the first contact; NaN where it cannot tell.
+    pub(super) contact: Option<f64>,
+    /// Whether it agrees with the first.
+    pub(super) agrees: bool,
+}
+
 /// Two keep-out balls of radius delta/2.
 #[derive(Clone, Debug)]
 pub(super) struct KeepOut {
@@ -32,6 +41,13 @@ pub(super) struct KeepOut {
 impl KeepOut {
     pub(super) fn new(delta_m: f64) -> Self {
         Self { ball: Ball::new(delta_m / 2.0), delta_m }
+    }
+
+    /// The cast beside the closed form.
+    pub(super) fn cross_check(&self, motion: &RelativeMotion) -> CrossCheck {
+        let (approach, contact) = (motion.closest(), self.cast(motion));
+        let below = (approach.separation_m() < self.delta_m).then(|| motion.below(self.delta_m, approach));
+        CrossCheck { contact, agrees: self.agrees(motion, approach, below, contact) }
     }
 
     /// When the balls first touch, as a fraction of the step; NaN if parry cannot tell.
@@ -49,7 +65,7 @@ impl KeepOut {
 
     /// Whether the closest approach is below delta or so little above it that it takes a closer look.
     #[inline]
-    pub(super) fn is_near(&self, motion: &RelativeMotion, closest: Approach) -> bool {
+    pub(super) fn is_near(&self, motion: &RelativeMotion, closest: ClosestPoint) -> bool {
         closest.squared <= self.delta_m * self.delta_m + self.grazing_band(motion)
     }
 
@@ -61,7 +77,7 @@ impl KeepOut {
     pub(super) fn agrees(
         &self,
         motion: &RelativeMotion,
-        closest: Approach,
+        closest: ClosestPoint,
         below: Option<Span>,
         cast: Option<f64>,
     ) -> bool {
@@ -69,7 +85,13 @@ impl KeepOut {
     }
 
     /// How far the two answers are apart, in squared separation \[m^2\]; NaN if parry could not tell.
-    fn difference(&self, motion: &RelativeMotion, closest: Approach, below: Option<Span>, cast: Option<f64>) -> f64 {
+    fn difference(
+        &self,
+        motion: &RelativeMotion,
+        closest: ClosestPoint,
+        below: Option<Span>,
+        cast: Option<f64>,
+    ) -> f64 {
         match (below, cast) {
             (None, None) => 0.0,
             (None, Some(toi)) if toi.is_nan() => f64::NAN,
@@ -107,7 +129,7 @@ mod tests {
 
     const DELTA_M: f64 = 2.0;
 
-    fn answers(keep_out: &KeepOut, motion: &RelativeMotion) -> (Approach, Option<Span>, Option<f64>) {
+    fn answers(keep_out: &KeepOut, motion: &RelativeMotion) -> (ClosestPoint, Option<Span>, Option<f64>) {
         let closest = motion.closest();
         let below = (closest.separation_m() < keep_out.delta_m).then(|| motion.below(keep_out.delta_m, closest));
         (closest, below, keep_out.cast(motion))

@@ -6,6 +6,10 @@
 
 use nalgebra::Vector3;
 
+/// Smallest limit that is judged by \[m\]: its fourth power, which the cast forms, does not vanish.
+pub(super) const MIN_LIMIT_M: f64 = 1e-70;
+/// Largest limit and coordinate that is judged \[m\]: fourth powers of lengths stay finite.
+pub(super) const MAX_LENGTH_M: f64 = 1e70;
 /// Rounding of [`RelativeMotion::closest`]: the separation found is off by at most this many times the larger of |r0|
 /// and |r1|.
 ///
@@ -13,6 +17,27 @@ use nalgebra::Vector3;
 /// to |r0| or less since s |d| <= |r0| at the closest point; that is at most 8 u = 4 eps. An error of s\* itself moves the
 /// point along d, which the separation feels in second order alone unless it is itself of that size.
 pub(super) const RESOLUTION: f64 = 4.0 * f64::EPSILON;
+
+/// An interval of time \[s\], from its first to its last instant.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interval {
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
+}
+
+impl Interval {
+    /// The time at a fraction of the interval, exact at both ends; no difference of times is formed that could overflow.
+    pub(super) fn at(self, fraction: f64) -> f64 {
+        ((1.0 - fraction) * self.from_s + fraction * self.to_s).max(self.from_s).min(self.to_s)
+    }
+}
+
+/// Smallest distance of two vehicles \[m\] while their relative position moves on a straight line from `from` to `to`
+/// \[m\].
+#[must_use]
+pub fn swept_separation_m(from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+    RelativeMotion::new(from, to).closest().separation_m()
+}
 
 /// Straight relative motion of a pair over a step.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +56,7 @@ pub(super) struct RelativeMotion {
 
 /// Where a relative motion is closest to zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Approach {
+pub(super) struct ClosestPoint {
     /// Smallest separation, squared \[m^2\].
     pub(super) squared: f64,
     /// Fraction s of the step at which it is reached first.
@@ -53,8 +78,8 @@ impl RelativeMotion {
 
     /// The closest approach. It is never farther than either end.
     #[inline]
-    pub(super) fn closest(&self) -> Approach {
-        let mut closest = Approach { squared: self.from_squared, at: 0.0 };
+    pub(super) fn closest(&self) -> ClosestPoint {
+        let mut closest = ClosestPoint { squared: self.from_squared, at: 0.0 };
         let start_rate = self.from.dot(&self.by);
         if start_rate < 0.0 && self.to.dot(&self.by) > 0.0 {
             let at = (-start_rate / self.by.norm_squared()).min(1.0);
@@ -69,7 +94,7 @@ impl RelativeMotion {
     /// With b = r0 . d and c = |r0|^2 - distance^2 the roots of |d|^2 s^2 + 2 b s + c are q / |d|^2 and c / q, where
     /// q = -b -+ sqrt(b^2 - |d|^2 c) takes the sign that does not cancel. The discriminant is taken from the closest
     /// point of the unbounded line, |d|^2 (distance^2 - |r(s\*)|^2), which keeps a graze exact where b^2 - |d|^2 c cancels.
-    pub(super) fn below(&self, distance_m: f64, closest: Approach) -> Span {
+    pub(super) fn below(&self, distance_m: f64, closest: ClosestPoint) -> Span {
         let excess = |squared: f64| (squared.sqrt() - distance_m) * (squared.sqrt() + distance_m);
         let (speed_squared, b, c) = (self.by.norm_squared(), self.from.dot(&self.by), excess(self.from_squared));
         let foot_squared = (self.from - self.by * (b / speed_squared)).norm_squared();
@@ -82,7 +107,7 @@ impl RelativeMotion {
     }
 }
 
-impl Approach {
+impl ClosestPoint {
     #[inline]
     fn improve(&mut self, squared: f64, at: f64) {
         if squared < self.squared {
@@ -174,7 +199,7 @@ mod tests {
     #[test]
     fn a_pair_that_keeps_its_distance_is_closest_at_the_start() {
         let still = motion([3.0, 4.0, 0.0], [3.0, 4.0, 0.0]);
-        assert_eq!(still.closest(), Approach { squared: 25.0, at: 0.0 });
+        assert_eq!(still.closest(), ClosestPoint { squared: 25.0, at: 0.0 });
         assert_eq!(still.below(6.0, still.closest()), Span { enter: 0.0, exit: 1.0 });
     }
 

@@ -12,7 +12,9 @@ use super::obstacles;
 use super::outputs;
 use super::reading::{self, ReadArguments};
 use super::{Exit, Failure};
-use crate::audit::recorded::{Approach, History, Judge, Motion, Outcome, Question, RecordedError, Terms, Who};
+use crate::audit::recorded::{
+    Approach, Motion, Outcome, PairSeries, RecordedError, Settings, TrackAuditor, VehicleSettings,
+};
 use crate::figures::{self, Encounter, Figure};
 use crate::read::{self, Format, ReadOptions};
 use crate::record::mcap::McapRecording;
@@ -151,8 +153,8 @@ fn axes(text: &str) -> Result<Vector3<f64>, String> {
 }
 
 impl AuditArguments {
-    fn question(&self) -> Result<Question, Failure> {
-        let mut vehicles: BTreeMap<String, Terms> = BTreeMap::new();
+    fn settings(&self) -> Result<Settings, Failure> {
+        let mut vehicles: BTreeMap<String, VehicleSettings> = BTreeMap::new();
         let (mut radius_m, mut max_accel_m_s2) = (None, None);
         for (name, value) in &self.radius {
             match name {
@@ -180,7 +182,7 @@ impl AuditArguments {
             return Err(Failure::input("--max-accel says nothing of a motion that is known exactly", help));
         }
         let only: BTreeSet<String> = self.ids.iter().flat_map(|Listed(names)| names.iter().cloned()).collect();
-        Ok(Question {
+        Ok(Settings {
             delta_m: self.delta,
             motion,
             max_accel_m_s2,
@@ -251,19 +253,19 @@ impl AuditArguments {
 pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     arguments.check_outputs()?;
-    let mut question = arguments.question()?;
+    let mut settings = arguments.settings()?;
     let options = arguments.reading.options(arguments.format)?;
     let path = &arguments.reading.recording;
     let own_delta_m = arguments.own_delta_m();
-    question.delta_m = question.delta_m.or(own_delta_m);
-    let judge = Judge::new(question.clone())?;
-    let Judged { outcome, clock, mut notes, curves } = judged(judge, arguments, &options, console)?;
+    settings.delta_m = settings.delta_m.or(own_delta_m);
+    let auditor = TrackAuditor::new(settings.clone())?;
+    let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
     for note in &notes {
         console.warn(&format!("note: {note}"));
     }
     let source = Source { recording: path.display().to_string(), clock, notes };
-    let report = RecordedReport::new(&outcome, &question, source, &arguments.motion_in_words(curves));
+    let report = RecordedReport::new(&outcome, &settings, source, &arguments.motion_in_words(curves));
 
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
@@ -278,7 +280,7 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
         write_atomically(file, events::junit(&report, arguments.allow_undecided)?.as_bytes())?;
     }
     if let Some(html) = &arguments.html {
-        let figures = figures(arguments, &options, &question, &outcome)?;
+        let figures = figures(arguments, &options, &settings, &outcome)?;
         write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
     }
     Ok(match report.status {
@@ -298,7 +300,7 @@ struct Judged {
 }
 
 fn judged(
-    mut judge: Judge,
+    mut auditor: TrackAuditor,
     arguments: &AuditArguments,
     options: &ReadOptions,
     console: Console,
@@ -318,14 +320,14 @@ fn judged(
         }
         first = false;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
-        judge.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(path))?;
+        auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(path))?;
         read += items.len() as u64;
         progress.set_position(read);
     }
     progress.finish_and_clear();
     let clock = recording.clock();
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
-    let outcome = judge.finish().map_err(|error| Failure::from(error).of(path))?;
+    let outcome = auditor.finish().map_err(|error| Failure::from(error).of(path))?;
     Ok(Judged { outcome, clock, notes: recording.notes().to_vec(), curves })
 }
 
@@ -333,10 +335,10 @@ fn judged(
 fn figures(
     arguments: &AuditArguments,
     options: &ReadOptions,
-    question: &Question,
+    settings: &Settings,
     outcome: &Outcome,
 ) -> Result<Vec<Figure>, Failure> {
-    let follow = |approach: &Approach| Ok((History::new(question, outcome, approach.who)?, *approach));
+    let follow = |approach: &Approach| Ok((PairSeries::new(settings, outcome, approach.pair)?, *approach));
     let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();
     let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
     let mut recording = read::open(&arguments.reading.recording, options)?;
@@ -344,17 +346,14 @@ fn figures(
     while more {
         items.clear();
         more = recording.read(&mut items)?;
-        for (history, _) in pairs.iter_mut().chain(&mut obstacles) {
-            history.push(&items)?;
+        for (series, _) in pairs.iter_mut().chain(&mut obstacles) {
+            series.push(&items)?;
         }
     }
-    let unit = if question.ellipsoid_m.is_some() { "ellipsoids" } else { "m" };
-    let encounters = |followed: Vec<(History, Approach)>| {
-        let drawn =
-            followed.into_iter().map(|(history, approach)| encounter(history, &approach, question, outcome, unit));
-        drawn.collect::<Vec<_>>()
+    let drawn = |followed: Vec<(PairSeries, Approach)>| -> Vec<Encounter> {
+        followed.into_iter().map(|(series, approach)| encounter(series, &approach, settings, outcome)).collect()
     };
-    let (pairs, obstacles) = (encounters(pairs), encounters(obstacles));
+    let (pairs, obstacles) = (drawn(pairs), drawn(obstacles));
     let mut drawn = Vec::new();
     if let Some(nearest) = pairs.first() {
         drawn.push(figures::encounters(&pairs, "encounters", "Distances of the closest pairs"));
@@ -367,22 +366,10 @@ fn figures(
 }
 
 /// What a figure shows of two who came close.
-fn encounter(
-    history: History,
-    approach: &Approach,
-    question: &Question,
-    outcome: &Outcome,
-    unit: &'static str,
-) -> Encounter {
-    let vehicle = |k: usize| outcome.vehicles.get(k).cloned().unwrap_or_default();
-    let names = match approach.who {
-        Who::Pair(pair) => [vehicle(pair.first()), vehicle(pair.second())],
-        Who::Obstacle { vehicle: k, obstacle } => {
-            [vehicle(k), question.obstacles.get(obstacle).map(|thing| thing.name.clone()).unwrap_or_default()]
-        }
-    };
+fn encounter(series: PairSeries, approach: &Approach, settings: &Settings, outcome: &Outcome) -> Encounter {
+    let unit = if settings.ellipsoid_m.is_some() { "ellipsoids" } else { "m" };
     let mut encounter = Encounter {
-        names,
+        names: outcome.names(approach.pair, &settings.obstacles),
         unit,
         distances: Vec::new(),
         paths_m: [Vec::new(), Vec::new()],
@@ -390,13 +377,13 @@ fn encounter(
         closest_s: approach.time_s,
         closest: format!("{} {unit}", interval(approach.lower_m, approach.upper_m)),
     };
-    for moment in history.finish() {
-        if moment.unseen_before {
-            encounter.distances.push((moment.time_s, f64::NAN, 0.0));
+    for sample in series.finish() {
+        if sample.unseen_before {
+            encounter.distances.push((sample.time_s, f64::NAN, 0.0));
             encounter.paths_m.iter_mut().for_each(|path| path.push((f64::NAN, f64::NAN)));
         }
-        encounter.distances.push((moment.time_s, moment.distance_m, moment.slack_m));
-        for (path, at) in encounter.paths_m.iter_mut().zip(moment.positions_m) {
+        encounter.distances.push((sample.time_s, sample.distance_m, sample.deviation_m));
+        for (path, at) in encounter.paths_m.iter_mut().zip(sample.positions_m) {
             path.push((at.x, at.y));
         }
     }
@@ -426,10 +413,9 @@ impl From<RecordedError> for Failure {
             }
             RecordedError::Obstacle(_) => "mend the file of obstacles",
             RecordedError::Unnamed { .. }
-            | RecordedError::NotFinite { .. }
             | RecordedError::TimeNotIncreasing { .. }
             | RecordedError::OutOfOrder { .. }
-            | RecordedError::Piece { .. } => "mend the recording there, or leave the vehicle out with --ids",
+            | RecordedError::Item { .. } => "mend the recording there, or leave the vehicle out with --ids",
         };
         Self::input(error.to_string(), help)
     }

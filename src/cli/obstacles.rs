@@ -28,7 +28,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::Failure;
-use crate::audit::recorded::{Obstacle, Shape};
+use crate::audit::{Obstacle, Shape};
 
 /// Largest file that is read \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::artefact::{ArtefactError, write_atomically};
 use super::findings::{Findings, Performance, Run, finite};
 use super::verdict::Verdict;
-use crate::audit::{Status, Violation};
+use crate::audit::{self, Status};
+use crate::swarm::Pair;
 
 /// Version of the keys: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -65,9 +66,9 @@ pub struct Tool {
 /// How close vehicles came.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Separation {
-    /// Safety distance delta \[m\].
-    pub delta_m: f64,
+pub struct Separation<Delta = f64> {
+    /// Safety distance delta \[m\]; of a recording, none where radii alone were asked about.
+    pub delta_m: Delta,
     /// Smallest distance of two centres over the whole run \[m\].
     pub min_m: Option<f64>,
     /// When it occurred \[s\].
@@ -98,6 +99,30 @@ pub struct Audit {
     pub parry: Parry,
     /// The engine's own collision detection, which is evidence alone.
     pub rapier: Rapier,
+}
+
+/// A time during which a pair was closer than delta.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Violation {
+    /// The pair.
+    pub pair: Pair,
+    /// When it began \[s\].
+    pub from_s: f64,
+    /// When it ended, or the end of the run \[s\].
+    pub to_s: f64,
+    /// Smallest distance within \[m\].
+    pub min_m: f64,
+    /// When that was \[s\].
+    pub min_at_s: f64,
+}
+
+impl Violation {
+    /// Of two vehicles, whichever audit found it.
+    pub(super) fn new<P>(pair: Pair, found: &audit::Violation<P>) -> Self {
+        let &audit::Violation { from_s, to_s, min_m, min_at_s, .. } = found;
+        Self { pair, from_s, to_s, min_m, min_at_s }
+    }
 }
 
 /// The closed-form sweep.
@@ -197,7 +222,7 @@ impl Report {
             },
             audit: Audit {
                 status: audit.status,
-                violations: audit.violations.clone(),
+                violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
                 steps: audit.steps,
                 pairs_checked: audit.pairs_checked,
                 closed_form: ClosedForm { min_m: closest.and_then(|closest| finite(closest.separation_m)) },

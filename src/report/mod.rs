@@ -14,12 +14,12 @@ pub mod recorded;
 mod verdict;
 mod words;
 
-pub use crate::audit::{Status, Violation};
+pub use crate::audit::Status;
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
 pub use findings::{EndedEarly, Findings, Performance, Run};
 pub use flight::{
     Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,
-    Separation, Tool, Velocity,
+    Separation, Tool, Velocity, Violation,
 };
 pub use html::RunPage;
 pub use verdict::Verdict;

@@ -7,10 +7,12 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::findings::finite;
-use super::flight::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION};
+use super::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
 use super::page::{Badge, Block, Column, Page, Section, Table, Tone};
-use crate::audit::recorded::{self, Approach, Outcome, Question, Who};
-use crate::audit::{Status, Violation};
+use crate::audit::recorded::{
+    Approach, Contradiction, Gap, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS, WIDTH_M,
+};
+use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
 use crate::swarm::Pair;
 use crate::text::{at_least, counted, fixed, metres, metres_below, seconds};
@@ -62,154 +64,63 @@ pub struct RecordedReport {
     /// First and last instant judged \[s\].
     pub span_s: Option<(f64, f64)>,
     /// How close vehicles came.
-    pub separation: Separation,
+    pub separation: Separation<Option<f64>>,
     /// What the judgement rests on.
     pub audit: Audit,
     /// Every violation, of pairs and of obstacles, in order of time.
-    pub violations: Vec<Breach>,
+    pub violations: Vec<OfPair<Violation<ObjectPair>>>,
     /// The ten closest pairs.
-    pub closest: Vec<Closest>,
+    pub closest: Vec<OfPair<Approach>>,
     /// What obstacles were in the way of.
     pub obstacles: Obstacles,
     /// When vehicles were not seen.
-    pub gaps: Vec<Gap>,
+    pub gaps: Vec<OfVehicle<Gap>>,
     /// When it cannot be told whether two came too close.
-    pub undecided: Vec<Undecided>,
+    pub undecided: Vec<OfPair<Undecided<ObjectPair>>>,
     /// Where the recording contradicts the assumed bound on acceleration.
-    pub contradiction: Option<Contradiction>,
+    pub contradiction: Option<OfVehicle<Contradiction>>,
 }
 
-/// How close vehicles came, by the keys of a flight's report.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Separation {
-    /// Safety distance delta \[m\]; none where radii alone were asked about.
-    pub delta_m: Option<f64>,
-    /// Smallest distance of two vehicles \[m\].
-    pub min_m: Option<f64>,
-    /// When it occurred \[s\].
-    pub min_at_s: Option<f64>,
-    /// Which pair.
-    pub min_pair: Option<[usize; 2]>,
-    /// Of flights alone.
-    pub certified_m: Option<f64>,
-    /// Of flights alone.
-    pub certificate_void: Vec<String>,
-}
-
-/// The closest that two came.
+/// A finding on a pair, with their names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Closest {
+pub struct OfPair<T> {
     /// Their names.
     pub who: [String; 2],
-    /// It is at least this \[m\].
-    pub lower_m: f64,
-    /// And at most this \[m\].
-    pub upper_m: f64,
-    /// When \[s\].
-    pub time_s: f64,
-    /// What it must not fall below \[m\].
-    pub limit_m: f64,
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
+}
+
+/// A finding on a vehicle, with its name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfVehicle<T> {
+    /// Its name.
+    pub vehicle: String,
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
 }
 
 /// Obstacles and who came close to them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Obstacles {
     /// The ten closest approaches.
-    pub closest: Vec<Closest>,
+    pub closest: Vec<OfPair<Approach>>,
     /// Every time that a vehicle was too close to one.
-    pub violations: Vec<Breach>,
-}
-
-/// A time during which two were too close, by their names.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Breach {
-    /// Their names.
-    pub who: [String; 2],
-    /// When it began \[s\].
-    pub from_s: f64,
-    /// When it ended \[s\].
-    pub to_s: f64,
-    /// Smallest distance within \[m\].
-    pub min_m: f64,
-    /// When that was \[s\].
-    pub min_at_s: f64,
-    /// What it must not fall below \[m\].
-    pub limit_m: f64,
-}
-
-/// A time during which a vehicle was not seen.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Gap {
-    /// The vehicle.
-    pub vehicle: String,
-    /// Last seen \[s\].
-    pub from_s: f64,
-    /// Seen again \[s\].
-    pub to_s: f64,
-}
-
-/// A time over which it cannot be told whether two came too close.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Undecided {
-    /// Their names.
-    pub who: [String; 2],
-    /// From \[s\].
-    pub from_s: f64,
-    /// To \[s\].
-    pub to_s: f64,
-    /// Their distance is at least this \[m\].
-    pub lower_m: f64,
-    /// Its smallest value is at most this \[m\].
-    pub upper_m: f64,
-    /// What it must not fall below \[m\].
-    pub limit_m: f64,
-    /// The sampling rate that would decide \[Hz\].
-    pub rate_hz: Option<f64>,
-}
-
-/// Where the recording needs more acceleration than was assumed.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Contradiction {
-    /// The vehicle.
-    pub vehicle: String,
-    /// When \[s\].
-    pub time_s: f64,
-    /// What it needs \[m/s^2\].
-    pub needs_m_s2: f64,
-    /// What was assumed \[m/s^2\].
-    pub assumed_m_s2: f64,
+    pub violations: Vec<OfPair<Violation<ObjectPair>>>,
 }
 
 impl RecordedReport {
     /// The report on an outcome.
     #[must_use]
-    pub fn new(outcome: &Outcome, question: &Question, source: Source, motion: &str) -> Self {
-        let name = |vehicle: usize| outcome.vehicles.get(vehicle).cloned().unwrap_or_else(|| (vehicle + 1).to_string());
-        let names = |who: Who| match who {
-            Who::Pair(pair) => [name(pair.first()), name(pair.second())],
-            Who::Obstacle { vehicle, obstacle } => {
-                [name(vehicle), question.obstacles.get(obstacle).map_or(String::new(), |thing| thing.name.clone())]
-            }
-        };
-        let closest = |approach: &Approach| Closest {
-            who: names(approach.who),
-            lower_m: approach.lower_m,
-            upper_m: approach.upper_m,
-            time_s: approach.time_s,
-            limit_m: approach.limit_m,
-        };
-        let breach = |v: &recorded::Violation| Breach {
-            who: names(v.who),
-            from_s: v.from_s,
-            to_s: v.to_s,
-            min_m: v.min_m,
-            min_at_s: v.min_at_s,
-            limit_m: v.limit_m,
-        };
-        let is_pair = |who: Who| matches!(who, Who::Pair(_));
+    pub fn new(outcome: &Outcome, settings: &Settings, source: Source, motion: &str) -> Self {
         let first = outcome.closest.first();
-        let scaled = question.ellipsoid_m.is_some();
+        let scaled = settings.ellipsoid_m.is_some();
         let min_m = first.and_then(|first| finite(first.certain_m()));
+        let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
+        let closest = |of: &[Approach]| of.iter().map(|a| OfPair { who: names(a.pair), finding: *a }).collect();
+        let violations: Vec<_> =
+            outcome.violations.iter().map(|v| OfPair { who: names(v.pair), finding: *v }).collect();
         Self {
             schema_version: SCHEMA_VERSION,
             status: outcome.status,
@@ -220,51 +131,44 @@ impl RecordedReport {
             judged: outcome.presence.iter().flatten().count(),
             span_s: outcome.span_s,
             separation: Separation {
-                delta_m: question.delta_m.or(scaled.then_some(recorded::TOUCHING_ELLIPSOIDS)),
+                delta_m: settings.delta_m.or(scaled.then_some(TOUCHING_ELLIPSOIDS)),
                 min_m,
                 min_at_s: first.and_then(|first| finite(first.time_s)),
-                min_pair: first.and_then(|first| first.who.pair()).map(Pair::numbers),
-                ..Separation::default()
+                min_pair: first.and_then(|first| first.pair.vehicles()).map(Pair::numbers),
+                certified_m: None,
+                certificate_void: Vec::new(),
             },
             audit: Audit {
                 status: outcome.status,
-                violations: outcome.violations.iter().filter_map(violation).collect(),
-                steps: outcome.stretches,
+                violations: outcome
+                    .violations
+                    .iter()
+                    .filter_map(|v| Some(flight::Violation::new(v.pair.vehicles()?, v)))
+                    .collect(),
+                steps: outcome.segments,
                 pairs_checked: outcome.swept,
                 closed_form: ClosedForm { min_m },
-                parry: Parry { min_toi_s: outcome.min_toi_s.and_then(finite), disagreements: outcome.disagreements },
+                parry: Parry {
+                    min_toi_s: outcome.parry.min_toi_s.and_then(finite),
+                    disagreements: outcome.parry.disagreements,
+                },
                 rapier: Rapier { contact_pairs: None },
             },
-            violations: outcome.violations.iter().map(breach).collect(),
-            closest: outcome.closest.iter().map(closest).collect(),
+            closest: closest(&outcome.closest),
             obstacles: Obstacles {
-                closest: outcome.obstacles.iter().map(closest).collect(),
-                violations: outcome.violations.iter().filter(|v| !is_pair(v.who)).map(breach).collect(),
+                closest: closest(&outcome.obstacles),
+                violations: violations.iter().filter(|v| v.finding.pair.vehicles().is_none()).cloned().collect(),
             },
+            violations,
             gaps: outcome
                 .gaps
                 .iter()
-                .map(|gap| Gap { vehicle: name(gap.vehicle), from_s: gap.from_s, to_s: gap.to_s })
+                .map(|gap| OfVehicle { vehicle: outcome.name(gap.vehicle), finding: *gap })
                 .collect(),
-            undecided: outcome
-                .undecided
-                .iter()
-                .map(|u| Undecided {
-                    who: names(u.who),
-                    from_s: u.from_s,
-                    to_s: u.to_s,
-                    lower_m: u.lower_m,
-                    upper_m: u.upper_m,
-                    limit_m: u.limit_m,
-                    rate_hz: u.rate_hz.and_then(finite),
-                })
-                .collect(),
-            contradiction: outcome.contradiction.map(|c| Contradiction {
-                vehicle: name(c.vehicle),
-                time_s: c.time_s,
-                needs_m_s2: c.needs_m_s2,
-                assumed_m_s2: c.assumed_m_s2,
-            }),
+            undecided: outcome.undecided.iter().map(|u| OfPair { who: names(u.pair), finding: *u }).collect(),
+            contradiction: outcome
+                .contradiction
+                .map(|finding| OfVehicle { vehicle: outcome.name(finding.vehicle), finding }),
         }
     }
 
@@ -301,33 +205,29 @@ impl RecordedReport {
         match self.status {
             Status::Clear => {
                 let all = self.closest.iter().chain(&self.obstacles.closest);
-                let closest = all.min_by(|a, b| a.lower_m.total_cmp(&b.lower_m)).map_or_else(
+                let lowest = all.min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
+                let closest = lowest.map_or_else(
                     || "at no time were there two vehicles to keep apart".to_owned(),
-                    |closest| {
-                        let [first, second] = &closest.who;
-                        let at = seconds(closest.time_s);
-                        format!(
-                            "never closer than {}{unit}, {first} and {second} at {at}",
-                            at_least(closest.lower_m, 6)
-                        )
+                    |OfPair { who: [first, second], finding }| {
+                        let (least, at) = (at_least(finding.lower_m, 6), seconds(finding.time_s));
+                        format!("never closer than {least}{unit}, {first} and {second} at {at}")
                     },
                 );
                 format!("{closest} ({delta}, {})", self.motion)
             }
             Status::Violation => {
-                let violations = &self.violations;
-                let deepest = violations.iter().min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
-                let others = match violations.len() {
+                let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
+                let deepest = self.violations.iter().min_by(|a, b| over(a).total_cmp(&over(b)));
+                let others = match self.violations.len() {
                     0 | 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
-                deepest.map_or(String::new(), |b| {
-                    let [first, second] = &b.who;
+                deepest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
                     format!(
                         "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
-                        metres_below(b.min_m, b.limit_m),
-                        metres(b.limit_m),
-                        seconds(b.min_at_s),
+                        metres_below(finding.min_m, finding.limit_m),
+                        metres(finding.limit_m),
+                        seconds(finding.min_at_s),
                         self.motion
                     )
                 })
@@ -341,36 +241,46 @@ impl RecordedReport {
         if self.audit.parry.disagreements > 0 {
             return "the two detectors disagree".to_owned();
         }
-        if let Some(c) = &self.contradiction {
+        if let Some(OfVehicle { vehicle, finding }) = &self.contradiction {
             return format!(
-                "{} needs {} m/s^2 at {}, more than the assumed {:?} m/s^2",
-                c.vehicle,
-                fixed(c.needs_m_s2, 3),
-                seconds(c.time_s),
-                c.assumed_m_s2
+                "{vehicle} needs {} m/s^2 at {}, more than the assumed {:?} m/s^2",
+                fixed(finding.needs_m_s2, 3),
+                seconds(finding.time_s),
+                finding.assumed_m_s2
             );
         }
-        if let Some(u) = self.undecided.iter().min_by(|a, b| a.lower_m.total_cmp(&b.lower_m)) {
-            let [first, second] = &u.who;
+        let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
+        if let Some(OfPair { who: [first, second], finding }) = closest {
             let rate =
                 self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
             return format!(
                 "{first} and {second} came to between {}{unit} and {}{unit} by {}{rate}",
-                at_least(u.lower_m, 6),
-                metres(u.upper_m),
-                seconds(u.to_s)
+                at_least(finding.lower_m, 6),
+                metres(finding.upper_m),
+                seconds(finding.to_s)
             );
         }
-        match &self.gaps[..] {
-            [] => "there was nothing to judge".to_owned(),
-            [gap] => format!("{} was not seen from {} to {}", gap.vehicle, seconds(gap.from_s), seconds(gap.to_s)),
-            [gap, ..] => format!("{} gaps, the first of {} at {}", self.gaps.len(), gap.vehicle, seconds(gap.from_s)),
+        let Some(OfVehicle { vehicle, finding: Gap { from_s, to_s, .. } }) = self.gaps.first() else {
+            return "there was nothing to judge".to_owned();
+        };
+        match self.gaps.len() {
+            1 => format!("{vehicle} was not seen from {} to {}", seconds(*from_s), seconds(*to_s)),
+            count => format!("{count} gaps, the first of {vehicle} at {}", seconds(*from_s)),
         }
     }
 
     /// The sampling rate that would decide everything undecided \[Hz\]; `None` where some of it no rate is known for.
     fn rate_hz(&self) -> Option<f64> {
-        self.undecided.iter().map(|u| u.rate_hz).try_fold(0.0, |most: f64, rate| Some(most.max(rate?)))
+        self.undecided.iter().map(|u| u.finding.rate_hz).try_fold(0.0, |most: f64, rate| Some(most.max(rate?)))
+    }
+
+    /// What was found of each kind, a sentence each.
+    fn lists(&self) -> [(&'static str, Vec<String>); 3] {
+        [
+            ("Violations", self.violations.iter().map(OfPair::<Violation<_>>::words).collect()),
+            ("Undecided", self.undecided.iter().map(OfPair::<Undecided<_>>::words).collect()),
+            ("Gaps", self.gaps.iter().map(OfVehicle::words).collect()),
+        ]
     }
 
     /// The closest pairs and what was found, a line each, with a line end.
@@ -393,27 +303,17 @@ impl RecordedReport {
             if !closest.is_empty() {
                 line(format!("{heading} [{}]", self.unit().trim()));
             }
-            for c in closest {
-                let [first, second] = &c.who;
-                let at = fixed(c.time_s, 3);
-                line(format!("  {}  at {at} s  {first} and {second}", interval(c.lower_m, c.upper_m)));
+            for OfPair { who: [first, second], finding } in closest {
+                let (apart, at) = (interval(finding.lower_m, finding.upper_m), fixed(finding.time_s, 3));
+                line(format!("  {apart}  at {at} s  {first} and {second}"));
             }
         }
-        let mut list = |heading: &str, lines: Vec<String>| {
+        for (heading, lines) in self.lists() {
             if !lines.is_empty() {
-                line(format!("{heading}: {}", lines.len()));
+                line(format!("{}: {}", heading.to_lowercase(), lines.len()));
             }
-            let rest = lines.len().saturating_sub(LISTED_IN_WORDS);
-            for words in lines.into_iter().take(LISTED_IN_WORDS) {
-                line(format!("  {words}"));
-            }
-            if rest > 0 {
-                line(format!("  and {rest} more"));
-            }
-        };
-        list("violations", self.violations.iter().map(Breach::words).collect());
-        list("undecided", self.undecided.iter().map(Undecided::words).collect());
-        list("gaps", self.gaps.iter().map(Gap::words).collect());
+            listed(lines, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
+        }
         text
     }
 
@@ -430,20 +330,9 @@ impl RecordedReport {
         if !self.obstacles.closest.is_empty() {
             sections.push(Section::new("Obstacles", vec![Block::Table(closest_table(&self.obstacles.closest))]));
         }
-        let lists = [
-            ("Violations", self.violations.iter().map(Breach::words).collect::<Vec<_>>()),
-            ("Undecided", self.undecided.iter().map(Undecided::words).collect()),
-            ("Gaps", self.gaps.iter().map(Gap::words).collect()),
-            ("How it was read", self.source.notes.clone()),
-        ];
-        for (heading, mut lines) in lists {
-            let rest = lines.len().saturating_sub(LISTED_ON_PAGE);
-            lines.truncate(LISTED_ON_PAGE);
-            if rest > 0 {
-                lines.push(format!("and {rest} more"));
-            }
+        for (heading, lines) in self.lists().into_iter().chain([("How it was read", self.source.notes.clone())]) {
             if !lines.is_empty() {
-                sections.push(Section::new(heading, vec![Block::List(lines)]));
+                sections.push(Section::new(heading, vec![Block::List(listed(lines, LISTED_ON_PAGE).collect())]));
             }
         }
         let assumed = vec![
@@ -472,40 +361,42 @@ impl RecordedReport {
     }
 }
 
-fn violation(violation: &recorded::Violation) -> Option<Violation> {
-    let recorded::Violation { from_s, to_s, min_m, min_at_s, .. } = *violation;
-    Some(Violation { pair: violation.who.pair()?, from_s, to_s, min_m, min_at_s })
+/// The first of some lines, and how many more there are.
+fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
+    let rest = lines.len().saturating_sub(most);
+    lines.truncate(most);
+    lines.into_iter().chain((rest > 0).then(|| format!("and {rest} more")))
 }
 
-impl Breach {
+impl OfPair<Violation<ObjectPair>> {
     fn words(&self) -> String {
-        let [first, second] = &self.who;
-        let min = metres_below(self.min_m, self.limit_m);
+        let Self { who: [first, second], finding } = self;
+        let min = metres_below(finding.min_m, finding.limit_m);
         format!(
             "{first} and {second}: {min} at {} s, below {} from {}",
-            fixed(self.min_at_s, 3),
-            metres(self.limit_m),
-            span(self.from_s, self.to_s)
+            fixed(finding.min_at_s, 3),
+            metres(finding.limit_m),
+            span(finding.from_s, finding.to_s)
         )
     }
 }
 
-impl Undecided {
+impl OfPair<Undecided<ObjectPair>> {
     fn words(&self) -> String {
-        let [first, second] = &self.who;
-        let rate = self.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
+        let Self { who: [first, second], finding } = self;
+        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
         format!(
             "{first} and {second}: {} from {}, limit {}{rate}",
-            interval(self.lower_m, self.upper_m),
-            span(self.from_s, self.to_s),
-            metres(self.limit_m)
+            interval(finding.lower_m, finding.upper_m),
+            span(finding.from_s, finding.to_s),
+            metres(finding.limit_m)
         )
     }
 }
 
-impl Gap {
+impl OfVehicle<Gap> {
     fn words(&self) -> String {
-        format!("{} was not seen from {}", self.vehicle, span(self.from_s, self.to_s))
+        format!("{} was not seen from {}", self.vehicle, span(self.finding.from_s, self.finding.to_s))
     }
 }
 
@@ -518,17 +409,16 @@ fn span(from_s: f64, to_s: f64) -> String {
 #[must_use]
 pub fn interval(lower: f64, upper: f64) -> String {
     let (low, high) = (at_least(lower, 6), fixed(upper, 6));
-    if upper - lower <= 2.0 * recorded::WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
+    if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
 }
 
-fn closest_table(closest: &[Closest]) -> Table {
-    let rows = closest.iter().map(|c| {
-        let [first, second] = &c.who;
+fn closest_table(closest: &[OfPair<Approach>]) -> Table {
+    let rows = closest.iter().map(|OfPair { who: [first, second], finding }| {
         vec![
             format!("{first} and {second}").into(),
-            interval(c.lower_m, c.upper_m).into(),
-            fixed(c.time_s, 3).into(),
-            metres(c.limit_m).into(),
+            interval(finding.lower_m, finding.upper_m).into(),
+            fixed(finding.time_s, 3).into(),
+            metres(finding.limit_m).into(),
         ]
     });
     Table {

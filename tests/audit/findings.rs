@@ -1,7 +1,7 @@
 //! What the judge of recordings lists: everything that it found, once, with its own numbers.
 
 use nalgebra::Vector3;
-use tautline::audit::recorded::{Motion, Outcome, Question, judge};
+use tautline::audit::recorded::{Motion, Outcome, Settings, audit};
 use tautline::track::{Item, Piece, Sample};
 
 /// Rounding of a handful of operations on numbers around ten.
@@ -11,10 +11,10 @@ fn seen(vehicle: usize, time_s: f64, at: [f64; 3]) -> Item {
     Item::Sample(Sample { vehicle, time_s, position_m: at.into(), velocity_m_s: None, radius_m: None })
 }
 
-fn asked(items: &[Item], question: Question) -> Outcome {
+fn asked(items: &[Item], settings: Settings) -> Outcome {
     let count = items.iter().map(|item| item.vehicle() + 1).max().unwrap_or(0);
     let names: Vec<String> = (1..=count).map(|number| number.to_string()).collect();
-    judge(&names, items, question).expect("it can be judged")
+    audit(&names, items, settings).expect("it can be judged")
 }
 
 /// Two come as near as this along x at each whole second, and are 30 m apart in between.
@@ -39,12 +39,12 @@ fn every_time_too_close_and_every_doubt_is_listed_once_with_its_own_smallest_dis
     }
     crowd.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
     for (items, count) in [(visits(&near), 2), (crowd, 8)] {
-        let outcome = asked(&items, Question::delta(1.0));
+        let outcome = asked(&items, Settings::delta(1.0));
         let found: Vec<_> = outcome.violations.iter().map(|v| (v.min_at_s, v.min_m)).collect();
         assert_eq!(found, expected);
         assert!(count > 2 || outcome.swept == 1 + 2 * near.len() as u64, "{}", outcome.swept);
     }
-    let bounded = Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(4.0), ..Question::delta(1.0) };
+    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(4.0), ..Settings::delta(1.0) };
     // Two accelerations of 4 m/s^2 over 1 s: at most 1 m of deviation together.
     let outcome = asked(&visits(&[1.3, 9.0, 1.9]), bounded);
     let found: Vec<_> = outcome.undecided.iter().map(|u| (u.from_s, u.to_s, u.lower_m.max(0.0))).collect();
@@ -61,13 +61,13 @@ fn each_dip_of_one_curve_has_its_own_smallest_distance() {
         let coefficients = x.iter().map(|x| Vector3::new(*x, 0.0, 0.0)).collect();
         Item::Piece(Piece { vehicle, from_s: 0.0, to_s: 4.0, coefficients })
     };
-    let outcome = asked(&[curve(0, &[0.0]), curve(1, &x)], Question::delta(0.5));
+    let outcome = asked(&[curve(0, &[0.0]), curve(1, &x)], Settings::delta(0.5));
     let [first, second] = outcome.violations[..] else { panic!("{:?}", outcome.violations) };
     for (dip, at_s, min_m) in [(first, 0.96, 0.097), (second, 2.96, 0.397)] {
         assert!((dip.min_at_s - at_s).abs() < 0.01 && (dip.min_m - min_m).abs() < 1e-3, "{dip:?}");
         assert!(dip.from_s < dip.min_at_s && dip.min_at_s < dip.to_s, "{dip:?}");
     }
-    assert_eq!(asked(&[curve(0, &[0.0]), curve(1, &x)], Question::delta(0.3)).violations.len(), 1);
+    assert_eq!(asked(&[curve(0, &[0.0]), curve(1, &x)], Settings::delta(0.3)).violations.len(), 1);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn a_vehicle_is_there_from_its_first_to_its_last_sample_however_long_the_recordi
         let second = (500..1500).contains(&k).then(|| seen(1, time_s, [9.0, 0.0, 0.0]));
         [Some(seen(0, time_s, [0.0; 3])), second].into_iter().flatten()
     });
-    let outcome = asked(&flown.collect::<Vec<_>>(), Question::delta(1.0));
+    let outcome = asked(&flown.collect::<Vec<_>>(), Settings::delta(1.0));
     let there: Vec<_> = outcome.presence.iter().flatten().map(|there| (there.from_s, there.to_s)).collect();
     assert_eq!(there, [(0.0, 0.1 * 1999.0), (50.0, 0.1 * 1499.0)]);
 }
@@ -95,12 +95,12 @@ fn a_sample_of_both_bounds_what_is_listed_from_above() {
         seen(0, 3.0, [0.0; 3]),
         seen(1, 3.0, [5.0, 0.0, 0.0]),
     ];
-    let question = Question {
+    let settings = Settings {
         max_gap_s: Some(5.0),
         motion: Some(Motion::Bounded),
         max_accel_m_s2: Some(1.0),
-        ..Question::delta(4.6)
+        ..Settings::delta(4.6)
     };
-    let closest = asked(&items, question).closest[0];
+    let closest = asked(&items, settings).closest[0];
     assert_eq!((closest.lower_m, closest.upper_m), (4.0, 4.5));
 }

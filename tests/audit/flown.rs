@@ -84,7 +84,8 @@ fn touching_at_exactly_delta_is_no_violation() {
 fn a_start_below_delta_is_a_violation_even_without_a_step() {
     let outcome = judge(DELTA_M, &[(3.0, rows(&[[0.0; 3], [1.5, 0.0, 0.0]]))]);
     assert_eq!(outcome.status, Status::Violation);
-    let expected = Violation { pair: Pair::new(0, 1), from_s: 3.0, to_s: 3.0, min_m: 1.5, min_at_s: 3.0 };
+    let pair = Pair::new(0, 1);
+    let expected = Violation { pair, from_s: 3.0, to_s: 3.0, min_m: 1.5, min_at_s: 3.0, limit_m: DELTA_M };
     assert_eq!(outcome.violations, [expected]);
     assert_eq!((outcome.parry.min_toi_s, outcome.steps, outcome.pairs_checked), (Some(3.0), 0, 1));
 }
@@ -102,7 +103,8 @@ fn a_violation_that_lasts_over_steps_is_one_interval_with_its_deepest_point() {
     let second = auditor.step(flight[2].0, &flight[2].1).unwrap();
     assert_eq!((second.began.len(), second.ended.len()), (0, 0));
     let third = auditor.step(flight[3].0, &flight[3].1).unwrap();
-    let whole = Violation { pair: Pair::new(0, 1), from_s: 2.0, to_s: 6.0, min_m: 0.0, min_at_s: 4.0 };
+    let pair = Pair::new(0, 1);
+    let whole = Violation { pair, from_s: 2.0, to_s: 6.0, min_m: 0.0, min_at_s: 4.0, limit_m: DELTA_M };
     assert_eq!((third.began.len(), third.ended), (0, &[whole][..]));
     assert_eq!(auditor.violations(), [whole]);
     assert_eq!(

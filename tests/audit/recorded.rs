@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use tautline::audit::Status;
 use tautline::audit::recorded::{
-    Judge, Motion, Obstacle, Outcome, Question, RecordedError, Shape, Terms, WIDTH_M, Who, judge,
+    Motion, ObjectPair, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings, WIDTH_M, audit,
 };
+use tautline::audit::{Obstacle, Shape, Status};
 use tautline::track::{Item, Piece, Sample};
 
 /// Rounding of a handful of operations on numbers around ten.
@@ -21,13 +21,13 @@ fn names(count: usize) -> Vec<String> {
     ["alpha", "bravo", "charlie", "delta"].iter().take(count).map(ToString::to_string).collect()
 }
 
-fn asked(items: &[Item], question: Question) -> Outcome {
+fn asked(items: &[Item], settings: Settings) -> Outcome {
     let count = items.iter().map(|item| item.vehicle() + 1).max().unwrap_or(0);
-    judge(&names(count), items, question).expect("it can be judged")
+    audit(&names(count), items, settings).expect("it can be judged")
 }
 
-fn status(items: &[Item], question: Question) -> Status {
-    asked(items, question).status
+fn status(items: &[Item], settings: Settings) -> Status {
+    asked(items, settings).status
 }
 
 /// Two vehicles pass each other within a second, `miss_m` apart in the middle and far apart in every sample.
@@ -40,17 +40,17 @@ fn pass(miss_m: f64) -> Vec<Item> {
     ]
 }
 
-fn of(terms: &[(&str, Terms)]) -> BTreeMap<String, Terms> {
-    terms.iter().map(|(name, terms)| ((*name).to_owned(), *terms)).collect()
+fn of(settings: &[(&str, VehicleSettings)]) -> BTreeMap<String, VehicleSettings> {
+    settings.iter().map(|(name, settings)| ((*name).to_owned(), *settings)).collect()
 }
 
 #[test]
 fn what_happens_between_samples_is_judged_and_equality_is_no_violation() {
-    assert_eq!(status(&pass(1.0), Question::delta(2.0)), Status::Violation);
-    assert_eq!(status(&pass(3.0), Question::delta(2.0)), Status::Clear);
-    assert_eq!(status(&pass(2.0), Question::delta(2.0)), Status::Clear);
-    assert_eq!(status(&pass(2.0_f64.next_down()), Question::delta(2.0)), Status::Violation);
-    let found = asked(&pass(1.0), Question::delta(2.0)).violations[0];
+    assert_eq!(status(&pass(1.0), Settings::delta(2.0)), Status::Violation);
+    assert_eq!(status(&pass(3.0), Settings::delta(2.0)), Status::Clear);
+    assert_eq!(status(&pass(2.0), Settings::delta(2.0)), Status::Clear);
+    assert_eq!(status(&pass(2.0_f64.next_down()), Settings::delta(2.0)), Status::Violation);
+    let found = asked(&pass(1.0), Settings::delta(2.0)).violations[0];
     let half_s = 3_f64.sqrt() / 20.0;
     assert!((found.from_s - (0.5 - half_s)).abs() < ROUNDING && (found.to_s - (0.5 + half_s)).abs() < ROUNDING);
     assert_eq!((found.min_m, found.min_at_s), (1.0, 0.5));
@@ -59,8 +59,8 @@ fn what_happens_between_samples_is_judged_and_equality_is_no_violation() {
 #[test]
 fn the_first_instant_and_a_single_sample_are_judged() {
     let once = |apart_m: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [apart_m, 0.0, 0.0])];
-    assert_eq!(status(&once(1.0), Question::delta(2.0)), Status::Violation);
-    assert_eq!(status(&once(3.0), Question::delta(2.0)), Status::Clear);
+    assert_eq!(status(&once(1.0), Settings::delta(2.0)), Status::Violation);
+    assert_eq!(status(&once(3.0), Settings::delta(2.0)), Status::Clear);
     // Seen once, in the way of one that flies.
     let in_the_way = |time_s| {
         let mut items = pass(9.0);
@@ -68,19 +68,19 @@ fn the_first_instant_and_a_single_sample_are_judged() {
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         items
     };
-    assert_eq!(status(&in_the_way(0.5), Question::delta(2.0)), Status::Violation);
-    assert_eq!(status(&in_the_way(0.1), Question::delta(2.0)), Status::Clear);
+    assert_eq!(status(&in_the_way(0.5), Settings::delta(2.0)), Status::Violation);
+    assert_eq!(status(&in_the_way(0.1), Settings::delta(2.0)), Status::Clear);
     // Apart from then on, too close at the start alone.
     let mut parting = once(1.0);
     parting.extend([seen(0, 1.0, [-5.0, 0.0, 0.0]), seen(1, 1.0, [5.0, 0.0, 0.0])]);
-    assert_eq!(asked(&parting, Question::delta(2.0)).violations[0].from_s, 0.0);
+    assert_eq!(asked(&parting, Settings::delta(2.0)).violations[0].from_s, 0.0);
 }
 
 #[test]
 fn nothing_to_judge_is_undecided() {
-    assert_eq!(judge(&[], &[], Question::delta(1.0)).unwrap().status, Status::Undecided);
-    assert_eq!(status(&[seen(0, 0.0, [0.0; 3])], Question::delta(1.0)), Status::Clear);
-    let elsewhere = Question { from_s: Some(5.0), ..Question::delta(1.0) };
+    assert_eq!(audit(&[], &[], Settings::delta(1.0)).unwrap().status, Status::Undecided);
+    assert_eq!(status(&[seen(0, 0.0, [0.0; 3])], Settings::delta(1.0)), Status::Clear);
+    let elsewhere = Settings { from_s: Some(5.0), ..Settings::delta(1.0) };
     assert_eq!(status(&pass(3.0), elsewhere), Status::Undecided);
 }
 
@@ -93,14 +93,14 @@ fn a_held_vehicle_is_where_it_was_and_its_jump_is_swept() {
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         items
     };
-    let held = Question { motion: Some(Motion::Hold), ..Question::delta(2.0) };
+    let held = Settings { motion: Some(Motion::Hold), ..Settings::delta(2.0) };
     let found = asked(&items(1.0), held.clone());
     assert_eq!((found.status, found.violations[0].from_s, found.violations[0].to_s), (Status::Violation, 1.0, 1.0));
     assert_eq!(status(&items(3.0), held.clone()), Status::Clear);
     // Charlie crosses where alpha still stands, though not where a straight flight would be.
     let mut crossing = vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [6.0, 6.0, 0.0])];
     crossing.extend([seen(1, 0.5, [6.0, 0.0, 0.0]), seen(1, 0.9, [1.0, 0.0, 0.0]), seen(0, 1.0, [0.0, 60.0, 0.0])]);
-    let patient = |motion| Question { motion: Some(motion), max_gap_s: Some(9.0), ..Question::delta(2.0) };
+    let patient = |motion| Settings { motion: Some(motion), max_gap_s: Some(9.0), ..Settings::delta(2.0) };
     assert_eq!(status(&crossing, patient(Motion::Hold)), Status::Violation);
     assert_eq!(status(&crossing, patient(Motion::Linear)), Status::Clear);
 }
@@ -184,27 +184,27 @@ fn sampled(curves: &[Item], rate_hz: u32, with_velocity: bool) -> Vec<Item> {
 #[test]
 fn the_minimum_on_curves_is_enclosed_and_not_sampled() {
     for miss_m in [0.0, 0.25, 0.610_765, 3.0] {
-        let outcome = asked(&curves(miss_m), Question::delta(0.5));
+        let outcome = asked(&curves(miss_m), Settings::delta(0.5));
         let closest = outcome.closest[0];
         // The pieces are expanded about other times than the curve was made at, which rounds.
         assert!(closest.lower_m <= miss_m + ROUNDING && miss_m <= closest.upper_m + ROUNDING, "{closest:?}");
         assert!(closest.upper_m - closest.lower_m < 2.0 * WIDTH_M, "{closest:?}");
         assert!((closest.time_s - 1.7).abs() < 1e-4, "{closest:?}");
         assert_eq!(outcome.status, if miss_m < 0.5 { Status::Violation } else { Status::Clear });
-        assert_eq!(outcome.disagreements, 0);
+        assert_eq!(outcome.parry.disagreements, 0);
     }
     // A curve is not its samples, which look better.
     let samples =
-        asked(&sampled(&curves(0.25), 10, false), Question { motion: Some(Motion::Hold), ..Question::delta(0.2) });
+        asked(&sampled(&curves(0.25), 10, false), Settings { motion: Some(Motion::Hold), ..Settings::delta(0.2) });
     assert_eq!(samples.status, Status::Clear);
-    let near = asked(&curves(0.25), Question::delta(0.25 - 2.0 * WIDTH_M)).status;
-    let beyond = asked(&curves(0.25), Question::delta(0.25 + 2.0 * WIDTH_M)).status;
+    let near = asked(&curves(0.25), Settings::delta(0.25 - 2.0 * WIDTH_M)).status;
+    let beyond = asked(&curves(0.25), Settings::delta(0.25 + 2.0 * WIDTH_M)).status;
     assert_eq!((near, beyond), (Status::Clear, Status::Violation));
 }
 
 #[test]
 fn the_time_below_delta_on_curves_ends_where_delta_is_reached() {
-    let outcome = asked(&curves(0.25), Question::delta(0.5));
+    let outcome = asked(&curves(0.25), Settings::delta(0.5));
     let [found] = outcome.violations[..] else { panic!("{outcome:?}") };
     for time_s in [found.from_s, found.to_s] {
         let x = (time_s - 1.7) * (1.0 + time_s * time_s / 4.0).powi(3);
@@ -213,8 +213,8 @@ fn the_time_below_delta_on_curves_ends_where_delta_is_reached() {
     assert!(found.from_s < 1.7 && found.to_s > 1.7);
 }
 
-fn bounded(delta_m: f64, max_accel_m_s2: f64) -> Question {
-    Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(max_accel_m_s2), ..Question::delta(delta_m) }
+fn bounded(delta_m: f64, max_accel_m_s2: f64) -> Settings {
+    Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(max_accel_m_s2), ..Settings::delta(delta_m) }
 }
 
 #[test]
@@ -250,19 +250,19 @@ fn the_rate_that_is_said_to_decide_does() {
         items
     };
     let both = |accels: [f64; 2]| {
-        let terms = |accel| Terms { max_accel_m_s2: Some(accel), ..Terms::default() };
-        let vehicles = of(&[("alpha", terms(accels[0])), ("bravo", terms(accels[1]))]);
-        Question { motion: Some(Motion::Bounded), vehicles, max_gap_s: Some(1.0), ..Question::delta(2.9) }
+        let settings = |accel| VehicleSettings { max_accel_m_s2: Some(accel), ..VehicleSettings::default() };
+        let vehicles = of(&[("alpha", settings(accels[0])), ("bravo", settings(accels[1]))]);
+        Settings { motion: Some(Motion::Bounded), vehicles, max_gap_s: Some(1.0), ..Settings::delta(2.9) }
     };
     // The same rate and acceleration of both, and a slow one beside a quick one that is seen often.
     for (rates_hz, accels) in [([1.0, 1.0], [4.0, 4.0]), ([1.0, 10.0], [8.0, 400.0])] {
-        let question = both(accels);
-        let outcome = asked(&straight(rates_hz), question.clone());
+        let settings = both(accels);
+        let outcome = asked(&straight(rates_hz), settings.clone());
         assert_eq!(outcome.status, Status::Undecided);
         let rate_hz = outcome.undecided[0].rate_hz.expect("a rate decides");
         assert!((rate_hz - ((accels[0] + accels[1]) / 8.0 / 0.1).sqrt()).abs() < 1e-9, "{rate_hz}");
-        assert_eq!(status(&straight([rate_hz; 2]), question.clone()), Status::Clear);
-        assert_eq!(status(&straight([0.7 * rate_hz; 2]), question), Status::Undecided);
+        assert_eq!(status(&straight([rate_hz; 2]), settings.clone()), Status::Clear);
+        assert_eq!(status(&straight([0.7 * rate_hz; 2]), settings), Status::Undecided);
     }
 }
 
@@ -302,14 +302,14 @@ fn pairs_on_the_ground_are_left_out_until_one_of_them_leaves_it() {
         items.extend([seen(0, 2.0, [0.0, 0.0, climbs_m]), seen(1, 2.0, [1.0, 0.0, 0.0])]);
         items
     };
-    let above = Question { above_m: Some(0.25), ..Question::delta(1.5) };
-    assert_eq!(status(&items(1.0), Question::delta(1.5)), Status::Violation);
+    let above = Settings { above_m: Some(0.25), ..Settings::delta(1.5) };
+    assert_eq!(status(&items(1.0), Settings::delta(1.5)), Status::Violation);
     assert_eq!(status(&items(0.2), above.clone()), Status::Clear);
     let outcome = asked(&items(1.0), above.clone());
     assert_eq!(outcome.violations[0].from_s, 0.5, "{outcome:?}");
     assert!((outcome.closest[0].lower_m - 1.0_f64.hypot(0.25)).abs() < ROUNDING);
     // On curves, and under a bound, which may leave the ground sooner.
-    let bounded = Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(0.01), ..above };
+    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(0.01), ..above };
     assert!(asked(&items(1.0), bounded).violations[0].from_s < 0.5);
 }
 
@@ -325,10 +325,10 @@ fn one_who_begins_to_climb_at_the_instant_another_ends_was_on_the_ground_with_it
         ]
     };
     for (above_m, motion) in [(0.0, Motion::Linear), (0.0, Motion::Hold), (0.1, Motion::Linear)] {
-        let question = Question { above_m: Some(above_m), motion: Some(motion), ..Question::delta(1.0) };
-        let outcome = asked(&items(above_m), question.clone());
+        let settings = Settings { above_m: Some(above_m), motion: Some(motion), ..Settings::delta(1.0) };
+        let outcome = asked(&items(above_m), settings.clone());
         assert_eq!(outcome.violations, [], "{above_m} {motion:?}");
-        assert_eq!(status(&items(above_m + 0.01), question), Status::Violation, "{above_m} {motion:?}");
+        assert_eq!(status(&items(above_m + 0.01), settings), Status::Violation, "{above_m} {motion:?}");
     }
 }
 
@@ -339,16 +339,16 @@ fn no_interval_is_too_short_to_be_judged() {
         let a = |k: i32| seen(0, f64::from(k) * step_s, [0.0; 3]);
         [a(0), b(0, 5.0), a(1), b(1, 0.1), a(2), b(2, 5.0)]
     };
-    assert_eq!(status(&items(1e-60), Question::delta(1.0)), Status::Violation);
-    let bounded = Question { motion: Some(Motion::Bounded), max_accel_m_s2: Some(1.0), ..Question::delta(1.0) };
+    assert_eq!(status(&items(1e-60), Settings::delta(1.0)), Status::Violation);
+    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(1.0), ..Settings::delta(1.0) };
     assert_ne!(status(&items(1e-60), bounded), Status::Clear);
-    let refused = judge(&names(2), &items(3e-310), Question::delta(1.0));
+    let refused = audit(&names(2), &items(3e-310), Settings::delta(1.0));
     assert!(matches!(refused, Err(RecordedError::TimeNotIncreasing { .. })), "{refused:?}");
 }
 
 #[test]
 fn a_window_clips_exactly() {
-    let inside = |from_s, to_s| Question { from_s, to_s, ..Question::delta(2.0) };
+    let inside = |from_s, to_s| Settings { from_s, to_s, ..Settings::delta(2.0) };
     // Below delta from 0.5 - sqrt(3) / 20 = 0.4134 s on.
     assert_eq!(status(&pass(1.0), inside(None, Some(0.41))), Status::Clear);
     assert_eq!(status(&pass(1.0), inside(Some(0.59), None)), Status::Clear);
@@ -371,20 +371,20 @@ fn a_gap_is_undecided_unless_it_is_bridged() {
         }
         items
     };
-    assert_eq!(status(&flown(99), Question::delta(2.0)), Status::Clear);
-    let outcome = asked(&flown(7), Question::delta(2.0));
+    assert_eq!(status(&flown(99), Settings::delta(2.0)), Status::Clear);
+    let outcome = asked(&flown(7), Settings::delta(2.0));
     assert_eq!((outcome.status, outcome.gaps.len(), outcome.gaps[0].vehicle), (Status::Undecided, 1, 1));
     assert!((outcome.gaps[0].from_s - 0.6).abs() < ROUNDING && (outcome.gaps[0].to_s - 0.8).abs() < ROUNDING);
-    assert_eq!(status(&flown(7), Question { max_gap_s: Some(0.25), ..Question::delta(2.0) }), Status::Clear);
+    assert_eq!(status(&flown(7), Settings { max_gap_s: Some(0.25), ..Settings::delta(2.0) }), Status::Clear);
     // Late and early are no gaps.
-    assert!(asked(&flown(0), Question::delta(2.0)).gaps.is_empty());
-    assert!(asked(&flown(19), Question::delta(2.0)).gaps.is_empty());
+    assert!(asked(&flown(0), Settings::delta(2.0)).gaps.is_empty());
+    assert!(asked(&flown(19), Settings::delta(2.0)).gaps.is_empty());
     // Nor is one that ends before the window.
-    assert_eq!(status(&flown(7), Question { from_s: Some(1.0), ..Question::delta(2.0) }), Status::Clear);
+    assert_eq!(status(&flown(7), Settings { from_s: Some(1.0), ..Settings::delta(2.0) }), Status::Clear);
     // A gap between curves.
     let mut curves = curves(5.0);
     curves.retain(|item| !(item.vehicle() == 0 && item.time_s() == 1.0));
-    assert_eq!(asked(&curves, Question::delta(0.1)).gaps.len(), 1);
+    assert_eq!(asked(&curves, Settings::delta(0.1)).gaps.len(), 1);
 }
 
 #[test]
@@ -399,11 +399,11 @@ fn a_clock_that_was_off_is_set_right() {
     };
     let mut items: Vec<_> = through(0, 0.0, false).chain(through(1, 1.0, true)).collect();
     items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-    let set = |offset_s| Question {
-        vehicles: of(&[("bravo", Terms { offset_s, ..Terms::default() })]),
-        ..Question::delta(2.0)
+    let set = |offset_s| Settings {
+        vehicles: of(&[("bravo", VehicleSettings { offset_s, ..VehicleSettings::default() })]),
+        ..Settings::delta(2.0)
     };
-    assert_eq!(status(&items, Question::delta(2.0)), Status::Clear);
+    assert_eq!(status(&items, Settings::delta(2.0)), Status::Clear);
     let outcome = asked(&items, set(-1.0));
     assert_eq!(outcome.status, Status::Violation);
     assert!(outcome.closest[0].lower_m < 1e-12 && (outcome.closest[0].time_s - 2.0).abs() < 1e-12);
@@ -414,24 +414,24 @@ fn a_clock_that_was_off_is_set_right() {
 fn ellipsoids_are_judged_by_scaled_distance() {
     let stacked = |dz: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [0.0, 0.0, dz])];
     let beside = |dx: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [dx, 0.0, 0.0])];
-    let downwash = Question { ellipsoid_m: Some(Vector3::new(0.125, 0.125, 0.375)), ..Question::default() };
+    let downwash = Settings { ellipsoid_m: Some(Vector3::new(0.125, 0.125, 0.375)), ..Settings::default() };
     assert_eq!(status(&stacked(0.7), downwash.clone()), Status::Violation);
     assert_eq!(status(&stacked(0.75), downwash.clone()), Status::Clear);
     assert_eq!(status(&beside(0.3), downwash.clone()), Status::Clear);
     let outcome = asked(&beside(0.2), downwash.clone());
     assert_eq!(outcome.status, Status::Violation);
     assert!((outcome.closest[0].lower_m - 1.6).abs() < ROUNDING);
-    assert_eq!(status(&beside(0.2), Question { delta_m: Some(1.5), ..downwash }), Status::Clear);
+    assert_eq!(status(&beside(0.2), Settings { delta_m: Some(1.5), ..downwash }), Status::Clear);
 }
 
 #[test]
 fn radii_and_delta_are_both_kept() {
     let apart = |distance_m: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [distance_m, 0.0, 0.0])];
-    let radius = |radius_m| Terms { radius_m: Some(radius_m), ..Terms::default() };
-    let radii = Question { vehicles: of(&[("alpha", radius(0.5)), ("bravo", radius(1.0))]), ..Question::default() };
+    let radius = |radius_m| VehicleSettings { radius_m: Some(radius_m), ..VehicleSettings::default() };
+    let radii = Settings { vehicles: of(&[("alpha", radius(0.5)), ("bravo", radius(1.0))]), ..Settings::default() };
     assert_eq!(status(&apart(1.4), radii.clone()), Status::Violation);
     assert_eq!(status(&apart(1.5), radii.clone()), Status::Clear);
-    let both = Question { delta_m: Some(2.0), ..radii };
+    let both = Settings { delta_m: Some(2.0), ..radii };
     assert_eq!(status(&apart(1.6), both), Status::Violation);
     // The recording's own radii, and none at all.
     let mut own = apart(1.4);
@@ -440,8 +440,8 @@ fn radii_and_delta_are_both_kept() {
             sample.radius_m = Some(0.75);
         }
     }
-    assert_eq!(status(&own, Question::default()), Status::Violation);
-    let none = judge(&names(2), &apart(1.4), Question::default()).unwrap_err();
+    assert_eq!(status(&own, Settings::default()), Status::Violation);
+    let none = audit(&names(2), &apart(1.4), Settings::default()).unwrap_err();
     assert_eq!(none, RecordedError::NoLimit { vehicle: "alpha".to_owned() });
 }
 
@@ -453,7 +453,7 @@ fn thing(shape: Shape, at: [f64; 3]) -> Obstacle {
 fn obstacles_are_kept_clear_of() {
     let flight = [seen(0, 0.0, [-5.0, 0.0, 2.0]), seen(0, 1.0, [5.0, 0.0, 2.0])];
     // A keep-out ball of delta / 2 = 0.5 m must not enter.
-    let with = |obstacle: Obstacle| Question { obstacles: vec![obstacle], ..Question::delta(1.0) };
+    let with = |obstacle: Obstacle| Settings { obstacles: vec![obstacle], ..Settings::delta(1.0) };
     let ball = Shape::Ball { radius_m: 1.0 };
     let cuboid = Shape::Box { half_m: Vector3::new(1.0, 1.0, 1.0), yaw_rad: 0.3 };
     let capsule =
@@ -468,7 +468,7 @@ fn obstacles_are_kept_clear_of() {
             (Some(0.0), 1.1, Status::Violation),
         ] {
             let outcome = asked(&flight, with(Obstacle { clearance_m, ..thing(shape, [0.0, 0.0, z]) }));
-            assert_eq!((outcome.status, outcome.disagreements), (expected, 0), "{shape:?} {z} {outcome:?}");
+            assert_eq!((outcome.status, outcome.parry.disagreements), (expected, 0), "{shape:?} {z} {outcome:?}");
             assert!((outcome.obstacles[0].lower_m - (1.0 - z)).abs() < 1e-9, "{outcome:?}");
         }
     }
@@ -484,17 +484,17 @@ fn obstacles_are_kept_clear_of() {
     };
     let hit = asked(&flight, with(moving(0.0)));
     assert_eq!(hit.status, Status::Violation);
-    assert!(matches!(hit.violations[0].who, Who::Obstacle { vehicle: 0, obstacle: 0 }));
+    assert!(matches!(hit.violations[0].pair, ObjectPair::Obstacle { vehicle: 0, obstacle: 0 }));
     assert_eq!(status(&flight, with(moving(3.0))), Status::Clear);
     // On a curve.
-    let outcome = asked(&curves(5.0), Question { obstacles: vec![ground(-20.0)], ..Question::delta(0.1) });
-    assert_eq!((outcome.disagreements, outcome.status), (0, Status::Clear));
+    let outcome = asked(&curves(5.0), Settings { obstacles: vec![ground(-20.0)], ..Settings::delta(0.1) });
+    assert_eq!((outcome.parry.disagreements, outcome.status), (0, Status::Clear));
     // Alpha begins within one box, 0.1 m deep, and never comes near the other.
     for (at, expected) in [([0.3, 1.0, 1.5], Status::Violation), ([0.3, 1.0, 9.5], Status::Clear)] {
         let cuboid = Shape::Box { half_m: Vector3::repeat(0.1), yaw_rad: 0.3 };
         let entered = with(Obstacle { clearance_m: Some(0.0), ..thing(cuboid, at) });
         let outcome = asked(&curves(5.0), entered);
-        assert_eq!((outcome.disagreements, outcome.status), (0, expected), "{outcome:?}");
+        assert_eq!((outcome.parry.disagreements, outcome.status), (0, expected), "{outcome:?}");
     }
 }
 
@@ -503,39 +503,39 @@ fn only_those_who_are_asked_for_are_judged() {
     let mut items = pass(1.0);
     items.extend([seen(2, 0.0, [0.0, 50.0, 0.0]), seen(2, 1.0, [0.0, 50.0, 0.0])]);
     items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-    let only = |names: &[&str]| Question {
+    let only = |names: &[&str]| Settings {
         only: Some(names.iter().map(ToString::to_string).collect::<BTreeSet<_>>()),
-        ..Question::delta(2.0)
+        ..Settings::delta(2.0)
     };
     assert_eq!(status(&items, only(&["alpha", "charlie"])), Status::Clear);
     assert_eq!(status(&items, only(&["alpha", "bravo"])), Status::Violation);
-    let unknown = judge(&names(3), &items, only(&["zulu"])).unwrap_err();
+    let unknown = audit(&names(3), &items, only(&["zulu"])).unwrap_err();
     assert_eq!(unknown.to_string(), "the recording has no vehicle zulu; it has alpha, bravo, charlie");
 }
 
 #[test]
 fn wrong_recordings_and_questions_are_refused_by_name() {
-    let refused = |items: &[Item], question: Question| judge(&names(2), items, question).unwrap_err().to_string();
+    let refused = |items: &[Item], settings: Settings| audit(&names(2), items, settings).unwrap_err().to_string();
     let twice = [seen(0, 1.0, [0.0; 3]), seen(0, 1.0, [1.0, 0.0, 0.0])];
-    assert!(refused(&twice, Question::delta(1.0)).contains("alpha: the time 1.0 s is not later than 1.0 s"));
+    assert!(refused(&twice, Settings::delta(1.0)).contains("alpha: the time 1.0 s is not later than 1.0 s"));
     assert!(
-        refused(&[seen(1, 1.0, [f64::NAN, 0.0, 0.0])], Question::delta(1.0)).contains("bravo at 1.0 s: the position")
+        refused(&[seen(1, 1.0, [f64::NAN, 0.0, 0.0])], Settings::delta(1.0)).contains("bravo at 1.0 s: the position")
     );
     let back = [seen(0, 1.0, [0.0; 3]), seen(1, 0.5, [0.0; 3])];
-    assert!(refused(&back, Question::delta(1.0)).contains("comes after one at 1.0 s"));
-    assert!(refused(&[seen(7, 1.0, [0.0; 3])], Question::delta(1.0)).contains("no name for vehicle 8"));
-    let with = |motion| Question { motion: Some(motion), ..Question::delta(1.0) };
+    assert!(refused(&back, Settings::delta(1.0)).contains("comes after one at 1.0 s"));
+    assert!(refused(&[seen(7, 1.0, [0.0; 3])], Settings::delta(1.0)).contains("no name for vehicle 8"));
+    let with = |motion| Settings { motion: Some(motion), ..Settings::delta(1.0) };
     assert!(refused(&pass(1.0), with(Motion::Polynomial)).contains("has samples and no curve"));
     assert!(refused(&curves(1.0), with(Motion::Linear)).contains("has a curve"));
     assert!(refused(&pass(1.0), with(Motion::Bounded)).contains("needs its largest acceleration"));
-    for question in [
-        Question::delta(0.0),
-        Question::delta(f64::NAN),
-        Question { max_gap_s: Some(-1.0), ..Question::delta(1.0) },
-        Question { from_s: Some(2.0), to_s: Some(1.0), ..Question::delta(1.0) },
-        Question { ellipsoid_m: Some(Vector3::new(1.0, 0.0, 1.0)), ..Question::default() },
+    for settings in [
+        Settings::delta(0.0),
+        Settings::delta(f64::NAN),
+        Settings { max_gap_s: Some(-1.0), ..Settings::delta(1.0) },
+        Settings { from_s: Some(2.0), to_s: Some(1.0), ..Settings::delta(1.0) },
+        Settings { ellipsoid_m: Some(Vector3::new(1.0, 0.0, 1.0)), ..Settings::default() },
     ] {
-        assert!(Judge::new(question.clone()).is_err(), "{question:?}");
+        assert!(TrackAuditor::new(settings.clone()).is_err(), "{settings:?}");
     }
 }
 
@@ -551,9 +551,9 @@ fn a_recording_in_parts_is_judged_like_the_whole() {
             }
         }
     }
-    let question = Question { max_gap_s: Some(1.0), ..Question::delta(2.0) };
-    let whole = judge(&names(4), &items, question.clone()).unwrap();
-    let mut in_parts = Judge::new(question).unwrap();
+    let settings = Settings { max_gap_s: Some(1.0), ..Settings::delta(2.0) };
+    let whole = audit(&names(4), &items, settings.clone()).unwrap();
+    let mut in_parts = TrackAuditor::new(settings).unwrap();
     for part in items.chunks(7) {
         in_parts.push(&names(4), part).unwrap();
     }
@@ -587,8 +587,8 @@ proptest! {
         let motion = [None, Some(Motion::Linear), Some(Motion::Hold), Some(Motion::Polynomial), Some(Motion::Bounded)]
             [usize::from(motion)];
         let obstacles = vec![thing(Shape::Ball { radius_m: 1.0 }, [0.0; 3])];
-        let question =
-            Question { motion, above_m: above, max_accel_m_s2: Some(1.0), obstacles, ..Question::delta(1.0) };
-        let _ = judge(&names(4), &items, question);
+        let settings =
+            Settings { motion, above_m: above, max_accel_m_s2: Some(1.0), obstacles, ..Settings::delta(1.0) };
+        let _ = audit(&names(4), &items, settings);
     }
 }

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use num_rational::BigRational;
 use tautline::audit::Status;
-use tautline::audit::recorded::{Outcome, Question, Who, judge};
+use tautline::audit::recorded::{ObjectPair, Outcome, Settings, audit};
 use tautline::swarm::Pair;
 use tautline::track::{Item, Sample};
 
@@ -248,8 +248,8 @@ fn nearest(fraction: &BigRational) -> f64 {
 fn judged(tracks: &Tracks) -> Outcome {
     let names: Vec<String> = (1..=tracks.len()).map(|k| k.to_string()).collect();
     // Late and rare sightings are no gaps here.
-    let question = Question { max_gap_s: Some(f64::INFINITY), ..Question::delta(DELTA_M) };
-    judge(&names, &items(tracks), question).expect("a scene can be judged")
+    let settings = Settings { max_gap_s: Some(f64::INFINITY), ..Settings::delta(DELTA_M) };
+    audit(&names, &items(tracks), settings).expect("a scene can be judged")
 }
 
 /// Whether the judge's answer is that of brute force; says whether samples alone would have misled.
@@ -264,9 +264,9 @@ fn compare(number: u64, tracks: &Tracks) -> bool {
     let told: BTreeSet<Pair> = outcome
         .violations
         .iter()
-        .map(|violation| match violation.who {
-            Who::Pair(pair) => pair,
-            Who::Obstacle { .. } => panic!("there is none"),
+        .map(|violation| match violation.pair {
+            ObjectPair::Vehicles(pair) => pair,
+            ObjectPair::Obstacle { .. } => panic!("there is none"),
         })
         .collect();
     let true_ones: BTreeSet<Pair> =
@@ -279,14 +279,14 @@ fn compare(number: u64, tracks: &Tracks) -> bool {
     );
     let status = if true_ones.is_empty() { Status::Clear } else { Status::Violation };
     assert_eq!(outcome.status, status, "scene {number}: {outcome:?}");
-    assert_eq!(outcome.disagreements, 0, "scene {number}: {:?}", outcome.first_disagreement);
+    assert_eq!(outcome.parry.disagreements, 0, "scene {number}: {:?}", outcome.parry.first_disagreement);
 
     let mut smallest: Vec<f64> = answers.values().map(|answer| answer.min_m).collect();
     smallest.sort_by(f64::total_cmp);
     smallest.truncate(10);
     assert_eq!(outcome.closest.len(), smallest.len(), "scene {number}");
     for (approach, min_m) in outcome.closest.iter().zip(smallest) {
-        let Who::Pair(pair) = approach.who else { panic!("there is none") };
+        let ObjectPair::Vehicles(pair) = approach.pair else { panic!("there is none") };
         let answer = answers[&pair];
         // The judge's distance is that of the pair, and the list is the list of the smallest.
         let rounding_m = ROUNDING * answer.scale_m + TIE * min_m;

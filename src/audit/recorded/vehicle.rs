@@ -1,15 +1,15 @@
-//! One vehicle of a recording, from items to stretches.
+//! One vehicle of a recording, from items to segments.
 
 use nalgebra::Vector3;
 
-use super::enclosure::range;
-use super::outcome::{Contradiction, Gap, Presence, RecordedError};
-use super::question::Motion;
-use super::segment::{Curve, Segment, Slack};
-use crate::track::{Piece, Sample};
+use super::error::RecordedError;
+use super::outcome::{Contradiction, Gap, Presence};
+use super::settings::{Motion, Settings};
+use crate::audit::polynomial::BernsteinBasis;
+use crate::audit::segment::{Curve, Deviation, Segment};
+use crate::audit::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
+use crate::track::{Item, Piece, Sample};
 
-/// Largest coordinate that is judged \[m\]: fourth powers of lengths stay finite.
-const MAX_COORDINATE_M: f64 = 1e70;
 /// Pieces of a curve that follow each other within this \[s\] leave no gap: times are written with so many digits. What the
 /// position jumps by is swept.
 const SAME_INSTANT_S: f64 = 1e-6;
@@ -20,49 +20,44 @@ const SHORTEST_INTERVAL_S: f64 = 1e-70;
 /// Relative excess over the assumed acceleration that rounding explains.
 const ROUNDING: f64 = 1e-9;
 
-/// How one vehicle is judged.
-#[derive(Clone, Debug)]
-pub(super) struct Course {
-    pub(super) offset_s: f64,
-    pub(super) motion: Option<Motion>,
-    pub(super) max_accel_m_s2: f64,
-    /// 1 over the axes of the ellipsoid.
-    pub(super) scale: Option<Vector3<f64>>,
-    pub(super) window_s: (f64, f64),
-    pub(super) above_m: Option<f64>,
-    pub(super) max_gap_s: f64,
-}
-
-/// A vehicle as far as it has been read.
+/// A vehicle as far as it has been read, and how it is judged.
 #[derive(Clone, Debug)]
 pub(super) struct Vehicle {
     pub(super) name: String,
     /// Whether it is judged.
     pub(super) asked_for: bool,
-    pub(super) course: Course,
-    /// Radius \[m\]; none where neither the recording nor the question has one.
+    offset_s: f64,
+    motion: Option<Motion>,
+    /// Largest acceleration \[m/s^2\]; NaN where none is given.
+    max_accel_m_s2: f64,
+    /// 1 over the axes of the ellipsoid.
+    scale: Option<Vector3<f64>>,
+    window: Interval,
+    above_m: Option<f64>,
+    pub(super) max_gap_s: f64,
+    /// Radius \[m\]; none where neither the recording nor the settings have one.
     pub(super) radius_m: Option<f64>,
     /// Whether the radius was taken from the recording and must not change.
-    pub(super) radius_recorded: bool,
-    /// Stretches not yet done with, in order of time.
+    radius_recorded: bool,
+    /// Segments not yet done with, in order of time.
     pub(super) segments: Vec<Segment>,
     /// When the vehicle was there, as far as it was forgotten.
     pub(super) presence: Option<Presence>,
-    last: Option<Seen>,
+    last: Option<Fix>,
     /// Speed over the last interval \[m/s\] and its length \[s\].
     last_interval: Option<(Vector3<f64>, f64)>,
     pub(super) contradiction: Option<Contradiction>,
 }
 
-/// The end of what is known.
+/// Where the vehicle was last known to be.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct Fix {
     time_s: f64,
     position_m: Vector3<f64>,
     velocity_m_s: Option<Vector3<f64>>,
 }
 
-impl Seen {
+impl Fix {
     #[inline]
     fn new(time_s: f64, sample: &Sample) -> Self {
         Self { time_s, position_m: sample.position_m, velocity_m_s: sample.velocity_m_s }
@@ -70,11 +65,19 @@ impl Seen {
 }
 
 impl Vehicle {
-    pub(super) fn new(name: String, asked_for: bool, course: Course, radius_m: Option<f64>) -> Self {
+    pub(super) fn new(name: &str, settings: &Settings, max_gap_s: f64) -> Self {
+        let own = settings.vehicles.get(name).copied().unwrap_or_default();
+        let radius_m = own.radius_m.or(settings.radius_m);
         Self {
-            name,
-            asked_for,
-            course,
+            name: name.to_owned(),
+            asked_for: settings.only.as_ref().is_none_or(|only| only.contains(name)),
+            offset_s: own.offset_s,
+            motion: settings.motion,
+            max_accel_m_s2: own.max_accel_m_s2.or(settings.max_accel_m_s2).unwrap_or(f64::NAN),
+            scale: settings.ellipsoid_m.map(|axes| axes.map(f64::recip)),
+            window: settings.window(),
+            above_m: settings.above_m,
+            max_gap_s,
             radius_m,
             radius_recorded: radius_m.is_none(),
             segments: Vec::new(),
@@ -83,6 +86,18 @@ impl Vehicle {
             last_interval: None,
             contradiction: None,
         }
+    }
+
+    /// Whether it can be judged, once it was seen.
+    pub(super) fn check(&self, settings: &Settings) -> Result<(), RecordedError> {
+        if self.motion == Some(Motion::Bounded) && self.max_accel_m_s2.is_nan() {
+            return Err(RecordedError::NoBound { vehicle: self.name.clone() });
+        }
+        let limited = settings.delta_m.is_some() || settings.ellipsoid_m.is_some();
+        if !limited && self.radius_m.is_none_or(|radius_m| radius_m < MIN_LIMIT_M) {
+            return Err(RecordedError::NoLimit { vehicle: self.name.clone() });
+        }
+        Ok(())
     }
 
     #[inline]
@@ -95,19 +110,28 @@ impl Vehicle {
         self.last.map_or(f64::NEG_INFINITY, |last| last.time_s)
     }
 
+    /// Takes what is said of it next; returns the gap before it, if there is one.
+    #[inline]
+    pub(super) fn take(&mut self, item: &Item) -> Result<Option<Gap>, RecordedError> {
+        match item {
+            Item::Sample(sample) => self.sample(sample),
+            Item::Piece(piece) => self.piece(piece),
+        }
+    }
+
     /// Takes a sample; returns the gap before it, if there is one.
     #[inline]
     pub(super) fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
-        let motion = self.course.motion.unwrap_or(Motion::Linear);
+        let motion = self.motion.unwrap_or(Motion::Linear);
         if motion == Motion::Polynomial {
             return Err(RecordedError::NotACurve { vehicle: self.name.clone() });
         }
-        let time_s = sample.time_s + self.course.offset_s;
+        let time_s = sample.time_s + self.offset_s;
         self.check_sample(sample)?;
         if let Some(last) = &self.last
             && time_s - last.time_s < SHORTEST_INTERVAL_S
         {
-            return Err(self.not_increasing(time_s));
+            return Err(self.not_increasing(last.time_s, time_s));
         }
         if self.radius_recorded && sample.radius_m != self.radius_m {
             if self.last.is_some() {
@@ -118,7 +142,7 @@ impl Vehicle {
         }
         let mut gap = None;
         match &self.last {
-            Some(last) if time_s - last.time_s <= self.course.max_gap_s => {
+            Some(last) if time_s - last.time_s <= self.max_gap_s => {
                 let (from_s, from) = (last.time_s, self.scaled(last.position_m));
                 let to = self.scaled(sample.position_m);
                 match motion {
@@ -127,7 +151,11 @@ impl Vehicle {
                         self.keep_straight((from_s, time_s), from, from);
                         self.keep_straight((time_s, time_s), from, to);
                     }
-                    Motion::Bounded => self.keep_bounded(sample.vehicle, *last, Seen::new(time_s, sample)),
+                    Motion::Bounded => {
+                        let (last, fix) = (*last, Fix::new(time_s, sample));
+                        self.compare_with_bound(sample.vehicle, &last, &fix);
+                        self.keep_bounded(&last, &fix);
+                    }
                 }
             }
             last => {
@@ -137,32 +165,27 @@ impl Vehicle {
                 self.keep_straight((time_s, time_s), at, at);
             }
         }
-        self.last = Some(Seen::new(time_s, sample));
+        self.last = Some(Fix::new(time_s, sample));
         Ok(gap)
     }
 
     /// Takes a piece of a curve; returns the gap before it, if there is one.
     pub(super) fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
-        if !matches!(self.course.motion, None | Some(Motion::Polynomial)) {
+        if !matches!(self.motion, None | Some(Motion::Polynomial)) {
             return Err(RecordedError::NotSamples { vehicle: self.name.clone() });
         }
-        let (from_s, to_s) = (piece.from_s + self.course.offset_s, piece.to_s + self.course.offset_s);
+        let (from_s, to_s) = (piece.from_s + self.offset_s, piece.to_s + self.offset_s);
         let coefficients: Vec<_> = piece.coefficients.iter().map(|c| self.scaled(*c)).collect();
-        let segment = self.curve(Curve { from_s, to_s, coefficients, slack: Slack::None })?;
+        let segment = self.curve(Curve { from_s, to_s, coefficients, deviation: Deviation::None })?;
         let (start, end) = (segment.from, segment.to);
-        let seen = Seen { time_s: to_s, position_m: end, velocity_m_s: None };
+        let fix = Fix { time_s: to_s, position_m: end, velocity_m_s: None };
         let mut gap = None;
-        match self.last.replace(seen) {
+        match self.last.replace(fix) {
             Some(last) if from_s < last.time_s - SAME_INSTANT_S => {
-                return Err(RecordedError::TimeNotIncreasing {
-                    vehicle: self.name.clone(),
-                    previous_s: last.time_s,
-                    time_s: from_s,
-                });
+                return Err(self.not_increasing(last.time_s, from_s));
             }
-            Some(last) if from_s - last.time_s <= self.course.max_gap_s.max(SAME_INSTANT_S) => {
-                let rests = last.position_m == start && last.time_s == from_s;
-                if !rests {
+            Some(last) if from_s - last.time_s <= self.max_gap_s.max(SAME_INSTANT_S) => {
+                if last.position_m != start || last.time_s != from_s {
                     self.keep_straight((last.time_s.min(from_s), from_s), last.position_m, start);
                 }
             }
@@ -173,7 +196,7 @@ impl Vehicle {
     }
 
     fn curve(&self, curve: Curve) -> Result<Segment, RecordedError> {
-        let wrong = |what| Err(RecordedError::Piece { vehicle: self.name.clone(), time_s: curve.from_s, what });
+        let wrong = |what: &str| Err(self.wrong(curve.from_s, what.to_owned()));
         if curve.coefficients.is_empty() {
             return wrong("the piece has no coefficients");
         }
@@ -182,42 +205,37 @@ impl Vehicle {
         }
         let length = curve.to_s - curve.from_s;
         let reach = curve.coefficients.iter().rev().fold(0.0, |sum, c| sum * length + c.abs().sum());
-        if reach.is_nan() || reach > MAX_COORDINATE_M {
+        if reach.is_nan() || reach > MAX_LENGTH_M {
             return wrong("a coefficient is not a finite number, or leads beyond 1e70 m");
         }
         Ok(Segment::curved(curve))
     }
 
+    /// Keeps the chord, or the cubic, between two samples, and how far the vehicle can be from it.
     #[inline(never)]
-    fn keep_bounded(&mut self, index: usize, last: Seen, seen: Seen) {
-        self.compare_with_bound(index, &last, &seen);
-        let segment = self.bounded(&last, &seen);
-        self.keep(&segment);
-    }
-
-    fn bounded(&self, last: &Seen, seen: &Seen) -> Segment {
-        let h = seen.time_s - last.time_s;
-        let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
+    fn keep_bounded(&mut self, last: &Fix, fix: &Fix) {
+        let h = fix.time_s - last.time_s;
+        let (from, to) = (self.scaled(last.position_m), self.scaled(fix.position_m));
         // Lengths are divided by the axes of the ellipsoid, so deviations by its shortest.
-        let accel = self.course.max_accel_m_s2 * self.course.scale.map_or(1.0, |scale| scale.max());
-        let (coefficients, slack) = match last.velocity_m_s.zip(seen.velocity_m_s) {
+        let accel = self.max_accel_m_s2 * self.scale.map_or(1.0, |scale| scale.max());
+        let (coefficients, deviation) = match last.velocity_m_s.zip(fix.velocity_m_s) {
             Some((start, end)) => {
                 let (by, start, end) = (to - from, self.scaled(start), self.scaled(end));
                 let second = (by * 3.0 / h - start * 2.0 - end) / h;
                 let third = (start + end - by * 2.0 / h) / (h * h);
-                (vec![from, start, second, third], Slack::Hermite { peak: accel * h * h / 16.0 })
+                (vec![from, start, second, third], Deviation::Hermite { peak: accel * h * h / 16.0 })
             }
-            None => (vec![from, (to - from) / h], Slack::Chord { peak: accel * h * h / 8.0 }),
+            None => (vec![from, (to - from) / h], Deviation::Chord { peak: accel * h * h / 8.0 }),
         };
-        let curve = Curve { from_s: last.time_s, to_s: seen.time_s, coefficients, slack };
-        Segment { from, to, ..Segment::curved(curve) }
+        let curve = Curve { from_s: last.time_s, to_s: fix.time_s, coefficients, deviation };
+        self.keep(&Segment { from, to, ..Segment::curved(curve) });
     }
 
     /// Notes where two samples, or three without velocities, cannot be joined within the bound.
-    fn compare_with_bound(&mut self, index: usize, last: &Seen, seen: &Seen) {
-        let h = seen.time_s - last.time_s;
-        let mean = (seen.position_m - last.position_m) / h;
-        let rounding = 4.0 * f64::EPSILON * (seen.position_m.norm() + last.position_m.norm()) / (h * h);
+    fn compare_with_bound(&mut self, index: usize, last: &Fix, fix: &Fix) {
+        let h = fix.time_s - last.time_s;
+        let mean = (fix.position_m - last.position_m) / h;
+        let rounding = 4.0 * f64::EPSILON * (fix.position_m.norm() + last.position_m.norm()) / (h * h);
         let mut needs = 0.0_f64;
         if let Some((before, before_s)) = self.last_interval {
             let apart_s = 0.5 * (before_s + h);
@@ -226,43 +244,41 @@ impl Vehicle {
         if let Some(start) = last.velocity_m_s {
             needs = needs.max(2.0 * (mean - start).norm() / h - 2.0 * rounding);
         }
-        if let Some(end) = seen.velocity_m_s {
+        if let Some(end) = fix.velocity_m_s {
             needs = needs.max(2.0 * (end - mean).norm() / h - 2.0 * rounding);
         }
-        if let Some((start, end)) = last.velocity_m_s.zip(seen.velocity_m_s) {
+        if let Some((start, end)) = last.velocity_m_s.zip(fix.velocity_m_s) {
             needs = needs.max((end - start).norm() / h);
         }
         self.last_interval = Some((mean, h));
-        let assumed_m_s2 = self.course.max_accel_m_s2;
+        let assumed_m_s2 = self.max_accel_m_s2;
         let excess = needs > assumed_m_s2 * (1.0 + ROUNDING);
-        let judged = self.course.window_s.0 <= seen.time_s && last.time_s <= self.course.window_s.1;
+        let judged = self.window.from_s <= fix.time_s && last.time_s <= self.window.to_s;
         if excess && judged && self.contradiction.is_none_or(|largest| needs > largest.needs_m_s2) {
             self.contradiction =
                 Some(Contradiction { vehicle: index, time_s: last.time_s, needs_m_s2: needs, assumed_m_s2 });
         }
     }
 
-    /// Keeps what is asked for of a straight stretch. Where that is all of it, it is written in place: it is what most
+    /// Keeps what is asked for of a straight segment. Where that is all of it, it is written in place: it is what most
     /// recordings consist of.
     #[inline]
     fn keep_straight(&mut self, (from_s, to_s): (f64, f64), from: Vector3<f64>, to: Vector3<f64>) {
-        let (start_s, end_s) = self.course.window_s;
-        if start_s <= from_s && to_s <= end_s && self.course.above_m.is_none() {
+        if self.window.from_s <= from_s && to_s <= self.window.to_s && self.above_m.is_none() {
             self.segments.push(Segment::straight(from_s, to_s, from, to));
         } else {
             self.keep(&Segment::straight(from_s, to_s, from, to));
         }
     }
 
-    /// Keeps what is asked for of any stretch.
+    /// Keeps what is asked for of any segment.
     #[inline(never)]
     fn keep(&mut self, segment: &Segment) {
-        let (from_s, to_s) = self.course.window_s;
-        let Some(segment) = segment.clipped(from_s, to_s) else { return };
-        match self.course.above_m {
+        let Some(segment) = segment.clipped(self.window) else { return };
+        match self.above_m {
             None => self.segments.push(segment),
             Some(above_m) => {
-                let height = above_m * self.course.scale.map_or(1.0, |scale| scale.z) - segment.slack();
+                let height = above_m * self.scale.map_or(1.0, |scale| scale.z) - segment.deviation();
                 split_at_height(segment, height, &mut self.segments);
             }
         }
@@ -270,7 +286,7 @@ impl Vehicle {
 
     #[inline]
     fn scaled(&self, v: Vector3<f64>) -> Vector3<f64> {
-        match &self.course.scale {
+        match &self.scale {
             None => v,
             Some(scale) => v.component_mul(scale),
         }
@@ -299,16 +315,20 @@ impl Vehicle {
         } else {
             "the radius, which must not be below 0 m,"
         };
-        RecordedError::NotFinite { vehicle: self.name.clone(), time_s: sample.time_s, what }
+        self.wrong(sample.time_s, format!("{what} is not a finite number below 1e70"))
     }
 
     #[cold]
-    fn not_increasing(&self, time_s: f64) -> RecordedError {
-        let previous_s = self.last.map_or(f64::NAN, |last| last.time_s);
+    fn wrong(&self, time_s: f64, what: String) -> RecordedError {
+        RecordedError::Item { vehicle: self.name.clone(), time_s, what }
+    }
+
+    #[cold]
+    fn not_increasing(&self, previous_s: f64, time_s: f64) -> RecordedError {
         RecordedError::TimeNotIncreasing { vehicle: self.name.clone(), previous_s, time_s }
     }
 
-    /// Forgets what ended by a time, and says how many stretches that were.
+    /// Forgets what ended by a time, and says how many segments that were.
     pub(super) fn forget(&mut self, until_s: f64) -> usize {
         let all = self.segments.last().is_none_or(|last| last.to_s <= until_s);
         let done = if all { self.segments.len() } else { self.segments.partition_point(|part| part.to_s <= until_s) };
@@ -321,14 +341,14 @@ impl Vehicle {
 }
 
 fn is_near(v: &Vector3<f64>) -> bool {
-    (v.x.abs() <= MAX_COORDINATE_M) & (v.y.abs() <= MAX_COORDINATE_M) & (v.z.abs() <= MAX_COORDINATE_M)
+    (v.x.abs() <= MAX_LENGTH_M) & (v.y.abs() <= MAX_LENGTH_M) & (v.z.abs() <= MAX_LENGTH_M)
 }
 
 fn is_radius(radius_m: f64) -> bool {
-    (0.0..=MAX_COORDINATE_M).contains(&radius_m)
+    (0.0..=MAX_LENGTH_M).contains(&radius_m)
 }
 
-/// Splits a stretch where it passes a height and says which parts are on the ground. A jump is on the ground if both ends
+/// Splits a segment where it passes a height and says which parts are on the ground. A jump is on the ground if both ends
 /// are; what cannot be told on a curve is above.
 fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
     let (low, high) = (segment.from.z.min(segment.to.z), segment.from.z.max(segment.to.z));
@@ -342,7 +362,8 @@ fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
         let starts_low = segment.from.z <= height;
         for (from_s, to_s, grounded) in [(segment.from_s, at_s, starts_low), (at_s, segment.to_s, !starts_low)] {
             if to_s > from_s {
-                into.extend(segment.clipped(from_s, to_s).map(|part| Segment { grounded, ..part }));
+                let part = segment.clipped(Interval { from_s, to_s });
+                into.extend(part.map(|part| Segment { grounded, ..part }));
             }
         }
     }
@@ -353,11 +374,11 @@ fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>
     let mut stack = vec![(0.0, 1.0)];
     let mut runs: Vec<(f64, f64, bool)> = Vec::new();
     while let Some((start, length)) = stack.pop() {
-        let at = |u: f64| segment.from_s + length_s * u;
-        let local = segment.local(at(start), at(start + length));
+        let [from_s, to_s] = [start, start + length].map(|u| segment.from_s + length_s * u);
+        let local = segment.local(Interval { from_s, to_s });
         let mut above: Vec<f64> = local.iter().map(|c| c.z).collect();
         above[0] -= height;
-        let (low, high) = range(&above);
+        let (low, high) = BernsteinBasis::of_degree(above.len() - 1).range(&above);
         if high > 0.0 && low <= 0.0 && length > SHORTEST_PART {
             let half = 0.5 * length;
             stack.extend([(start + half, half), (start, half)]);
@@ -372,7 +393,7 @@ fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>
     for (start, end, grounded) in runs {
         let from_s = if start <= 0.0 { segment.from_s } else { segment.from_s + length_s * start };
         let to_s = if end >= 1.0 { segment.to_s } else { segment.from_s + length_s * end };
-        into.extend(segment.clipped(from_s, to_s).map(|part| Segment { grounded, ..part }));
+        into.extend(segment.clipped(Interval { from_s, to_s }).map(|part| Segment { grounded, ..part }));
     }
 }
 
@@ -400,7 +421,7 @@ mod tests {
     fn a_hop_on_a_curve_is_above_between_its_two_crossings() {
         // z = 4 u (1 - u): above 0.75 between 1/4 and 3/4.
         let coefficients = vec![Vector3::zeros(), Vector3::new(0.0, 0.0, 4.0), Vector3::new(0.0, 0.0, -4.0)];
-        let hop = Segment::curved(Curve { from_s: 0.0, to_s: 1.0, coefficients, slack: Slack::None });
+        let hop = Segment::curved(Curve { from_s: 0.0, to_s: 1.0, coefficients, deviation: Deviation::None });
         let found = parts(hop, 0.75);
         assert_eq!(found.iter().map(|part| part.2).collect::<Vec<_>>(), [true, false, true]);
         assert!((found[0].1 - 0.25).abs() < 1e-9 && (found[1].1 - 0.75).abs() < 1e-9, "{found:?}");

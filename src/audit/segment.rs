@@ -1,12 +1,15 @@
-//! A vehicle over one stretch of time, as the judge holds it.
+//! Motion over an interval of time.
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::polynomial::{rescale, value};
+use super::sweep::Interval;
+
 /// What is known of a vehicle from one instant to a later one: a straight line between two points, or a [`Curve`].
 ///
-/// A jump is a stretch of no length whose ends differ, and a vehicle seen once is one whose ends do not.
+/// A jump is a segment of no length whose ends differ, and a vehicle seen once is one whose ends do not.
 #[derive(Clone, Debug)]
 pub(super) struct Segment {
     pub(super) from_s: f64,
@@ -15,7 +18,7 @@ pub(super) struct Segment {
     pub(super) to: Vector3<f64>,
     /// The vehicle counts as on the ground.
     pub(super) grounded: bool,
-    /// Where the stretch is not a straight line known for certain.
+    /// Where the segment is not a straight line known for certain.
     pub(super) curve: Option<Arc<Curve>>,
 }
 
@@ -25,7 +28,7 @@ pub(super) struct Curve {
     pub(super) from_s: f64,
     pub(super) to_s: f64,
     pub(super) coefficients: Vec<Vector3<f64>>,
-    pub(super) slack: Slack,
+    pub(super) deviation: Deviation,
 }
 
 /// How far a vehicle of bounded acceleration can be from the curve drawn through two samples h apart, x being the
@@ -34,7 +37,7 @@ pub(super) struct Curve {
 /// Both bounds follow from Peano's form of the error, e(x) = h^2 * integral of K(x, s) p''(s) over s from 0 to 1, so that
 /// |e(x)| <= A h^2 * integral of |K(x, s)|.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Slack {
+pub(super) enum Deviation {
     /// The vehicle is on the curve.
     None,
     /// Samples of position alone, joined by the chord: K(x, s) is -s (1 - x) for s <= x and -x (1 - s) beyond, which
@@ -58,8 +61,8 @@ pub(super) enum Slack {
     },
 }
 
-impl Slack {
-    /// The largest deviation over the whole stretch.
+impl Deviation {
+    /// The largest deviation over the whole segment.
     pub(super) fn peak(self) -> f64 {
         match self {
             Self::None => 0.0,
@@ -82,33 +85,18 @@ impl Slack {
 impl Curve {
     /// Where the curve is at a time.
     pub(super) fn position(&self, time_s: f64) -> Vector3<f64> {
-        let t = time_s - self.from_s;
-        self.coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c)
+        value(&self.coefficients, time_s - self.from_s)
     }
 
     /// How far from there the vehicle can be.
-    pub(super) fn slack_at(&self, time_s: f64) -> f64 {
-        self.slack.at((time_s - self.from_s) / (self.to_s - self.from_s))
+    pub(super) fn deviation_at(&self, time_s: f64) -> f64 {
+        self.deviation.at((time_s - self.from_s) / (self.to_s - self.from_s))
     }
 
-    /// The curve over a stretch as a polynomial of the fraction u of the stretch, by Horner's shift of the origin.
-    pub(super) fn local(&self, from_s: f64, to_s: f64) -> Vec<Vector3<f64>> {
+    /// The curve over an interval as a polynomial of the fraction u of the interval.
+    fn local(&self, over: Interval) -> Vec<Vector3<f64>> {
         let mut local = self.coefficients.clone();
-        let (shift, length) = (from_s - self.from_s, to_s - from_s);
-        let degree = local.len().saturating_sub(1);
-        if shift != 0.0 {
-            for lowest in 0..degree {
-                for k in (lowest..degree).rev() {
-                    let higher = local[k + 1];
-                    local[k] += higher * shift;
-                }
-            }
-        }
-        let mut power = 1.0;
-        for c in &mut local {
-            *c *= power;
-            power *= length;
-        }
+        rescale(&mut local, over.from_s - self.from_s, over.to_s - over.from_s);
         local
     }
 
@@ -138,17 +126,17 @@ impl Segment {
         self.to_s <= self.from_s && self.from != self.to
     }
 
-    /// How far the vehicle can be from the curve, anywhere on the stretch.
-    pub(super) fn slack(&self) -> f64 {
-        self.curve.as_ref().map_or(0.0, |curve| curve.slack.peak())
+    /// How far the vehicle can be from the curve, anywhere on the segment.
+    pub(super) fn deviation(&self) -> f64 {
+        self.curve.as_ref().map_or(0.0, |curve| curve.deviation.peak())
     }
 
     /// How far the vehicle can be from the curve at a time.
-    pub(super) fn slack_at(&self, time_s: f64) -> f64 {
-        self.curve.as_ref().map_or(0.0, |curve| curve.slack_at(time_s))
+    pub(super) fn deviation_at(&self, time_s: f64) -> f64 {
+        self.curve.as_ref().map_or(0.0, |curve| curve.deviation_at(time_s))
     }
 
-    /// The fraction of a straight stretch that has passed at a time within it.
+    /// The fraction of a straight segment that has passed at a time within it.
     #[inline]
     pub(super) fn fraction(&self, time_s: f64) -> f64 {
         if time_s <= self.from_s {
@@ -160,7 +148,7 @@ impl Segment {
         }
     }
 
-    /// Where the curve is at a time within the stretch.
+    /// Where the curve is at a time within the segment.
     #[inline]
     pub(super) fn position(&self, time_s: f64) -> Vector3<f64> {
         if time_s <= self.from_s {
@@ -174,9 +162,9 @@ impl Segment {
         }
     }
 
-    /// The part of the stretch between two times; `None` if there is none.
-    pub(super) fn clipped(&self, from_s: f64, to_s: f64) -> Option<Self> {
-        let (start_s, end_s) = (self.from_s.max(from_s), self.to_s.min(to_s));
+    /// The part of the segment in an interval; `None` if there is none.
+    pub(super) fn clipped(&self, to: Interval) -> Option<Self> {
+        let (start_s, end_s) = (self.from_s.max(to.from_s), self.to_s.min(to.to_s));
         if start_s > end_s {
             return None;
         }
@@ -187,14 +175,14 @@ impl Segment {
         Some(Self { from_s: start_s, to_s: end_s, from, to, ..self.clone() })
     }
 
-    /// The stretch as a polynomial of the fraction u of the part between two times within it.
-    pub(super) fn local(&self, from_s: f64, to_s: f64) -> Vec<Vector3<f64>> {
+    /// The segment as a polynomial of the fraction u of an interval within it.
+    pub(super) fn local(&self, over: Interval) -> Vec<Vector3<f64>> {
         match &self.curve {
-            Some(curve) => curve.local(from_s, to_s),
+            Some(curve) => curve.local(over),
             None if self.to_s <= self.from_s => vec![self.from, self.to - self.from],
             None => {
-                let rate = (to_s - from_s) / (self.to_s - self.from_s);
-                vec![self.position(from_s), (self.to - self.from) * rate]
+                let rate = (over.to_s - over.from_s) / (self.to_s - self.from_s);
+                vec![self.position(over.from_s), (self.to - self.from) * rate]
             }
         }
     }
@@ -213,15 +201,15 @@ mod tests {
 
     const TOLERANCE: f64 = 1e-12;
 
-    fn curve(slack: Slack) -> Curve {
+    fn curve(deviation: Deviation) -> Curve {
         let coefficients = (0..8).map(|k| Vector3::new(1.0, -2.0, 0.5) / f64::from(1 + k * k)).collect();
-        Curve { from_s: 10.0, to_s: 12.0, coefficients, slack }
+        Curve { from_s: 10.0, to_s: 12.0, coefficients, deviation }
     }
 
     #[test]
     fn a_part_of_a_curve_as_a_polynomial_of_its_fraction_is_the_same_curve() {
-        let curve = curve(Slack::None);
-        let local = curve.local(10.5, 11.75);
+        let curve = curve(Deviation::None);
+        let local = curve.local(Interval { from_s: 10.5, to_s: 11.75 });
         for u in [0.0, 0.2, 0.7, 1.0] {
             let there = local.iter().rev().fold(Vector3::zeros(), |sum, c| sum * u + c);
             assert!((there - curve.position(10.5 + 1.25 * u)).norm() < TOLERANCE);
@@ -245,7 +233,7 @@ mod tests {
             let reached = |with_velocity| {
                 (0..CELLS).map(|k| missed((f64::from(k) + 0.5) * cell, with_velocity).abs() * cell).sum::<f64>()
             };
-            let (chord, cubic) = (Slack::Chord { peak: 1.0 / 8.0 }, Slack::Hermite { peak: 1.0 / 16.0 });
+            let (chord, cubic) = (Deviation::Chord { peak: 1.0 / 8.0 }, Deviation::Hermite { peak: 1.0 / 16.0 });
             assert!((reached(false) - chord.at(x)).abs() < 1e-6, "{} {}", reached(false), chord.at(x));
             assert!((reached(true) - cubic.at(x)).abs() < 1e-6, "{} {}", reached(true), cubic.at(x));
             assert!(cubic.at(x) <= cubic.peak() && chord.at(x) <= chord.peak());
@@ -253,13 +241,13 @@ mod tests {
     }
 
     #[test]
-    fn a_clipped_stretch_is_where_the_whole_one_is() {
+    fn a_clipped_segment_is_where_the_whole_one_is() {
         let line = Segment::straight(1.0, 3.0, Vector3::zeros(), Vector3::new(4.0, 0.0, 2.0));
-        let part = line.clipped(2.0, 9.0).unwrap();
+        let part = line.clipped(Interval { from_s: 2.0, to_s: 9.0 }).unwrap();
         assert_eq!((part.from_s, part.to_s, part.from, part.to), (2.0, 3.0, Vector3::new(2.0, 0.0, 1.0), line.to));
-        assert!(line.clipped(3.5, 9.0).is_none());
-        let whole = Segment::curved(curve(Slack::None));
-        let part = whole.clipped(10.5, 11.0).unwrap();
+        assert!(line.clipped(Interval { from_s: 3.5, to_s: 9.0 }).is_none());
+        let whole = Segment::curved(curve(Deviation::None));
+        let part = whole.clipped(Interval { from_s: 10.5, to_s: 11.0 }).unwrap();
         assert_eq!(part.position(10.75), whole.position(10.75));
     }
 }

@@ -5,40 +5,38 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQuery as _;
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace};
 
-use super::enclosure::{Minimum, stray};
+use super::enclosure::{Minimum, Search, Target};
 use super::obstacle::Shape;
-use crate::audit::parry::KeepOut;
-use crate::audit::sweep::RelativeMotion;
+use super::parry::{CrossCheck, KeepOut};
+use super::polynomial::{stray, value};
+use super::sweep::RelativeMotion;
 
-/// Most chords that a stretch of a curve is cast along.
+/// Most chords that a segment of a curve is cast along.
 const MOST_CHORDS: u32 = 64;
 /// How far a chord may stray from the curve, as a fraction of the limit, where the number of chords allows it.
 const CHORD_OVER_LIMIT: f64 = 1e-6;
-/// Places on a stretch at which the distance from an obstacle is measured again.
+/// Places on a segment at which the distance from an obstacle is measured again.
 const PLACES: u32 = 8;
 /// Relative difference of two distances from an obstacle that rounding explains: each is a handful of operations.
 const ROUNDING: f64 = 1e-12;
 
-/// What the second detector says of a stretch.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Opinion {
-    /// Fraction of the stretch at which it sees the first contact; NaN where it cannot tell.
-    pub(super) contact: Option<f64>,
-    /// Whether it agrees.
-    pub(super) agrees: bool,
+/// What the second detector says of a segment where the first found this minimum.
+pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minimum, rounding: f64) -> CrossCheck {
+    match (search.target, search.exact()) {
+        (Target::Origin, Some(motion)) => keep_out.cross_check(&motion),
+        (Target::Origin, None) => along_chords(keep_out, search.r, found, rounding),
+        (Target::Shape(shape), _) => from_shape(shape, keep_out.delta_m, found, |u| search.position(u)),
+    }
 }
 
 /// Casts keep-out balls along chords of a curve. The answers may differ by what the chords stray.
-pub(super) fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, rounding: f64) -> Opinion {
+fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, rounding: f64) -> CrossCheck {
     let limit = keep_out.delta_m;
     let whole = stray(r);
     let wanted = (whole / (CHORD_OVER_LIMIT * limit)).sqrt().ceil();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a small number")]
     let chords = wanted.clamp(1.0, f64::from(MOST_CHORDS)) as u32;
-    let at = |k: u32| {
-        let u = f64::from(k) / f64::from(chords);
-        r.iter().rev().fold(Vector3::zeros(), |sum, c| sum * u + c)
-    };
+    let at = |k: u32| value(r, f64::from(k) / f64::from(chords));
     let mut from = at(0);
     let mut contact = None;
     for k in 0..chords {
@@ -55,7 +53,7 @@ pub(super) fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minim
         None => found.upper >= limit - strayed,
         Some(fraction) => !fraction.is_nan() && found.lower <= limit + strayed,
     };
-    Opinion { contact, agrees }
+    CrossCheck { contact, agrees }
 }
 
 /// Farthest that a chord of a part of length 1 / n strays from the curve, times n^2: an eighth of a bound on |r''|.
@@ -64,12 +62,7 @@ fn curvature_stray(r: &[Vector3<f64>]) -> f64 {
 }
 
 /// Measures the distance from an obstacle again, where it was found to be smallest and at places in between.
-pub(super) fn from_shape(
-    shape: &Shape,
-    limit: f64,
-    found: &Minimum,
-    position: impl Fn(f64) -> Vector3<f64>,
-) -> Opinion {
+fn from_shape(shape: &Shape, limit: f64, found: &Minimum, position: impl Fn(f64) -> Vector3<f64>) -> CrossCheck {
     let places = (0..=PLACES).map(|k| f64::from(k) / f64::from(PLACES));
     let measured = |u: f64| {
         let at = position(u);
@@ -82,7 +75,7 @@ pub(super) fn from_shape(
         distance >= found.lower.max(0.0) - rounding
     });
     let contact = places.chain([found.at]).filter(|u| measured(*u).0 < limit).reduce(f64::min);
-    Opinion { contact, agrees: same && lowest }
+    CrossCheck { contact, agrees: same && lowest }
 }
 
 /// Distance of a point from a shape by parry, zero within.
@@ -101,8 +94,8 @@ fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::obstacle::one_of_each;
     use super::*;
+    use crate::audit::obstacle::one_of_each;
 
     #[test]
     fn parry_measures_the_same_distances() {

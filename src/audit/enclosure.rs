@@ -1,8 +1,8 @@
 //! Certified minima on curves: branch and bound with Bernstein coefficients.
 //!
-//! Over a stretch the relative position is a polynomial r(u), u from 0 to 1. A polynomial lies between its least and its
+//! Over a segment the relative position is a polynomial r(u), u from 0 to 1. A polynomial lies between its least and its
 //! greatest Bernstein coefficient, so those of |r|^2 enclose the squared distance; for an obstacle the control points of r
-//! enclose the distance from their chord. Halving the stretch makes both bounds tight to second order. What rounding adds
+//! enclose the distance from their chord. Halving the segment makes both bounds tight to second order. What rounding adds
 //! is bounded from the magnitudes that are summed, and widens the bounds.
 
 use std::cmp::Ordering;
@@ -11,10 +11,13 @@ use std::collections::BinaryHeap;
 use nalgebra::Vector3;
 
 use super::obstacle::Shape;
+use super::outcome::WIDTH_M;
+use super::polynomial::{BernsteinBasis, rescale, value};
+use super::sweep::{RelativeMotion, Span};
 
 /// Parts that a search looks at before it gives up and answers with the interval it has.
 const MOST_PARTS: usize = 20_000;
-/// Shortest part of a stretch, as a fraction of it, that is looked at for when a distance is passed.
+/// Shortest part of a segment, as a fraction of it, that is looked at for when a distance is passed.
 const SHORTEST_PART: f64 = 1e-10;
 
 /// What a moving point keeps a distance from.
@@ -36,18 +39,18 @@ impl Target<'_> {
     }
 }
 
-/// The smallest distance over a stretch.
+/// The smallest distance over a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Minimum {
     /// It is at least this.
     pub(super) lower: f64,
     /// And at most this, which is reached,
     pub(super) upper: f64,
-    /// at this fraction of the stretch.
+    /// at this fraction of the segment.
     pub(super) at: f64,
 }
 
-/// A part of a stretch that could hold the minimum.
+/// A part of a segment that could hold the minimum.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     low: f64,
@@ -76,14 +79,13 @@ impl Ord for Part {
     }
 }
 
-/// A relative position over a stretch, and where it is close to a target.
+/// A relative position over a segment, and where it is close to a target.
 #[derive(Debug)]
 pub(super) struct Search<'a> {
-    target: Target<'a>,
-    r: &'a [Vector3<f64>],
-    basis: Vec<f64>,
+    pub(super) target: Target<'a>,
+    pub(super) r: &'a [Vector3<f64>],
+    basis: BernsteinBasis,
     part: Vec<Vector3<f64>>,
-    norms: Vec<f64>,
     squared: Vec<f64>,
 }
 
@@ -92,17 +94,40 @@ impl<'a> Search<'a> {
     pub(super) fn new(target: Target<'a>, r: &'a [Vector3<f64>]) -> Self {
         let degree = r.len().saturating_sub(1);
         let wanted = if matches!(target, Target::Origin) { 2 * degree } else { degree };
-        let (part, norms, squared) = (Vec::with_capacity(r.len()), Vec::new(), Vec::new());
-        Self { target, r, basis: basis(wanted), part, norms, squared }
+        let basis = BernsteinBasis::of_degree(wanted);
+        Self { target, r, basis, part: Vec::with_capacity(r.len()), squared: Vec::new() }
     }
 
-    /// The smallest distance, to within `width`; `None` if it is not below `cutoff`.
-    pub(super) fn minimum(&mut self, cutoff: f64, width: f64) -> Option<Minimum> {
-        self.minimum_within((0.0, 1.0), cutoff, width)
+    /// The motion, where it is straight.
+    pub(super) fn straight(&self) -> Option<RelativeMotion> {
+        match *self.r {
+            [from] => Some(RelativeMotion::new(from, from)),
+            [from, by] => Some(RelativeMotion::new(from, from + by)),
+            _ => None,
+        }
     }
 
-    /// The smallest distance between two fractions of the stretch, likewise.
-    pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64, width: f64) -> Option<Minimum> {
+    /// The motion, where it is straight and its distance known in closed form.
+    pub(super) fn exact(&self) -> Option<RelativeMotion> {
+        self.straight().filter(|_| matches!(self.target, Target::Origin))
+    }
+
+    /// The smallest distance, in closed form or to within [`WIDTH_M`]; `None` if it is not below `cutoff`.
+    pub(super) fn minimum(&mut self, cutoff: f64) -> Option<Minimum> {
+        let Some(motion) = self.straight() else { return self.minimum_within((0.0, 1.0), cutoff) };
+        let (lower, at) = match self.target {
+            Target::Origin => {
+                let approach = motion.closest();
+                (approach.separation_m(), approach.at)
+            }
+            Target::Shape(shape) => shape.closest(motion.from, motion.to),
+        };
+        (lower < cutoff).then_some(Minimum { lower, upper: lower, at })
+    }
+
+    /// The smallest distance between two fractions of the segment, to within [`WIDTH_M`]; `None` if it is not below
+    /// `cutoff`.
+    pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64) -> Option<Minimum> {
         let (low, _) = self.enclose(from, to - from);
         if low >= cutoff {
             return None;
@@ -114,7 +139,7 @@ impl<'a> Search<'a> {
         let mut lower = f64::INFINITY;
         while let Some(part) = parts.pop() {
             lower = part.low;
-            if part.low >= cutoff || part.low >= upper - width || looked_at > MOST_PARTS {
+            if part.low >= cutoff || part.low >= upper - WIDTH_M || looked_at > MOST_PARTS {
                 break;
             }
             let half = 0.5 * part.length;
@@ -133,9 +158,13 @@ impl<'a> Search<'a> {
         (lower < cutoff).then_some(Minimum { lower, upper, at })
     }
 
-    /// The parts of the stretch that are spent below a distance, given that it is below at the fraction `at`; each to
+    /// The parts of the segment that are spent below a distance, given that it is below at the fraction `at`; each to
     /// within [`SHORTEST_PART`], rather too long than too short.
     pub(super) fn below(&mut self, distance: f64, at: f64) -> Vec<(f64, f64)> {
+        if let Some(motion) = self.exact() {
+            let Span { enter, exit } = motion.below(distance, motion.closest());
+            return vec![(enter, exit)];
+        }
         // An unbroken run of parts, and whether some of it is below for certain.
         let mut runs: Vec<(f64, f64, bool)> = Vec::new();
         let mut stack = vec![(0.0, 1.0)];
@@ -162,48 +191,28 @@ impl<'a> Search<'a> {
         if spans.is_empty() { vec![(at, at)] } else { spans }
     }
 
-    /// The distance at a fraction of the stretch.
+    /// The distance at a fraction of the segment.
     pub(super) fn distance(&self, u: f64) -> f64 {
         self.target.distance(self.position(u))
     }
 
     pub(super) fn position(&self, u: f64) -> Vector3<f64> {
-        self.r.iter().rev().fold(Vector3::zeros(), |sum, c| sum * u + c)
+        value(self.r, u)
     }
 
-    /// Lower and upper bound of the distance over a part of the stretch.
+    /// Lower and upper bound of the distance over a part of the segment.
     fn enclose(&mut self, start: f64, length: f64) -> (f64, f64) {
-        self.expand(start, length);
+        self.part.clear();
+        self.part.extend_from_slice(self.r);
+        rescale(&mut self.part, start, length);
         match self.target {
             Target::Origin => self.enclose_norm(),
             Target::Shape(shape) => self.enclose_shape(shape),
         }
     }
 
-    /// Expands r about the start of a part, in fractions of the part.
-    fn expand(&mut self, start: f64, length: f64) {
-        self.part.clear();
-        self.part.extend_from_slice(self.r);
-        let degree = self.part.len() - 1;
-        if start != 0.0 {
-            for lowest in 0..degree {
-                for k in (lowest..degree).rev() {
-                    let higher = self.part[k + 1];
-                    self.part[k] += higher * start;
-                }
-            }
-        }
-        let mut power = 1.0;
-        for c in &mut self.part {
-            *c *= power;
-            power *= length;
-        }
-    }
-
     fn enclose_norm(&mut self) -> (f64, f64) {
         let n = self.part.len();
-        self.norms.clear();
-        self.norms.extend(self.part.iter().map(Vector3::norm));
         self.squared.clear();
         self.squared.resize(2 * n - 1, 0.0);
         for a in 0..n {
@@ -212,13 +221,8 @@ impl<'a> Search<'a> {
                 self.squared[a + b] += 2.0 * self.part[a].dot(&self.part[b]);
             }
         }
-        let magnitude = self.norms.iter().sum::<f64>().powi(2);
-        let rounding = 2.0 * self.squared.len() as f64 * f64::EPSILON * magnitude;
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for row in rows(&self.basis, self.squared.len()) {
-            let coefficient: f64 = row.iter().zip(&self.squared).map(|(b, c)| b * c).sum();
-            (low, high) = (low.min(coefficient), high.max(coefficient));
-        }
+        let rounding = 2.0 * self.squared.len() as f64 * f64::EPSILON * self.magnitude().powi(2);
+        let (low, high) = self.basis.range(&self.squared);
         ((low - rounding).max(0.0).sqrt(), (high + rounding).max(0.0).sqrt())
     }
 
@@ -230,68 +234,23 @@ impl<'a> Search<'a> {
         let to: Vector3<f64> = self.part.iter().sum();
         let last = (n - 1).max(1) as f64;
         let (mut stray, mut high) = (0.0_f64, f64::NEG_INFINITY);
-        for (k, row) in rows(&self.basis, n).enumerate() {
-            let control = row.iter().zip(&self.part).fold(Vector3::zeros(), |sum, (b, c)| sum + c * *b);
+        for (k, control) in self.basis.points(&self.part).enumerate() {
             stray = stray.max((control - (from + (to - from) * (k as f64 / last))).norm());
             high = high.max(shape.distance(control));
         }
-        let magnitude: f64 = self.part.iter().map(Vector3::norm).sum();
-        let rounding = 4.0 * n as f64 * f64::EPSILON * magnitude;
+        let rounding = 4.0 * n as f64 * f64::EPSILON * self.magnitude();
         (shape.closest(from, to).0 - stray - rounding, high + rounding)
     }
-}
 
-/// Farthest that a polynomial strays from the straight way between its ends, by its control points.
-pub(super) fn stray(r: &[Vector3<f64>]) -> f64 {
-    let n = r.len();
-    let Some(from) = r.first() else { return 0.0 };
-    if n <= 2 {
-        return 0.0;
+    /// What is summed for a position, at most.
+    fn magnitude(&self) -> f64 {
+        self.part.iter().map(Vector3::norm).sum()
     }
-    let by: Vector3<f64> = r[1..].iter().sum();
-    let basis = basis(n - 1);
-    rows(&basis, n)
-        .enumerate()
-        .map(|(k, row)| {
-            let control = row.iter().zip(r).fold(Vector3::zeros(), |sum, (b, c)| sum + c * *b);
-            (control - from - by * (k as f64 / (n - 1) as f64)).norm()
-        })
-        .fold(0.0, f64::max)
-}
-
-/// Least and greatest Bernstein coefficient of a polynomial with numbers for coefficients.
-pub(super) fn range(c: &[f64]) -> (f64, f64) {
-    let basis = basis(c.len().saturating_sub(1));
-    rows(&basis, c.len())
-        .map(|row| row.iter().zip(c).map(|(b, c)| b * c).sum::<f64>())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), b| (low.min(b), high.max(b)))
-}
-
-/// The lower triangle of C(j, k) / C(n, k), row by row: the Bernstein coefficients of degree n are its product with the
-/// coefficients of the powers.
-fn basis(n: usize) -> Vec<f64> {
-    let mut table = Vec::with_capacity((n + 1) * (n + 2) / 2);
-    for j in 0..=n {
-        // C(j, k) / C(n, k) = product over m < k of (j - m) / (n - m).
-        let mut entry = 1.0;
-        for k in 0..=j {
-            table.push(entry);
-            entry *= (j - k) as f64 / (n - k).max(1) as f64;
-        }
-    }
-    table
-}
-
-/// The rows of a [`basis`] of so many coefficients.
-fn rows(table: &[f64], count: usize) -> impl Iterator<Item = &[f64]> {
-    (0..count).map(|j| &table[j * (j + 1) / 2..(j + 1) * (j + 2) / 2])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const WIDTH: f64 = 1e-9;
 
     /// A curve of degree 7 that comes to exactly `miss` from the origin at u = 1/3: its distance is the root of
     /// miss^2 + (3 u - 1)^2 (1 + u^2)^2 ... by construction of its two parts at right angles.
@@ -305,9 +264,9 @@ mod tests {
     fn the_minimum_of_a_curve_is_enclosed_to_the_width() {
         for miss in [0.0, 1e-6, 0.3, 5.0] {
             let r = pass(miss);
-            let found = Search::new(Target::Origin, &r).minimum(f64::INFINITY, WIDTH).unwrap();
+            let found = Search::new(Target::Origin, &r).minimum(f64::INFINITY).unwrap();
             assert!(found.lower <= miss && miss <= found.upper + 1e-15, "{miss}: {found:?}");
-            assert!(found.upper - found.lower <= WIDTH, "{miss}: {found:?}");
+            assert!(found.upper - found.lower <= WIDTH_M, "{miss}: {found:?}");
             // At 0.3 m the distance is flat to the root of its width.
             assert!((found.at - 1.0 / 3.0).abs() < 1e-4, "{found:?}");
         }
@@ -316,15 +275,15 @@ mod tests {
     #[test]
     fn a_minimum_that_is_not_below_the_cutoff_is_not_looked_for() {
         let r = pass(0.3);
-        assert!(Search::new(Target::Origin, &r).minimum(0.29, WIDTH).is_none());
-        assert!(Search::new(Target::Origin, &r).minimum(0.31, WIDTH).is_some());
+        assert!(Search::new(Target::Origin, &r).minimum(0.29).is_none());
+        assert!(Search::new(Target::Origin, &r).minimum(0.31).is_some());
     }
 
     #[test]
     fn the_time_below_a_distance_ends_where_the_distance_is_reached() {
         let r = pass(0.3);
         let mut search = Search::new(Target::Origin, &r);
-        let found = search.minimum(f64::INFINITY, WIDTH).unwrap();
+        let found = search.minimum(f64::INFINITY).unwrap();
         let spans = search.below(0.5, found.at);
         let [(from, to)] = spans[..] else { panic!("{spans:?}") };
         assert!((search.distance(from) - 0.5).abs() < 1e-8 && (search.distance(to) - 0.5).abs() < 1e-8);
@@ -345,16 +304,7 @@ mod tests {
         let shape = Shape::Box { half_m: Vector3::repeat(0.25), yaw_rad: 0.0 };
         // A parabola over the box: z = 1 + (u - 1/2)^2, x from -1 to 1.
         let r = [Vector3::new(-1.0, 0.0, 1.25), Vector3::new(2.0, 0.0, -1.0), Vector3::new(0.0, 0.0, 1.0)];
-        let found = Search::new(Target::Shape(&shape), &r).minimum(f64::INFINITY, WIDTH).unwrap();
-        assert!((found.upper - 0.75).abs() <= WIDTH && found.lower <= 0.75 && found.upper - found.lower <= WIDTH);
-    }
-
-    #[test]
-    fn a_curve_strays_from_its_chord_at_most_as_far_as_its_control_points() {
-        let r = [Vector3::zeros(), Vector3::new(1.0, 4.0, 0.0), Vector3::new(0.0, -4.0, 0.0)];
-        // The parabola rises by 1; its one inner control point by 2.
-        assert_eq!(stray(&r), 2.0);
-        assert_eq!(stray(&r[..2]), 0.0);
-        assert_eq!(range(&[0.0, 4.0, -4.0]), (0.0, 2.0));
+        let found = Search::new(Target::Shape(&shape), &r).minimum(f64::INFINITY).unwrap();
+        assert!((found.upper - 0.75).abs() <= WIDTH_M && found.lower <= 0.75 && found.upper - found.lower <= WIDTH_M);
     }
 }

@@ -3,12 +3,10 @@
 use nalgebra::Vector3;
 
 use super::segment::Segment;
-use crate::audit::sweep::RelativeMotion;
+use super::sweep::{MAX_LENGTH_M, RelativeMotion};
 
 /// Before and after its points an obstacle stands still; no recording lasts longer \[s\].
 const ALWAYS_S: f64 = 1e300;
-/// Largest length of an obstacle \[m\]: squares of lengths stay finite.
-const MAX_LENGTH_M: f64 = 1e70;
 
 /// A thing that a vehicle must stay clear of.
 ///

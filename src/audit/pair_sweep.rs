@@ -1,0 +1,303 @@
+//! The sweep of two objects past each other, segment by segment.
+
+use nalgebra::Vector3;
+
+use super::cross_check::cross_check;
+use super::enclosure::{Minimum, Search, Target};
+use super::ledger::is_coarse;
+use super::outcome::{Approach, ObjectPair, Undecided, Violation};
+use super::parry::KeepOut;
+use super::results::Results;
+use super::segment::Segment;
+use super::sweep::{Interval, RelativeMotion};
+
+/// Two that must keep a distance.
+#[derive(Debug)]
+pub(super) struct PairSweep<'a> {
+    pub(super) pair: ObjectPair,
+    pub(super) target: Target<'a>,
+    pub(super) keep_out: KeepOut,
+    /// What the distance must come below to be among the closest.
+    pub(super) cutoff: f64,
+    /// Whether bounds on the motion leave it open that the distance falls below its limit: then it is judged twice.
+    pub(super) may_violate: bool,
+    /// Height at or below which both are on the ground.
+    pub(super) above: Option<f64>,
+}
+
+/// Two segments and the time that they share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Overlap<'a> {
+    pub(super) first: &'a Segment,
+    pub(super) second: &'a Segment,
+    pub(super) over: Interval,
+}
+
+/// Calls `f` with the time that each segment of one shares with each of the other, in order of time.
+///
+/// Segments are closed: one that ends where another begins shares that instant with it. Where two end together the next
+/// two follow, so that two jumps at one instant are swept together; one that nothing follows waits for what follows the
+/// other, unless the two were such jumps.
+pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: impl FnMut(Overlap<'a>)) {
+    let (mut a, mut b) = (0, 0);
+    while let (Some(one), Some(other)) = (first.get(a), second.get(b)) {
+        let (from_s, to_s) = (one.from_s.max(other.from_s), one.to_s.min(other.to_s));
+        if from_s <= to_s {
+            f(Overlap { first: one, second: other, over: Interval { from_s, to_s } });
+        }
+        let (mut step_a, mut step_b) = (one.to_s <= to_s, other.to_s <= to_s);
+        if step_a && step_b {
+            let follows = |next: Option<&Segment>| next.is_some_and(|next| next.from_s <= to_s);
+            let (next_a, next_b) = (follows(first.get(a + 1)), follows(second.get(b + 1)));
+            if next_a != next_b && !(one.jumps() && other.jumps()) {
+                (step_a, step_b) = (next_a, next_b);
+            }
+        }
+        a += usize::from(step_a);
+        b += usize::from(step_b);
+    }
+}
+
+impl PairSweep<'_> {
+    /// Judges what two vehicles, or an obstacle and a vehicle, do in a window. Straight segments are judged whole, so that
+    /// what is found does not depend on windows; curves within the window.
+    pub(super) fn judge(&self, first: &[Segment], second: &[Segment], window: Interval, results: &mut Results) {
+        let (mut nearest_squared, mut nearest_at) = (f64::INFINITY, (window, 0.0));
+        let vehicles = matches!(self.target, Target::Origin);
+        let mut swept = 0;
+        overlaps(first, second, |overlap| {
+            if self.is_on_ground(overlap.first, overlap.over) && self.is_on_ground(overlap.second, overlap.over) {
+                return;
+            }
+            if vehicles && overlap.first.curve.is_none() && overlap.second.curve.is_none() {
+                swept += 1;
+                let closest = overlap.straight().closest();
+                if closest.squared < nearest_squared {
+                    (nearest_squared, nearest_at) = (closest.squared, (overlap.over, closest.at));
+                }
+                if self.may_violate {
+                    self.straight(&overlap, results);
+                }
+            } else {
+                let Interval { from_s, to_s } = overlap.over;
+                let over = Interval { from_s: from_s.max(window.from_s), to_s: to_s.min(window.to_s) };
+                if over.from_s <= over.to_s {
+                    swept += 1;
+                    self.curved(&Overlap { over, ..overlap }, results);
+                }
+            }
+        });
+        results.swept += swept;
+        let lower_m = nearest_squared.sqrt();
+        if lower_m < self.cutoff {
+            let (over, fraction) = nearest_at;
+            self.offer(lower_m, lower_m, over.at(fraction), results);
+        }
+    }
+
+    /// Whether one of two is on the ground for all of a time that they share. A segment that leaves the ground begins on
+    /// it, which matters where no more than that instant is shared.
+    #[inline]
+    fn is_on_ground(&self, of: &Segment, over: Interval) -> bool {
+        let starts_there = |above: f64| {
+            over.from_s >= over.to_s
+                && !of.jumps()
+                && of.position(over.from_s).z + of.deviation_at(over.from_s) <= above
+        };
+        of.grounded || self.above.is_some_and(starts_there)
+    }
+
+    fn offer(&self, lower_m: f64, upper_m: f64, time_s: f64, results: &mut Results) {
+        let Self { pair, keep_out, .. } = self;
+        let approach = Approach { pair: *pair, lower_m, upper_m, time_s, limit_m: keep_out.delta_m };
+        results.table(*pair).offer(approach);
+    }
+
+    /// Two straight segments, by the closed form and by the cast.
+    #[inline(never)]
+    fn straight(&self, overlap: &Overlap<'_>, results: &mut Results) {
+        let motion = overlap.straight();
+        let (closest, contact) = (motion.closest(), self.keep_out.cast(&motion));
+        if contact.is_some() || self.keep_out.is_near(&motion, closest) {
+            results.ledger.near(self.pair, overlap.over, &self.keep_out, &motion, closest, contact);
+        }
+    }
+
+    /// A time in which somebody is on a curve, or an obstacle is in the way.
+    fn curved(&self, overlap: &Overlap<'_>, results: &mut Results) {
+        let Overlap { first, second, over } = *overlap;
+        let (pair, limit_m) = (self.pair, self.keep_out.delta_m);
+        let r = overlap.relative();
+        let mut search = Search::new(self.target, &r);
+        let deviation = first.deviation() + second.deviation();
+        let rounding = if search.straight().is_some() { 0.0 } else { first.rounding() + second.rounding() };
+        let Some(drawn) = search.minimum(limit_m.max(self.cutoff) + deviation + rounding) else { return };
+
+        let floor = if matches!(self.target, Target::Origin) { 0.0 } else { f64::NEG_INFINITY };
+        let lower = |lowest: &Minimum| (lowest.lower - deviation - rounding).max(floor);
+        let deviation_at = |u: f64| first.deviation_at(over.at(u)) + second.deviation_at(over.at(u));
+        // What the ends say is a fact where they are samples.
+        let upper = |search: &Search<'_>, from: f64, to: f64, lowest: &Minimum| {
+            let [start, end] = [from, to].map(|u| search.distance(u) + deviation_at(u));
+            (lowest.upper + deviation_at(lowest.at)).min(start).min(end) + rounding
+        };
+        let undecided = |from_s: f64, to_s: f64, lower_m: f64, upper_m: f64, lowest: &Minimum| {
+            let rate_hz = overlap.rate_hz((lowest.upper - limit_m).abs());
+            Undecided { pair, from_s, to_s, lower_m, upper_m, limit_m, rate_hz }
+        };
+        let (lower_m, upper_m) = (lower(&drawn), upper(&search, 0.0, 1.0, &drawn));
+        if lower_m < self.cutoff {
+            self.offer(lower_m, upper_m, over.at(drawn.at), results);
+        }
+        let mut enter = None;
+        if upper_m < limit_m {
+            for (from, to) in search.below(limit_m, drawn.at) {
+                let holds = from <= drawn.at && drawn.at <= to;
+                let other = if holds { None } else { search.minimum_within((from, to), f64::INFINITY) };
+                let lowest = other.unwrap_or(drawn);
+                let (from_s, to_s) = (over.at(from), over.at(to));
+                let min_m = upper(&search, from, to, &lowest);
+                if min_m < limit_m {
+                    let from_start = from <= 0.0 && search.distance(0.0) < limit_m;
+                    let min_at_s = over.at(lowest.at);
+                    results.ledger.violated(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, from_start);
+                    enter = enter.or(Some(from));
+                } else {
+                    results.ledger.undecided(undecided(from_s, to_s, lower(&lowest), min_m, &lowest));
+                }
+            }
+        } else {
+            let coarse =
+                || search.exact().is_some_and(|motion| deviation == 0.0 && is_coarse(&motion, lower_m, limit_m));
+            if lower_m < limit_m || coarse() {
+                results.ledger.undecided(undecided(over.from_s, over.to_s, lower_m, upper_m, &drawn));
+            }
+        }
+        if self.may_violate {
+            let check = cross_check(&search, &self.keep_out, &drawn, rounding);
+            results.ledger.cross_check(pair, over, drawn.upper, enter, check);
+        }
+    }
+}
+
+impl Overlap<'_> {
+    /// The relative motion of two straight segments over the time that they share.
+    #[inline]
+    pub(super) fn straight(&self) -> RelativeMotion {
+        let (a, b) = (self.first, self.second);
+        if a.from_s == b.from_s && a.to_s == b.to_s {
+            RelativeMotion::new(b.from - a.from, b.to - a.to)
+        } else {
+            let (from, to) = self.cut();
+            RelativeMotion::new(from, to)
+        }
+    }
+
+    /// The relative positions at both ends of the shared time, where the segments are not over the same time.
+    /// Displacements are added to the difference of two starting points, never positions to positions: far from the
+    /// origin that loses nothing.
+    #[inline(never)]
+    fn cut(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let (a, b) = (self.first, self.second);
+        let (start, by_a, by_b) = (b.from - a.from, a.to - a.from, b.to - b.from);
+        let at = |time_s: f64, end: bool| {
+            let share = |segment: &Segment| {
+                if segment.to_s <= segment.from_s { f64::from(u8::from(end)) } else { segment.fraction(time_s) }
+            };
+            start + (by_b * share(b) - by_a * share(a))
+        };
+        (at(self.over.from_s, false), at(self.over.to_s, true))
+    }
+
+    /// The relative position as a polynomial of the fraction of the time that is shared: at least one coefficient, the last
+    /// one of several not zero.
+    fn relative(&self) -> Vec<Vector3<f64>> {
+        let (a, b) = (self.first, self.second);
+        if a.curve.is_none() && b.curve.is_none() {
+            let motion = self.straight();
+            return vec![motion.from, motion.by];
+        }
+        let mut r = b.local(self.over);
+        let less = a.local(self.over);
+        r.resize(r.len().max(less.len()).max(1), Vector3::zeros());
+        for (r, less) in r.iter_mut().zip(&less) {
+            *r -= less;
+        }
+        while r.len() > 1 && r.last().is_some_and(|c| *c == Vector3::zeros()) {
+            r.pop();
+        }
+        r
+    }
+
+    /// The sampling rate of both at which the deviation is no more than the margin: over intervals of h it is the sum of
+    /// what each has now, c = peak / `h_now`^2, times h^2.
+    fn rate_hz(&self, margin: f64) -> Option<f64> {
+        let curves = [self.first, self.second].into_iter().filter_map(|segment| segment.curve.as_ref());
+        let per_s2: f64 = curves.map(|curve| curve.deviation.peak() / (curve.to_s - curve.from_s).powi(2)).sum();
+        let rate_hz = (per_s2 / margin).sqrt();
+        (per_s2 > 0.0 && margin > 0.0 && rate_hz.is_finite()).then_some(rate_hz)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn still(from_s: f64, to_s: f64, x: f64) -> Segment {
+        Segment::straight(from_s, to_s, Vector3::new(x, 0.0, 0.0), Vector3::new(x, 0.0, 0.0))
+    }
+
+    fn jump(at_s: f64, x: [f64; 2]) -> Segment {
+        let [from, to] = x.map(|x| Vector3::new(x, 0.0, 0.0));
+        Segment::straight(at_s, at_s, from, to)
+    }
+
+    fn times(first: &[Segment], second: &[Segment]) -> Vec<(f64, f64)> {
+        let mut times = Vec::new();
+        overlaps(first, second, |overlap| times.push((overlap.over.from_s, overlap.over.to_s)));
+        times
+    }
+
+    #[test]
+    fn two_jumps_at_one_instant_are_swept_together() {
+        let first = [still(0.0, 1.0, 0.0), jump(1.0, [0.0, 5.0]), still(1.0, 2.0, 5.0)];
+        let second = [still(0.0, 1.0, 5.0), jump(1.0, [5.0, 10.0]), still(1.0, 2.0, 10.0)];
+        let mut closest = f64::INFINITY;
+        overlaps(&first, &second, |overlap| closest = closest.min(overlap.straight().closest().separation_m()));
+        assert_eq!(closest, 5.0);
+        assert_eq!(times(&first, &second), [(0.0, 1.0), (1.0, 1.0), (1.0, 2.0)]);
+        // One jumps while the other stands: the jump meets it where it stands.
+        let waiting = [still(0.5, 1.5, 3.0)];
+        let mut closest = f64::INFINITY;
+        overlaps(&first, &waiting, |overlap| closest = closest.min(overlap.straight().closest().separation_m()));
+        assert_eq!(closest, 0.0);
+    }
+
+    #[test]
+    fn what_ends_where_the_other_begins_shares_an_instant() {
+        assert_eq!(times(&[still(0.0, 1.0, 0.0)], &[still(1.0, 2.0, 0.0)]), [(1.0, 1.0)]);
+        assert_eq!(times(&[still(0.0, 1.0, 0.0)], &[still(1.5, 2.0, 0.0)]), []);
+        let first = [still(0.0, 1.0, 0.0)];
+        assert_eq!(times(&first, &[still(0.0, 1.0, 3.0), jump(1.0, [3.0, 4.0])]), [(0.0, 1.0), (1.0, 1.0)]);
+        let late = [still(0.0, 1.0, 0.0), still(5.0, 6.0, 0.0)];
+        assert_eq!(times(&late, &[still(0.0, 9.0, 0.0)]), [(0.0, 1.0), (5.0, 6.0)]);
+    }
+
+    fn closest(first: &[Segment], second: &[Segment]) -> f64 {
+        let mut closest = f64::INFINITY;
+        overlaps(first, second, |overlap| closest = closest.min(overlap.straight().closest().separation_m()));
+        closest
+    }
+
+    #[test]
+    fn a_last_jump_is_swept_once_and_one_seen_once_meets_the_jump_of_the_other() {
+        // In convoy: one takes the place that the other leaves at the same instant, and the other is not seen again.
+        let lead = [still(0.0, 1.0, 0.0), jump(1.0, [0.0, 1.0])];
+        let tail = [still(0.0, 1.0, -1.0), jump(1.0, [-1.0, 0.0]), still(1.0, 2.0, 0.0), jump(2.0, [0.0, 0.0])];
+        assert_eq!((closest(&lead, &tail), closest(&tail, &lead)), (1.0, 1.0));
+        // Fix once between two gaps, where the other's jump leads.
+        let seen_once = [still(0.0, 0.0, 50.0), still(1.0, 1.0, 0.0), still(3.0, 3.0, 50.0)];
+        assert_eq!((closest(&seen_once, &tail), closest(&tail, &seen_once)), (0.0, 0.0));
+        assert_eq!(closest(&[still(0.0, 0.0, 50.0), still(1.0, 1.0, 3.0), still(3.0, 3.0, 50.0)], &tail), 3.0);
+    }
+}

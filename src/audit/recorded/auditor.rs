@@ -1,0 +1,237 @@
+//! The audit of a recording, as it is read.
+
+use super::error::RecordedError;
+use super::outcome::{Gap, Outcome};
+use super::rates::Rates;
+use super::settings::{LARGEST, Settings};
+use super::vehicle::Vehicle;
+use super::window::Windows;
+use crate::audit::outcome::Status;
+use crate::audit::results::Results;
+use crate::audit::sweep::Interval;
+use crate::track::Item;
+
+/// Segments of a vehicle in a window, about.
+const SEGMENTS: usize = 16;
+/// Fewest items between two windows.
+const FEWEST_ITEMS: usize = 48;
+/// Names that an error lists.
+const NAMES_LISTED: usize = 12;
+
+/// Judges a recording as it is read.
+///
+/// [`push`](TrackAuditor::push) takes items in order of time, any number at a time; the first push should hold some samples of
+/// each vehicle, since usual intervals are learnt from it. [`finish`](TrackAuditor::finish) gives the verdict.
+#[derive(Clone, Debug)]
+pub struct TrackAuditor {
+    settings: Settings,
+    vehicles: Vec<Vehicle>,
+    rates: Option<Rates>,
+    windows: Windows,
+    results: Results,
+    gaps: Vec<Gap>,
+    /// Smallest clock offset of any vehicle \[s\].
+    least_offset_s: f64,
+    /// Time of the last item, and of the last one before that time \[s\].
+    now_s: f64,
+    before_s: f64,
+    /// Up to when everything was judged \[s\].
+    done_s: f64,
+    pending: usize,
+    segments: u64,
+}
+
+/// Judges a recording in memory: the items of vehicles with these names, in order of time.
+///
+/// # Errors
+/// [`RecordedError`] where the settings or the recording are wrong.
+pub fn audit(names: &[String], items: &[Item], settings: Settings) -> Result<Outcome, RecordedError> {
+    let mut auditor = TrackAuditor::new(settings)?;
+    auditor.push(names, items)?;
+    auditor.finish()
+}
+
+impl TrackAuditor {
+    /// An auditor with settings.
+    ///
+    /// # Errors
+    /// [`RecordedError`] where a number of the settings is out of range.
+    pub fn new(settings: Settings) -> Result<Self, RecordedError> {
+        settings.check()?;
+        Ok(Self {
+            least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
+            windows: Windows::new(settings.limits(), &settings.obstacles),
+            settings,
+            vehicles: Vec::new(),
+            rates: None,
+            results: Results::default(),
+            gaps: Vec::new(),
+            now_s: f64::NEG_INFINITY,
+            before_s: f64::NEG_INFINITY,
+            done_s: f64::NEG_INFINITY,
+            pending: 0,
+            segments: 0,
+        })
+    }
+
+    /// Judges what comes next. `names` are those of all vehicles known so far.
+    ///
+    /// # Errors
+    /// [`RecordedError`] where an item is wrong; nothing more can be judged then.
+    pub fn push(&mut self, names: &[String], items: &[Item]) -> Result<(), RecordedError> {
+        if self.rates.is_none() && !items.is_empty() {
+            let given = self.settings.max_gap_s.is_some();
+            self.rates = Some(if given { Rates::default() } else { Rates::learn(items, names.len()) });
+        }
+        for name in names.iter().skip(self.vehicles.len()) {
+            let usual = || self.rates.as_ref().map_or(f64::INFINITY, |rates| rates.max_gap_s(self.vehicles.len()));
+            let max_gap_s = self.settings.max_gap_s.unwrap_or_else(usual);
+            self.vehicles.push(Vehicle::new(name, &self.settings, max_gap_s));
+        }
+        for item in items {
+            match item {
+                Item::Sample(sample) => self.take(sample.vehicle, sample.time_s, |vehicle| vehicle.sample(sample))?,
+                Item::Piece(piece) => self.take(piece.vehicle, piece.from_s, |vehicle| vehicle.piece(piece))?,
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn take(
+        &mut self,
+        index: usize,
+        time_s: f64,
+        take: impl FnOnce(&mut Vehicle) -> Result<Option<Gap>, RecordedError>,
+    ) -> Result<(), RecordedError> {
+        if time_s != self.now_s {
+            self.turn_to(time_s, index)?;
+        }
+        let Some(vehicle) = self.vehicles.get_mut(index) else {
+            return Err(RecordedError::Unnamed { vehicle: index });
+        };
+        if !vehicle.asked_for {
+            return Ok(());
+        }
+        let unseen = vehicle.is_unseen();
+        let gap = take(vehicle)?;
+        if unseen {
+            vehicle.check(&self.settings)?;
+        }
+        self.pending += 1;
+        if let Some(gap) = gap {
+            self.note(gap);
+        }
+        Ok(())
+    }
+
+    /// A new instant: everything before it has been read.
+    #[inline(never)]
+    fn turn_to(&mut self, time_s: f64, vehicle: usize) -> Result<(), RecordedError> {
+        let name = || self.vehicles.get(vehicle).map(|vehicle| vehicle.name.clone()).unwrap_or_default();
+        if !time_s.is_finite() || time_s.abs() > LARGEST {
+            return Err(RecordedError::Item {
+                vehicle: name(),
+                time_s,
+                what: "the time is not a finite number below 1e70".to_owned(),
+            });
+        }
+        if time_s < self.now_s {
+            return Err(RecordedError::OutOfOrder { vehicle: name(), previous_s: self.now_s, time_s });
+        }
+        (self.before_s, self.now_s) = (self.now_s, time_s);
+        if self.before_s == f64::NEG_INFINITY {
+            self.done_s = time_s + self.least_offset_s;
+        } else if self.pending >= (SEGMENTS * self.vehicles.len()).max(FEWEST_ITEMS) {
+            self.advance();
+        }
+        Ok(())
+    }
+
+    /// Judges up to where every vehicle that may still be there is known.
+    fn advance(&mut self) {
+        let read_s = self.now_s + self.least_offset_s;
+        let seen = self.vehicles.iter().filter(|vehicle| !vehicle.is_unseen());
+        let there = seen.filter(|vehicle| read_s - vehicle.known_s() <= vehicle.max_gap_s);
+        let until_s = there.map(Vehicle::known_s).fold(self.before_s + self.least_offset_s, f64::min);
+        if until_s > self.done_s {
+            self.judge_until(until_s);
+            self.pending = 0;
+        } else {
+            // Somebody is seen more seldom: look again after as many items.
+            self.pending /= 2;
+        }
+    }
+
+    fn judge_until(&mut self, to_s: f64) {
+        self.windows.judge(&self.vehicles, Interval { from_s: self.done_s, to_s }, &mut self.results);
+        for vehicle in &mut self.vehicles {
+            self.segments += vehicle.forget(to_s) as u64;
+        }
+        self.done_s = to_s;
+    }
+
+    /// Notes a gap as far as it lies in the window that is asked for.
+    fn note(&mut self, gap: Gap) {
+        let window = self.settings.window();
+        let (from_s, to_s) = (gap.from_s.max(window.from_s), gap.to_s.min(window.to_s));
+        if from_s < to_s {
+            self.gaps.push(Gap { from_s, to_s, ..gap });
+        }
+    }
+
+    /// The verdict over everything judged.
+    ///
+    /// # Errors
+    /// [`RecordedError::UnknownVehicle`] where the settings name a vehicle that the recording does not have.
+    pub fn finish(mut self) -> Result<Outcome, RecordedError> {
+        self.check_names()?;
+        let end_s = self.vehicles.iter().map(Vehicle::known_s).fold(self.done_s, f64::max);
+        if end_s.is_finite() {
+            self.judge_until(end_s);
+        }
+        let presence: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.presence).collect();
+        let there = || presence.iter().flatten();
+        let span_s = there().map(|there| (there.from_s, there.to_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let contradiction =
+            self.vehicles.iter().filter_map(|v| v.contradiction).max_by(|a, b| a.needs_m_s2.total_cmp(&b.needs_m_s2));
+        self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
+        let in_the_way = there().count() > 1 || !self.settings.obstacles.is_empty();
+        let unseen = in_the_way && !self.gaps.is_empty();
+        let Results { ledger, closest, obstacles, swept } = self.results;
+        let decided = span_s.is_some() && ledger.is_decided() && !unseen && contradiction.is_none();
+        let parry = ledger.parry;
+        let (violations, undecided) = ledger.into_lists();
+        Ok(Outcome {
+            status: Status::new(!violations.is_empty(), decided),
+            max_gaps_s: self.vehicles.iter().map(|vehicle| vehicle.max_gap_s).collect(),
+            vehicles: self.vehicles.into_iter().map(|vehicle| vehicle.name).collect(),
+            presence,
+            span_s,
+            closest: closest.kept,
+            obstacles: obstacles.kept,
+            violations,
+            undecided,
+            gaps: self.gaps,
+            contradiction,
+            segments: self.segments,
+            swept,
+            parry,
+        })
+    }
+
+    fn check_names(&self) -> Result<(), RecordedError> {
+        let asked = self.settings.vehicles.keys().chain(self.settings.only.iter().flatten());
+        let known: Vec<&str> = self.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
+        for name in asked {
+            if !known.contains(&name.as_str()) {
+                let mut listed = known.iter().take(NAMES_LISTED).copied().collect::<Vec<_>>().join(", ");
+                if known.len() > NAMES_LISTED {
+                    listed += ", ...";
+                }
+                return Err(RecordedError::UnknownVehicle { name: name.clone(), known: listed });
+            }
+        }
+        Ok(())
+    }
+}
