@@ -45,7 +45,8 @@ fn an_approach_counts_from_its_own_time_and_not_from_its_sample() {
 
 #[test]
 fn a_long_flight_is_thinned_and_keeps_its_ends_and_its_closest_approach() {
-    let mut timeline = Timeline { budget_bytes: 20_000, ..Timeline::new("pair", 2) };
+    let mut timeline = Timeline::new("pair", 2);
+    timeline.budget_bytes = 20_000;
     for k in 0..10_000_u32 {
         let separation_m = if k == 7777 { 0.5 } else { 3.0 };
         sample(&mut timeline, f64::from(k), f64::from(k), separation_m);

@@ -143,11 +143,12 @@ impl App {
             let viewport = Viewport { texture: open.texture, extent: &open.extent, drawn: drawn.as_ref() };
             let context = open.input.egui_ctx().clone();
             context.set_theme(if state.theme == Theme::Dark { egui::Theme::Dark } else { egui::Theme::Light });
-            let (mut requests, mut area) = (Requests::default(), egui::Rect::NOTHING);
+            let mut area = egui::Rect::NOTHING;
             let output = context.run_ui(input, |ui| {
-                requests = state.keys(ui.ctx(), player);
+                state.keys(ui.ctx(), player);
                 area = panels::show(ui, state, player, &viewport);
             });
+            let requests = std::mem::take(&mut state.requests);
             if requests.picture
                 && let Some((_, scene)) = &drawn
             {

@@ -46,8 +46,8 @@ impl OpenWindow {
         let attributes = Window::default_attributes()
             .with_title(format!("tautline: {}", timeline.name))
             .with_inner_size(LogicalSize::new(FIRST_SIZE[0], FIRST_SIZE[1]));
-        let refused = |error: &dyn std::fmt::Display| RenderError::NoWindow(error.to_string());
-        let window = Arc::new(events.create_window(attributes).map_err(|error| refused(&error))?);
+        let window = events.create_window(attributes).map_err(|error| RenderError::NoWindow(error.to_string()))?;
+        let window = Arc::new(window);
         let context = egui::Context::default();
         context.options_mut(|options| options.zoom_with_keyboard = false);
         let shown = Arc::clone(&window);
@@ -57,9 +57,7 @@ impl OpenWindow {
             }
         });
         let (gpu, painter) = start(events, adapter, &window, &context)?;
-        let unusable = "it cannot draw on windows";
-        let unusable = || RenderError::UnusableAdapter { adapter: gpu.name.clone(), reason: unusable.to_owned() };
-        let panels = painter.render_state().ok_or_else(unusable)?;
+        let panels = painter.render_state().ok_or(RenderError::AdapterLost)?;
         #[expect(clippy::cast_possible_truncation, reason = "a factor of a few")]
         let scale = window.scale_factor() as f32;
         let side = Some(gpu.largest_px as usize);

@@ -1,6 +1,8 @@
 //! What the window shows around the picture, and what the mouse does.
 
-use egui::{Button, Color32, PointerButton, Rect, RichText, Sense, Slider, Stroke, TextureId, Ui, Vec2, pos2, vec2};
+use egui::{
+    Button, Color32, Key, PointerButton, Rect, RichText, Sense, Slider, Stroke, TextureId, Ui, Vec2, pos2, vec2,
+};
 
 use super::player::Player;
 use super::plot::plot;
@@ -66,7 +68,7 @@ impl Viewport<'_> {
 
 /// Draws the panels and the picture; gives the area that is left for the picture \[points\].
 pub(super) fn show(ui: &mut Ui, state: &mut WindowState, player: &mut Player, viewport: &Viewport<'_>) -> Rect {
-    egui::Panel::bottom("time").show(ui, |ui| controls(ui, player, state.message.as_deref()));
+    egui::Panel::bottom("time").show(ui, |ui| controls(ui, state, player));
     egui::Panel::right("sides").default_size(230.0).show(ui, |ui| sides(ui, state, player, viewport));
     egui::CentralPanel::no_frame().show(ui, |ui| picture(ui, state, player, viewport)).inner
 }
@@ -137,25 +139,21 @@ fn sides(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewp
 }
 
 /// Play, step, scrub, speed.
-fn controls(ui: &mut Ui, player: &mut Player, message: Option<&str>) {
+fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
     ui.add_space(3.0);
     ui.horizontal(|ui| {
-        let pressed = |ui: &mut Ui, sign: &str, what: &str| ui.button(sign).on_hover_text(what).clicked();
-        if pressed(ui, "|<", "to the start (Home)") {
-            player.seek(f64::NEG_INFINITY);
-        }
-        if pressed(ui, "<", "a sample back (Left)") {
-            player.step(-1);
-        }
-        let play = if player.playing { "Pause" } else { "Play" };
-        if ui.add_sized([56.0, 18.0], Button::new(play)).on_hover_text("Space").clicked() {
-            player.toggle();
-        }
-        if pressed(ui, ">", "a sample on (Right)") {
-            player.step(1);
-        }
-        if pressed(ui, ">|", "to the end (End)") {
-            player.seek(f64::INFINITY);
+        let play = Button::new(if player.playing { "Pause" } else { "Play" }).min_size(vec2(56.0, 18.0));
+        let buttons = [
+            (Button::new("|<"), "to the start (Home)", Key::Home),
+            (Button::new("<"), "a sample back (Left)", Key::ArrowLeft),
+            (play, "Space", Key::Space),
+            (Button::new(">"), "a sample on (Right)", Key::ArrowRight),
+            (Button::new(">|"), "to the end (End)", Key::End),
+        ];
+        for (button, what, key) in buttons {
+            if ui.add(button).on_hover_text(what).clicked() {
+                state.press(key, player);
+            }
         }
         let [first_s, last_s] = player.timeline.range_s();
         let mut time_s = player.time_s;
@@ -179,7 +177,7 @@ fn controls(ui: &mut Ui, player: &mut Player, message: Option<&str>) {
         }
     });
     // Its line is always there, so that the picture keeps its size.
-    ui.add(egui::Label::new(player.said.as_deref().or(message).unwrap_or(" ")).truncate());
+    ui.add(egui::Label::new(player.said.as_deref().or(state.message.as_deref()).unwrap_or(" ")).truncate());
     ui.add_space(2.0);
 }
 

@@ -20,6 +20,7 @@ pub(super) struct WindowState {
     /// The camera follows the extent of the flight until somebody moves it.
     pub(super) framed: bool,
     pub(super) message: Option<String>,
+    pub(super) requests: Requests,
 }
 
 /// What is asked of the window.
@@ -40,6 +41,7 @@ impl WindowState {
             help: false,
             framed: true,
             message: None,
+            requests: Requests::default(),
         }
     }
 
@@ -89,11 +91,11 @@ impl WindowState {
         ]
     }
 
-    pub(super) fn keys(&mut self, context: &egui::Context, player: &mut Player) -> Requests {
+    pub(super) fn keys(&mut self, context: &egui::Context, player: &mut Player) {
         // A field being typed into has its keys to itself; any other field in focus has those that work it.
         let focus = context.memory(egui::Memory::focused);
         if focus.is_some_and(|id| egui::text_edit::TextEditState::load(context, id).is_some()) {
-            return Requests::default();
+            return;
         }
         let works_it = |key: Key| {
             matches!(key, Key::Space | Key::Enter | Key::ArrowLeft | Key::ArrowRight | Key::Escape) && focus.is_some()
@@ -109,49 +111,50 @@ impl WindowState {
         if !pressed.is_empty() {
             self.message = None;
         }
-        let mut requests = Requests::default();
-        for key in pressed.into_iter().filter(|&key| !works_it(key)) {
-            match key {
-                Key::Space => player.toggle(),
-                Key::ArrowLeft => player.step(-1),
-                Key::ArrowRight => player.step(1),
-                Key::Home => player.seek(f64::NEG_INFINITY),
-                Key::End => player.seek(f64::INFINITY),
-                Key::N => {
-                    if let Some(closest) = player.timeline.closest() {
-                        player.playing = false;
-                        player.seek(closest.time_s);
-                    }
+        pressed.into_iter().filter(|&key| !works_it(key)).for_each(|key| self.press(key, player));
+    }
+
+    /// Does what a key, or the button that stands for it, is for.
+    pub(super) fn press(&mut self, key: Key, player: &mut Player) {
+        match key {
+            Key::Space => player.toggle(),
+            Key::ArrowLeft => player.step(-1),
+            Key::ArrowRight => player.step(1),
+            Key::Home => player.seek(f64::NEG_INFINITY),
+            Key::End => player.seek(f64::INFINITY),
+            Key::N => {
+                if let Some(closest) = player.timeline.closest() {
+                    player.playing = false;
+                    player.seek(closest.time_s);
                 }
-                Key::Minus => player.faster(false),
-                Key::Plus | Key::Equals => player.faster(true),
-                Key::A => self.turn(-KEY_TURN_DEG, 0.0),
-                Key::D => self.turn(KEY_TURN_DEG, 0.0),
-                Key::W => self.turn(0.0, KEY_TURN_DEG),
-                Key::S => self.turn(0.0, -KEY_TURN_DEG),
-                Key::PageUp => self.approach(0.9),
-                Key::PageDown => self.approach(1.0 / 0.9),
-                Key::V => {
-                    let next = self.picked.map_or(0, |picked| picked + 1);
-                    self.picked = (next < player.timeline.count()).then_some(next);
-                }
-                Key::F => self.framed = true,
-                Key::T => {
-                    let at = Theme::ALL.iter().position(|(_, theme)| *theme == self.theme).unwrap_or(0);
-                    self.theme = Theme::ALL[(at + 1) % Theme::ALL.len()].1;
-                }
-                Key::P => requests.picture = true,
-                Key::H | Key::F1 | Key::Questionmark => self.help = !self.help,
-                Key::Escape if self.help => self.help = false,
-                Key::Q | Key::Escape => requests.quit = true,
-                digit => {
-                    if let Ok(number @ 1..=8) = digit.name().parse::<usize>() {
-                        let (_, shown) = &mut self.layers()[number - 1];
-                        **shown = !**shown;
-                    }
+            }
+            Key::Minus => player.faster(false),
+            Key::Plus | Key::Equals => player.faster(true),
+            Key::A => self.turn(-KEY_TURN_DEG, 0.0),
+            Key::D => self.turn(KEY_TURN_DEG, 0.0),
+            Key::W => self.turn(0.0, KEY_TURN_DEG),
+            Key::S => self.turn(0.0, -KEY_TURN_DEG),
+            Key::PageUp => self.approach(0.9),
+            Key::PageDown => self.approach(1.0 / 0.9),
+            Key::V => {
+                let next = self.picked.map_or(0, |picked| picked + 1);
+                self.picked = (next < player.timeline.count()).then_some(next);
+            }
+            Key::F => self.framed = true,
+            Key::T => {
+                let at = Theme::ALL.iter().position(|(_, theme)| *theme == self.theme).unwrap_or(0);
+                self.theme = Theme::ALL[(at + 1) % Theme::ALL.len()].1;
+            }
+            Key::P => self.requests.picture = true,
+            Key::H | Key::F1 | Key::Questionmark => self.help = !self.help,
+            Key::Escape if self.help => self.help = false,
+            Key::Q | Key::Escape => self.requests.quit = true,
+            digit => {
+                if let Ok(number @ 1..=8) = digit.name().parse::<usize>() {
+                    let (_, shown) = &mut self.layers()[number - 1];
+                    **shown = !**shown;
                 }
             }
         }
-        requests
     }
 }
