@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::history::Keyframe;
-use crate::formation::closest_pair;
+use crate::space::closest_pair;
 use crate::swarm::{ClosestApproach, Pair, Rows, row};
 
 /// Two instants, between which every vehicle flies on a straight line. One that is only there at the end is judged there.
