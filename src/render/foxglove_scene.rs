@@ -9,11 +9,12 @@ use foxglove::messages::{
 };
 
 use super::scene::{Colour, Theme};
-use super::timeline::{Interval, Plan};
+use super::timeline::Plan;
 use crate::graph::Graph;
 use crate::record::Sample;
 use crate::record::mcap::{Channel, Companion};
 use crate::scenario::Scenario;
+use crate::space::NearPairs;
 use crate::swarm::{Pair, Rows, row, separation};
 
 /// Scenes a second \[Hz\].
@@ -36,6 +37,7 @@ pub struct FoxgloveScene {
     radius_m: Vec<f64>,
     delta_m: f64,
     next_s: f64,
+    near: NearPairs,
 }
 
 impl FoxgloveScene {
@@ -47,17 +49,18 @@ impl FoxgloveScene {
             radius_m: scenario.hull_radius_m.clone(),
             delta_m: scenario.delta_m,
             next_s: f64::NEG_INFINITY,
+            near: NearPairs::default(),
         }
     }
 
-    fn scene(&self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
+    fn scene(&mut self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
         let theme = Theme::Dark;
         let count = positions_m.nrows();
-        let now = Interval { times_s: [time_s; 2], positions_m: [positions_m; 2] };
         let mut alarm = vec![false; count];
-        for pair in now.near(self.delta_m) {
-            if now.inside_s(pair, self.delta_m).is_some() {
-                (alarm[pair.first()], alarm[pair.second()]) = (true, true);
+        self.near.update(positions_m, self.delta_m);
+        for &(i, j) in self.near.pairs() {
+            if separation(positions_m, i, j) < self.delta_m {
+                (alarm[i], alarm[j]) = (true, true);
             }
         }
         let hulls = (0..count).map(|k| {

@@ -26,7 +26,7 @@ use target::Target;
 
 /// Draws scenes into pictures.
 pub struct Renderer {
-    gpu: Gpu,
+    pub(crate) gpu: Gpu,
     pipelines: Pipelines,
     overlay: Overlay,
     target: Option<Target>,
@@ -52,28 +52,18 @@ impl Renderer {
         &self.gpu.name
     }
 
-    /// Largest width and height of a picture \[pixels\].
-    #[must_use]
-    pub fn largest_px(&self) -> u32 {
-        self.gpu.largest_px
-    }
-
     /// Whether pictures of this width and height \[pixels\] can be drawn.
     ///
     /// # Errors
-    /// [`RenderError::PictureSize`] when a side is not between 1 and [`Renderer::largest_px`].
+    /// [`RenderError::PictureSize`] when a side is not between 1 and the most that the adapter draws.
     pub fn check_size(&self, size_px: [u32; 2]) -> Result<(), RenderError> {
         self.gpu.check_size(size_px)
-    }
-
-    pub(crate) fn gpu(&self) -> &Gpu {
-        &self.gpu
     }
 
     /// The picture of a scene.
     ///
     /// # Errors
-    /// [`RenderError`] when the picture's size is not between 1 and [`Renderer::largest_px`], or the adapter fails.
+    /// [`RenderError`] when the adapter cannot draw a picture of this size, or fails.
     pub fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
         self.draw(scene, true)?;
         let target = self.target.as_ref().ok_or(RenderError::AdapterLost)?;

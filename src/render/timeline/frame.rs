@@ -1,8 +1,23 @@
-//! A flight at a time of it.
+//! A flight at a time of it, as it was recorded and as it is drawn.
 
 use crate::swarm::{ClosestApproach, Pair, Rows, separation};
 
-/// A flight at a time of it.
+/// A time at which every position is known.
+#[derive(Clone, Debug)]
+pub struct Keyframe {
+    /// The time \[s\].
+    pub time_s: f64,
+    /// Positions \[m\], N x 3; NaN for a vehicle that is not there.
+    pub positions_m: Rows,
+    /// Commanded accelerations \[m/s^2\], where they were recorded.
+    pub control_m_s2: Option<Rows>,
+    /// Closest approach since the keyframe before.
+    pub closest: Option<ClosestApproach>,
+    /// Closest approach since the start.
+    pub so_far: Option<ClosestApproach>,
+}
+
+/// A flight at any time of it.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// The time \[s\].

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::frame::Frame;
+use super::frame::{Frame, Keyframe};
 use super::interval::{Interval, nearest_present};
 use super::plan::Plan;
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::render::error::{RenderError, check_lengths};
 use crate::scenario::{Scenario, Source};
-use crate::swarm::{ClosestApproach, Pair, Rows};
+use crate::swarm::{ClosestApproach, Pair};
 
 /// Most memory that the keyframes of a flight take \[bytes\]; beyond it every second one is dropped.
 pub(super) const BUDGET_BYTES: usize = 256 << 20;
@@ -46,21 +46,6 @@ pub struct Timeline {
     /// Samples since the last one that stays.
     since_kept: usize,
     pub(super) budget_bytes: usize,
-}
-
-/// A time at which every position is known.
-#[derive(Clone, Debug)]
-pub struct Keyframe {
-    /// The time \[s\].
-    pub time_s: f64,
-    /// Positions \[m\], N x 3; NaN for a vehicle that is not there.
-    pub positions_m: Rows,
-    /// Commanded accelerations \[m/s^2\], where they were recorded.
-    pub control_m_s2: Option<Rows>,
-    /// Closest approach since the keyframe before.
-    pub closest: Option<ClosestApproach>,
-    /// Closest approach since the start.
-    pub so_far: Option<ClosestApproach>,
 }
 
 /// A time during which a pair was closer than delta.

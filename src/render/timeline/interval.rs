@@ -2,14 +2,14 @@
 
 use nalgebra::Vector3;
 
-use super::history::Keyframe;
+use super::frame::Keyframe;
 use crate::space::closest_pair;
 use crate::swarm::{ClosestApproach, Pair, Rows, row};
 
 /// Two instants, between which every vehicle flies on a straight line. One that is only there at the end is judged there.
-pub(in crate::render) struct Interval<'a> {
-    pub(in crate::render) times_s: [f64; 2],
-    pub(in crate::render) positions_m: [&'a Rows; 2],
+pub(super) struct Interval<'a> {
+    times_s: [f64; 2],
+    positions_m: [&'a Rows; 2],
 }
 
 /// How one vehicle moves relative to another: `first_m` at the first of two times and longer by `change_m` at the second.
@@ -41,7 +41,7 @@ impl<'a> Interval<'a> {
     }
 
     /// When a pair was nearest, and how near.
-    pub(in crate::render) fn approach(&self, pair: Pair) -> Option<ClosestApproach> {
+    pub(super) fn approach(&self, pair: Pair) -> Option<ClosestApproach> {
         let motion = self.motion(pair)?;
         let squared = motion.change_m.norm_squared();
         let part = if squared > 0.0 { (-motion.first_m.dot(&motion.change_m) / squared).clamp(0.0, 1.0) } else { 0.0 };
@@ -50,7 +50,7 @@ impl<'a> Interval<'a> {
     }
 
     /// From when to when a pair was closer than delta \[s\].
-    pub(in crate::render) fn inside_s(&self, pair: Pair, delta_m: f64) -> Option<[f64; 2]> {
+    pub(super) fn inside_s(&self, pair: Pair, delta_m: f64) -> Option<[f64; 2]> {
         let motion = self.motion(pair)?;
         // |first + part change|^2 < delta^2, with its two roots.
         let (a, b) = (motion.change_m.norm_squared(), motion.first_m.dot(&motion.change_m));
@@ -64,7 +64,7 @@ impl<'a> Interval<'a> {
     }
 
     /// Every pair that may come within reach, in order: the boxes around their ways do.
-    pub(in crate::render) fn near(&self, reach_m: f64) -> Vec<Pair> {
+    pub(super) fn near(&self, reach_m: f64) -> Vec<Pair> {
         let mut boxes: Vec<(usize, [Vector3<f64>; 2])> = (0..self.positions_m[1].nrows())
             .filter_map(|k| self.ends(k).map(|([first, second], _)| (k, [first.inf(&second), first.sup(&second)])))
             .collect();

@@ -6,9 +6,8 @@ mod interval;
 mod plan;
 mod tracks;
 
-pub use frame::Frame;
-pub use history::{Keyframe, Timeline, ViolationSpan};
-pub(super) use interval::Interval;
+pub use frame::{Frame, Keyframe};
+pub use history::{Timeline, ViolationSpan};
 pub use plan::Plan;
 pub use tracks::TracksError;
 

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::history::{BUDGET_BYTES, Keyframe, Timeline, UNKNOWN_RADIUS_M, nearer};
+use super::frame::Keyframe;
+use super::history::{BUDGET_BYTES, Timeline, UNKNOWN_RADIUS_M, nearer};
 use super::interval::{Interval, nearest_present};
 use crate::render::error::{RenderError, check_lengths};
 use crate::swarm::{Rows, set_row};

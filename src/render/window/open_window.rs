@@ -73,7 +73,7 @@ impl OpenWindow {
     }
 
     pub(super) fn resize(&mut self, size_px: [u32; 2]) {
-        let largest = self.renderer.largest_px();
+        let largest = self.renderer.gpu.largest_px;
         if let [Some(width), Some(height)] = size_px.map(|side| NonZeroU32::new(side.min(largest))) {
             self.painter.on_window_resized(ViewportId::ROOT, width, height);
         }
@@ -132,7 +132,7 @@ impl OpenWindow {
             &self.window,
         );
         output.textures_delta.clear();
-        self.renderer.gpu().check()
+        self.renderer.gpu.check()
     }
 }
 
@@ -159,5 +159,5 @@ fn start(
 }
 
 fn fitting(size_px: [u32; 2], renderer: &Renderer) -> [u32; 2] {
-    size_px.map(|side| side.clamp(LEAST_PX, renderer.largest_px()))
+    size_px.map(|side| side.clamp(LEAST_PX, renderer.gpu.largest_px))
 }
