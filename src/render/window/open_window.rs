@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use egui::{TextureId, ViewportId};
 use egui_wgpu::winit::Painter;
-use egui_wgpu::{RenderState, RendererOptions, WgpuConfiguration, WgpuSetupExisting};
+use egui_wgpu::{RenderState, RendererOptions, SurfaceConfig, WgpuConfiguration, WgpuSetupExisting};
 use winit::dpi::LogicalSize;
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
@@ -145,12 +145,14 @@ fn start(
 ) -> Result<(Gpu, Painter), RenderError> {
     let instance = instance(Some(Box::new(events.owned_display_handle())));
     // Without any driver the instance has nothing to make a surface with.
-    let surface = instance.create_surface(Arc::clone(window)).map_err(|_| RenderError::NoAdapter)?;
-    let gpu = Gpu::open(&instance, adapter, Some(&surface))?;
-    drop(surface);
+    let probe = instance.create_surface(Arc::clone(window)).map_err(|_| RenderError::NoAdapter)?;
+    let gpu = Gpu::open(&instance, adapter, Some(&probe))?;
+    drop(probe);
     let (adapter, device, queue) = (gpu.adapter.clone(), gpu.device.clone(), gpu.queue.clone());
     let wgpu_setup = WgpuSetupExisting { instance, adapter, device, queue }.into();
-    let configuration = WgpuConfiguration { wgpu_setup, ..WgpuConfiguration::default() };
+    // In order: where late pictures may overtake, an older one can be left on the window.
+    let surface = SurfaceConfig { present_mode: wgpu::PresentMode::Fifo, ..SurfaceConfig::HIGH_THROUGHPUT };
+    let configuration = WgpuConfiguration { wgpu_setup, surface, ..WgpuConfiguration::default() };
     let options = RendererOptions::default();
     let mut painter = pollster::block_on(Painter::new(context.clone(), configuration, false, options));
     pollster::block_on(painter.set_window(ViewportId::ROOT, Some(Arc::clone(window))))
