@@ -8,19 +8,19 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use tautline::formation::Formation;
 use tautline::record::Sample;
-use tautline::render::scene::Stage;
-use tautline::render::{AdapterChoice, CameraSpec, Footage, Renderer, Scene, View};
+use tautline::render::scene::Extent;
+use tautline::render::{AdapterChoice, CameraSpec, Renderer, Scene, Timeline, View};
 use tautline::scenario::Scenario;
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, row, set_row};
 
 const SAMPLES: u32 = 200;
 
 /// A grid of vehicles in a plane that wave for twenty seconds.
-fn footage(count: usize) -> Footage {
+fn timeline(count: usize) -> Timeline {
     let formation = Formation::grid(count, 3.0);
     let start = Swarm::at_rest(formation.slots_m.clone());
     let scenario = Scenario::new("wave", start.clone(), formation, 2.0, 20.0);
-    let mut footage = Footage::of(&scenario);
+    let mut timeline = Timeline::of(&scenario);
     let control = Rows::zeros(count);
     for k in 0..SAMPLES {
         let time_s = f64::from(k) * 0.1;
@@ -31,7 +31,7 @@ fn footage(count: usize) -> Footage {
             set_row(&mut swarm.positions_m, vehicle, place + Vector3::new(0.2 * wave, 0.0, 1.0 + wave));
         }
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 2.8, time_s });
-        footage.take(&Sample {
+        timeline.take(&Sample {
             time_s,
             step: u64::from(k),
             swarm: &swarm,
@@ -41,7 +41,7 @@ fn footage(count: usize) -> Footage {
             channels: &[],
         });
     }
-    footage
+    timeline
 }
 
 fn benchmarks(criterion: &mut Criterion) {
@@ -51,13 +51,17 @@ fn benchmarks(criterion: &mut Criterion) {
     }
     let view = View::default();
     for count in [10, 200, 1_000, 10_000] {
-        let footage = footage(count);
-        let stage = Stage::of(&footage);
-        let moment = footage.at(15.0).expect("a moment");
-        let list = || Scene::compose(&footage, &stage, &moment, &view).expect("a scene");
+        let timeline = timeline(count);
+        let extent = Extent::of(&timeline);
+        let frame = timeline.at(15.0).expect("a frame");
+        let list_of = |view: &View| {
+            let camera = extent.camera(&timeline, &frame, view).expect("a camera");
+            Scene::compose(&timeline, &extent, &frame, view, camera)
+        };
+        let list = || list_of(&view);
         let near = View { camera: CameraSpec::Closest, ..View::default() };
-        criterion.bench_with_input(BenchmarkId::new("moment", count), &footage, |bencher, footage| {
-            bencher.iter(|| footage.at(black_box(15.03)));
+        criterion.bench_with_input(BenchmarkId::new("frame", count), &timeline, |bencher, timeline| {
+            bencher.iter(|| timeline.at(black_box(15.03)));
         });
         criterion.bench_function(&format!("draw list/{count}"), |bencher| {
             bencher.iter(|| black_box(list()));
@@ -70,7 +74,7 @@ fn benchmarks(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::new("with read-back", count), |bencher| {
             bencher.iter(|| renderer.paint(&scene).expect("a picture"));
         });
-        let close_up = Scene::compose(&footage, &stage, &moment, &near).expect("a scene");
+        let close_up = list_of(&near);
         group.bench_function(BenchmarkId::new("with read-back, close up", count), |bencher| {
             bencher.iter(|| renderer.paint(&close_up).expect("a picture"));
         });

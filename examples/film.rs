@@ -6,8 +6,8 @@ use std::io::{BufWriter, Write as _};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use tautline::render::scene::Stage;
-use tautline::render::{AdapterChoice, Film, FilmFormat, Footage, Renderer, Scene, View};
+use tautline::render::scene::Extent;
+use tautline::render::{AdapterChoice, Film, FilmFormat, Renderer, Scene, Timeline, View};
 use tautline::scenario::{Override, Scenario, Source};
 use tautline::sim::{self, Parts};
 
@@ -18,12 +18,12 @@ const SPEED: f64 = 6.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let shorter = Override::parse("time.duration_s=60")?;
     let scenario = Scenario::read(&Source::resolve("circle")?, &[shorter])?;
-    let mut footage = Footage::of(&scenario);
-    sim::fly(&scenario, Parts::of(&scenario)?, &mut footage, &mut |_step| ControlFlow::Continue(()))?;
+    let mut timeline = Timeline::of(&scenario);
+    sim::fly(&scenario, Parts::of(&scenario)?, &mut timeline, &mut |_step| ControlFlow::Continue(()))?;
 
     let path = Path::new("circle.mp4");
     let view = View { size_px: [960, 540], ..View::default() };
-    let (stage, [start_s, end_s]) = (Stage::of(&footage), footage.range_s());
+    let (extent, [start_s, end_s]) = (Extent::of(&timeline), timeline.range_s());
     let mut renderer = Renderer::open(&AdapterChoice::Best)?;
     let times: Vec<f64> = (0..u16::MAX)
         .map(|k| start_s + f64::from(k) * SPEED / f64::from(FPS))
@@ -33,8 +33,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pictures = u32::try_from(times.len())?;
     let mut film = Film::new(&mut out, FilmFormat::of(path)?, view.size_px, FPS, pictures)?;
     for time_s in times {
-        let Some(moment) = footage.at(time_s) else { break };
-        let scene = Scene::compose(&footage, &stage, &moment, &view)?;
+        let Some(frame) = timeline.at(time_s) else { break };
+        let camera = extent.camera(&timeline, &frame, &view)?;
+        let scene = Scene::compose(&timeline, &extent, &frame, &view, camera);
         film.add(&[renderer.paint(&scene)?])?;
     }
     film.finish()?;

@@ -1,10 +1,10 @@
 //! `tautline completions`: a completion script for a shell.
 
-use clap::{Args, CommandFactory as _};
+use clap::Args;
 use clap_complete::Shell;
 
 use super::console;
-use super::{Arguments, Exit, Failure};
+use super::{Exit, Failure};
 
 /// Arguments of `tautline completions`.
 #[derive(Debug, Args)]
@@ -13,9 +13,9 @@ pub(super) struct CompletionsArguments {
     shell: Shell,
 }
 
-pub(super) fn completions(arguments: &CompletionsArguments) -> Result<Exit, Failure> {
+pub(super) fn completions(arguments: &CompletionsArguments, program: &mut clap::Command) -> Result<Exit, Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::command(), env!("CARGO_PKG_NAME"), &mut script);
+    clap_complete::generate(arguments.shell, program, env!("CARGO_PKG_NAME"), &mut script);
     console::data(&String::from_utf8_lossy(&script))?;
     Ok(Exit::Good)
 }

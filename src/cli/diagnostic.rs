@@ -3,10 +3,10 @@
 use std::fmt;
 use std::io::Write as _;
 use std::path::Path;
+use std::process::ExitCode;
 
 use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
 
-use super::Exit;
 use crate::export::ExportError;
 use crate::law::ParameterError;
 use crate::read::ReadError;
@@ -17,6 +17,25 @@ use crate::sim::SimError;
 
 /// Longest line of a source that is shown in a frame \[bytes\].
 const LONGEST_LINE: usize = 400;
+
+/// How the program ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Exit {
+    /// Judged and good, or nothing to judge.
+    Good = 0,
+    /// Judged and bad: a violation, a claim not met.
+    Bad = 1,
+    /// The input is wrong: usage, scenario, recording.
+    WrongInput = 2,
+    /// The machine failed: input and output, no adapter.
+    MachineFailed = 3,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
 
 /// An error on its way to the user, with the exit code that it means.
 #[derive(Debug)]
@@ -43,6 +62,12 @@ impl Failure {
     /// The machine failed.
     pub(super) fn machine(message: impl Into<String>) -> Self {
         Self::plain(Exit::MachineFailed, message)
+    }
+
+    /// What an error says: the machine failed, or the input is wrong.
+    pub(super) fn told(is_machine: bool, error: &dyn std::error::Error, help: Option<String>) -> Self {
+        let exit = if is_machine { Exit::MachineFailed } else { Exit::WrongInput };
+        Self { help: help.map(|help| harmless(&help)), ..Self::plain(exit, error.to_string()) }
     }
 
     pub(super) fn with_help(self, help: impl Into<String>) -> Self {
@@ -149,15 +174,13 @@ impl From<ArtefactError> for Failure {
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
-        let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
-        Self::plain(exit, error.to_string()).with_help(error.help())
+        Self::told(error.is_machine(), &error, Some(error.help()))
     }
 }
 
 impl From<ExportError> for Failure {
     fn from(error: ExportError) -> Self {
-        let exit = if error.is_machine() { Exit::MachineFailed } else { Exit::WrongInput };
-        Self::plain(exit, error.to_string()).with_help(error.help())
+        Self::told(error.is_machine(), &error, Some(error.help()))
     }
 }
 

@@ -8,10 +8,7 @@ use super::Failure;
 use super::console::Console;
 use crate::read::{self, Fault, Format, ReadError, ReadOptions};
 use crate::record::mcap::McapRecording;
-use crate::render::{
-    AdapterChoice, CameraError, FARTHEST_M, FilmError, Footage, FootageError, GpuError, PictureError, ShootError,
-    Theme, TracksError,
-};
+use crate::render::{FARTHEST_M, RenderError, Theme, Timeline, TracksError};
 
 /// Bytes of an MCAP file that hold the name of what wrote it.
 const FIRST_BYTES: u64 = 64;
@@ -38,47 +35,41 @@ fn pair(text: &str) -> Option<[u32; 2]> {
     Some([side(first)?, side(second)?])
 }
 
-/// Any words are an adapter's name.
-pub(super) fn adapter(text: &str) -> AdapterChoice {
-    // Parsing cannot fail.
-    text.parse().unwrap_or_default()
-}
-
 /// Reads a recording to draw it, and says what a person should know about how it was read. `delta_m` is for recordings
 /// that do not say what they are judged by.
-pub(super) fn footage(
+pub(super) fn timeline(
     recording: &Path,
     reading: &ReadOptions,
     delta_m: Option<f64>,
     console: Console,
-) -> Result<Footage, Failure> {
+) -> Result<Timeline, Failure> {
     if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && *delta_m <= FARTHEST_M)) {
         let help = format!("give a positive distance in metres, at most {FARTHEST_M:e}");
         return Err(Failure::input(format!("--delta is {delta_m:?}"), help));
     }
     // Our own recordings know formation, graph and law too.
     let may_be_ours = reading.format.is_none_or(|format| format == Format::Mcap);
-    let footage = match McapRecording::open(recording) {
+    let timeline = match McapRecording::open(recording) {
         Ok(ours) if may_be_ours => {
             speaks_for_itself(&ours, reading, delta_m)?;
-            Footage::read_mcap(recording)?
+            Timeline::read_mcap(recording)?
         }
         _ => of_others(recording, reading, delta_m)?,
     };
-    if footage.instants() == 0 {
-        return Err(FootageError::Empty { name: recording.display().to_string() }.into());
+    if timeline.keyframes().is_empty() {
+        return Err(RenderError::Empty(recording.display().to_string()).into());
     }
-    for note in &footage.notes {
+    for note in &timeline.notes {
         console.warn(&format!("note: {note}"));
     }
-    if footage.every() > 1 {
-        console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", footage.every()));
+    if timeline.every() > 1 {
+        console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", timeline.every()));
     }
-    Ok(footage)
+    Ok(timeline)
 }
 
 /// Reads a recording that knows nothing but positions.
-fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> Result<Footage, Failure> {
+fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> Result<Timeline, Failure> {
     let unreadable = |error: ReadError| {
         let help = error.help();
         let failure = Failure::from(error);
@@ -97,9 +88,9 @@ fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> R
         opened => opened.map_err(unreadable)?,
     };
     let name = recording.file_stem().unwrap_or_default().to_string_lossy();
-    Footage::from_tracks(&name, tracks.as_mut(), delta_m).map_err(|error| match error {
+    Timeline::from_tracks(&name, tracks.as_mut(), delta_m).map_err(|error| match error {
         TracksError::Read(error) => unreadable(error),
-        TracksError::Footage(error) => error.into(),
+        TracksError::Render(error) => error.into(),
     })
 }
 
@@ -130,77 +121,11 @@ fn speaks_for_itself(ours: &McapRecording, reading: &ReadOptions, delta_m: Optio
     Ok(())
 }
 
-impl From<FootageError> for Failure {
-    fn from(error: FootageError) -> Self {
+impl From<RenderError> for Failure {
+    fn from(error: RenderError) -> Self {
         match error {
-            FootageError::Record(error) => error.into(),
-            FootageError::TooFar { .. } => {
-                Self::input(error.to_string(), "mend the recording, or see whether its lengths are in metres")
-            }
-            FootageError::Empty { .. } => Self::input(
-                error.to_string(),
-                "give a recording that holds at least one sample, such as a run's run.mcap",
-            ),
+            RenderError::Record(error) => error.into(),
+            error => Self::told(error.is_machine(), &error, error.help().map(str::to_owned)),
         }
-    }
-}
-
-impl From<GpuError> for Failure {
-    fn from(error: GpuError) -> Self {
-        let message = error.to_string();
-        match error {
-            GpuError::NoAdapter => Self::machine(message).with_help(GpuError::HELP),
-            GpuError::NoSuchAdapter { .. } => Self::input(
-                message,
-                "give hardware, software or a part of the name of an adapter that there is with --adapter",
-            ),
-            GpuError::Size { .. } => Self::input(message, "give another size with --size"),
-            GpuError::Unusable { .. } | GpuError::Driver { .. } | GpuError::Lost => {
-                Self::machine(message).with_help("try a smaller picture, or another driver with --adapter software")
-            }
-        }
-    }
-}
-
-impl From<CameraError> for Failure {
-    fn from(error: CameraError) -> Self {
-        let help = match error {
-            CameraError::NoVehicle { .. } => "give the name of a vehicle of the recording",
-            CameraError::Unknown(_) | CameraError::Range { .. } => CameraError::HELP,
-        };
-        Self::input(error.to_string(), help)
-    }
-}
-
-impl From<ShootError> for Failure {
-    fn from(error: ShootError) -> Self {
-        match error {
-            ShootError::Camera(error) => error.into(),
-            ShootError::Gpu(error) => error.into(),
-            ShootError::Empty => Self::input(error.to_string(), "give a flight with at least one sample"),
-        }
-    }
-}
-
-impl From<FilmError> for Failure {
-    fn from(error: FilmError) -> Self {
-        let message = error.to_string();
-        match error {
-            FilmError::UnknownFormat(_) => {
-                Self::input(message, "name the film something.mp4, something.gif or something.png")
-            }
-            FilmError::Rate { .. } => Self::input(message, "give another rate with --fps"),
-            FilmError::Size { .. } => Self::input(message, "give another size with --size, or another format"),
-            FilmError::Write(_) => Self::machine(message).with_help("free some space or write to another folder"),
-            FilmError::Mixed | FilmError::Count { .. } | FilmError::Picture(_) | FilmError::Encoder { .. } => {
-                Self::machine(message)
-            }
-        }
-    }
-}
-
-impl From<PictureError> for Failure {
-    fn from(error: PictureError) -> Self {
-        Self::machine(error.to_string())
     }
 }

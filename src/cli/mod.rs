@@ -29,29 +29,10 @@ mod view;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::read;
-use diagnostic::Failure;
-
-/// How the program ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Exit {
-    /// Judged and good, or nothing to judge.
-    Good = 0,
-    /// Judged and bad: a violation, a claim not met.
-    Bad = 1,
-    /// The input is wrong: usage, scenario, recording.
-    WrongInput = 2,
-    /// The machine failed: input and output, no adapter.
-    MachineFailed = 3,
-}
-
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        Self::from(exit as u8)
-    }
-}
+use diagnostic::{Exit, Failure};
 
 /// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
 ///
@@ -97,7 +78,7 @@ fn quiet_guarded_panics() {
     let speak = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         #[cfg(feature = "viewer")]
-        if crate::render::in_window_library() {
+        if crate::render::is_in_window_library() {
             std::process::exit(view::lose_display() as i32);
         }
         if !read::is_guarded() {
@@ -131,7 +112,7 @@ pub fn main() -> ExitCode {
         Command::View(arguments) => view::view(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
-        Command::Completions(arguments) => completions::completions(&arguments),
+        Command::Completions(arguments) => completions::completions(&arguments, &mut Arguments::command()),
     };
     done.unwrap_or_else(|failure| failure.show()).into()
 }

@@ -13,9 +13,8 @@ use super::drawing;
 use super::outputs::{self, Called};
 use super::reading::{self, ReadArguments};
 use super::{Exit, Failure};
-use crate::render::scene::Stage;
 use crate::render::{
-    CameraSpec, Film, FilmError, FilmFormat, Footage, Picture, Renderer, Scene, ShootError, Theme, View, contact_sheet,
+    CameraSpec, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, contact_sheet,
 };
 use crate::report::{write_atomically, write_atomically_with};
 
@@ -87,9 +86,9 @@ struct Still {
 }
 
 /// Draws a flight as it is asked for.
-struct Studio<'a> {
-    footage: &'a Footage,
-    stage: Stage,
+struct Batch<'a> {
+    timeline: &'a Timeline,
+    extent: Extent,
     renderer: Renderer,
     view: View,
     progress: ProgressBar,
@@ -99,13 +98,15 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: false, quiet: arguments.quiet };
     let camera: CameraSpec = arguments.camera.parse()?;
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
+    let fps = arguments.fps.unwrap_or(FPS);
     let reading = arguments.reading.options(arguments.input_format)?;
     let recording = &arguments.reading.recording;
-    let footage = drawing::footage(recording, &reading, arguments.delta, console)?;
-    let folder = arguments.out.clone().unwrap_or_else(|| beside(recording));
-    let stills = stills(arguments, &footage, &folder)?;
-    let frames = film.map(|_| film_times(arguments, &footage)).transpose()?.unwrap_or_default();
-    let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &footage)).transpose()?;
+    let timeline = drawing::timeline(recording, &reading, arguments.delta, console)?;
+    let beside = || recording.parent().unwrap_or(Path::new("")).join("snapshots");
+    let folder = arguments.out.clone().unwrap_or_else(beside);
+    let stills = stills(arguments, &timeline, &folder)?;
+    let frames = film.map_or(Ok(Vec::new()), |_| film_times(fps, arguments.speed, &timeline))?;
+    let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &timeline)).transpose()?;
     let sheet_path = folder.join("sheet.png");
     let outputs: Vec<Called<'_>> = (stills.iter().map(|still| ("the picture", still.path.as_path())))
         .chain(sheet.iter().map(|_| ("the sheet", sheet_path.as_path())))
@@ -114,12 +115,12 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     outputs::check(&[("the recording", recording)], &outputs)?;
     let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
     if let Some((_, format)) = film {
-        format.check(view.size_px, arguments.fps.unwrap_or(FPS))?;
+        format.check(view.size_px, fps)?;
     }
-    let renderer = Renderer::open(&drawing::adapter(&arguments.adapter))?;
+    let renderer = Renderer::open(&arguments.adapter.as_str().into())?;
     renderer.check_size(view.size_px)?;
-    let stage = Stage::of(&footage);
-    stage.camera(&footage, &footage.at(f64::NEG_INFINITY).ok_or(ShootError::Empty)?, &view)?;
+    let extent = Extent::of(&timeline);
+    extent.camera(&timeline, &timeline.at(f64::NEG_INFINITY).ok_or(RenderError::NoSamples)?, &view)?;
     // Targets are tried before the work.
     if !stills.is_empty() || sheet.is_some() {
         writable(&folder)?;
@@ -132,44 +133,42 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         writable(path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")))?;
     }
     let tiles = sheet.as_ref().map_or(0, |(times, _)| times.len());
-    let progress = console.progress((stills.len() + frames.len() + tiles) as u64, footage.name.clone());
-    let mut studio = Studio { stage, footage: &footage, renderer, view, progress };
+    let progress = console.progress((stills.len() + frames.len() + tiles) as u64, timeline.name.clone());
+    let mut batch = Batch { extent, timeline: &timeline, renderer, view, progress };
 
     let times: Vec<f64> = stills.iter().map(|still| still.time_s).collect();
-    studio.shoot(&times, |first, pictures| {
+    batch.shoot(&times, |first, pictures| {
         let jobs: Vec<_> = stills[first..].iter().zip(pictures).collect();
         jobs.par_iter().map(|(still, picture)| write(&still.path, picture)).collect::<Result<(), Failure>>()
     })?;
-    let mut written: Vec<PathBuf> = stills.into_iter().map(|still| still.path).collect();
     if let Some((path, format)) = film {
-        let fps = arguments.fps.unwrap_or(FPS);
-        write_atomically_with(path, |file| {
-            studio.film(file, format, fps, &frames).map_err(|failure| failure.of(path))
-        })?;
-        written.push(path.to_owned());
+        write_atomically_with(path, |file| batch.film(file, format, fps, &frames).map_err(|failure| failure.of(path)))?;
     }
-    if let (Some((times, size_px)), Some([columns, _])) = (sheet, arguments.sheet) {
-        studio.view.size_px = size_px;
+    if let (Some((times, size_px)), Some([columns, _])) = (&sheet, arguments.sheet) {
+        batch.view.size_px = *size_px;
         let mut tiles = Vec::new();
-        studio.shoot(&times, |_, pictures| {
+        batch.shoot(times, |_, pictures| {
             tiles.extend_from_slice(pictures);
             Ok(())
         })?;
         write(&sheet_path, &contact_sheet(&tiles, columns)?)?;
-        written.push(sheet_path);
     }
-    studio.progress.finish_and_clear();
+    batch.progress.finish_and_clear();
+    let written: Vec<&Path> = (stills.iter().map(|still| still.path.as_path()))
+        .chain(film.map(|(path, _)| path))
+        .chain(sheet.iter().map(|_| sheet_path.as_path()))
+        .collect();
     let names = match written.as_slice() {
         [first, .., last] if written.len() > 4 => {
             format!("{} pictures from {} to {}", written.len(), first.display(), last.display())
         }
         _ => written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "),
     };
-    console.say(&format!("wrote {names}\ndrawn by {}", studio.renderer.adapter()));
+    console.say(&format!("wrote {names}\ndrawn by {}", batch.renderer.adapter()));
     Ok(Exit::Good)
 }
 
-impl Studio<'_> {
+impl Batch<'_> {
     /// Takes pictures at these times and hands them on in order, some at a time; while those are worked on, the next
     /// ones are drawn.
     fn shoot(
@@ -199,13 +198,13 @@ impl Studio<'_> {
         let mut film = Film::new(&mut out, format, self.view.size_px, fps, pictures)?;
         self.shoot(times_s, |_, pictures| Ok(film.add(pictures)?))?;
         film.finish()?;
-        Ok(out.flush().map_err(FilmError::from)?)
+        Ok(out.flush().map_err(RenderError::Write)?)
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
-        let moment = self.footage.at(time_s).ok_or(ShootError::Empty)?;
-        let scene = Scene::compose(self.footage, &self.stage, &moment, &self.view)?;
-        let picture = self.renderer.paint(&scene)?;
+        let frame = self.timeline.at(time_s).ok_or(RenderError::NoSamples)?;
+        let camera = self.extent.camera(self.timeline, &frame, &self.view)?;
+        let picture = self.renderer.paint(&Scene::compose(self.timeline, &self.extent, &frame, &self.view, camera))?;
         self.progress.inc(1);
         Ok(picture)
     }
@@ -215,51 +214,39 @@ fn write(path: &Path, picture: &Picture) -> Result<(), Failure> {
     Ok(write_atomically(path, &picture.to_png()?)?)
 }
 
-fn beside(recording: &Path) -> PathBuf {
-    recording.parent().unwrap_or(Path::new("")).join("snapshots")
-}
-
 /// Makes a folder and a file in it, and takes the file away again.
 fn writable(folder: &Path) -> Result<(), Failure> {
     let probe = folder.join(format!(".tautline-{}", std::process::id()));
-    fs::create_dir_all(folder).and_then(|()| fs::write(&probe, [])).and_then(|()| fs::remove_file(&probe)).map_err(
-        |error| {
-            Failure::machine(format!("cannot write to {}: {error}", folder.display()))
-                .with_help("give a folder that can be written to with --out, or another --film")
-        },
-    )
+    let tried = fs::create_dir_all(folder).and_then(|()| fs::write(&probe, [])).and_then(|()| fs::remove_file(&probe));
+    tried.map_err(|error| {
+        Failure::machine(format!("cannot write to {}: {error}", folder.display()))
+            .with_help("give a folder that can be written to with --out, or another --film")
+    })
 }
 
 /// The pictures asked for, each with its file.
-fn stills(arguments: &RenderArguments, footage: &Footage, folder: &Path) -> Result<Vec<Still>, Failure> {
-    let [start_s, end_s] = footage.range_s();
+fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Result<Vec<Still>, Failure> {
+    let [start_s, end_s] = timeline.range_s();
     let nothing_else = arguments.every.is_none() && arguments.film.is_none() && arguments.sheet.is_none();
-    let default = ["start", "closest", "end"].map(str::to_owned);
-    let wanted = if arguments.at.is_empty() && nothing_else { &default[..] } else { &arguments.at };
+    let mut wanted: Vec<&str> = arguments.at.iter().map(|text| text.trim()).collect();
+    if wanted.is_empty() && nothing_else {
+        // One vehicle alone has no closest approach.
+        wanted = if timeline.closest().is_some() { vec!["start", "closest", "end"] } else { vec!["start", "end"] };
+    }
     let mut stills = Vec::new();
     for text in wanted {
-        let (time_s, name) = match text.trim() {
+        let (time_s, name) = match text {
             "start" => (start_s, "start".to_owned()),
             "end" => (end_s, "end".to_owned()),
-            "closest" => match footage.closest() {
-                Some(closest) => (closest.time_s, "closest".to_owned()),
-                // One vehicle alone has no closest approach; nobody asked for one by default.
-                None if arguments.at.is_empty() => continue,
-                None => {
-                    return Err(Failure::input(
-                        "the recording has no closest approach: it has fewer than two vehicles at a time",
-                        "leave `closest` out of --at",
-                    ));
-                }
-            },
+            "closest" => {
+                let none = "the recording has no closest approach: it has fewer than two vehicles at a time";
+                let closest = timeline.closest().ok_or_else(|| Failure::input(none, "leave `closest` out of --at"))?;
+                (closest.time_s, "closest".to_owned())
+            }
             seconds => {
+                let help = "give start, closest, end or seconds, such as --at start,12.5,end";
                 let time_s = seconds.parse().ok().filter(|time: &f64| time.is_finite());
-                let time_s = time_s.ok_or_else(|| {
-                    Failure::input(
-                        format!("`{text}` is not a time"),
-                        "give start, closest, end or seconds, such as --at start,12.5,end",
-                    )
-                })?;
+                let time_s = time_s.ok_or_else(|| Failure::input(format!("`{text}` is not a time"), help))?;
                 (time_s, format!("at-{time_s:.3}s"))
             }
         };
@@ -276,20 +263,16 @@ fn stills(arguments: &RenderArguments, footage: &Footage, folder: &Path) -> Resu
         }
     }
     if let Some(every_s) = arguments.every {
-        let times = even_times(footage, every_s, "--every")?;
-        stills.extend(
-            times
-                .into_iter()
-                .enumerate()
-                .map(|(k, time_s)| Still { time_s, path: folder.join(format!("frame-{:05}.png", k + 1)) }),
-        );
+        let times = even_times(timeline, every_s, "--every")?;
+        let path = |k: usize| folder.join(format!("frame-{:05}.png", k + 1));
+        stills.extend(times.into_iter().enumerate().map(|(k, time_s)| Still { time_s, path: path(k) }));
     }
     Ok(stills)
 }
 
 /// Times from the start of a flight to its end, so far apart \[s\].
-fn even_times(footage: &Footage, apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
-    let [start_s, end_s] = footage.range_s();
+fn even_times(timeline: &Timeline, apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
+    let [start_s, end_s] = timeline.range_s();
     positive(apart_s, option)?;
     let count = ((end_s - start_s) / apart_s + 1e-6).floor() + 1.0;
     if count > MOST_PICTURES {
@@ -311,22 +294,22 @@ fn positive(number: f64, option: &str) -> Result<f64, Failure> {
     Err(Failure::input(message, format!("give a positive number with {option}")))
 }
 
-fn film_times(arguments: &RenderArguments, footage: &Footage) -> Result<Vec<f64>, Failure> {
-    let [start_s, end_s] = footage.range_s();
-    let fps = f64::from(arguments.fps.unwrap_or(FPS).max(1));
-    let speed = match arguments.speed {
+fn film_times(fps: u32, speed: Option<f64>, timeline: &Timeline) -> Result<Vec<f64>, Failure> {
+    let [start_s, end_s] = timeline.range_s();
+    let fps = f64::from(fps.max(1));
+    let speed = match speed {
         Some(speed) => positive(speed, "--speed")?,
         // The last picture lasts as long as the others.
         None => ((end_s - start_s) / (LONGEST_FILM_S - 1.0 / fps)).max(1.0),
     };
-    even_times(footage, speed / fps, "--speed")
+    even_times(timeline, speed / fps, "--speed")
 }
 
 /// The times of a sheet's pictures and their size.
 fn sheet_plan(
     [columns, rows]: [u32; 2],
     [width, height]: [u32; 2],
-    footage: &Footage,
+    timeline: &Timeline,
 ) -> Result<(Vec<f64>, [u32; 2]), Failure> {
     let size_px = [width / columns, height / rows];
     if size_px.contains(&0) {
@@ -335,7 +318,7 @@ fn sheet_plan(
             "give fewer pictures with --sheet, or a larger --size",
         ));
     }
-    let [start_s, end_s] = footage.range_s();
+    let [start_s, end_s] = timeline.range_s();
     let last = (u64::from(columns) * u64::from(rows) - 1).max(1) as f64;
     if last > MOST_PICTURES {
         return Err(Failure::input(

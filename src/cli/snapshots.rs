@@ -40,7 +40,7 @@ impl Sink for Watched {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         #[cfg(feature = "viewer")]
         if let Some(camera) = &mut self.camera {
-            camera.footage.take(sample);
+            camera.timeline.take(sample);
         }
         let _ = sample;
         Ok(())
@@ -49,7 +49,7 @@ impl Sink for Watched {
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         #[cfg(feature = "viewer")]
         if let Some(camera) = &mut self.camera {
-            camera.footage.note(event);
+            camera.timeline.note(event);
         }
         let _ = event;
         Ok(())
@@ -62,26 +62,26 @@ mod viewer {
 
     use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-    use super::super::{Failure, console::Console, drawing, pictures::write_files};
+    use super::super::{Failure, console::Console, pictures::write_files};
     use super::{Picture, Watched};
     use crate::render::{
-        self, Footage, Renderer, ShootError, Snapshot, Theme, View, data_uri, snapshot_names, snapshots_of_run,
+        self, RenderError, Renderer, Snapshot, Theme, Timeline, View, data_uri, snapshot_names, snapshots_of_run,
     };
     use crate::scenario::Scenario;
 
     /// Room for pictures on a page \[bytes\].
     const PAGE_BYTES: usize = 900 << 10;
 
-    /// Footage, and what is to draw it.
+    /// A flight in memory, and what is to draw it.
     pub(super) struct Camera {
-        pub(super) footage: Footage,
+        pub(super) timeline: Timeline,
         adapter: String,
     }
 
     impl Watched {
         /// Watches a flight of this scenario, to be drawn by this adapter.
         pub(in super::super) fn of(scenario: &Scenario, adapter: &str) -> Self {
-            Self { camera: Some(Camera { footage: Footage::of(scenario), adapter: adapter.to_owned() }) }
+            Self { camera: Some(Camera { timeline: Timeline::of(scenario), adapter: adapter.to_owned() }) }
         }
     }
 
@@ -120,10 +120,10 @@ mod viewer {
 
     fn taken(camera: &Camera) -> Result<Vec<Snapshot>, Failure> {
         let view = View { theme: Theme::Light, ..View::default() };
-        if camera.footage.instants() == 0 {
-            return Err(ShootError::Empty.into());
+        if camera.timeline.keyframes().is_empty() {
+            return Err(RenderError::NoSamples.into());
         }
-        let mut renderer = Renderer::open(&drawing::adapter(&camera.adapter))?;
-        Ok(snapshots_of_run(&mut renderer, &camera.footage, &view)?)
+        let mut renderer = Renderer::open(&camera.adapter.as_str().into())?;
+        Ok(snapshots_of_run(&mut renderer, &camera.timeline, &view)?)
     }
 }

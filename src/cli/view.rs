@@ -1,5 +1,6 @@
 //! `tautline view`: a window on a recording, or on a scenario that is flown while it is watched.
 
+use std::io;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -11,7 +12,7 @@ use super::drawing;
 use super::{Exit, Failure};
 use crate::read::ReadOptions;
 use crate::record::{Event, RecordError, Sample, Sink};
-use crate::render::{Fed, Footage, Theme, WindowError, show};
+use crate::render::{LiveUpdate, Theme, Timeline, show};
 use crate::scenario::{Override, Scenario, Source};
 use crate::sim::{self, Parts};
 
@@ -42,12 +43,12 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let path = Path::new(&arguments.what);
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
-    let (footage, feed) = if is_recording {
+    let (timeline, live) = if is_recording {
         if !arguments.overrides.is_empty() {
             let help = "leave --set out, or give a scenario";
             return Err(Failure::input("a recording has been flown: --set has no effect on it", help));
         }
-        (drawing::footage(path, &ReadOptions::default(), arguments.delta, console)?, None)
+        (drawing::timeline(path, &ReadOptions::default(), arguments.delta, console)?, None)
     } else {
         if arguments.delta.is_some() {
             let help = "leave --delta out, or give --set with the scenario's own key";
@@ -58,21 +59,21 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
         }
         let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
         let scenario = Scenario::read(&Source::resolve(&arguments.what)?, &overrides)?;
-        (Footage::of(&scenario), Some(take_off(scenario)?))
+        (Timeline::of(&scenario), Some(take_off(scenario)?))
     };
-    show(footage, feed, arguments.theme, drawing::adapter(&arguments.adapter))?;
+    show(timeline, live, arguments.theme, arguments.adapter.as_str().into())?;
     Ok(Exit::Good)
 }
 
 /// Starts a flight in a thread of its own. It waits for the window where that is slower, and ends when the window is
 /// closed.
-fn take_off(scenario: Scenario) -> Result<Receiver<Fed>, Failure> {
+fn take_off(scenario: Scenario) -> Result<Receiver<LiveUpdate>, Failure> {
     let parts = Parts::of(&scenario)?;
     let (sender, receiver) = sync_channel(WAITING);
     std::thread::spawn(move || {
-        let mut downlink = Downlink { sender, cut: false };
+        let mut sink = LiveSink(sender);
         let mut carry_on = |_| ControlFlow::Continue(());
-        let flown = sim::fly(&scenario, parts, &mut downlink, &mut carry_on);
+        let flown = sim::fly(&scenario, parts, &mut sink, &mut carry_on);
         let said = match flown {
             Ok(flight) => match flight.ending {
                 sim::Ending::LawUndefined(why) => Some(format!("the flight ended: the law is undefined: {why}")),
@@ -81,41 +82,31 @@ fn take_off(scenario: Scenario) -> Result<Receiver<Fed>, Failure> {
             },
             Err(error) => Some(format!("the flight ended: {error}")),
         };
-        downlink.send(Fed::Ended(said));
+        // Nobody is left to tell where the window is closed.
+        let _ = sink.send(LiveUpdate::Ended(said));
     });
     Ok(receiver)
 }
 
 /// Sends a flight to the window.
-struct Downlink {
-    sender: SyncSender<Fed>,
-    cut: bool,
-}
+struct LiveSink(SyncSender<LiveUpdate>);
 
-impl Downlink {
-    fn send(&mut self, fed: Fed) {
-        self.cut |= self.sender.send(fed).is_err();
-    }
-
-    /// A window that is closed ends the flight.
-    fn result(&self) -> Result<(), RecordError> {
-        if self.cut {
-            let source = std::io::Error::from(std::io::ErrorKind::BrokenPipe);
-            return Err(RecordError::Write { path: "the window".to_owned(), source });
-        }
-        Ok(())
+impl LiveSink {
+    /// Sends what was flown; a window that is closed ends the flight.
+    fn send(&self, update: LiveUpdate) -> Result<(), RecordError> {
+        let closed = |_| io::Error::from(io::ErrorKind::BrokenPipe);
+        let sent = self.0.send(update).map_err(closed);
+        sent.map_err(|source| RecordError::Write { path: "the window".to_owned(), source })
     }
 }
 
-impl Sink for Downlink {
+impl Sink for LiveSink {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
-        self.send(Fed::Sample(Box::new(sample.into())));
-        self.result()
+        self.send(LiveUpdate::Sample(Box::new(sample.into())))
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.send(Fed::Event(event.clone()));
-        self.result()
+        self.send(LiveUpdate::Event(event.clone()))
     }
 }
 
@@ -124,16 +115,4 @@ pub(super) fn lose_display() -> Exit {
     Failure::machine("the display is gone, and the window with it")
         .with_help("open it again on a display that stays, or draw without one: tautline render RECORDING")
         .show()
-}
-
-impl From<WindowError> for Failure {
-    fn from(error: WindowError) -> Self {
-        let message = error.to_string();
-        match error {
-            WindowError::NoDisplay(_) => Self::machine(message)
-                .with_help("run it on a machine with a screen, or draw without one: tautline render RECORDING"),
-            WindowError::Refused(_) => Self::machine(message),
-            WindowError::Gpu(error) => error.into(),
-        }
-    }
 }

@@ -8,13 +8,14 @@ use foxglove::messages::{
 };
 use foxglove::{Encode as _, Schema};
 
-use super::footage::Plan;
-use super::footage::stretch::Stretch;
 use super::scene::{Colour, Theme};
+use super::timeline::Plan;
+use crate::graph::Graph;
 use crate::record::Sample;
 use crate::record::mcap::{ExtraTopic, Topic};
 use crate::scenario::Scenario;
-use crate::swarm::{Pair, Rows, row};
+use crate::space::NearPairs;
+use crate::swarm::{Pair, Rows, row, separation};
 
 /// Scenes a second \[Hz\].
 pub const SCENE_HZ: f64 = 5.0;
@@ -37,6 +38,7 @@ pub struct FoxgloveScene {
     delta_m: f64,
     next_s: f64,
     schema: Option<Schema>,
+    near: NearPairs,
 }
 
 impl FoxgloveScene {
@@ -49,20 +51,18 @@ impl FoxgloveScene {
             delta_m: scenario.delta_m,
             next_s: f64::NEG_INFINITY,
             schema: SceneUpdate::get_schema(),
+            near: NearPairs::default(),
         }
     }
 
-    fn scene(&self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
+    fn scene(&mut self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
         let theme = Theme::Dark;
         let count = positions_m.nrows();
-        let now = Stretch { times_s: [time_s; 2], positions_m: [positions_m; 2] };
-        let graph = &self.plan.graph;
-        let edges: Vec<(usize, usize)> =
-            if graph.edge_count() <= MOST_EDGES { graph.edges().collect() } else { Vec::new() };
         let mut alarm = vec![false; count];
-        for pair in now.near(self.delta_m) {
-            if now.inside_s(pair, self.delta_m).is_some() {
-                (alarm[pair.first()], alarm[pair.second()]) = (true, true);
+        self.near.update(positions_m, self.delta_m);
+        for &(i, j) in self.near.pairs() {
+            if separation(positions_m, i, j) < self.delta_m {
+                (alarm[i], alarm[j]) = (true, true);
             }
         }
         let hulls = (0..count).map(|k| {
@@ -79,12 +79,10 @@ impl FoxgloveScene {
             thickness: EDGE_M,
             ..LinePrimitive::default()
         };
-        for &(i, j) in &edges {
-            let distance_m = (row(positions_m, i) - row(positions_m, j)).norm();
-            #[expect(clippy::cast_possible_truncation, reason = "a colour")]
-            let tension = self.plan.tension(Pair::new(i, j), distance_m) as f32;
-            for k in [i, j] {
-                let place = row(positions_m, k);
+        let few_edges = Some(&self.plan.graph).filter(|graph| graph.edge_count() <= MOST_EDGES);
+        for (i, j) in few_edges.into_iter().flat_map(Graph::edges) {
+            let tension = self.plan.tension(Pair::new(i, j), separation(positions_m, i, j));
+            for place in [i, j].map(|k| row(positions_m, k)) {
                 lines.points.push(Point3 { x: place.x, y: place.y, z: place.z });
                 lines.colors.push(colour(theme.tension(tension).at(0.8)));
             }
@@ -96,7 +94,7 @@ impl FoxgloveScene {
                 frame_id: "world".to_owned(),
                 id: "swarm".to_owned(),
                 spheres: hulls.chain(shells).collect(),
-                lines: if edges.is_empty() { Vec::new() } else { vec![lines] },
+                lines: if lines.points.is_empty() { Vec::new() } else { vec![lines] },
                 ..SceneEntity::default()
             }],
         }

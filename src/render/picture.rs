@@ -1,5 +1,7 @@
 //! Pictures in memory.
 
+use super::error::RenderError;
+
 /// A picture: rows from the top, pixels from the left, red, green, blue and opacity in sRGB.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Picture {
@@ -8,11 +10,6 @@ pub struct Picture {
     /// 4 bytes a pixel.
     pub rgba: Vec<u8>,
 }
-
-/// A picture cannot be encoded or put together.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the picture cannot be made: {0}")]
-pub struct PictureError(String);
 
 impl std::fmt::Debug for Picture {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -35,19 +32,15 @@ impl Picture {
     /// The picture as PNG, without its opacity, which is full.
     ///
     /// # Errors
-    /// [`PictureError`] when the number of bytes does not fit the size.
-    pub fn to_png(&self) -> Result<Vec<u8>, PictureError> {
-        let rgb: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    /// [`RenderError::Picture`] when the number of bytes does not fit the size.
+    pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
         let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.size_px[0], self.size_px[1]);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::Balanced);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        let error = |error: png::EncodingError| PictureError(error.to_string());
-        let mut writer = encoder.write_header().map_err(error)?;
-        writer.write_image_data(&rgb).map_err(error)?;
-        writer.finish().map_err(error)?;
+        let write = |bytes| {
+            let mut writer = png_encoder(bytes, self.size_px).write_header()?;
+            writer.write_image_data(&self.rgb())?;
+            writer.finish()
+        };
+        write(&mut bytes).map_err(|error: png::EncodingError| RenderError::Picture(error.to_string()))?;
         Ok(bytes)
     }
 
@@ -65,6 +58,21 @@ impl Picture {
         let rgba = (0..size_px[1]).flat_map(|y| (0..size_px[0]).flat_map(|x| mean(x, y)).collect::<Vec<_>>()).collect();
         Self { size_px, rgba }
     }
+
+    /// 3 bytes a pixel: without the opacity, which is full.
+    pub(super) fn rgb(&self) -> Vec<u8> {
+        self.rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+    }
+}
+
+/// What encodes pictures of this size as PNG.
+pub(super) fn png_encoder<W: std::io::Write>(out: W, [width, height]: [u32; 2]) -> png::Encoder<'static, W> {
+    let mut encoder = png::Encoder::new(out, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Balanced);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder
 }
 
 /// A PNG within an address, for pages that load nothing.
@@ -77,12 +85,12 @@ pub fn data_uri(png: &[u8]) -> String {
 /// Pictures of one size side by side, so many in a row; what is left of the last row has the first pixel's colour.
 ///
 /// # Errors
-/// [`PictureError`] when there is none, or they differ in size.
-pub fn contact_sheet(pictures: &[Picture], columns: u32) -> Result<Picture, PictureError> {
-    let Some(first) = pictures.first() else { return Err(PictureError("there are none".to_owned())) };
+/// [`RenderError::Picture`] when there is none, or they differ in size.
+pub fn contact_sheet(pictures: &[Picture], columns: u32) -> Result<Picture, RenderError> {
+    let Some(first) = pictures.first() else { return Err(RenderError::Picture("there are none".to_owned())) };
     let [width, height] = first.size_px;
     if columns == 0 || pictures.iter().any(|picture| picture.size_px != first.size_px) {
-        return Err(PictureError("a sheet needs a column and pictures of one size".to_owned()));
+        return Err(RenderError::Picture("a sheet needs a column and pictures of one size".to_owned()));
     }
     let rows = u32::try_from(pictures.len().div_ceil(columns as usize)).unwrap_or(u32::MAX);
     let size_px = [width.saturating_mul(columns), height.saturating_mul(rows)];

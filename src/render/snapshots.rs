@@ -1,9 +1,10 @@
 //! The pictures that a run leaves.
 
-use super::Footage;
-use super::gpu::{Renderer, ShootError};
+use super::error::RenderError;
+use super::gpu::Renderer;
 use super::picture::Picture;
-use super::scene::{CameraSpec, Scene, Stage, View, metres};
+use super::scene::{CameraSpec, Extent, Scene, View, metres};
+use super::timeline::Timeline;
 use crate::swarm::Pair;
 
 /// Most violations that are pictured.
@@ -20,39 +21,6 @@ pub struct Snapshot {
     pub picture: Picture,
 }
 
-/// What is worth a picture.
-struct Occasion {
-    name: String,
-    description: String,
-    time_s: f64,
-    /// The pair to be seen from near; the whole flight where there is none.
-    pair: Option<Pair>,
-}
-
-fn occasions(footage: &Footage) -> Vec<Occasion> {
-    let [start_s, end_s] = footage.range_s();
-    let whole = |name: &str, description, time_s| Occasion { name: name.to_owned(), description, time_s, pair: None };
-    let mut occasions = vec![whole("start", format!("The start, at {start_s:.2} s."), start_s)];
-    if let Some(closest) = footage.closest() {
-        let description = format!(
-            "The closest approach of the flight: vehicles {} at {:.2} s, {} apart.",
-            closest.pair,
-            closest.time_s,
-            metres(closest.separation_m)
-        );
-        occasions.push(whole("closest", description, closest.time_s));
-    }
-    occasions.push(whole("end", format!("The end, at {end_s:.2} s."), end_s));
-    for (k, span) in footage.violations().iter().take(MOST_VIOLATIONS).enumerate() {
-        let until_s = span.to_s.min(end_s);
-        let description =
-            format!("Vehicles {} were closer than delta from {:.2} s to {until_s:.2} s.", span.pair, span.from_s);
-        let (name, time_s) = (format!("violation-{}", k + 1), footage.worst_s(span));
-        occasions.push(Occasion { name, description, time_s, pair: Some(span.pair) });
-    }
-    occasions
-}
-
 /// Names of all pictures that [`snapshots_of_run`] can take.
 #[must_use]
 pub fn snapshot_names() -> Vec<String> {
@@ -61,22 +29,41 @@ pub fn snapshot_names() -> Vec<String> {
 }
 
 /// Pictures of the start, the closest approach, the end and the first ten violations of a flight; none of a flight
-/// without instants.
+/// without samples.
 ///
 /// # Errors
-/// [`ShootError`] when the adapter fails.
-pub fn snapshots_of_run(renderer: &mut Renderer, footage: &Footage, view: &View) -> Result<Vec<Snapshot>, ShootError> {
-    let stage = Stage::of(footage);
-    let mut snapshots = Vec::new();
+/// [`RenderError`] when the adapter fails.
+pub fn snapshots_of_run(
+    renderer: &mut Renderer,
+    timeline: &Timeline,
+    view: &View,
+) -> Result<Vec<Snapshot>, RenderError> {
+    let extent = Extent::of(timeline);
     let view = View { camera: CameraSpec::Iso, ..view.clone() };
-    for Occasion { name, description, time_s, pair } in occasions(footage) {
-        let Some(moment) = footage.at(time_s) else { break };
+    let mut snapshots = Vec::new();
+    // The whole flight, or one pair from near.
+    let mut shoot = |name: &str, description: String, time_s: f64, pair: Option<Pair>| {
+        let Some(frame) = timeline.at(time_s) else { return Ok(()) };
         let camera = match pair {
-            Some(pair) => stage.close_up(footage, &moment, pair, view.size_px),
-            None => stage.camera(footage, &moment, &view)?,
+            Some(pair) => extent.close_up(timeline, &frame, pair, view.size_px),
+            None => extent.camera(timeline, &frame, &view)?,
         };
-        let picture = renderer.paint(&Scene::seen_by(camera, footage, &stage, &moment, &view))?;
-        snapshots.push(Snapshot { name, description, picture });
+        let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, &view, camera))?;
+        snapshots.push(Snapshot { name: name.to_owned(), description, picture });
+        Ok::<(), RenderError>(())
+    };
+    let [start_s, end_s] = timeline.range_s();
+    shoot("start", format!("The start, at {start_s:.2} s."), start_s, None)?;
+    if let Some(closest) = timeline.closest() {
+        let (pair, time_s, apart) = (closest.pair, closest.time_s, metres(closest.separation_m));
+        let what = format!("The closest approach of the flight: vehicles {pair} at {time_s:.2} s, {apart} apart.");
+        shoot("closest", what, time_s, None)?;
+    }
+    shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
+    for (k, span) in timeline.violations().iter().take(MOST_VIOLATIONS).enumerate() {
+        let (pair, from_s, to_s) = (span.pair, span.from_s, span.to_s.min(end_s));
+        let what = format!("Vehicles {pair} were closer than delta from {from_s:.2} s to {to_s:.2} s.");
+        shoot(&format!("violation-{}", k + 1), what, timeline.worst_s(span), Some(pair))?;
     }
     Ok(snapshots)
 }

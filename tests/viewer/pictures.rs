@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use tautline::record::{Event, Sample};
 use tautline::render::gpu::Renderer;
 use tautline::render::scene::{Ball, Camera, Colour, Lens, Line, Orbit};
-use tautline::render::{AdapterChoice, Footage, GpuError, Layers, Picture, Scene, Theme, View};
+use tautline::render::{AdapterChoice, Layers, Picture, RenderError, Scene, Theme, Timeline, View};
 use tautline::scenario::{Scenario, Source};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
@@ -41,7 +41,7 @@ fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
         balls: balls.to_vec(),
         shells: Vec::new(),
         lines: Vec::new(),
-        marks: Vec::new(),
+        annotations: Vec::new(),
     }
 }
 
@@ -120,12 +120,12 @@ fn of_two_lines_on_one_another_the_later_one_is_seen_whole() {
 #[test]
 fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
     let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
-    let mut footage = Footage::of(&scenario);
+    let mut timeline = Timeline::of(&scenario);
     let mut swarm = Swarm::at_rest(scenario.start.positions_m.clone());
     for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
         swarm.positions_m[(4, 0)] += 30e3 * time_s;
         let control = Rows::zeros(5);
-        footage.take(&Sample {
+        timeline.take(&Sample {
             time_s,
             step: step as u64,
             swarm: &swarm,
@@ -141,8 +141,8 @@ fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
         ..small()
     };
     let mut renderer = renderer();
-    let with = renderer.shoot(&footage, 0.0, &view).expect("a picture");
-    let without = renderer.shoot(&footage, 0.0, &View { layers: Layers::NONE, ..view }).expect("a picture");
+    let with = renderer.shoot(&timeline, 0.0, &view).expect("a picture");
+    let without = renderer.shoot(&timeline, 0.0, &View { layers: Layers::NONE, ..view }).expect("a picture");
     let (difference, _) = flip(&without, &with);
     assert!(difference > FLIP_CEILING, "the edges are missing: {difference}");
 }
@@ -204,12 +204,12 @@ fn a_line_has_the_width_and_colour_that_it_asks_for() {
 
 #[test]
 fn frames_repeat_bit_for_bit_even_on_another_renderer() {
-    let footage = crossing();
-    let shoot = |renderer: &mut Renderer| renderer.shoot(&footage, 2.0, &small()).expect("a picture");
+    let timeline = crossing();
+    let shoot = |renderer: &mut Renderer| renderer.shoot(&timeline, 2.0, &small()).expect("a picture");
     let (mut first, mut second) = (renderer(), renderer());
     let once = shoot(&mut first);
     assert!(once == shoot(&mut first) && once == shoot(&mut second));
-    assert!(once != first.shoot(&footage, 2.1, &small()).expect("a picture"), "another time is another picture");
+    assert!(once != first.shoot(&timeline, 2.1, &small()).expect("a picture"), "another time is another picture");
 }
 
 #[test]
@@ -224,13 +224,13 @@ fn a_size_that_cannot_be_drawn_is_refused() {
         assert_eq!(picture.rgba.len(), size_px[0] as usize * size_px[1] as usize * 4);
     }
     let none = Renderer::open(&AdapterChoice::Named("no such adapter".to_owned())).err();
-    assert!(matches!(none, Some(GpuError::NoSuchAdapter { .. })), "{none:?}");
+    assert!(matches!(none, Some(RenderError::NoSuchAdapter { .. })), "{none:?}");
 }
 
 /// Three vehicles pass each other; two of them come too close from 2 s to 3 s.
-fn crossing() -> Footage {
+fn crossing() -> Timeline {
     let scenario = Scenario::read(&Source::Builtin("pentagon-laplacian".to_owned()), &[]).expect("built in");
-    let mut footage = Footage::of(&scenario);
+    let mut timeline = Timeline::of(&scenario);
     for k in 0..=40_u32 {
         let time_s = f64::from(k) / 10.0;
         let mut swarm = Swarm::at_rest(scenario.start.positions_m.clone());
@@ -240,7 +240,7 @@ fn crossing() -> Footage {
         }
         let separation = Some(ClosestApproach { pair: Pair::new(0, 2), separation_m: 3.0 - 0.4 * time_s, time_s });
         let control = Rows::zeros(5);
-        footage.take(&Sample {
+        timeline.take(&Sample {
             time_s,
             step: u64::from(k),
             swarm: &swarm,
@@ -250,9 +250,9 @@ fn crossing() -> Footage {
             channels: &[],
         });
     }
-    footage.note(&Event::ViolationBegan { pair: Pair::new(0, 2), time_s: 2.0 });
-    footage.note(&Event::ViolationEnded { pair: Pair::new(0, 2), time_s: 3.0, min_m: 1.8 });
-    footage
+    timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 2), time_s: 2.0 });
+    timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 2), time_s: 3.0, min_m: 1.8 });
+    timeline
 }
 
 fn small() -> View {
@@ -311,9 +311,9 @@ fn looks_like(name: &str, actual: &Picture) {
 
 #[test]
 fn pictures_look_as_they_did() {
-    let (footage, mut renderer) = (crossing(), renderer());
+    let (timeline, mut renderer) = (crossing(), renderer());
     let mut shoot = |name: &str, time_s: f64, view: View| {
-        looks_like(name, &renderer.shoot(&footage, time_s, &view).expect(name));
+        looks_like(name, &renderer.shoot(&timeline, time_s, &view).expect(name));
     };
     shoot("start", 0.0, small());
     shoot("violation", 2.5, View { theme: Theme::Light, ..small() });
@@ -325,8 +325,8 @@ fn pictures_look_as_they_did() {
 fn a_vehicle_that_moved_is_seen_to_have_moved() {
     let mut renderer = renderer();
     let bare = View { layers: Layers::NONE, ..small() };
-    let footage = crossing();
-    let [first, second] = [2.0, 2.1].map(|time_s| renderer.shoot(&footage, time_s, &bare).expect("a picture"));
+    let timeline = crossing();
+    let [first, second] = [2.0, 2.1].map(|time_s| renderer.shoot(&timeline, time_s, &bare).expect("a picture"));
     let (same, _) = flip(&first, &first);
     let (moved, _) = flip(&first, &second);
     assert_eq!(same, 0.0);

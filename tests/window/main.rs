@@ -8,8 +8,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use tautline::render::scene::{Camera, Stage};
-use tautline::render::{CameraSpec, Footage};
+use tautline::render::scene::{Camera, Extent};
+use tautline::render::{CameraSpec, Timeline};
 
 /// Longest wait for anything on a slow machine.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -29,7 +29,7 @@ impl Screen {
         static TURN: Mutex<()> = Mutex::new(());
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = tempfile::tempdir().expect("a folder");
-        // Without `-noreset` the server begins anew, and drops the window, when a client was the last one for a moment.
+        // Without `-noreset` the server begins anew, and drops the window, when a client was the last one for a frame.
         let mut server = Command::new("Xvfb")
             .args(["-noreset", "-displayfd", "1", "-screen", "0", "1400x900x24", "-nolisten", "tcp", "-fbdir"])
             .arg(memory.path())
@@ -270,11 +270,11 @@ fn every_layer_theme_and_turn_changes_the_picture_and_back_again() {
 
 /// Where the first vehicle is at the end of a recording in a framed picture of this size \[pixels\].
 fn first_vehicle(recording: &Path, size_px: [u32; 2]) -> [u32; 2] {
-    let footage = Footage::read_mcap(recording).expect("a recording");
-    let stage = Stage::of(&footage);
-    let (orbit, target_m) = stage.orbit(&CameraSpec::Iso, size_px);
-    let moment = footage.at(f64::INFINITY).expect("a moment");
-    let place = moment.positions_m.row(0).transpose().fixed_rows::<3>(0) - stage.origin_m();
+    let timeline = Timeline::read_mcap(recording).expect("a recording");
+    let extent = Extent::of(&timeline);
+    let (orbit, target_m) = extent.orbit(&CameraSpec::Iso, size_px);
+    let frame = timeline.at(f64::INFINITY).expect("a frame");
+    let place = frame.positions_m.row(0).transpose().fixed_rows::<3>(0) - extent.origin_m();
     let at = Camera::orbiting(orbit, target_m, size_px).project(place).expect("before the camera");
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of the picture")]
     let at_px = at.at_px.map(|pixels| pixels.round() as u32);

@@ -2,7 +2,10 @@
 
 use std::io::Write;
 
-use super::FilmError;
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+
+use super::encoder::FilmEncoder;
+use crate::render::error::RenderError;
 use crate::render::picture::Picture;
 
 pub(super) const NAME: &str = "GIF";
@@ -14,51 +17,54 @@ const SPEED: i32 = 3;
 
 pub(super) struct Gif<W: Write> {
     encoder: gif::Encoder<W>,
+    sides: [u16; 2],
     fps: u32,
     pictures: u32,
 }
 
-/// Chooses the colours of a picture and compresses it.
-pub(super) fn prepare(picture: &Picture) -> Result<gif::Frame<'static>, FilmError> {
-    let [width, height] = sides(picture.size_px)?;
-    let mut rgba = picture.rgba.clone();
-    let mut frame = gif::Frame::from_rgba_speed(width, height, &mut rgba, SPEED);
-    frame.make_lzw_pre_encoded();
-    Ok(frame)
-}
-
-pub(super) fn sides(size_px: [u32; 2]) -> Result<[u16; 2], FilmError> {
+pub(super) fn sides(size_px: [u32; 2]) -> Result<[u16; 2], RenderError> {
     let [width, height] = size_px;
     match (u16::try_from(width), u16::try_from(height)) {
         (Ok(width @ 1..), Ok(height @ 1..)) => Ok([width, height]),
-        _ => Err(FilmError::Size { format: NAME, width, height, why: "a side has from 1 to 65535" }),
+        _ => Err(RenderError::FilmSize { format: NAME, width, height, why: "a side has from 1 to 65535" }),
     }
 }
 
-fn failed(error: gif::EncodingError) -> FilmError {
+fn failed(error: gif::EncodingError) -> RenderError {
     match error {
         gif::EncodingError::Io(error) => error.into(),
-        error => FilmError::Encoder { format: NAME, reason: error.to_string() },
+        error => RenderError::Encoder { format: NAME, reason: error.to_string() },
     }
 }
 
 impl<W: Write> Gif<W> {
-    pub(super) fn new(out: W, size_px: [u32; 2], fps: u32) -> Result<Self, FilmError> {
-        let [width, height] = sides(size_px)?;
-        let mut encoder = gif::Encoder::new(out, width, height, &[]).map_err(failed)?;
+    pub(super) fn new(out: W, size_px: [u32; 2], fps: u32) -> Result<Self, RenderError> {
+        let sides = sides(size_px)?;
+        let mut encoder = gif::Encoder::new(out, sides[0], sides[1], &[]).map_err(failed)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
-        Ok(Self { encoder, fps, pictures: 0 })
+        Ok(Self { encoder, sides, fps, pictures: 0 })
+    }
+}
+
+impl<W: Write + Send> FilmEncoder for Gif<W> {
+    fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError> {
+        let [width, height] = self.sides;
+        let chosen = pictures.par_iter().map(|picture| {
+            let mut frame = gif::Frame::from_rgba_speed(width, height, &mut picture.rgba.clone(), SPEED);
+            frame.make_lzw_pre_encoded();
+            frame
+        });
+        for mut frame in chosen.collect::<Vec<_>>() {
+            // Hundredths of a second, rounded so that they add up to the right time.
+            let until = |pictures: u32| u64::from(pictures) * 100 / u64::from(self.fps);
+            frame.delay = u16::try_from(until(self.pictures + 1) - until(self.pictures)).unwrap_or(u16::MAX);
+            self.pictures += 1;
+            self.encoder.write_lzw_pre_encoded_frame(&frame).map_err(failed)?;
+        }
+        Ok(())
     }
 
-    pub(super) fn add(&mut self, mut frame: gif::Frame<'static>) -> Result<(), FilmError> {
-        // Hundredths of a second, rounded so that they add up to the right time.
-        let until = |pictures: u32| u64::from(pictures) * 100 / u64::from(self.fps);
-        frame.delay = u16::try_from(until(self.pictures + 1) - until(self.pictures)).unwrap_or(u16::MAX);
-        self.pictures += 1;
-        self.encoder.write_lzw_pre_encoded_frame(&frame).map_err(failed)
-    }
-
-    pub(super) fn finish(self) -> Result<(), FilmError> {
+    fn finish(self: Box<Self>) -> Result<(), RenderError> {
         self.encoder.into_inner().map(|_| ()).map_err(failed)
     }
 }

@@ -7,7 +7,10 @@ use openh264::OpenH264API;
 use openh264::encoder::{Encoder, EncoderConfig, FrameRate, FrameType, IntraFramePeriod, RateControlMode, VuiConfig};
 use openh264::formats::{RgbaSliceU8, YUVBuffer};
 
-use super::FilmError;
+use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
+
+use super::encoder::FilmEncoder;
+use crate::render::error::RenderError;
 use crate::render::picture::Picture;
 
 pub(super) const NAME: &str = "MP4";
@@ -25,19 +28,19 @@ pub(super) struct Mp4<W> {
     alone: Option<YUVBuffer>,
 }
 
-fn failed(error: &dyn std::fmt::Display) -> FilmError {
-    FilmError::Encoder { format: NAME, reason: error.to_string() }
+fn failed(error: &dyn std::fmt::Display) -> RenderError {
+    RenderError::Encoder { format: NAME, reason: error.to_string() }
 }
 
 /// Brightness and colour of a picture.
-pub(super) fn prepare(picture: &Picture) -> YUVBuffer {
+pub(super) fn yuv(picture: &Picture) -> YUVBuffer {
     let size = picture.size_px.map(|side| side as usize);
     YUVBuffer::from_rgba8_source(RgbaSliceU8::new(&picture.rgba, (size[0], size[1])))
 }
 
 /// Whether the encoder takes pictures of this size.
-pub(super) fn check([width, height]: [u32; 2]) -> Result<(), FilmError> {
-    let size = |why| Err(FilmError::Size { format: NAME, width, height, why });
+pub(super) fn check([width, height]: [u32; 2]) -> Result<(), RenderError> {
+    let size = |why| Err(RenderError::FilmSize { format: NAME, width, height, why });
     if width % 2 == 1 || height % 2 == 1 {
         return size("H.264 needs even sides");
     }
@@ -48,7 +51,7 @@ pub(super) fn check([width, height]: [u32; 2]) -> Result<(), FilmError> {
 }
 
 impl<W: Write> Mp4<W> {
-    pub(super) fn new(out: W, [width, height]: [u32; 2], fps: u32) -> Result<Self, FilmError> {
+    pub(super) fn new(out: W, [width, height]: [u32; 2], fps: u32) -> Result<Self, RenderError> {
         let config = EncoderConfig::new()
             .max_frame_rate(FrameRate::from_hz(fps as f32))
             .intra_frame_period(IntraFramePeriod::from_num_frames(KEY_EVERY_S * fps))
@@ -65,25 +68,29 @@ impl<W: Write> Mp4<W> {
         Ok(Self { encoder, muxer, fps, pictures: 0, alone: None })
     }
 
-    pub(super) fn add(&mut self, picture: YUVBuffer) -> Result<(), FilmError> {
-        self.encode(&picture, f64::from(self.pictures) / f64::from(self.fps))?;
-        self.alone = (self.pictures == 0).then_some(picture);
-        self.pictures += 1;
-        Ok(())
-    }
-
-    fn encode(&mut self, picture: &YUVBuffer, time_s: f64) -> Result<(), FilmError> {
+    fn encode(&mut self, picture: &YUVBuffer, time_s: f64) -> Result<(), RenderError> {
         let stream = self.encoder.encode(picture).map_err(|error| failed(&error))?;
         let is_key = matches!(stream.frame_type(), FrameType::IDR | FrameType::I);
         self.muxer.write_video(time_s, &stream.to_vec(), is_key).map_err(|error| failed(&error))
     }
 
     #[cfg(test)]
-    pub(super) fn encoded(&mut self, picture: &YUVBuffer) -> Result<Vec<u8>, FilmError> {
+    pub(super) fn encoded(&mut self, picture: &YUVBuffer) -> Result<Vec<u8>, RenderError> {
         Ok(self.encoder.encode(picture).map_err(|error| failed(&error))?.to_vec())
     }
+}
 
-    pub(super) fn finish(mut self) -> Result<(), FilmError> {
+impl<W: Write + Send> FilmEncoder for Mp4<W> {
+    fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError> {
+        for picture in pictures.par_iter().map(yuv).collect::<Vec<_>>() {
+            self.encode(&picture, f64::from(self.pictures) / f64::from(self.fps))?;
+            self.alone = (self.pictures == 0).then_some(picture);
+            self.pictures += 1;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<(), RenderError> {
         // The last picture lasts as long as the one before it: a single one is shown twice, half as long.
         if let Some(picture) = self.alone.take() {
             self.encode(&picture, 0.5 / f64::from(self.fps))?;

@@ -1,7 +1,8 @@
 //! Finding a graphics adapter.
 
-use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::render::error::RenderError;
 
 /// Which adapter draws.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -17,79 +18,31 @@ pub enum AdapterChoice {
     Named(String),
 }
 
-impl FromStr for AdapterChoice {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(match text {
+impl From<&str> for AdapterChoice {
+    fn from(text: &str) -> Self {
+        match text {
             "" | "best" => Self::Best,
             "hardware" => Self::Hardware,
             "software" => Self::Software,
             name => Self::Named(name.to_owned()),
-        })
+        }
     }
 }
 
 /// Ways to speak to adapters. OpenGL is none of them: it cannot say which samples of a pixel a ball covers.
-pub(crate) const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
+const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 
-/// Why nothing can be drawn.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum GpuError {
-    /// The machine has no adapter at all.
-    #[error("this machine has no graphics adapter and no driver in software")]
-    NoAdapter,
-    /// It has adapters, but not of this choice.
-    #[error("there is no {wanted} adapter; there are: {found}")]
-    NoSuchAdapter {
-        /// What was asked for.
-        wanted: String,
-        /// Names of those that there are.
-        found: String,
-    },
-    /// The adapter cannot be started.
-    #[error("the adapter {adapter} cannot be used: {reason}")]
-    Unusable {
-        /// Its name.
-        adapter: String,
-        /// What the driver said.
-        reason: String,
-    },
-    /// A picture of this size cannot be drawn.
-    #[error(
-        "a picture of {width} x {height} pixels cannot be drawn: {adapter} draws from 1 to {largest} pixels a side"
-    )]
-    Size {
-        /// Width asked for.
-        width: u32,
-        /// Height asked for.
-        height: u32,
-        /// Largest side.
-        largest: u32,
-        /// Name of the adapter.
-        adapter: String,
-    },
-    /// The adapter failed while drawing.
-    #[error("the graphics driver failed: {reason}")]
-    Driver {
-        /// What it said.
-        reason: String,
-    },
-    /// The adapter is gone.
-    #[error("the graphics adapter was lost")]
-    Lost,
-}
-
-impl GpuError {
-    /// What helps where there is no adapter.
-    pub const HELP: &'static str =
-        "install a driver; one in software is in Debian's packages: apt-get install mesa-vulkan-drivers libvulkan1";
+/// What finds adapters, for pictures alone or for windows on a display.
+pub(crate) fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>) -> wgpu::Instance {
+    let headless = wgpu::InstanceDescriptor::new_without_display_handle();
+    wgpu::Instance::new(wgpu::InstanceDescriptor { backends: BACKENDS, display, ..headless })
 }
 
 /// An adapter at work.
 pub(crate) struct Gpu {
     pub(crate) name: String,
     pub(crate) largest_px: u32,
+    pub(crate) adapter: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     /// The first error that nobody asked for.
@@ -97,25 +50,14 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    pub(super) fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = BACKENDS;
-        Self::start(&pick(&wgpu::Instance::new(descriptor), choice, None)?)
-    }
-
-    /// An adapter that can show what it draws on a surface.
-    pub(crate) fn open_for(
+    /// Starts the best adapter of a choice, for a surface one that can show what it draws on it.
+    pub(crate) fn open(
         instance: &wgpu::Instance,
-        surface: &wgpu::Surface<'_>,
         choice: &AdapterChoice,
-    ) -> Result<(Self, wgpu::SurfaceCapabilities), GpuError> {
-        let adapter = pick(instance, choice, Some(surface))?;
-        let capabilities = surface.get_capabilities(&adapter);
-        Ok((Self::start(&adapter)?, capabilities))
-    }
-
-    fn start(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        let name = name(adapter);
+        surface: Option<&wgpu::Surface<'_>>,
+    ) -> Result<Self, RenderError> {
+        let adapter = pick(instance, choice, surface)?;
+        let name = name(&adapter);
         let limits = adapter.limits();
         // The limits of the adapter itself would forbid another one to do the same; a picture needs few of them.
         let required_limits = wgpu::Limits {
@@ -130,27 +72,27 @@ impl Gpu {
             ..wgpu::DeviceDescriptor::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|error| GpuError::Unusable { adapter: name.clone(), reason: error.to_string() })?;
+            .map_err(|error| RenderError::UnusableAdapter { adapter: name.clone(), reason: error.to_string() })?;
         let trouble = Arc::new(Mutex::new(None));
         let kept = Arc::clone(&trouble);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             kept.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
         }));
-        Ok(Self { name, largest_px, device, queue, trouble })
+        Ok(Self { name, largest_px, adapter, device, queue, trouble })
     }
 
-    pub(crate) fn check_size(&self, [width, height]: [u32; 2]) -> Result<(), GpuError> {
+    pub(crate) fn check_size(&self, [width, height]: [u32; 2]) -> Result<(), RenderError> {
         let largest = self.largest_px;
         if (1..=largest).contains(&width) && (1..=largest).contains(&height) {
             return Ok(());
         }
-        Err(GpuError::Size { width, height, largest, adapter: self.name.clone() })
+        Err(RenderError::PictureSize { width, height, largest, adapter: self.name.clone() })
     }
 
     /// Whether the driver has failed since the last call.
-    pub(crate) fn check(&self) -> Result<(), GpuError> {
+    pub(crate) fn check(&self) -> Result<(), RenderError> {
         let trouble = self.trouble.lock().unwrap_or_else(PoisonError::into_inner).take();
-        trouble.map_or(Ok(()), |reason| Err(GpuError::Driver { reason }))
+        trouble.map_or(Ok(()), |reason| Err(RenderError::Driver(reason)))
     }
 }
 
@@ -164,7 +106,7 @@ fn pick(
     instance: &wgpu::Instance,
     choice: &AdapterChoice,
     surface: Option<&wgpu::Surface<'_>>,
-) -> Result<wgpu::Adapter, GpuError> {
+) -> Result<wgpu::Adapter, RenderError> {
     let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
     adapters.retain(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)));
     adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
@@ -178,20 +120,16 @@ fn pick(
             AdapterChoice::Named(wanted) => name(adapter).to_lowercase().contains(&wanted.to_lowercase()),
         }
     });
-    chosen.ok_or_else(|| not_found(choice, &found))
-}
-
-fn not_found(choice: &AdapterChoice, found: &[String]) -> GpuError {
-    if found.is_empty() {
-        return GpuError::NoAdapter;
-    }
-    let wanted = match choice {
-        AdapterChoice::Best => "usable".to_owned(),
-        AdapterChoice::Hardware => "hardware".to_owned(),
-        AdapterChoice::Software => "software".to_owned(),
-        AdapterChoice::Named(name) => format!("`{name}`"),
-    };
-    GpuError::NoSuchAdapter { wanted, found: found.join(", ") }
+    chosen.ok_or_else(|| {
+        let wanted = match choice {
+            _ if found.is_empty() => return RenderError::NoAdapter,
+            AdapterChoice::Best => "usable".to_owned(),
+            AdapterChoice::Hardware => "hardware".to_owned(),
+            AdapterChoice::Software => "software".to_owned(),
+            AdapterChoice::Named(name) => format!("`{name}`"),
+        };
+        RenderError::NoSuchAdapter { wanted, found: found.join(", ") }
+    })
 }
 
 fn rank(device_type: wgpu::DeviceType) -> u8 {

@@ -11,47 +11,34 @@ mod overlay;
 mod pipelines;
 mod target;
 
-pub use adapter::{AdapterChoice, GpuError};
+pub use adapter::AdapterChoice;
 
-pub(crate) use adapter::{BACKENDS, Gpu};
+pub(crate) use adapter::{Gpu, instance};
 pub(crate) use overlay::paint;
 
+use super::error::RenderError;
 use super::picture::Picture;
-use super::scene::{CameraError, Scene, Stage, View};
-use super::{Footage, Moment};
+use super::scene::{Extent, Scene, View};
+use super::timeline::Timeline;
 use overlay::Overlay;
 use pipelines::Pipelines;
 use target::Target;
 
 /// Draws scenes into pictures.
 pub struct Renderer {
-    gpu: Gpu,
+    pub(crate) gpu: Gpu,
     pipelines: Pipelines,
     overlay: Overlay,
     target: Option<Target>,
-}
-
-/// Why there is no picture.
-#[derive(Debug, thiserror::Error)]
-pub enum ShootError {
-    /// The camera cannot be used.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-    /// It cannot be drawn.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// There is nothing to draw.
-    #[error("the flight has no samples")]
-    Empty,
 }
 
 impl Renderer {
     /// Starts an adapter.
     ///
     /// # Errors
-    /// [`GpuError`] when there is none of this choice.
-    pub fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
-        Ok(Self::on(Gpu::open(choice)?))
+    /// [`RenderError`] when there is none of this choice.
+    pub fn open(choice: &AdapterChoice) -> Result<Self, RenderError> {
+        Ok(Self::on(Gpu::open(&instance(None), choice, None)?))
     }
 
     pub(crate) fn on(gpu: Gpu) -> Self {
@@ -65,31 +52,21 @@ impl Renderer {
         &self.gpu.name
     }
 
-    /// Largest width and height of a picture \[pixels\].
-    #[must_use]
-    pub fn largest_px(&self) -> u32 {
-        self.gpu.largest_px
-    }
-
     /// Whether pictures of this width and height \[pixels\] can be drawn.
     ///
     /// # Errors
-    /// [`GpuError::Size`] when a side is not between 1 and [`Renderer::largest_px`].
-    pub fn check_size(&self, size_px: [u32; 2]) -> Result<(), GpuError> {
+    /// [`RenderError::PictureSize`] when a side is not between 1 and the most that the adapter draws.
+    pub fn check_size(&self, size_px: [u32; 2]) -> Result<(), RenderError> {
         self.gpu.check_size(size_px)
-    }
-
-    pub(crate) fn gpu(&self) -> &Gpu {
-        &self.gpu
     }
 
     /// The picture of a scene.
     ///
     /// # Errors
-    /// [`GpuError`] when the picture's size is not between 1 and [`Renderer::largest_px`], or the adapter fails.
-    pub fn paint(&mut self, scene: &Scene) -> Result<Picture, GpuError> {
+    /// [`RenderError`] when the adapter cannot draw a picture of this size, or fails.
+    pub fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
         self.draw(scene, true)?;
-        let target = self.target.as_ref().ok_or(GpuError::Lost)?;
+        let target = self.target.as_ref().ok_or(RenderError::AdapterLost)?;
         let picture = target.read(&self.gpu)?;
         self.gpu.check()?;
         Ok(picture)
@@ -98,29 +75,28 @@ impl Renderer {
     /// The picture of a flight at a time \[s\], which is brought into its range.
     ///
     /// # Errors
-    /// [`ShootError`] when there is nothing to draw, the camera cannot be used or the adapter fails.
-    pub fn shoot(&mut self, footage: &Footage, time_s: f64, view: &View) -> Result<Picture, ShootError> {
-        let moment: Moment = footage.at(time_s).ok_or(ShootError::Empty)?;
-        let scene = Scene::compose(footage, &Stage::of(footage), &moment, view)?;
-        Ok(self.paint(&scene)?)
+    /// [`RenderError`] when there is nothing to draw, the camera cannot be used or the adapter fails.
+    pub fn shoot(&mut self, timeline: &Timeline, time_s: f64, view: &View) -> Result<Picture, RenderError> {
+        let frame = timeline.at(time_s).ok_or(RenderError::NoSamples)?;
+        let extent = Extent::of(timeline);
+        let camera = extent.camera(timeline, &frame, view)?;
+        self.paint(&Scene::compose(timeline, &extent, &frame, view, camera))
     }
 
-    /// Draws a scene into a texture, with or without its marks.
-    pub(crate) fn draw(&mut self, scene: &Scene, with_marks: bool) -> Result<&wgpu::TextureView, GpuError> {
+    /// Draws a scene into a texture, with or without its annotations.
+    pub(crate) fn draw(&mut self, scene: &Scene, with_annotations: bool) -> Result<&wgpu::TextureView, RenderError> {
         let size_px = scene.camera.size_px;
         self.gpu.check_size(size_px)?;
-        let device = &self.gpu.device;
         let fits = self.target.as_ref().is_some_and(|target| target.size_px == size_px);
         if !fits {
             self.target = None;
             self.target = Some(Target::new(&self.gpu, size_px)?);
         }
-        let target = self.target.as_ref().ok_or(GpuError::Lost)?;
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.pipelines.upload(device, &self.gpu.queue, scene);
-        self.pipelines.draw(&mut encoder, target, scene);
-        if with_marks {
-            self.overlay.draw(&self.gpu, &mut encoder, target, &scene.marks);
+        let target = self.target.as_ref().ok_or(RenderError::AdapterLost)?;
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.pipelines.draw(&self.gpu, &mut encoder, target, scene);
+        if with_annotations {
+            self.overlay.draw(&self.gpu, &mut encoder, target, &scene.annotations);
         }
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.check()?;

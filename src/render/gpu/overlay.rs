@@ -4,11 +4,11 @@ use egui::epaint::{ClippedPrimitive, Mesh, Vertex};
 use egui::{Color32, FontId, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2, pos2};
 use egui_wgpu::ScreenDescriptor;
 
-use super::Gpu;
+use super::adapter::Gpu;
 use super::target::{Target, WORDS_FORMAT};
-use crate::render::scene::{Colour, Mark};
+use crate::render::scene::{Annotation, Colour};
 
-/// Lays marks over pictures.
+/// Lays annotations over pictures.
 pub(super) struct Overlay {
     context: egui::Context,
     renderer: egui_wgpu::Renderer,
@@ -21,7 +21,13 @@ impl Overlay {
         Self { context: egui::Context::default(), renderer }
     }
 
-    pub(super) fn draw(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, target: &Target, marks: &[Mark]) {
+    pub(super) fn draw(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        annotations: &[Annotation],
+    ) {
         let [width, height] = target.size_px;
         let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(width as f32, height as f32));
         let input = egui::RawInput {
@@ -33,7 +39,7 @@ impl Overlay {
         };
         let mut output = self.context.run_pass(input, |context| {
             let layer = egui::LayerId::background();
-            paint(&context.layer_painter(layer).with_clip_rect(screen), marks, Vec2::ZERO, 1.0);
+            paint(&context.layer_painter(layer).with_clip_rect(screen), annotations, Vec2::ZERO, 1.0);
         });
         let primitives: Vec<ClippedPrimitive> = self.context.tessellate(std::mem::take(&mut output.shapes), 1.0);
         let screen = ScreenDescriptor { size_in_pixels: target.size_px, pixels_per_point: 1.0 };
@@ -64,15 +70,15 @@ impl Overlay {
     }
 }
 
-/// Paints marks with the top left corner of their picture at `origin` \[points\], so many pixels a point.
-pub(crate) fn paint(painter: &egui::Painter, marks: &[Mark], origin: Vec2, pixels_per_point: f32) {
+/// Paints annotations with the top left corner of their picture at `origin` \[points\], so many pixels a point.
+pub(crate) fn paint(painter: &egui::Painter, annotations: &[Annotation], origin: Vec2, pixels_per_point: f32) {
     let scale = 1.0 / pixels_per_point;
     let at = |[x, y]: [f32; 2]| pos2(x * scale, y * scale) + origin;
     let corners = |[low, high]: [[f32; 2]; 2]| Rect::from_min_max(at(low), at(high));
     let stroke = |width_px: f32, colour| Stroke::new(width_px * scale, colour32(colour));
-    for mark in marks {
-        match mark {
-            Mark::Words { at_px, anchor, size_px, colour, text } => {
+    for annotation in annotations {
+        match annotation {
+            Annotation::Words { at_px, anchor, size_px, colour, text } => {
                 let font = FontId::proportional(size_px * scale);
                 let galley = painter.layout_no_wrap(text.clone(), font, colour32(*colour));
                 let place = at(*at_px) - Vec2::new(anchor[0], anchor[1]) * galley.size();
@@ -81,19 +87,19 @@ pub(crate) fn paint(painter: &egui::Painter, marks: &[Mark], origin: Vec2, pixel
                     pos2((place.x * pixels_per_point).round() * scale, (place.y * pixels_per_point).round() * scale);
                 painter.galley(place, galley, colour32(*colour));
             }
-            Mark::Box { corners_px, colour, round_px } => {
+            Annotation::Box { corners_px, colour, round_px } => {
                 painter.rect_filled(corners(*corners_px), round_px * scale, colour32(*colour));
             }
-            Mark::Outline { corners_px, colour, width_px } => {
+            Annotation::Outline { corners_px, colour, width_px } => {
                 painter.rect_stroke(corners(*corners_px), 0.0, stroke(*width_px, *colour), StrokeKind::Inside);
             }
-            Mark::Scale { corners_px, colours } => {
+            Annotation::Scale { corners_px, colours } => {
                 painter.add(Shape::mesh(gradient(corners(*corners_px), colours)));
             }
-            Mark::Stroke { ends_px, colour, width_px } => {
+            Annotation::Stroke { ends_px, colour, width_px } => {
                 painter.line_segment(ends_px.map(at), stroke(*width_px, *colour));
             }
-            Mark::Ring { at_px, radius_px, colour, width_px } => {
+            Annotation::Ring { at_px, radius_px, colour, width_px } => {
                 painter.circle_stroke(at(*at_px), radius_px * scale, stroke(*width_px, *colour));
             }
         }

@@ -1,6 +1,7 @@
 //! What is drawn into, and how it is read back.
 
-use super::{Gpu, GpuError};
+use super::adapter::Gpu;
+use crate::render::error::RenderError;
 use crate::render::picture::Picture;
 
 /// Samples of a pixel.
@@ -24,7 +25,7 @@ pub(super) struct Target {
 }
 
 impl Target {
-    pub(super) fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, GpuError> {
+    pub(super) fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, RenderError> {
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let make = |label, format, sample_count, usage, view_formats| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -55,13 +56,13 @@ impl Target {
             texture,
         };
         match pollster::block_on(scope.pop()) {
-            Some(error) => Err(GpuError::Driver { reason: error.to_string() }),
+            Some(error) => Err(RenderError::Driver(error.to_string())),
             None => Ok(target),
         }
     }
 
     /// The picture, once everything submitted is drawn.
-    pub(super) fn read(&self, gpu: &Gpu) -> Result<Picture, GpuError> {
+    pub(super) fn read(&self, gpu: &Gpu) -> Result<Picture, RenderError> {
         let [width, height] = self.size_px;
         let row_bytes = width * 4;
         let padded_bytes = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -85,7 +86,7 @@ impl Target {
             wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         );
         gpu.queue.submit([encoder.finish()]);
-        let driver = |error: &dyn std::fmt::Display| GpuError::Driver { reason: error.to_string() };
+        let driver = |error: &dyn std::fmt::Display| RenderError::Driver(error.to_string());
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
             // Whoever asked may have given up.
@@ -93,7 +94,7 @@ impl Target {
         });
         gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| driver(&error))?;
         gpu.check()?;
-        receiver.recv().map_err(|_| GpuError::Lost)?.map_err(|error| driver(&error))?;
+        receiver.recv().map_err(|_| RenderError::AdapterLost)?.map_err(|error| driver(&error))?;
         let mapped = buffer.get_mapped_range(..).map_err(|error| driver(&error))?;
         let mut rgba = Vec::with_capacity(row_bytes as usize * height as usize);
         for row in mapped.chunks_exact(padded_bytes as usize) {

@@ -4,8 +4,10 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
+use crate::render::error::RenderError;
+
 /// Half of the vertical angle of view, as a tangent: 35 degrees in all.
-const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
+pub(in crate::render) const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
 /// Parts of the picture's half width and height that framing leaves to captions: left, right, bottom, top.
 const MARGINS: [f64; 4] = [0.02, 0.02, 0.15, 0.21];
 /// Nearest that a camera is put to what it looks at \[m\].
@@ -44,39 +46,10 @@ pub struct Orbit {
     pub distance_m: f64,
 }
 
-/// Why a camera cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CameraError {
-    /// It is none of the known ones.
-    #[error("`{0}` is not a camera")]
-    Unknown(String),
-    /// An angle or a distance is out of range.
-    #[error("the camera `{text}` has {what}")]
-    Range {
-        /// As given.
-        text: String,
-        /// What is wrong with it.
-        what: &'static str,
-    },
-    /// It follows a vehicle that the flight does not have.
-    #[error("there is no vehicle `{name}` to follow; the flight has {vehicles}")]
-    NoVehicle {
-        /// As given.
-        name: String,
-        /// Those that there are, in words.
-        vehicles: String,
-    },
-}
-
-impl CameraError {
-    /// What to give instead.
-    pub const HELP: &'static str = "give iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and metres such as -60,30,25";
-}
-
 impl FromStr for CameraSpec {
-    type Err = CameraError;
+    type Err = RenderError;
 
-    fn from_str(text: &str) -> Result<Self, CameraError> {
+    fn from_str(text: &str) -> Result<Self, RenderError> {
         match text {
             "iso" => return Ok(Self::Iso),
             "top" => return Ok(Self::Top),
@@ -90,9 +63,9 @@ impl FromStr for CameraSpec {
         }
         let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
         let Ok([azimuth_deg, elevation_deg, distance_m]) = numbers.as_deref() else {
-            return Err(CameraError::Unknown(text.to_owned()));
+            return Err(RenderError::UnknownCamera(text.to_owned()));
         };
-        let range = |what| Err(CameraError::Range { text: text.to_owned(), what });
+        let range = |what| Err(RenderError::CameraRange { text: text.to_owned(), what });
         if !azimuth_deg.is_finite() {
             return range("an azimuth that is not a finite number");
         }
@@ -348,11 +321,12 @@ mod tests {
     #[test]
     fn what_is_not_a_camera_is_refused() {
         for text in ["", "isometric", "follow:", "1,2", "1,2,3,4", "a,b,c"] {
-            assert_eq!(CameraSpec::from_str(text), Err(CameraError::Unknown(text.to_owned())));
+            let refused = CameraSpec::from_str(text);
+            assert!(matches!(&refused, Err(RenderError::UnknownCamera(said)) if said == text), "{refused:?}");
         }
         for text in ["nan,0,1", "0,91,1", "0,0,0", "0,0,-1", "0,0,nan", "0,0,1e10"] {
-            assert!(matches!(CameraSpec::from_str(text), Err(CameraError::Range { .. })), "{text}");
+            assert!(matches!(CameraSpec::from_str(text), Err(RenderError::CameraRange { .. })), "{text}");
         }
-        assert_eq!(CameraSpec::from_str("follow:cf 7"), Ok(CameraSpec::Follow("cf 7".to_owned())));
+        assert_eq!(CameraSpec::from_str("follow:cf 7").ok(), Some(CameraSpec::Follow("cf 7".to_owned())));
     }
 }

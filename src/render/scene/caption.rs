@@ -1,8 +1,11 @@
 //! Words about what is seen: caption, verdict, legend, numbers of the vehicles, the closest pair.
 
-use super::placing::{Placing, width};
-use super::world::MOST_EDGES;
-use super::{Colour, Mark, Painting, Scene, Theme};
+use super::builder::SceneBuilder;
+use super::camera::Projected;
+use super::colour::Colour;
+use super::draw_list::{Annotation, pixels};
+use super::geometry::has_few_edges;
+use super::labels::{LabelLayout, width};
 use crate::swarm::Pair;
 use crate::text::at_least;
 
@@ -20,70 +23,45 @@ const LONGEST_NAME: usize = 40;
 const FEWEST_LETTERS: usize = 4;
 /// Opacity of what is behind words.
 const BACKING: f32 = 0.72;
-const WHITE: Colour = Colour::hex(0xFF_FF_FF);
 
-impl Painting<'_> {
-    pub(super) fn annotate(&self, scene: &mut Scene) {
-        let layers = self.view.layers;
-        let mut marks = std::mem::take(&mut scene.marks);
-        let mut placing = Placing::new(&mut marks, self.view.size_px);
-        if layers.caption {
-            self.caption(&mut placing);
-            self.legend(&mut placing);
-        }
-        if layers.labels {
-            self.keep_off_vehicles(&mut placing);
-        }
-        if layers.closest {
-            self.distances(&mut placing);
-        }
-        if layers.ground {
-            self.scale(&mut placing);
-        }
-        if layers.labels {
-            self.names(&mut placing);
-        }
-        scene.marks = marks;
-    }
-
-    fn caption(&self, placing: &mut Placing<'_>) {
+impl SceneBuilder<'_> {
+    pub(super) fn caption(&self, labels: &mut LabelLayout) {
         let (theme, size_px, margin) = (self.view.theme, self.view.text_px(1.0), self.margin());
         let width_px = self.view.size_px[0] as f32;
-        let mut y = self.banner(placing);
+        let mut y = self.banner(labels);
         let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
-        let (bottom, taken) = placing.placed();
+        let (bottom, taken) = labels.placed();
         // What has no room is left out: first the closest approach, then the name, then the verdict, then the time.
         let large_px = 1.35 * size_px;
-        let time = format!("t = {:.2} s", self.moment.time_s);
+        let time = format!("t = {:.2} s", self.frame.time_s);
         let mut free_px = width_px - 2.0 * margin;
         if width(large_px, &time) > free_px {
             return;
         }
-        free_px = placing.write([width_px - margin, y], [1.0, 0.0], large_px, theme.ink(), &time)[0][0] - 2.0 * margin;
+        free_px = labels.put([width_px - margin, y], [1.0, 0.0], large_px, theme.ink(), &time)[0][0] - 2.0 * margin;
         let below = y + 1.8 * size_px;
         let (verdicts, colour) = self.verdict();
         let verdict = verdicts.iter().find(|text| width(size_px, text) <= width_px - 2.0 * margin);
-        let verdict_px =
-            verdict.map(|text| placing.write([width_px - margin, below], [1.0, 0.0], size_px, colour, text));
-        placing.back(taken, bottom, ground, room_px);
-        let (_, taken) = placing.placed();
-        if let Some(name) = cut(&shortened(&self.footage.name), large_px, free_px) {
-            placing.write([margin, y], [0.0, 0.0], large_px, theme.ink(), &name);
-            placing.back(taken, bottom, ground, room_px);
+        let verdict_px = verdict.map(|text| labels.put([width_px - margin, below], [1.0, 0.0], size_px, colour, text));
+        labels.back(taken, bottom, ground, room_px);
+        let (_, taken) = labels.placed();
+        if let Some(name) = cut(&shortened(&self.timeline.name), large_px, free_px) {
+            labels.put([margin, y], [0.0, 0.0], large_px, theme.ink(), &name);
+            labels.back(taken, bottom, ground, room_px);
         }
         y = below;
-        let (_, taken) = placing.placed();
+        let (_, taken) = labels.placed();
         let free_px = verdict_px.map_or(0.0, |corners_px| corners_px[0][0] - 2.0 * margin);
         if let Some(text) = self.closest_so_far().iter().find(|text| width(size_px, text) <= free_px) {
-            placing.write([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
-            placing.back(taken, bottom, ground, room_px);
+            labels.put([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
+            labels.back(taken, bottom, ground, room_px);
         }
     }
 
     /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
-    fn banner(&self, placing: &mut Placing<'_>) -> f32 {
+    fn banner(&self, labels: &mut LabelLayout) -> f32 {
         let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
-        let (Some(&(pair, distance_m)), Some(delta_m)) = (self.violated.first(), self.footage.delta_m) else {
+        let (Some(&(pair, distance_m)), Some(delta_m)) = (self.violated.first(), self.timeline.delta_m) else {
             return self.margin();
         };
         let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
@@ -99,22 +77,22 @@ impl Painting<'_> {
         ];
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
         let bottom = 1.9 * size_px;
-        placing.draw(Mark::Box { corners_px: [[0.0, 0.0], [width_px, bottom]], colour: alarm, round_px: 0.0 });
+        labels.draw(Annotation::Box { corners_px: [[0.0, 0.0], [width_px, bottom]], colour: alarm, round_px: 0.0 });
         let corners_px = [[0.0, 0.0], [width_px, height_px]];
-        placing.draw(Mark::Outline { corners_px, colour: alarm, width_px: 5.0 * self.view.unit_px() });
-        let on_alarm = if self.view.theme == Theme::Dark { Colour::hex(0x14_00_02) } else { WHITE };
-        placing.write([width_px / 2.0, bottom / 2.0], [0.5, 0.5], size_px, on_alarm, text);
-        placing.take([[0.0, 0.0], [width_px, bottom]]);
+        labels.draw(Annotation::Outline { corners_px, colour: alarm, width_px: 5.0 * self.view.unit_px() });
+        let ink = self.view.theme.on_alarm();
+        labels.put([width_px / 2.0, bottom / 2.0], [0.5, 0.5], size_px, ink, text);
+        labels.reserve([[0.0, 0.0], [width_px, bottom]]);
         bottom + 0.6 * self.margin()
     }
 
     /// What can be said up to now, in a few words and in fewer.
     fn verdict(&self) -> (Vec<String>, Colour) {
         let theme = self.view.theme;
-        if self.footage.delta_m.is_none() {
+        if self.timeline.delta_m.is_none() {
             return (vec!["not judged: no delta".to_owned(), "not judged".to_owned()], theme.soft_ink());
         }
-        let began: Vec<_> = self.footage.violations().iter().filter(|span| span.from_s <= self.moment.time_s).collect();
+        let began: Vec<_> = self.timeline.violations().iter().filter(|span| span.from_s <= self.frame.time_s).collect();
         match began.first() {
             None => (vec!["clear so far".to_owned()], theme.good()),
             Some(span) => {
@@ -130,10 +108,10 @@ impl Painting<'_> {
 
     /// The closest approach up to now, at length and in short.
     fn closest_so_far(&self) -> Vec<String> {
-        let Some(approach) = self.moment.so_far else { return Vec::new() };
+        let Some(approach) = self.frame.so_far else { return Vec::new() };
         let (separation, pair) = (metres(approach.separation_m), self.pair(approach.pair));
         let at = format!("{:.2} s", approach.time_s);
-        let delta = self.footage.delta_m.map_or(String::new(), |delta_m| format!("  (delta {})", metres(delta_m)));
+        let delta = self.timeline.delta_m.map_or(String::new(), |delta_m| format!("  (delta {})", metres(delta_m)));
         vec![
             format!("closest so far {separation}, vehicles {pair} at {at}{delta}"),
             format!("closest so far {separation}, {pair}{delta}"),
@@ -141,148 +119,130 @@ impl Painting<'_> {
         ]
     }
 
-    fn legend(&self, placing: &mut Placing<'_>) {
+    pub(super) fn legend(&self, labels: &mut LabelLayout) {
         let [width_px, height_px] = self.view.size_px;
         if width_px < NO_LEGEND_PX[0] || height_px < NO_LEGEND_PX[1] {
             return;
         }
         let (theme, size_px, margin) = (self.view.theme, self.view.text_px(0.85), self.margin());
-        let (layers, plan) = (self.view.layers, self.footage.plan.as_ref());
-        let y = height_px as f32 - margin;
-        let mut x = margin;
-        let (bottom, taken) = placing.placed();
-        let ink = theme.soft_ink();
-        let room_px = width_px as f32 - margin;
-        let fits = |x: f32, text: &str| x + width(size_px, text) <= room_px;
+        let (layers, plan, ink) = (self.view.layers, self.timeline.plan.as_ref(), self.view.theme.soft_ink());
+        let (mut x, y) = (margin, height_px as f32 - margin);
+        let (bottom, taken) = labels.placed();
+        let fits = |x: f32, text: &str| x + width(size_px, text) <= width_px as f32 - margin;
+        // Writes words at a place from the left; gives where the next ones begin.
+        let write = |labels: &mut LabelLayout, x: f32, text: &str| {
+            labels.put([x, y], [0.0, 1.0], size_px, ink, text)[1][0] + 1.5 * size_px
+        };
         if let Some(plan) = plan.filter(|_| layers.edges) {
-            if plan.graph.edge_count() <= MOST_EDGES {
+            let hidden = format!("{} edges, not drawn", plan.graph.edge_count());
+            if has_few_edges(plan) {
                 let [left, scale] = [x, 9.0 * size_px];
                 let colours = (-SHADES..=SHADES).map(|k| theme.tension(f32::from(k) / f32::from(SHADES))).collect();
                 let corners_px = [[left, y - 0.6 * size_px], [left + scale, y]];
-                placing.draw(Mark::Scale { corners_px, colours });
-                placing.take(corners_px);
-                let above = y - 0.9 * size_px;
-                placing.write([left, above], [0.0, 1.0], size_px, ink, "push");
-                placing.write([left + scale / 2.0, above], [0.5, 1.0], size_px, ink, "rest");
-                placing.write([left + scale, above], [1.0, 1.0], size_px, ink, "pull");
-                x += scale + 2.0 * size_px;
-            } else {
-                let text = format!("{} edges, not drawn", plan.graph.edge_count());
-                if fits(x, &text) {
-                    x = placing.write([x, y], [0.0, 1.0], size_px, ink, &text)[1][0] + 1.5 * size_px;
+                labels.draw(Annotation::Scale { corners_px, colours });
+                labels.reserve(corners_px);
+                for (text, part) in [("push", 0.0), ("rest", 0.5), ("pull", 1.0)] {
+                    labels.put([left + part * scale, y - 0.9 * size_px], [part, 1.0], size_px, ink, text);
                 }
+                x += scale + 2.0 * size_px;
+            } else if fits(x, &hidden) {
+                x = write(labels, x, &hidden);
             }
         }
-        let stroke = 1.6 * self.view.unit_px();
-        let arm = 0.32 * size_px;
-        let middle = y - size_px / 2.0;
+        let (width_px, arm, middle) = (1.6 * self.view.unit_px(), 0.32 * size_px, y - size_px / 2.0);
+        let ring =
+            |x, radius_px, colour, width_px| Annotation::Ring { at_px: [x, middle], radius_px, colour, width_px };
         if layers.marks && fits(x + size_px, "start") {
             for down in [arm, -arm] {
                 let ends_px = [[x, middle - down], [x + 2.0 * arm, middle + down]];
-                placing.draw(Mark::Stroke { ends_px, colour: ink, width_px: stroke });
+                labels.draw(Annotation::Stroke { ends_px, colour: ink, width_px });
             }
-            x = placing.write([x + size_px, y], [0.0, 1.0], size_px, ink, "start")[1][0] + 1.5 * size_px;
+            x = write(labels, x + size_px, "start");
         }
         if layers.marks && plan.is_some() && fits(x + size_px, "goal slot") {
-            placing.draw(Mark::Ring { at_px: [x + arm, middle], radius_px: 1.1 * arm, colour: ink, width_px: stroke });
-            x = placing.write([x + size_px, y], [0.0, 1.0], size_px, ink, "goal slot")[1][0] + 1.5 * size_px;
+            labels.draw(ring(x + arm, 1.1 * arm, ink, width_px));
+            x = write(labels, x + size_px, "goal slot");
         }
         let shell = "keep-out shell, radius delta/2";
-        if layers.shells && self.footage.delta_m.is_some() && fits(x + size_px, shell) {
-            let (at_px, colour) = ([x + arm, middle], theme.shell());
-            placing.draw(Mark::Ring { at_px, radius_px: 1.4 * arm, colour, width_px: 1.6 * stroke });
-            placing.write([x + 1.2 * size_px, y], [0.0, 1.0], size_px, ink, shell);
+        if layers.shells && self.timeline.delta_m.is_some() && fits(x + size_px, shell) {
+            labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * width_px));
+            write(labels, x + 1.2 * size_px, shell);
         }
-        placing.back(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
+        labels.back(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
     }
 
     /// Keeps words off the vehicles that have names.
-    fn keep_off_vehicles(&self, placing: &mut Placing<'_>) {
-        for k in self.named() {
-            if let Some(at) = self.vehicle(k).and_then(|place| self.camera.project(place)) {
-                #[expect(clippy::cast_possible_truncation, reason = "pixels")]
-                let [x, y, radius] =
-                    [at.at_px[0], at.at_px[1], self.footage.radius_m[k] * at.px_per_m].map(|v| v as f32);
-                placing.take([[x - radius, y - radius], [x + radius, y + radius]]);
-            }
+    pub(super) fn keep_off_vehicles(&self, labels: &mut LabelLayout) {
+        for (k, at) in self.named() {
+            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
+            labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
         }
     }
 
     /// The distance of the closest pair, and of the worst pairs closer than delta, beside the line that joins them; not
     /// where that is outside the picture or has no room.
-    fn distances(&self, placing: &mut Placing<'_>) {
+    pub(super) fn distances(&self, labels: &mut LabelLayout) {
         let theme = self.view.theme;
         let size_px = self.view.text_px(1.0);
         let alarmed = self.violated.iter().take(LABELLED).map(|&(pair, distance_m)| (pair, distance_m, true));
         let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
         for (pair, distance_m, alarm) in alarmed.chain(nearest) {
-            let (Some(first), Some(second)) = (self.vehicle(pair.first()), self.vehicle(pair.second())) else {
-                continue;
-            };
-            let Some(middle) = self.camera.project((first + second) / 2.0) else { continue };
+            let middle = self.ends(pair).and_then(|[first, second]| self.camera.project((first + second) / 2.0));
             let text = metres(distance_m);
             let distances_px = [1.1 * size_px, 1.8 * size_px, 3.0 * size_px];
-            let Some(at) = placing.find(middle.at_px, &distances_px, size_px, &text) else { continue };
+            let at = middle.and_then(|middle| labels.find(middle.at_px, &distances_px, size_px, &text));
+            let Some(at) = at else { continue };
             let half = width(size_px, &text) / 2.0 + 0.25 * size_px;
             let corners_px = [[at[0] - half, at[1] - 0.68 * size_px], [at[0] + half, at[1] + 0.68 * size_px]];
-            let (ground, ink) = if alarm {
-                (theme.alarm(), if theme == Theme::Dark { Colour::hex(0x14_00_02) } else { WHITE })
-            } else {
-                (theme.background().at(0.82), theme.ink())
-            };
-            placing.draw(Mark::Box { corners_px, colour: ground, round_px: 0.3 * size_px });
-            placing.write(at, [0.5, 0.5], size_px, ink, &text);
-            placing.take(corners_px);
+            let (ground, ink) =
+                if alarm { (theme.alarm(), theme.on_alarm()) } else { (theme.background().at(0.82), theme.ink()) };
+            labels.draw(Annotation::Box { corners_px, colour: ground, round_px: 0.3 * size_px });
+            labels.put(at, [0.5, 0.5], size_px, ink, &text);
+            labels.reserve(corners_px);
         }
     }
 
-    /// The vehicles that have names: all of few, else those of the worst violations.
-    fn named(&self) -> Vec<usize> {
-        if self.footage.count() <= NAMED {
-            return (0..self.footage.count()).collect();
-        }
-        let mut named = Vec::new();
-        for k in self.violated.iter().flat_map(|(pair, _)| [pair.first(), pair.second()]) {
-            if named.len() < NAMED && !named.contains(&k) {
-                named.push(k);
+    /// The vehicles that have names, with where they are: all of few, else those of the worst violations.
+    fn named(&self) -> impl Iterator<Item = (usize, Projected)> {
+        let mut named: Vec<usize> = Vec::new();
+        if self.timeline.count() <= NAMED {
+            named.extend(0..self.timeline.count());
+        } else {
+            for k in self.violated.iter().flat_map(|(pair, _)| [pair.first(), pair.second()]) {
+                if named.len() < NAMED && !named.contains(&k) {
+                    named.push(k);
+                }
             }
         }
-        named
+        named.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
     }
 
     /// The names of the vehicles, on those that are large enough and beside the others.
-    fn names(&self, placing: &mut Placing<'_>) {
-        let (theme, size_px, alarmed) = (self.view.theme, self.view.text_px(0.85), self.alarmed());
-        for k in self.named() {
-            let Some(at) = self.vehicle(k).and_then(|place| self.camera.project(place)) else { continue };
+    pub(super) fn names(&self, labels: &mut LabelLayout) {
+        let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
+        for (k, at) in self.named() {
             // One that is too close to another is often behind it.
-            let is_hidden = self.is_hidden(k);
-            if is_hidden && !alarmed[k] {
+            let is_hidden = self.is_hidden(k, at);
+            if is_hidden && !self.alarmed[k] {
                 continue;
             }
-            let name = shortened(&self.footage.vehicles[k]);
-            #[expect(clippy::cast_possible_truncation, reason = "pixels")]
-            let ([x, y], radius) = (at.at_px.map(|v| v as f32), (self.footage.radius_m[k] * at.px_per_m) as f32);
+            let name = shortened(&self.timeline.vehicles[k]);
+            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
             let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
             if fitting >= 8.0 && !is_hidden {
-                placing.draw(Mark::Words {
-                    at_px: [x, y],
-                    anchor: [0.5, 0.5],
-                    size_px: fitting,
-                    colour: theme.background(),
-                    text: name,
-                });
+                let (at_px, anchor, colour) = ([x, y], [0.5, 0.5], theme.background());
+                labels.draw(Annotation::Words { at_px, anchor, size_px: fitting, colour, text: name });
                 continue;
             }
             let offset = f64::from(radius + 0.2 * size_px);
-            let colour = if alarmed[k] { theme.alarm() } else { self.colour(k) };
+            let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k) };
             // Above to the right, above to the left, below to the right, below to the left: where there is room.
             for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {
                 let beside = [
                     at.at_px[0] + offset * (1.0 - 2.0 * f64::from(left)),
                     at.at_px[1] + offset * (1.0 - 2.0 * f64::from(above)),
                 ];
-                if placing.words_at(beside, [left, above], 0.85 * size_px, colour, &name) {
+                if labels.put_if_free(beside, [left, above], 0.85 * size_px, colour, &name) {
                     break;
                 }
             }
@@ -290,20 +250,17 @@ impl Painting<'_> {
     }
 
     /// Whether another vehicle is in front of the middle of this one.
-    fn is_hidden(&self, k: usize) -> bool {
-        let seen = |k: usize| self.camera.project(self.vehicle(k)?);
-        let Some(own) = seen(k) else { return true };
-        (0..self.footage.count()).filter(|&other| other != k).filter_map(|other| Some((other, seen(other)?))).any(
-            |(other, at)| {
-                let apart = (at.at_px[0] - own.at_px[0]).hypot(at.at_px[1] - own.at_px[1]);
-                at.depth_m < own.depth_m && apart < self.footage.radius_m[other] * at.px_per_m
-            },
-        )
+    fn is_hidden(&self, k: usize, own: Projected) -> bool {
+        let others = (0..self.timeline.count()).filter(|&other| other != k);
+        others.filter_map(|other| Some((other, self.projected(other)?))).any(|(other, at)| {
+            let apart = (at.at_px[0] - own.at_px[0]).hypot(at.at_px[1] - own.at_px[1]);
+            at.depth_m < own.depth_m && apart < self.timeline.radius_m[other] * at.px_per_m
+        })
     }
 
     /// A pair by the names of its vehicles.
     fn pair(&self, pair: Pair) -> String {
-        let name = |k: usize| self.footage.vehicles.get(k).map_or_else(|| (k + 1).to_string(), |name| shortened(name));
+        let name = |k: usize| self.timeline.vehicles.get(k).map_or_else(|| (k + 1).to_string(), |name| shortened(name));
         format!("{}-{}", name(pair.first()), name(pair.second()))
     }
 
@@ -313,7 +270,7 @@ impl Painting<'_> {
 }
 
 /// A length to the millimetre, rounded down: what is said to be clear is clear.
-pub(crate) fn metres(length_m: f64) -> String {
+pub(in crate::render) fn metres(length_m: f64) -> String {
     format!("{} m", at_least(length_m, 3))
 }
 

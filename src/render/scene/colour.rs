@@ -1,7 +1,10 @@
 //! Colours and themes.
 
+use bytemuck::{Pod, Zeroable};
+
 /// A colour: sRGB with straight alpha, 8 bits a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Colour {
     /// Red, green, blue and opacity.
     pub rgba: [u8; 4],
@@ -146,6 +149,12 @@ impl Theme {
     #[must_use]
     pub fn alarm(self) -> Colour {
         self.pick(0xFF_2F_3C, 0xD4_00_14, 0xD4_00_14)
+    }
+
+    /// Text on a violation's colour.
+    #[must_use]
+    pub fn on_alarm(self) -> Colour {
+        self.pick(0x14_00_02, 0xFF_FF_FF, 0xFF_FF_FF)
     }
 
     /// What is as it should be.

@@ -2,8 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::placing::{Placing, width};
-use super::{Colour, Line, Painting, Scene, single};
+use super::builder::SceneBuilder;
+use super::colour::{Colour, Theme};
+use super::draw_list::Line;
+use super::labels::{LabelLayout, width};
 use crate::text::decimals_of;
 
 /// Most lines of the ground in each direction.
@@ -18,42 +20,37 @@ const AXES: [[Colour; 3]; 2] = [
     [Colour::hex(0xB0_2A_37), Colour::hex(0x2B_7A_2B), Colour::hex(0x1F_5F_B0)],
 ];
 
-impl Painting<'_> {
-    pub(super) fn ground(&self, scene: &mut Scene) {
-        let [low, high] = self.stage.ground_m;
-        let (step, z) = (self.stage.grid_m, low.z);
+impl SceneBuilder<'_> {
+    pub(super) fn ground(&self, lines: &mut Vec<Line>) {
+        let ([low, high], step) = (self.extent.ground_m, self.extent.grid_m);
         let width_px = self.view.unit_px().max(0.7);
-        let colour = self.view.theme.grid();
-        let mut line = |from: Vector3<f64>, to: Vector3<f64>, colour, width_px| {
-            scene.lines.push(Line { ends_m: [single(from), single(to)], colours: [colour; 2], width_px });
-        };
-        for k in 0..=lines(high.x - low.x, step) {
-            let x = low.x + f64::from(k) * step;
-            line(Vector3::new(x, low.y, z), Vector3::new(x, high.y, z), colour, width_px);
-        }
-        for k in 0..=lines(high.y - low.y, step) {
-            let y = low.y + f64::from(k) * step;
-            line(Vector3::new(low.x, y, z), Vector3::new(high.x, y, z), colour, width_px);
+        for (along, across) in [(0, 1), (1, 0)] {
+            for k in 0..=steps(high[along] - low[along], step) {
+                let mut ends_m = [low, low];
+                ends_m[0][along] = low[along] + f64::from(k) * step;
+                ends_m[1] = ends_m[0];
+                ends_m[1][across] = high[across];
+                lines.push(Line::new(ends_m, self.view.theme.grid(), width_px));
+            }
         }
         for (axis, colour) in self.axes().into_iter().enumerate() {
-            line(low, low + Vector3::ith(axis, AXIS * step), colour, 2.4 * width_px);
+            lines.push(Line::new([low, low + Vector3::ith(axis, AXIS * step)], colour, 2.4 * width_px));
         }
     }
 
     fn axes(&self) -> [Colour; 3] {
-        AXES[usize::from(self.view.theme != super::Theme::Dark)]
+        AXES[usize::from(self.view.theme != Theme::Dark)]
     }
 
     /// Metres along the two edges of the ground that are nearest to the camera, and the names of the axes.
-    pub(super) fn scale(&self, placing: &mut Placing<'_>) {
-        let [low, high] = self.stage.ground_m;
-        let (step, origin_m) = (self.stage.grid_m, self.stage.origin_m());
+    pub(super) fn scale(&self, labels: &mut LabelLayout) {
+        let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
         let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
         for (axis, colour) in self.axes().into_iter().enumerate() {
             let tip = low + Vector3::ith(axis, (AXIS + 0.22) * step);
             let foreshortened = self.camera.back[axis].abs() > 0.97;
             if let Some(at) = self.camera.project(tip).filter(|_| !foreshortened) {
-                placing.words_at(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
+                labels.put_if_free(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
             }
         }
         // A number over a ball would be taken for its name.
@@ -91,20 +88,16 @@ impl Painting<'_> {
             };
             // The unit is that of the last number that has room.
             let mut unit = " m";
-            for k in (0..=lines(high[axis] - low[axis], step)).rev() {
+            for k in (0..=steps(high[axis] - low[axis], step)).rev() {
                 let mut point = low;
                 point[axis] += f64::from(k) * step;
                 point[other] = edge + outwards * 0.42 * step;
                 let text = format!("{}{unit}", plain(point[axis] + origin_m[axis], step));
-                if let Some(at) = self.camera.project(point) {
-                    let [x, y] = at.at_px;
-                    let middle = [x, y + below_px + (0.5 - f64::from(anchor[1])) * f64::from(size_px)];
-                    if is_covered(middle, &text) {
-                        continue;
-                    }
-                    if placing.words_at([x, y + below_px], anchor, size_px, soft, &text) {
-                        unit = "";
-                    }
+                let Some(at) = self.camera.project(point) else { continue };
+                let [x, y] = at.at_px;
+                let middle = [x, y + below_px + (0.5 - f64::from(anchor[1])) * f64::from(size_px)];
+                if !is_covered(middle, &text) && labels.put_if_free([x, y + below_px], anchor, size_px, soft, &text) {
+                    unit = "";
                 }
             }
         }
@@ -112,10 +105,10 @@ impl Painting<'_> {
 }
 
 /// How many whole steps there are in a length.
-fn lines(length: f64, step: f64) -> u32 {
+fn steps(length: f64, step: f64) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-    let lines = (length / step).round() as u32;
-    lines.min(MOST_LINES)
+    let steps = (length / step).round() as u32;
+    steps.min(MOST_LINES)
 }
 
 /// A multiple of a step with as many decimals as the step has.
@@ -135,6 +128,6 @@ mod tests {
             [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| plain(at, step)),
             ["0", "4", "0.30", "-15"]
         );
-        assert_eq!(lines(f64::INFINITY, 1.0), MOST_LINES);
+        assert_eq!(steps(f64::INFINITY, 1.0), MOST_LINES);
     }
 }

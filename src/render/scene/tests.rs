@@ -1,23 +1,26 @@
+use nalgebra::Vector3;
+
 use super::*;
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::record::{Event, Sample};
+use crate::render::timeline::Timeline;
 use crate::scenario::Scenario;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 /// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
-fn footage() -> Footage {
+fn timeline() -> Timeline {
     let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0, 3.0, 1.0, 0.0, 3.0, 1.0]));
     let formation = Formation { slots_m: start.positions_m.clone() };
     let scenario = Scenario::new("square", start.clone(), formation, 2.0, 10.0);
-    let mut footage = Footage::of(&scenario);
+    let mut timeline = Timeline::of(&scenario);
     for k in 0..=10_u32 {
         let time_s = f64::from(k);
         let mut swarm = start.clone();
         swarm.positions_m.column_mut(0).add_scalar_mut(time_s);
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 3.0 - 0.1 * time_s, time_s });
         let control = Rows::zeros(4);
-        footage.take(&Sample {
+        timeline.take(&Sample {
             time_s,
             step: u64::from(k),
             swarm: &swarm,
@@ -27,23 +30,24 @@ fn footage() -> Footage {
             channels: &[],
         });
     }
-    footage.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 4.0 });
-    footage.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: 6.0, min_m: 1.5 });
-    footage
+    timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 4.0 });
+    timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: 6.0, min_m: 1.5 });
+    timeline
 }
 
-fn scene(footage: &Footage, time_s: f64, view: &View) -> Scene {
-    let moment = footage.at(time_s).expect("a moment");
-    Scene::compose(footage, &Stage::of(footage), &moment, view).expect("a scene")
+fn scene(timeline: &Timeline, time_s: f64, view: &View) -> Scene {
+    let (frame, extent) = (timeline.at(time_s).expect("a frame"), Extent::of(timeline));
+    let camera = extent.camera(timeline, &frame, view).expect("a camera");
+    Scene::compose(timeline, &extent, &frame, view, camera)
 }
 
 fn words(scene: &Scene) -> Vec<&str> {
-    let text = |mark: &'_ Mark| matches!(mark, Mark::Words { .. });
+    let text = |mark: &'_ Annotation| matches!(mark, Annotation::Words { .. });
     scene
-        .marks
+        .annotations
         .iter()
-        .filter(|mark| text(mark))
-        .map(|mark| if let Mark::Words { text, .. } = mark { text } else { "" })
+        .filter(|annotation| text(annotation))
+        .map(|annotation| if let Annotation::Words { text, .. } = annotation { text } else { "" })
         .collect()
 }
 
@@ -53,9 +57,9 @@ fn camera(text: &str) -> View {
 
 #[test]
 fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
-    let footage = footage();
+    let timeline = timeline();
     for text in ["iso", "top", "front", "side", "closest", "follow:3", "10,80,5", "200,-30,100"] {
-        let scene = scene(&footage, 2.0, &camera(text));
+        let scene = scene(&timeline, 2.0, &camera(text));
         assert_eq!((scene.balls.len(), scene.shells.len()), (4, 4), "{text}");
         assert!(scene.balls.iter().all(|ball| ball.radius_m == 0.25), "{text}");
         assert!(scene.shells.iter().all(|shell| shell.radius_m == 1.0), "{text}");
@@ -64,9 +68,9 @@ fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
 
 #[test]
 fn shells_come_farthest_first_along_every_line_of_sight() {
-    let footage = footage();
+    let timeline = timeline();
     for text in ["iso", "front", "40,20,9"] {
-        let scene = scene(&footage, 2.0, &camera(text));
+        let scene = scene(&timeline, 2.0, &camera(text));
         let camera = scene.camera;
         let centre = |ball: &Ball| Vector3::from(ball.centre_m.map(f64::from));
         // Where rays enter each shell, through points all over the picture.
@@ -90,54 +94,54 @@ fn shells_come_farthest_first_along_every_line_of_sight() {
 
 #[test]
 fn layers_that_are_off_leave_nothing_behind() {
-    let footage = footage();
-    let bare = scene(&footage, 2.0, &View { layers: Layers::NONE, ..View::default() });
-    assert_eq!((bare.balls.len(), bare.shells.len(), bare.lines.len(), bare.marks.len()), (4, 0, 0, 0));
-    let whole = scene(&footage, 2.0, &View::default());
-    assert!(whole.lines.len() > 6 + 4 * 2 && whole.marks.len() > 10);
+    let timeline = timeline();
+    let bare = scene(&timeline, 2.0, &View { layers: Layers::NONE, ..View::default() });
+    assert_eq!((bare.balls.len(), bare.shells.len(), bare.lines.len(), bare.annotations.len()), (4, 0, 0, 0));
+    let whole = scene(&timeline, 2.0, &View::default());
+    assert!(whole.lines.len() > 6 + 4 * 2 && whole.annotations.len() > 10);
 }
 
 #[test]
 fn a_violation_shows_while_it_lasts_and_is_remembered() {
-    let footage = footage();
+    let timeline = timeline();
     let alarm = Theme::Dark.alarm();
     let red = |scene: &Scene| scene.balls.iter().filter(|ball| ball.colour == alarm).count();
     let says = |scene: &Scene, what: &str| words(scene).iter().any(|text| text.contains(what));
-    let [before, during, after] = [3.9, 5.0, 6.1].map(|time_s| scene(&footage, time_s, &View::default()));
+    let [before, during, after] = [3.9, 5.0, 6.1].map(|time_s| scene(&timeline, time_s, &View::default()));
     assert_eq!([&before, &during, &after].map(red), [0, 2, 0]);
     assert!(says(&before, "clear so far") && !says(&before, "VIOLATION"), "{:?}", words(&before));
     assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1-2"), "{:?}", words(&during));
     assert!(!says(&after, "VIOLATION") && says(&after, "violated at 4.00 s"), "{:?}", words(&after));
     // Of several, their number is said, and which was the first.
-    let mut again = footage;
+    let mut again = timeline;
     again.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 7.0 });
     let twice = scene(&again, 8.0, &View::default());
     assert!(says(&twice, "2 violations, the first at 4.00 s by 1-2"), "{:?}", words(&twice));
-    let footage = self::footage();
+    let timeline = self::timeline();
     // Even with every layer off, what is violated has its shell.
-    let bare = scene(&footage, 5.0, &View { layers: Layers::NONE, ..View::default() });
+    let bare = scene(&timeline, 5.0, &View { layers: Layers::NONE, ..View::default() });
     assert_eq!(bare.shells.len(), 2);
 }
 
 #[test]
 fn the_caption_says_the_smallest_separation_so_far() {
-    let footage = footage();
-    let scene = scene(&footage, 3.0, &View::default());
+    let timeline = timeline();
+    let scene = scene(&timeline, 3.0, &View::default());
     assert!(words(&scene).iter().any(|text| text.starts_with("closest so far 2.700 m, vehicles 1-2 at 3.00 s")));
     assert!(words(&scene).contains(&"t = 3.00 s") && words(&scene).contains(&"square"));
 }
 
 #[test]
 fn goals_are_where_the_formation_fits_and_starts_where_it_began() {
-    let footage = footage();
+    let timeline = timeline();
     let only = View { layers: Layers { marks: true, ..Layers::NONE }, ..camera("top") };
-    let scene = scene(&footage, 10.0, &only);
-    let stage = Stage::of(&footage);
+    let scene = scene(&timeline, 10.0, &only);
+    let extent = Extent::of(&timeline);
     // Two strokes of a cross for each start, then rings.
     assert_eq!(scene.lines.len(), 4 * 2 + 4 * 28);
     let middle = |line: &Line| {
         let [a, b] = line.ends_m.map(|end| Vector3::from(end.map(f64::from)));
-        (a + b) / 2.0 + stage.origin_m()
+        (a + b) / 2.0 + extent.origin_m()
     };
     assert!((middle(&scene.lines[0]) - Vector3::new(0.0, 0.0, 1.0)).norm() < 1e-6);
     let ring: Vector3<f64> = scene.lines[8..36].iter().map(middle).sum::<Vector3<f64>>() / 28.0;
@@ -146,8 +150,8 @@ fn goals_are_where_the_formation_fits_and_starts_where_it_began() {
 
 #[test]
 fn edges_push_below_their_rest_length_and_pull_beyond_it() {
-    let footage = footage();
-    let plan = footage.plan.as_ref().expect("a plan");
+    let timeline = timeline();
+    let plan = timeline.plan.as_ref().expect("a plan");
     assert_eq!(plan.graph, Graph::complete(4));
     let tension = |distance_m| plan.tension(Pair::new(0, 1), distance_m);
     assert!(tension(3.0).abs() < 1e-12 && tension(2.5) < 0.0 && tension(4.0) > 0.0);
@@ -157,21 +161,25 @@ fn edges_push_below_their_rest_length_and_pull_beyond_it() {
 
 #[test]
 fn a_follower_of_nobody_is_told_whom_it_can_follow() {
-    let footage = footage();
-    let moment = footage.at(0.0).expect("a moment");
-    let error = Scene::compose(&footage, &Stage::of(&footage), &moment, &camera("follow:9")).expect_err("no vehicle 9");
+    let timeline = timeline();
+    let frame = timeline.at(0.0).expect("a frame");
+    let error = Extent::of(&timeline).camera(&timeline, &frame, &camera("follow:9")).expect_err("no vehicle 9");
     assert_eq!(error.to_string(), "there is no vehicle `9` to follow; the flight has 1, 2, 3, 4");
 }
 
 #[test]
 fn no_size_of_picture_and_no_swarm_breaks_the_list() {
-    let footage = footage();
+    let timeline = timeline();
     for size_px in [[1, 1], [64, 2000], [16_384, 16], [320, 180]] {
-        let scene = scene(&footage, 5.0, &View { size_px, ..View::default() });
+        let scene = scene(&timeline, 5.0, &View { size_px, ..View::default() });
         let finite = |at: &[f32; 2]| at.iter().all(|x| x.is_finite());
-        assert!(scene.marks.iter().all(|mark| if let Mark::Words { at_px, .. } = mark { finite(at_px) } else { true }));
+        assert!(scene.annotations.iter().all(|annotation| if let Annotation::Words { at_px, .. } = annotation {
+            finite(at_px)
+        } else {
+            true
+        }));
     }
-    let mut alone = Footage::new("alone", 1);
+    let mut alone = Timeline::new("alone", 1);
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[f64::NAN, 0.0, 0.0]));
     alone.take(&Sample {
         time_s: 0.0,
@@ -184,7 +192,7 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
     });
     assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
     let far = Swarm::at_rest(Rows::from_row_slice(&[5e6, 4e6, 100.0]));
-    let mut far_away = Footage::new("far", 1);
+    let mut far_away = Timeline::new("far", 1);
     far_away.take(&Sample {
         time_s: 0.0,
         step: 0,
@@ -199,11 +207,11 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
 
 #[test]
 fn the_worst_pair_is_named_first_and_few_are_labelled() {
-    let mut footage = footage();
+    let mut timeline = timeline();
     for (i, j) in [(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
-        footage.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
+        timeline.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
     }
-    let scene = scene(&footage, 5.0, &View::default());
+    let scene = scene(&timeline, 5.0, &View::default());
     let banner = "VIOLATION  vehicles 1-2 2.500 m apart, delta 2.000 m and 5 more";
     assert!(words(&scene).contains(&banner), "{:?}", words(&scene));
     let labels = words(&scene).iter().filter(|text| text.ends_with(".000 m") || text.ends_with(".500 m")).count();
@@ -212,10 +220,10 @@ fn the_worst_pair_is_named_first_and_few_are_labelled() {
 
 #[test]
 fn in_a_small_picture_the_caption_gives_way_and_never_runs_over_itself() {
-    let mut footage = footage();
-    "an exceedingly long name of a flight".clone_into(&mut footage.name);
+    let mut timeline = timeline();
+    "an exceedingly long name of a flight".clone_into(&mut timeline.name);
     let said = |size_px| {
-        let scene = scene(&footage, 3.0, &View { size_px, ..View::default() });
+        let scene = scene(&timeline, 3.0, &View { size_px, ..View::default() });
         let [name, time] = ["an ex", "t = "].map(|start| words(&scene).iter().any(|text| text.starts_with(start)));
         (name, time)
     };
@@ -228,11 +236,11 @@ fn in_a_small_picture_the_caption_gives_way_and_never_runs_over_itself() {
 #[test]
 fn what_is_too_small_to_see_is_a_dot() {
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 30e3, 0.0, 1.0]));
-    let mut footage = Footage::new("far", 2);
+    let mut timeline = Timeline::new("far", 2);
     for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
         swarm.positions_m[(1, 1)] = time_s;
         let control = Rows::zeros(2);
-        footage.take(&Sample {
+        timeline.take(&Sample {
             time_s,
             step: step as u64,
             swarm: &swarm,
@@ -242,23 +250,25 @@ fn what_is_too_small_to_see_is_a_dot() {
             channels: &[],
         });
     }
-    let scene = scene(&footage, 0.0, &camera("top"));
+    let scene = scene(&timeline, 0.0, &camera("top"));
     let at = scene.camera.project(Vector3::zeros()).expect("ahead");
     assert!(scene.balls.iter().all(|ball| f64::from(ball.radius_m) * at.px_per_m > 1.4), "{:?}", scene.balls);
 }
 
 #[test]
 fn seen_along_the_ground_its_scale_is_below_it_and_the_last_number_has_the_unit() {
-    let footage = footage();
+    let timeline = timeline();
     for text in ["iso", "front", "side", "top"] {
-        let scene = scene(&footage, 2.0, &camera(text));
+        let scene = scene(&timeline, 2.0, &camera(text));
         let unit = words(&scene).iter().filter(|text| text.ends_with(" m") && !text.contains('.')).count();
         assert!((1..=2).contains(&unit), "{text}: {:?}", words(&scene));
     }
-    let front = scene(&footage, 2.0, &camera("front"));
-    let ground = front.camera.project(Stage::of(&footage).ground_m[0]).expect("ahead").at_px[1];
-    let numbers = front.marks.iter().filter_map(|mark| match mark {
-        Mark::Words { at_px, anchor: [_, 0.0], text, .. } if text.trim_end_matches(" m").parse::<f64>().is_ok() => {
+    let front = scene(&timeline, 2.0, &camera("front"));
+    let ground = front.camera.project(Extent::of(&timeline).ground_m[0]).expect("ahead").at_px[1];
+    let numbers = front.annotations.iter().filter_map(|annotation| match annotation {
+        Annotation::Words { at_px, anchor: [_, 0.0], text, .. }
+            if text.trim_end_matches(" m").parse::<f64>().is_ok() =>
+        {
             Some(at_px[1])
         }
         _ => None,
@@ -271,11 +281,11 @@ fn of_many_vehicles_those_that_are_too_close_are_named() {
     let places: Vec<f64> = (0..100_u32).flat_map(|k| [f64::from(k % 10) * 4.0, f64::from(k / 10) * 4.0, 5.0]).collect();
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&places));
     swarm.positions_m[(99, 0)] = swarm.positions_m[(98, 0)] + 0.5;
-    let mut footage = Footage::new("many", 100);
-    footage.delta_m = Some(1.0);
+    let mut timeline = Timeline::new("many", 100);
+    timeline.delta_m = Some(1.0);
     let control = Rows::zeros(100);
     for time_s in [0.0, 1.0] {
-        footage.take(&Sample {
+        timeline.take(&Sample {
             time_s,
             step: 0,
             swarm: &swarm,
@@ -285,10 +295,10 @@ fn of_many_vehicles_those_that_are_too_close_are_named() {
             channels: &[],
         });
     }
-    footage.note(&Event::ViolationBegan { pair: Pair::new(98, 99), time_s: 0.5 });
+    timeline.note(&Event::ViolationBegan { pair: Pair::new(98, 99), time_s: 0.5 });
     let named = |time_s| {
         let layers = Layers { labels: true, ..Layers::NONE };
-        let scene = scene(&footage, time_s, &View { layers, ..camera("top") });
+        let scene = scene(&timeline, time_s, &View { layers, ..camera("top") });
         words(&scene).into_iter().map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(named(0.0), Vec::<String>::new());
@@ -300,10 +310,10 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
     // One on the ground and three high above its edges, which are seen over them from above.
     let places = [0.0, 0.0, 0.5, 6.0, 0.0, 9.0, 0.0, 6.0, 9.0, -6.0, -6.0, 9.0];
     let swarm = Swarm::at_rest(Rows::from_row_slice(&places));
-    let mut footage = Footage::new("tower", 4);
-    footage.delta_m = Some(2.0);
+    let mut timeline = Timeline::new("tower", 4);
+    timeline.delta_m = Some(2.0);
     let control = Rows::zeros(4);
-    footage.take(&Sample {
+    timeline.take(&Sample {
         time_s: 0.0,
         step: 0,
         swarm: &swarm,
@@ -313,13 +323,13 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
         channels: &[],
     });
     let numbers = |view: &View| {
-        let scene = scene(&footage, 0.0, view);
+        let scene = scene(&timeline, 0.0, view);
         let number = |text: &str| text.trim_end_matches(" m").parse::<f64>().is_ok();
-        let at = |mark: &Mark| match mark {
-            Mark::Words { at_px, text, .. } if number(text) => Some(*at_px),
+        let at = |annotation: &Annotation| match annotation {
+            Annotation::Words { at_px, text, .. } if number(text) => Some(*at_px),
             _ => None,
         };
-        (scene.camera, scene.marks.iter().filter_map(at).collect::<Vec<_>>())
+        (scene.camera, scene.annotations.iter().filter_map(at).collect::<Vec<_>>())
     };
     let mut dropped = 0;
     let sides = (0..360).step_by(20).flat_map(|azimuth| [5, 30, 60, 80].map(|elevation| (azimuth, elevation)));
@@ -332,7 +342,7 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
         let (_, without) = numbers(&view(false));
         dropped += without.len() - with.len().min(without.len());
         for k in 0..4 {
-            let place = Stage::of(&footage).place(&footage.at(0.0).expect("a moment").positions_m, k).expect("there");
+            let place = Extent::of(&timeline).place(&timeline.at(0.0).expect("a frame").positions_m, k).expect("there");
             let Some(ball) = camera.project(place) else { continue };
             let clear = |at: &[f32; 2]| {
                 let [x, y] = [0, 1].map(|axis| f64::from(at[axis]) - ball.at_px[axis]);

@@ -1,24 +1,23 @@
-//! What the window shows around the picture, and what keys and mouse do.
+//! What the window shows around the picture, and what the mouse does.
 
-use egui::{Align2, Color32, Key, RichText, Sense, Slider, Stroke, Ui, Vec2, pos2, vec2};
-use nalgebra::Vector3;
+use egui::{
+    Button, Color32, Key, PointerButton, Rect, RichText, Sense, Slider, Stroke, TextureId, Ui, Vec2, pos2, vec2,
+};
 
 use super::player::Player;
+use super::plot::plot;
+use super::state::WindowState;
 use crate::render::gpu::paint;
-use crate::render::scene::{Camera, Mark, Orbit, Stage, metres};
-use crate::render::{CameraSpec, Layers, Moment, Plan, Theme};
+use crate::render::scene::{Extent, Projected, Scene, metres};
+use crate::render::timeline::{Frame, Plan};
 use crate::swarm::{Pair, row};
 
 /// Degrees that the camera turns for a point that the mouse is dragged.
 const TURN_DEG: f64 = 0.35;
-/// Degrees that the camera turns for a key.
-const KEY_TURN_DEG: f64 = 5.0;
 /// Most neighbours of the picked vehicle that are listed.
 const LISTED: usize = 8;
 /// Room for the button of the help \[points\].
 const HELP_HEIGHT: f32 = 28.0;
-/// Most points of the plot.
-const PLOT_POINTS: usize = 600;
 
 /// Keys and what they do, for the help.
 const HELP: [(&str, &str); 14] = [
@@ -38,273 +37,125 @@ const HELP: [(&str, &str); 14] = [
     ("H, Q", "this help, quit"),
 ];
 
-/// What the person has chosen.
-pub(super) struct Desk {
-    pub(super) orbit: Orbit,
-    pub(super) target_m: Vector3<f64>,
-    pub(super) layers: Layers,
-    pub(super) theme: Theme,
-    pub(super) picked: Option<usize>,
-    pub(super) help: bool,
-    /// The camera follows the extent of the flight until somebody moves it.
-    pub(super) framed: bool,
-    pub(super) message: Option<String>,
+/// The picture, and what is in it.
+pub(super) struct Viewport<'a> {
+    pub(super) texture: TextureId,
+    pub(super) extent: &'a Extent,
+    /// The flight at this time and its draw list; none before its first sample.
+    pub(super) drawn: Option<&'a (Frame, Scene)>,
 }
 
-/// What is asked of the window.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Wishes {
-    pub(super) picture: bool,
-    pub(super) quit: bool,
-}
-
-/// The picture and what is laid over it.
-pub(super) struct Shown<'a> {
-    pub(super) texture: egui::TextureId,
-    pub(super) marks: &'a [Mark],
-    pub(super) camera: Option<Camera>,
-    pub(super) moment: Option<&'a Moment>,
-    /// Where the origin of the camera's frame is \[m\].
-    pub(super) origin_m: Vector3<f64>,
-}
-
-impl Desk {
-    pub(super) fn new(theme: Theme) -> Self {
-        let orbit = Orbit { azimuth_deg: -62.0, elevation_deg: 32.0, distance_m: 20.0 };
-        Self {
-            orbit,
-            target_m: Vector3::zeros(),
-            layers: Layers::ALL,
-            theme,
-            picked: None,
-            help: false,
-            framed: true,
-            message: None,
-        }
-    }
-
-    /// Frames the whole flight.
-    pub(super) fn frame(&mut self, stage: &Stage, size_px: [u32; 2]) {
-        (self.orbit, self.target_m) = stage.orbit(&CameraSpec::Iso, size_px);
-        self.framed = true;
-    }
-
-    fn turn(&mut self, azimuth_deg: f64, elevation_deg: f64) {
-        self.orbit.azimuth_deg = (self.orbit.azimuth_deg + azimuth_deg).rem_euclid(360.0);
-        self.orbit.elevation_deg = (self.orbit.elevation_deg + elevation_deg).clamp(-90.0, 90.0);
-        self.framed = false;
-    }
-
-    fn approach(&mut self, factor: f64) {
-        self.orbit.distance_m = (self.orbit.distance_m * factor).clamp(1e-2, 1e7);
-        self.framed = false;
-    }
-
-    fn layer(&mut self, k: usize) -> Option<(&'static str, &mut bool)> {
-        let layers = &mut self.layers;
-        [
-            ("shells", &mut layers.shells),
-            ("edges", &mut layers.edges),
-            ("trails", &mut layers.trails),
-            ("marks", &mut layers.marks),
-            ("ground", &mut layers.ground),
-            ("names", &mut layers.labels),
-            ("closest", &mut layers.closest),
-            ("caption", &mut layers.caption),
-        ]
-        .into_iter()
-        .nth(k)
-    }
-
-    pub(super) fn keys(&mut self, context: &egui::Context, player: &mut Player) -> Wishes {
-        // A field being typed into has its keys to itself; any other field in focus has those that work it.
-        let focus = context.memory(egui::Memory::focused);
-        if focus.is_some_and(|id| egui::text_edit::TextEditState::load(context, id).is_some()) {
-            return Wishes::default();
-        }
-        let works_it = |key: Key| {
-            matches!(key, Key::Space | Key::Enter | Key::ArrowLeft | Key::ArrowRight | Key::Escape) && focus.is_some()
-        };
-        let pressed: Vec<Key> = context.input(|input| {
-            let pressed = |event: &egui::Event| match event {
-                egui::Event::Key { key, pressed: true, modifiers, .. } if !modifiers.command => Some(*key),
-                _ => None,
-            };
-            input.events.iter().filter_map(pressed).collect()
-        });
-        // What was said last is read by now.
-        if !pressed.is_empty() {
-            self.message = None;
-        }
-        let mut wishes = Wishes::default();
-        for key in pressed.into_iter().filter(|&key| !works_it(key)) {
-            match key {
-                Key::Space => player.toggle(),
-                Key::ArrowLeft => player.step(-1),
-                Key::ArrowRight => player.step(1),
-                Key::Home => player.seek(f64::NEG_INFINITY),
-                Key::End => player.seek(f64::INFINITY),
-                Key::N => {
-                    if let Some(closest) = player.footage.closest() {
-                        player.playing = false;
-                        player.seek(closest.time_s);
-                    }
-                }
-                Key::Minus => player.faster(false),
-                Key::Plus | Key::Equals => player.faster(true),
-                Key::A => self.turn(-KEY_TURN_DEG, 0.0),
-                Key::D => self.turn(KEY_TURN_DEG, 0.0),
-                Key::W => self.turn(0.0, KEY_TURN_DEG),
-                Key::S => self.turn(0.0, -KEY_TURN_DEG),
-                Key::PageUp => self.approach(0.9),
-                Key::PageDown => self.approach(1.0 / 0.9),
-                Key::V => {
-                    let next = self.picked.map_or(0, |picked| picked + 1);
-                    self.picked = (next < player.footage.count()).then_some(next);
-                }
-                Key::F => self.framed = true,
-                Key::T => {
-                    let at = Theme::ALL.iter().position(|(_, theme)| *theme == self.theme).unwrap_or(0);
-                    self.theme = Theme::ALL[(at + 1) % Theme::ALL.len()].1;
-                }
-                Key::P => wishes.picture = true,
-                Key::H | Key::F1 | Key::Questionmark => self.help = !self.help,
-                Key::Escape if self.help => self.help = false,
-                Key::Q | Key::Escape => wishes.quit = true,
-                digit => {
-                    const DIGITS: [Key; 8] =
-                        [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8];
-                    let layer = DIGITS.iter().position(|known| *known == digit).and_then(|k| self.layer(k));
-                    if let Some((_, shown)) = layer {
-                        *shown = !*shown;
-                    }
-                }
-            }
-        }
-        wishes
-    }
-
-    /// Draws the panels; gives the area that is left for the picture \[points\].
-    pub(super) fn show(&mut self, ui: &mut Ui, player: &mut Player, shown: &Shown<'_>) -> egui::Rect {
-        egui::Panel::bottom("time").show(ui, |ui| controls(ui, player, self.message.as_deref()));
-        egui::Panel::right("sides").default_size(230.0).show(ui, |ui| self.sides(ui, player, shown));
-        egui::CentralPanel::no_frame().show(ui, |ui| self.picture(ui, player, shown)).inner
-    }
-
-    fn picture(&mut self, ui: &mut Ui, player: &Player, shown: &Shown<'_>) -> egui::Rect {
-        let area = ui.available_rect_before_wrap();
-        let response = ui.allocate_rect(area, Sense::click_and_drag());
-        let points = ui.ctx().pixels_per_point();
-        let whole = egui::Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        let painter = ui.painter_at(area);
-        painter.image(shown.texture, area, whole, Color32::WHITE);
-        paint(&painter, shown.marks, area.min.to_vec2(), points);
-        if let Some((at, radius)) = self.picked.and_then(|picked| shown.on_picture(picked, player)) {
-            let stroke = Stroke::new(2.0, ui.visuals().strong_text_color());
-            painter.circle_stroke(area.min + at / points, (radius / points).max(6.0) + 4.0, stroke);
-        }
-        let drag = response.drag_delta();
-        if response.dragged_by(egui::PointerButton::Primary) && !ui.input(|input| input.modifiers.shift) {
-            self.turn(-f64::from(drag.x) * TURN_DEG, f64::from(drag.y) * TURN_DEG);
-        } else if response.dragged() {
-            self.pan(drag, shown.camera, area);
-        }
-        if response.hovered() {
-            let wheel = ui.input(|input| input.smooth_scroll_delta().y);
-            if wheel != 0.0 {
-                self.approach((-f64::from(wheel) * 0.003).exp());
-            }
-        }
-        if response.clicked()
-            && let Some(at) = response.interact_pointer_pos()
-        {
-            self.picked = shown.pick((at - area.min) * points, player);
-        }
-        if self.help {
-            help(ui.ctx(), &mut self.help);
-        }
-        area
-    }
-
-    fn pan(&mut self, drag: Vec2, camera: Option<Camera>, area: egui::Rect) {
-        let Some(camera) = camera else { return };
-        let metres = 2.0 * 0.315 * self.orbit.distance_m / f64::from(area.height().max(1.0));
-        self.target_m += (camera.up * f64::from(drag.y) - camera.right * f64::from(drag.x)) * metres;
-        self.framed = false;
-    }
-
-    fn sides(&mut self, ui: &mut Ui, player: &Player, shown: &Shown<'_>) {
-        ui.add_space(4.0);
-        ui.label(RichText::new("Layers").strong());
-        ui.columns(2, |columns| {
-            for k in 0..8 {
-                if let Some((name, shown)) = self.layer(k) {
-                    columns[k % 2].checkbox(shown, format!("{} {name}", k + 1));
-                }
-            }
-        });
-        ui.separator();
-        ui.label(RichText::new("Separation").strong());
-        plot(ui, player);
-        ui.separator();
-        let height = (ui.available_height() - HELP_HEIGHT).max(0.0);
-        egui::ScrollArea::vertical().max_height(height).show(ui, |ui| match (self.picked, shown.moment) {
-            (Some(picked), Some(moment)) if picked < player.footage.count() => vehicle(ui, player, moment, picked),
-            _ => {
-                ui.label("Click a vehicle to see its distances and forces.");
-            }
-        });
-        ui.with_layout(egui::Layout::bottom_up(egui::Align::LEFT), |ui| {
-            if ui.button("Help (H)").clicked() {
-                self.help = true;
-            }
-        });
-    }
-}
-
-impl Shown<'_> {
+impl Viewport<'_> {
     /// Where a vehicle is in the picture and how large \[pixels\].
-    fn on_picture(&self, k: usize, player: &Player) -> Option<(Vec2, f32)> {
-        let place = row(&self.moment?.positions_m, k) - self.origin_m;
-        let at = self.camera?.project(place)?;
+    fn on_picture(&self, k: usize, player: &Player) -> Option<(Projected, Vec2, f32)> {
+        let (frame, scene) = self.drawn?;
+        let at = scene.camera.project(self.extent.place(&frame.positions_m, k)?)?;
         #[expect(clippy::cast_possible_truncation, reason = "pixels")]
-        let [x, y, radius] = [at.at_px[0], at.at_px[1], player.footage.radius_m[k] * at.px_per_m].map(|v| v as f32);
-        Some((vec2(x, y), radius))
+        let [x, y, radius] = [at.at_px[0], at.at_px[1], player.timeline.radius_m[k] * at.px_per_m].map(|v| v as f32);
+        Some((at, vec2(x, y), radius))
     }
 
     /// The nearest vehicle whose ball, or a few pixels around its middle, is at a point of the picture.
-    fn pick(&self, at: Vec2, player: &Player) -> Option<usize> {
+    fn pick(&self, point: Vec2, player: &Player) -> Option<usize> {
         let depth_m = |k: usize| {
-            let (place, radius) = self.on_picture(k, player)?;
-            let projected = self.camera?.project(row(&self.moment?.positions_m, k) - self.origin_m)?;
-            ((place - at).length() <= radius.max(8.0)).then_some(projected.depth_m)
+            let (at, place, radius) = self.on_picture(k, player)?;
+            ((place - point).length() <= radius.max(8.0)).then_some(at.depth_m)
         };
-        let hit = (0..player.footage.count()).filter_map(|k| Some((k, depth_m(k)?)));
+        let hit = (0..player.timeline.count()).filter_map(|k| Some((k, depth_m(k)?)));
         hit.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
     }
 }
 
+/// Draws the panels and the picture; gives the area that is left for the picture \[points\].
+pub(super) fn show(ui: &mut Ui, state: &mut WindowState, player: &mut Player, viewport: &Viewport<'_>) -> Rect {
+    egui::Panel::bottom("time").show(ui, |ui| controls(ui, state, player));
+    egui::Panel::right("sides").default_size(230.0).show(ui, |ui| sides(ui, state, player, viewport));
+    egui::CentralPanel::no_frame().show(ui, |ui| picture(ui, state, player, viewport)).inner
+}
+
+fn picture(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewport<'_>) -> Rect {
+    let area = ui.available_rect_before_wrap();
+    let response = ui.allocate_rect(area, Sense::click_and_drag());
+    let points = ui.ctx().pixels_per_point();
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    let painter = ui.painter_at(area);
+    painter.image(viewport.texture, area, whole, Color32::WHITE);
+    if let Some((_, scene)) = viewport.drawn {
+        paint(&painter, &scene.annotations, area.min.to_vec2(), points);
+    }
+    if let Some((_, at, radius)) = state.picked.and_then(|picked| viewport.on_picture(picked, player)) {
+        let stroke = Stroke::new(2.0, ui.visuals().strong_text_color());
+        painter.circle_stroke(area.min + at / points, (radius / points).max(6.0) + 4.0, stroke);
+    }
+    let drag = response.drag_delta();
+    if response.dragged_by(PointerButton::Primary) && !ui.input(|input| input.modifiers.shift) {
+        state.turn(-f64::from(drag.x) * TURN_DEG, f64::from(drag.y) * TURN_DEG);
+    } else if response.dragged()
+        && let Some((_, scene)) = viewport.drawn
+    {
+        state.pan(drag, &scene.camera, area.height());
+    }
+    if response.hovered() {
+        let wheel = ui.input(|input| input.smooth_scroll_delta().y);
+        if wheel != 0.0 {
+            state.approach((-f64::from(wheel) * 0.003).exp());
+        }
+    }
+    if response.clicked()
+        && let Some(at) = response.interact_pointer_pos()
+    {
+        state.picked = viewport.pick((at - area.min) * points, player);
+    }
+    if state.help {
+        help(ui.ctx(), &mut state.help);
+    }
+    area
+}
+
+fn sides(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewport<'_>) {
+    ui.add_space(4.0);
+    ui.label(RichText::new("Layers").strong());
+    ui.columns(2, |columns| {
+        for (k, (name, shown)) in state.layers().into_iter().enumerate() {
+            columns[k % 2].checkbox(shown, format!("{} {name}", k + 1));
+        }
+    });
+    ui.separator();
+    ui.label(RichText::new("Separation").strong());
+    plot(ui, player);
+    ui.separator();
+    let height = (ui.available_height() - HELP_HEIGHT).max(0.0);
+    egui::ScrollArea::vertical().max_height(height).show(ui, |ui| match (state.picked, viewport.drawn) {
+        (Some(picked), Some((frame, _))) if picked < player.timeline.count() => vehicle(ui, player, frame, picked),
+        _ => {
+            ui.label("Click a vehicle to see its distances and forces.");
+        }
+    });
+    ui.with_layout(egui::Layout::bottom_up(egui::Align::LEFT), |ui| {
+        if ui.button("Help (H)").clicked() {
+            state.help = true;
+        }
+    });
+}
+
 /// Play, step, scrub, speed.
-fn controls(ui: &mut Ui, player: &mut Player, message: Option<&str>) {
+fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
     ui.add_space(3.0);
     ui.horizontal(|ui| {
-        if ui.button("|<").on_hover_text("to the start (Home)").clicked() {
-            player.seek(f64::NEG_INFINITY);
+        let play = Button::new(if player.playing { "Pause" } else { "Play" }).min_size(vec2(56.0, 18.0));
+        let buttons = [
+            (Button::new("|<"), "to the start (Home)", Key::Home),
+            (Button::new("<"), "a sample back (Left)", Key::ArrowLeft),
+            (play, "Space", Key::Space),
+            (Button::new(">"), "a sample on (Right)", Key::ArrowRight),
+            (Button::new(">|"), "to the end (End)", Key::End),
+        ];
+        for (button, what, key) in buttons {
+            if ui.add(button).on_hover_text(what).clicked() {
+                state.press(key, player);
+            }
         }
-        if ui.button("<").on_hover_text("a sample back (Left)").clicked() {
-            player.step(-1);
-        }
-        let play = if player.playing { "Pause" } else { "Play" };
-        if ui.add_sized([56.0, 18.0], egui::Button::new(play)).on_hover_text("Space").clicked() {
-            player.toggle();
-        }
-        if ui.button(">").on_hover_text("a sample on (Right)").clicked() {
-            player.step(1);
-        }
-        if ui.button(">|").on_hover_text("to the end (End)").clicked() {
-            player.seek(f64::INFINITY);
-        }
-        let [first_s, last_s] = player.footage.range_s();
+        let [first_s, last_s] = player.timeline.range_s();
         let mut time_s = player.time_s;
         ui.spacing_mut().slider_width = (ui.available_width() - 230.0).max(60.0);
         let slider = Slider::new(&mut time_s, first_s..=last_s.max(first_s + 1e-9))
@@ -326,96 +177,38 @@ fn controls(ui: &mut Ui, player: &mut Player, message: Option<&str>) {
         }
     });
     // Its line is always there, so that the picture keeps its size.
-    ui.add(egui::Label::new(player.said.as_deref().or(message).unwrap_or(" ")).truncate());
+    ui.add(egui::Label::new(player.said.as_deref().or(state.message.as_deref()).unwrap_or(" ")).truncate());
     ui.add_space(2.0);
 }
 
-/// The smallest separation over time against delta, with where one is.
-fn plot(ui: &mut Ui, player: &Player) {
-    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), 120.0), Sense::hover());
-    let painter = ui.painter_at(area);
-    let visuals = ui.visuals();
-    painter.rect_filled(area, 3.0, visuals.extreme_bg_color);
-    let [first_s, last_s] = player.footage.range_s();
-    let span_s = (last_s - first_s).max(1e-9);
-    let delta_m = player.footage.delta_m;
-    let most = player.footage.instants().div_ceil(PLOT_POINTS).max(1);
-    let mut points: Vec<[f64; 2]> = Vec::new();
-    for (k, [time_s, separation_m]) in player.footage.separations().enumerate() {
-        match points.last_mut() {
-            // The smallest of those that share a point is what counts.
-            Some(last) if k % most != 0 => last[1] = last[1].min(separation_m),
-            _ => points.push([time_s, separation_m]),
-        }
-    }
-    let values = || points.iter().map(|point| point[1]).chain(delta_m);
-    let top = values().fold(0.0, f64::max) * 1.1;
-    let bottom = (values().fold(f64::INFINITY, f64::min) * 0.9).min(top);
-    #[expect(clippy::cast_possible_truncation, reason = "points of a plot")]
-    let at = |time_s: f64, separation_m: f64| {
-        let (x, y) = ((time_s - first_s) / span_s, (separation_m - bottom) / (top - bottom).max(1e-9));
-        pos2(area.left() + x as f32 * area.width(), area.bottom() - y as f32 * area.height())
-    };
-    if let Some(delta_m) = delta_m {
-        let stroke = Stroke::new(1.5, Color32::from_rgb(0xE0, 0x30, 0x3C));
-        painter.line_segment([at(first_s, delta_m), at(last_s, delta_m)], stroke);
-        let font = egui::FontId::proportional(11.0);
-        painter.text(at(last_s, delta_m), Align2::RIGHT_BOTTOM, format!("delta {delta_m} m "), font, stroke.color);
-    }
-    let curve = points.iter().map(|&[time_s, separation_m]| at(time_s, separation_m)).collect();
-    painter.add(egui::Shape::line(curve, Stroke::new(1.5, visuals.hyperlink_color)));
-    let ink = plot_ink(visuals);
-    let number = |corner: egui::Pos2, anchor, text| {
-        painter.text(corner, anchor, text, egui::FontId::proportional(11.0), ink);
-    };
-    number(area.left_top(), Align2::LEFT_TOP, format!(" {top:.1} m"));
-    number(area.left_bottom(), Align2::LEFT_BOTTOM, format!(" {bottom:.1} m, {first_s:.0} s"));
-    number(area.right_bottom(), Align2::RIGHT_BOTTOM, format!("{last_s:.0} s "));
-    let now = at(player.time_s, bottom).x;
-    painter.vline(now, area.y_range(), Stroke::new(1.0, visuals.strong_text_color()));
-    if let Some(pointer) = response.hover_pos() {
-        let time_s = first_s + f64::from((pointer.x - area.left()) / area.width()) * span_s;
-        let near = points.iter().min_by(|a, b| (a[0] - time_s).abs().total_cmp(&(b[0] - time_s).abs()));
-        if let Some([time_s, separation_m]) = near {
-            response.on_hover_text(format!("{} at {time_s:.2} s", metres(*separation_m)));
-        }
-    }
-}
-
-/// The colour of the numbers of the plot.
-fn plot_ink(visuals: &egui::Visuals) -> Color32 {
-    visuals.text_color()
-}
-
-/// What is known of a vehicle at a moment.
-fn vehicle(ui: &mut Ui, player: &Player, moment: &Moment, k: usize) {
-    let footage = &player.footage;
-    ui.label(RichText::new(format!("Vehicle {}", footage.vehicles[k])).strong());
-    let place = row(&moment.positions_m, k);
+/// What is known of a vehicle at a time.
+fn vehicle(ui: &mut Ui, player: &Player, frame: &Frame, k: usize) {
+    let timeline = &player.timeline;
+    ui.label(RichText::new(format!("Vehicle {}", timeline.vehicles[k])).strong());
+    let place = row(&frame.positions_m, k);
     ui.label(format!("at ({:.3}, {:.3}, {:.3}) m", place.x, place.y, place.z));
-    if let Some(control) = &moment.control_m_s2 {
+    if let Some(control) = &frame.control_m_s2 {
         let control = row(control, k);
         ui.label(format!("commanded {:.3} m/s\u{b2}", control.norm()));
         ui.label(format!("  ({:.3}, {:.3}, {:.3})", control.x, control.y, control.z));
     }
-    let mut others: Vec<(f64, usize)> = (0..footage.count())
+    let mut others: Vec<(f64, usize)> = (0..timeline.count())
         .filter(|&other| other != k)
-        .map(|other| (moment.distance_m(Pair::new(k, other)), other))
+        .map(|other| (frame.distance_m(Pair::new(k, other)), other))
         .filter(|(distance_m, _)| distance_m.is_finite())
         .collect();
     others.sort_by(|a, b| a.0.total_cmp(&b.0));
     egui::Grid::new("neighbours").num_columns(3).show(ui, |ui| {
-        ui.label("to");
-        ui.label("distance");
-        ui.label("tension");
-        ui.end_row();
-        for (distance_m, other) in others.into_iter().take(LISTED) {
-            ui.label(&footage.vehicles[other]);
-            ui.label(metres(distance_m));
-            ui.label(
-                footage.plan.as_ref().map_or_else(String::new, |plan| in_words(plan, Pair::new(k, other), distance_m)),
-            );
+        let row = |ui: &mut Ui, cells: [&str; 3]| {
+            for cell in cells {
+                ui.label(cell);
+            }
             ui.end_row();
+        };
+        row(ui, ["to", "distance", "tension"]);
+        for (distance_m, other) in others.into_iter().take(LISTED) {
+            let tension = timeline.plan.as_ref().map(|plan| in_words(plan, Pair::new(k, other), distance_m));
+            row(ui, [&timeline.vehicles[other], &metres(distance_m), &tension.unwrap_or_default()]);
         }
     });
 }
@@ -431,8 +224,8 @@ fn in_words(plan: &Plan, pair: Pair, distance_m: f64) -> String {
         Some(pull) if pull < 0.0 => format!("push {:.2} m/s\u{b2}", -pull),
         Some(pull) => format!("pull {pull:.2} m/s\u{b2}"),
         None => {
-            let stretch = plan.stretch(pair, distance_m);
-            format!("{:.0} % too {}", 100.0 * stretch.abs(), if stretch < 0.0 { "short" } else { "long" })
+            let elongation = plan.elongation(pair, distance_m);
+            format!("{:.0} % too {}", 100.0 * elongation.abs(), if elongation < 0.0 { "short" } else { "long" })
         }
     }
 }
@@ -491,19 +284,6 @@ mod tests {
                 to_other.normalize() * plan.pull_m_s2(Pair::new(i, j), to_other.norm()).expect("a tension")
             });
             assert!((pulls.sum::<Vector3<f64>>() - row(&control, i)).norm() < 1e-12, "vehicle {}", i + 1);
-        }
-    }
-
-    #[test]
-    fn the_numbers_of_the_plot_stand_out_from_its_ground() {
-        for visuals in [egui::Visuals::dark(), egui::Visuals::light()] {
-            let luminance = |colour: Color32| {
-                let [red, green, blue, _] = egui::Rgba::from(colour).to_array();
-                0.2126 * red + 0.7152 * green + 0.0722 * blue
-            };
-            let [ink, ground] = [plot_ink(&visuals), visuals.extreme_bg_color].map(luminance);
-            // WCAG 2.2, level AA.
-            assert!((ink.max(ground) + 0.05) / (ink.min(ground) + 0.05) >= 4.5, "{ink} on {ground}");
         }
     }
 

@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 use crate::record::{Event, OwnedSample};
-use crate::render::Footage;
+use crate::render::timeline::Timeline;
 
 /// Speeds that keys go through.
 const SPEEDS: [f64; 10] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
@@ -12,7 +12,7 @@ const TAKEN_AT_ONCE: usize = 2000;
 
 /// What a flight in the air sends.
 #[derive(Clone, Debug)]
-pub enum Fed {
+pub enum LiveUpdate {
     /// A sample.
     Sample(Box<OwnedSample>),
     /// An event.
@@ -23,8 +23,8 @@ pub enum Fed {
 
 /// A flight being watched.
 pub(super) struct Player {
-    pub(super) footage: Footage,
-    feed: Option<Receiver<Fed>>,
+    pub(super) timeline: Timeline,
+    live: Option<Receiver<LiveUpdate>>,
     /// What the flight said at its end.
     pub(super) said: Option<String>,
     pub(super) time_s: f64,
@@ -33,48 +33,44 @@ pub(super) struct Player {
 }
 
 impl Player {
-    pub(super) fn new(footage: Footage, feed: Option<Receiver<Fed>>) -> Self {
-        let time_s = footage.range_s()[0];
-        Self { footage, feed, said: None, time_s, playing: true, speed: 1.0 }
+    pub(super) fn new(timeline: Timeline, live: Option<Receiver<LiveUpdate>>) -> Self {
+        let time_s = timeline.range_s()[0];
+        Self { timeline, live, said: None, time_s, playing: true, speed: 1.0 }
     }
 
     /// Whether the flight is still being flown.
     pub(super) fn is_live(&self) -> bool {
-        self.feed.is_some()
+        self.live.is_some()
     }
 
     /// Takes what has been flown; whether there was anything.
     pub(super) fn receive(&mut self) -> bool {
-        let Some(feed) = &self.feed else { return false };
+        let Some(live) = &self.live else { return false };
         for taken in 0..TAKEN_AT_ONCE {
-            match feed.try_recv() {
-                Ok(Fed::Sample(sample)) => {
-                    if let Err(error) = self.footage.check(&sample.as_sample()) {
-                        self.said = Some(error.to_string());
-                        self.feed = None;
-                        return true;
+            match live.try_recv() {
+                Ok(LiveUpdate::Sample(sample)) => {
+                    if let Err(error) = self.timeline.take_checked(&sample.as_sample()) {
+                        return self.end(Some(error.to_string()));
                     }
-                    self.footage.take(&sample.as_sample());
                 }
-                Ok(Fed::Event(event)) => self.footage.note(&event),
-                Ok(Fed::Ended(said)) => {
-                    self.said = said;
-                    self.feed = None;
-                    return true;
-                }
+                Ok(LiveUpdate::Event(event)) => self.timeline.note(&event),
+                Ok(LiveUpdate::Ended(said)) => return self.end(said),
                 Err(TryRecvError::Empty) => return taken > 0,
-                Err(TryRecvError::Disconnected) => {
-                    self.feed = None;
-                    return true;
-                }
+                Err(TryRecvError::Disconnected) => return self.end(None),
             }
         }
         true
     }
 
+    /// Watches the flight no further.
+    fn end(&mut self, said: Option<String>) -> bool {
+        (self.said, self.live) = (said, None);
+        true
+    }
+
     /// Lets time pass; at the end of a flight that has ended it stops, at the end of one in the air it waits.
-    pub(super) fn pass(&mut self, seconds: f64) {
-        let [first_s, last_s] = self.footage.range_s();
+    pub(super) fn advance(&mut self, seconds: f64) {
+        let [first_s, last_s] = self.timeline.range_s();
         if self.playing {
             self.time_s += seconds * self.speed;
         }
@@ -86,7 +82,7 @@ impl Player {
 
     /// Plays or pauses; from the end it plays again from the start.
     pub(super) fn toggle(&mut self) {
-        let [first_s, last_s] = self.footage.range_s();
+        let [first_s, last_s] = self.timeline.range_s();
         if !self.playing && self.time_s >= last_s && !self.is_live() {
             self.time_s = first_s;
         }
@@ -94,21 +90,21 @@ impl Player {
     }
 
     pub(super) fn seek(&mut self, time_s: f64) {
-        let [first_s, last_s] = self.footage.range_s();
+        let [first_s, last_s] = self.timeline.range_s();
         self.time_s = time_s.clamp(first_s, last_s.max(first_s));
     }
 
     /// Goes so many samples on, or back.
     pub(super) fn step(&mut self, samples: isize) {
         self.playing = false;
-        let times: Vec<f64> = self.footage.times().collect();
-        let at = times.partition_point(|&time| time <= self.time_s).saturating_sub(1);
-        let between = times.get(at).is_some_and(|&time| time < self.time_s);
+        let keyframes = self.timeline.keyframes();
+        let at = keyframes.partition_point(|keyframe| keyframe.time_s <= self.time_s).saturating_sub(1);
+        let between = keyframes.get(at).is_some_and(|keyframe| keyframe.time_s < self.time_s);
         // Back from between two samples is the one before.
         let by = if samples < 0 && between { samples + 1 } else { samples };
-        let to = at.saturating_add_signed(by).min(times.len().saturating_sub(1));
-        if let Some(&time_s) = times.get(to) {
-            self.time_s = time_s;
+        let to = at.saturating_add_signed(by).min(keyframes.len().saturating_sub(1));
+        if let Some(keyframe) = keyframes.get(to) {
+            self.time_s = keyframe.time_s;
         }
     }
 
@@ -142,19 +138,19 @@ mod tests {
     }
 
     fn player() -> Player {
-        let mut footage = Footage::new("one", 1);
+        let mut timeline = Timeline::new("one", 1);
         for time_s in [0.0, 1.0, 2.0] {
-            footage.take(&sample(time_s).as_sample());
+            timeline.take(&sample(time_s).as_sample());
         }
-        Player::new(footage, None)
+        Player::new(timeline, None)
     }
 
     #[test]
     fn playing_ends_at_the_end_and_starts_again_from_the_start() {
         let mut player = player();
-        player.pass(0.75);
+        player.advance(0.75);
         assert_eq!((player.time_s, player.playing), (0.75, true));
-        player.pass(9.0);
+        player.advance(9.0);
         assert_eq!((player.time_s, player.playing), (2.0, false));
         player.toggle();
         assert_eq!((player.time_s, player.playing), (0.0, true));
@@ -179,14 +175,14 @@ mod tests {
     #[test]
     fn a_flight_in_the_air_that_leaves_all_measure_is_watched_no_further() {
         let (sender, receiver) = std::sync::mpsc::channel();
-        let mut player = Player::new(Footage::new("one", 1), Some(receiver));
+        let mut player = Player::new(Timeline::new("one", 1), Some(receiver));
         let mut gone = sample(1.0);
         gone.swarm.positions_m[(0, 2)] = -1e10;
         for sample in [sample(0.0), gone] {
-            sender.send(Fed::Sample(Box::new(sample))).expect("sent");
+            sender.send(LiveUpdate::Sample(Box::new(sample))).expect("sent");
         }
         assert!(player.receive() && !player.is_live());
-        assert_eq!(player.footage.range_s(), [0.0, 0.0]);
+        assert_eq!(player.timeline.range_s(), [0.0, 0.0]);
         let said = player.said.expect("a sentence");
         assert!(said.starts_with("vehicle 1 has a coordinate of -10000000000.0 m at 1 s"), "{said}");
     }
@@ -203,16 +199,16 @@ mod tests {
     #[test]
     fn a_flight_in_the_air_is_waited_for() {
         let (sender, receiver) = std::sync::mpsc::channel();
-        let mut player = Player::new(Footage::new("one", 1), Some(receiver));
-        sender.send(Fed::Sample(Box::new(sample(0.0)))).expect("sent");
-        sender.send(Fed::Sample(Box::new(sample(1.0)))).expect("sent");
+        let mut player = Player::new(Timeline::new("one", 1), Some(receiver));
+        sender.send(LiveUpdate::Sample(Box::new(sample(0.0)))).expect("sent");
+        sender.send(LiveUpdate::Sample(Box::new(sample(1.0)))).expect("sent");
         assert!(player.receive());
-        player.pass(5.0);
+        player.advance(5.0);
         assert_eq!((player.time_s, player.playing, player.is_live()), (1.0, true, true));
-        sender.send(Fed::Ended(Some("it broke".to_owned()))).expect("sent");
+        sender.send(LiveUpdate::Ended(Some("it broke".to_owned()))).expect("sent");
         assert!(player.receive() && !player.is_live());
         assert_eq!(player.said.as_deref(), Some("it broke"));
-        player.pass(0.1);
+        player.advance(0.1);
         assert!(!player.playing);
     }
 }

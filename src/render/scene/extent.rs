@@ -1,11 +1,13 @@
-//! What does not change from one moment of a flight to the next.
+//! What does not change from one frame of a flight to the next.
 
 use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Vector3;
 
-use super::{Camera, CameraError, CameraSpec, Lens, Orbit, View};
-use crate::render::footage::{Footage, Moment};
+use super::camera::{Camera, CameraSpec, Lens, Orbit, TAN_HALF_VIEW};
+use super::view::View;
+use crate::render::error::RenderError;
+use crate::render::timeline::{Frame, Timeline};
 use crate::swarm::{Pair, Rows, row};
 
 /// Most places of vehicles that framing looks at.
@@ -26,15 +28,15 @@ const NEAREST: f64 = 1e-6;
 /// Room around the ground for its scale, in distances of its lines.
 const SCALE_ROOM: f64 = 0.6;
 
-/// Extent of a flight, the frame it is drawn in, and its ground.
+/// Extent of a flight, the coordinates that it is drawn in, and its ground.
 #[derive(Debug)]
-pub struct Stage {
+pub struct Extent {
     origin_m: Vector3<f64>,
     /// Places of vehicles over the flight with the radius that must be seen around them, and corners of the ground.
     places: Vec<(Vector3<f64>, f64)>,
     /// The framing asked for last: it is the same for all pictures of a film.
     framed: Mutex<Option<(CameraSpec, Camera)>>,
-    /// Corners of the ground, in the scene's frame \[m\].
+    /// Corners of the ground, in the scene's coordinates \[m\].
     pub(super) ground_m: [Vector3<f64>; 2],
     /// Distance of its lines \[m\].
     pub(super) grid_m: f64,
@@ -42,24 +44,17 @@ pub struct Stage {
     reach: (Vector3<f64>, f64),
 }
 
-impl Stage {
-    /// The stage of a flight, as far as it is known.
+impl Extent {
+    /// The extent of a flight, as far as it is known.
     #[must_use]
-    pub fn of(footage: &Footage) -> Self {
-        let instants = footage.positions();
-        let count = footage.count().max(1);
-        let stride = instants.len().div_ceil((FRAMED_PLACES / count).max(2)).max(1);
-        let last = instants.len().saturating_sub(1);
+    pub fn of(timeline: &Timeline) -> Self {
+        let keyframes = timeline.keyframes();
+        let stride = keyframes.len().div_ceil((FRAMED_PLACES / timeline.count().max(1)).max(2)).max(1);
         let mut places: Vec<(Vector3<f64>, f64)> = Vec::new();
-        for (k, (_, positions_m)) in instants.enumerate() {
-            if k % stride == 0 || k == last {
-                for vehicle in 0..positions_m.nrows() {
-                    let place = row(positions_m, vehicle);
-                    if place.iter().all(|x| x.is_finite()) {
-                        places.push((place, keep_out_m(footage, vehicle)));
-                    }
-                }
-            }
+        for keyframe in keyframes.iter().step_by(stride).chain(keyframes.last()) {
+            let there = (0..keyframe.positions_m.nrows()).map(|k| (k, row(&keyframe.positions_m, k)));
+            let there = there.filter(|(_, place)| place.iter().all(|x| x.is_finite()));
+            places.extend(there.map(|(k, place)| (place, timeline.keep_out_m(k))));
         }
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         let mut largest = 0.0_f64;
@@ -75,66 +70,54 @@ impl Stage {
             *place -= origin_m;
         }
         let is_near = low.z >= 0.0 && low.z <= NEAR_GROUND * (high - low).norm() + largest;
-        let ground_z = if is_near { 0.0 } else { low.z - largest };
+        let z = if is_near { 0.0 } else { low.z - largest } - origin_m.z;
         let (low, high) = (low - origin_m, high - origin_m);
         let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
         let grid_m = round_step(span / GROUND_LINES);
-        let snap = |x: f64, origin: f64, round: fn(f64) -> f64| round((x + origin) / grid_m) * grid_m - origin;
-        let z = ground_z - origin_m.z;
-        let ground_m = [
-            Vector3::new(
-                snap(low.x - largest, origin_m.x, f64::floor),
-                snap(low.y - largest, origin_m.y, f64::floor),
-                z,
-            ),
-            Vector3::new(
-                snap(high.x + largest, origin_m.x, f64::ceil),
-                snap(high.y + largest, origin_m.y, f64::ceil),
-                z,
-            ),
-        ];
-        for x in [ground_m[0].x - SCALE_ROOM * grid_m, ground_m[1].x + SCALE_ROOM * grid_m] {
-            for y in [ground_m[0].y - SCALE_ROOM * grid_m, ground_m[1].y + SCALE_ROOM * grid_m] {
-                places.push((Vector3::new(x, y, z), 0.0));
-            }
+        let corner = |at: Vector3<f64>, round: fn(f64) -> f64| {
+            let at = ((at + origin_m) / grid_m).map(round) * grid_m - origin_m;
+            Vector3::new(at.x, at.y, z)
+        };
+        let margin = Vector3::repeat(largest);
+        let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
+        let room = SCALE_ROOM * grid_m;
+        for x in [ground_m[0].x - room, ground_m[1].x + room] {
+            places.extend([ground_m[0].y - room, ground_m[1].y + room].map(|y| (Vector3::new(x, y, z), 0.0)));
         }
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
         Self { origin_m, places, framed: Mutex::new(None), ground_m, grid_m, reach }
     }
 
-    /// Where the origin of the scene's frame is in the recording's \[m\].
+    /// Where the origin of the scene's coordinates is in the recording's \[m\].
     #[must_use]
     pub fn origin_m(&self) -> Vector3<f64> {
         self.origin_m
     }
 
-    /// Where a row of a table of positions is in the scene's frame \[m\]; none where it is not finite.
-    pub(super) fn place(&self, positions_m: &Rows, k: usize) -> Option<Vector3<f64>> {
+    /// Where a row of a table of positions is in the scene's coordinates \[m\]; none where it is not finite.
+    pub(in crate::render) fn place(&self, positions_m: &Rows, k: usize) -> Option<Vector3<f64>> {
         let place = row(positions_m, k) - self.origin_m;
         place.iter().all(|x| x.is_finite()).then_some(place)
     }
 
-    /// The camera of a view at a moment.
+    /// The camera of a view of a frame.
     ///
     /// # Errors
-    /// [`CameraError`] when it follows a vehicle that the flight does not have.
-    pub fn camera(&self, footage: &Footage, moment: &Moment, view: &View) -> Result<Camera, CameraError> {
+    /// [`RenderError::NoVehicle`] when it follows a vehicle that the flight does not have.
+    pub fn camera(&self, timeline: &Timeline, frame: &Frame, view: &View) -> Result<Camera, RenderError> {
         let framing = |spec| self.framing(spec, view.size_px);
         Ok(match &view.camera {
             CameraSpec::Orbit(orbit) => Camera::orbiting(*orbit, Vector3::zeros(), view.size_px),
             CameraSpec::Follow(name) => {
-                let vehicle = Self::find(footage, name)?;
-                let around_m = footage
-                    .delta_m
-                    .map_or(FOLLOWED_RADII * footage.radius_m[vehicle], |delta_m| FOLLOWED_DELTAS * delta_m);
-                match self.place(&moment.positions_m, vehicle) {
-                    Some(place) => Camera::close_up(place, around_m, view.size_px),
-                    None => framing(&CameraSpec::Iso),
-                }
+                let vehicle = find(timeline, name)?;
+                let radius_m = FOLLOWED_RADII * timeline.radius_m[vehicle];
+                let around_m = timeline.delta_m.map_or(radius_m, |delta_m| FOLLOWED_DELTAS * delta_m);
+                let place = self.place(&frame.positions_m, vehicle);
+                place.map_or_else(|| framing(&CameraSpec::Iso), |place| Camera::close_up(place, around_m, view.size_px))
             }
-            CameraSpec::Closest => match moment.nearest {
-                Some((pair, _)) => self.close_up(footage, moment, pair, view.size_px),
+            CameraSpec::Closest => match frame.nearest {
+                Some((pair, _)) => self.close_up(timeline, frame, pair, view.size_px),
                 None => framing(&CameraSpec::Iso),
             },
             spec => framing(spec),
@@ -143,12 +126,12 @@ impl Stage {
 
     /// A camera near a pair; one that frames the flight where one of the two is not there.
     #[must_use]
-    pub fn close_up(&self, footage: &Footage, moment: &Moment, pair: Pair, size_px: [u32; 2]) -> Camera {
-        let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&moment.positions_m, k));
+    pub fn close_up(&self, timeline: &Timeline, frame: &Frame, pair: Pair, size_px: [u32; 2]) -> Camera {
+        let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&frame.positions_m, k));
         let (Some(first), Some(second)) = (first, second) else { return self.framing(&CameraSpec::Iso, size_px) };
         let distance_m = (second - first).norm();
         // Hulls of two at one place are seen too, whatever delta is.
-        let keep_out_m = 2.0 * keep_out_m(footage, pair.first()).max(keep_out_m(footage, pair.second()));
+        let keep_out_m = 2.0 * timeline.keep_out_m(pair.first()).max(timeline.keep_out_m(pair.second()));
         Camera::close_up((first + second) / 2.0, CLOSEST_DISTANCES * distance_m.max(keep_out_m), size_px)
     }
 
@@ -164,16 +147,6 @@ impl Stage {
         }
     }
 
-    fn find(footage: &Footage, name: &str) -> Result<usize, CameraError> {
-        footage.vehicles.iter().position(|vehicle| vehicle == name).ok_or_else(|| {
-            let mut vehicles = footage.vehicles.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-            if footage.count() > NAMED {
-                vehicles = format!("{vehicles} and {} more", footage.count() - NAMED);
-            }
-            CameraError::NoVehicle { name: name.to_owned(), vehicles }
-        })
-    }
-
     /// The orbit and the target \[m\] of a camera that frames the flight: where a person begins to look around.
     #[must_use]
     pub fn orbit(&self, spec: &CameraSpec, size_px: [u32; 2]) -> (Orbit, Vector3<f64>) {
@@ -181,7 +154,7 @@ impl Stage {
         let back = camera.back;
         let distance_m = match camera.lens {
             Lens::Perspective(_) => back.dot(&camera.eye_m).max(self.grid_m),
-            Lens::Parallel(half) => half[1] / 0.315,
+            Lens::Parallel(half) => half[1] / TAN_HALF_VIEW,
         };
         let elevation_deg = back.z.clamp(-1.0, 1.0).asin().to_degrees();
         // Seen straight from above, the azimuth is that of the picture's lower edge.
@@ -199,9 +172,15 @@ impl Stage {
     }
 }
 
-/// How far around a vehicle nothing may be: half of delta, or its own radius where there is no delta \[m\].
-pub(super) fn keep_out_m(footage: &Footage, vehicle: usize) -> f64 {
-    footage.delta_m.map_or(0.0, |delta_m| delta_m / 2.0).max(footage.radius_m[vehicle])
+/// The vehicle of this name.
+fn find(timeline: &Timeline, name: &str) -> Result<usize, RenderError> {
+    timeline.vehicles.iter().position(|vehicle| vehicle == name).ok_or_else(|| {
+        let mut vehicles = timeline.vehicles.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+        if timeline.count() > NAMED {
+            vehicles = format!("{vehicles} and {} more", timeline.count() - NAMED);
+        }
+        RenderError::NoVehicle { name: name.to_owned(), vehicles }
+    })
 }
 
 /// The nearest of 1, 2 and 5 times a power of ten at or above a length; 1 for what has none.

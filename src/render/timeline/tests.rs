@@ -3,14 +3,16 @@ use std::convert::Infallible;
 use nalgebra::Vector3;
 
 use super::*;
-use crate::swarm::Swarm;
+use crate::record::{Event, Sample};
+use crate::render::error::FARTHEST_M;
+use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 use crate::track::{Clock, Item, Tracks};
 
-fn sample(footage: &mut Footage, time_s: f64, x: f64, separation_m: f64) {
+fn sample(timeline: &mut Timeline, time_s: f64, x: f64, separation_m: f64) {
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, x, 0.0, 0.0]));
     let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s: time_s - 0.5 });
     let control = Rows::zeros(2);
-    footage.take(&Sample {
+    timeline.take(&Sample {
         time_s,
         step: 0,
         swarm: &swarm,
@@ -23,63 +25,69 @@ fn sample(footage: &mut Footage, time_s: f64, x: f64, separation_m: f64) {
 
 #[test]
 fn between_two_instants_vehicles_are_on_a_straight_line() {
-    let mut footage = Footage::new("pair", 2);
-    sample(&mut footage, 0.0, 4.0, 4.0);
-    sample(&mut footage, 1.0, 2.0, 2.0);
-    let moment = footage.at(0.25).expect("a moment");
-    assert_eq!((moment.positions_m[(1, 0)], moment.nearest), (3.5, Some((Pair::new(0, 1), 3.5))));
-    let beyond = footage.at(9.0).expect("a moment");
+    let mut timeline = Timeline::new("pair", 2);
+    sample(&mut timeline, 0.0, 4.0, 4.0);
+    sample(&mut timeline, 1.0, 2.0, 2.0);
+    let frame = timeline.at(0.25).expect("a frame");
+    assert_eq!((frame.positions_m[(1, 0)], frame.nearest), (3.5, Some((Pair::new(0, 1), 3.5))));
+    let beyond = timeline.at(9.0).expect("a frame");
     assert_eq!((beyond.time_s, beyond.positions_m[(1, 0)]), (1.0, 2.0));
 }
 
 #[test]
 fn an_approach_counts_from_its_own_time_and_not_from_its_sample() {
-    let mut footage = Footage::new("pair", 2);
-    sample(&mut footage, 0.0, 4.0, 4.0);
-    sample(&mut footage, 1.0, 4.0, 1.0);
-    let so_far = |time_s| footage.at(time_s).and_then(|moment| moment.so_far).map(|approach| approach.separation_m);
+    let mut timeline = Timeline::new("pair", 2);
+    sample(&mut timeline, 0.0, 4.0, 4.0);
+    sample(&mut timeline, 1.0, 4.0, 1.0);
+    let so_far = |time_s| timeline.at(time_s).and_then(|frame| frame.so_far).map(|approach| approach.separation_m);
     assert_eq!([0.0, 0.4, 0.5, 1.0].map(so_far), [Some(4.0), Some(4.0), Some(1.0), Some(1.0)]);
 }
 
 #[test]
 fn a_long_flight_is_thinned_and_keeps_its_ends_and_its_closest_approach() {
-    let mut footage = Footage { budget_bytes: 20_000, ..Footage::new("pair", 2) };
+    let mut timeline = Timeline::new("pair", 2);
+    timeline.budget_bytes = 20_000;
     for k in 0..10_000_u32 {
         let separation_m = if k == 7777 { 0.5 } else { 3.0 };
-        sample(&mut footage, f64::from(k), f64::from(k), separation_m);
+        sample(&mut timeline, f64::from(k), f64::from(k), separation_m);
     }
-    assert!(footage.instants() < 100 && footage.every() >= 64, "{} of every {}", footage.instants(), footage.every());
-    assert_eq!(footage.range_s(), [0.0, 9999.0]);
-    assert_eq!(footage.closest().map(|closest| closest.separation_m), Some(0.5));
-    let smallest = footage.separations().map(|[_, separation_m]| separation_m).fold(f64::INFINITY, f64::min);
+    assert!(
+        timeline.keyframes().len() < 100 && timeline.every() >= 64,
+        "{} of every {}",
+        timeline.keyframes().len(),
+        timeline.every()
+    );
+    assert_eq!(timeline.range_s(), [0.0, 9999.0]);
+    assert_eq!(timeline.closest().map(|closest| closest.separation_m), Some(0.5));
+    let separations = timeline.keyframes().iter().filter_map(|keyframe| Some(keyframe.closest?.separation_m));
+    let smallest = separations.fold(f64::INFINITY, f64::min);
     assert_eq!(smallest, 0.5, "the curve of separations keeps its minimum");
-    let times: Vec<f64> = footage.positions().map(|(time_s, _)| time_s).collect();
+    let times: Vec<f64> = timeline.keyframes().iter().map(|keyframe| keyframe.time_s).collect();
     assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
     // Straight motion is the same from fewer instants.
-    assert_eq!(footage.at(4321.0).map(|moment| moment.positions_m[(1, 0)]), Some(4321.0));
+    assert_eq!(timeline.at(4321.0).map(|frame| frame.positions_m[(1, 0)]), Some(4321.0));
 }
 
 #[test]
 fn nothing_recorded_is_nothing_to_draw() {
-    assert!(Footage::new("pair", 2).at(0.0).is_none());
-    assert!(matches!(Footage::new("pair", 2).complete("x.mcap"), Err(FootageError::Empty { .. })));
+    assert!(Timeline::new("pair", 2).at(0.0).is_none());
 }
 
 #[test]
 fn no_distance_is_shown_below_the_closest_so_far() {
-    let mut footage = Footage::new("pair", 2);
-    sample(&mut footage, 0.0, 4.0, 4.0);
+    let mut timeline = Timeline::new("pair", 2);
+    sample(&mut timeline, 0.0, 4.0, 4.0);
     // Drawn straight, the two are 3 m apart at 0.5 s; they were flown along a curve and never nearer than 3.2 m.
-    sample(&mut footage, 1.0, 2.0, 2.0);
+    sample(&mut timeline, 1.0, 2.0, 2.0);
     let between = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 3.2, time_s: 0.5 });
-    footage.instants[1].here = between;
+    timeline.keyframes[1].closest = between;
     for time_s in [0.3, 0.5, 0.7] {
-        let moment = footage.at(time_s).expect("a moment");
-        let (_, distance_m) = moment.nearest.expect("a pair");
-        let so_far_m = moment.so_far.expect("an approach").separation_m;
+        let frame = timeline.at(time_s).expect("a frame");
+        let (_, distance_m) = frame.nearest.expect("a pair");
+        let so_far_m = frame.so_far.expect("an approach").separation_m;
         assert!(so_far_m <= distance_m && distance_m >= 3.2, "{time_s} s: {so_far_m} m, {distance_m} m");
     }
-    assert_eq!(footage.at(0.5).expect("a moment").so_far, between);
+    assert_eq!(timeline.at(0.5).expect("a frame").so_far, between);
 }
 
 /// Recorded motion: vehicle, time and place of every sample.
@@ -111,9 +119,9 @@ impl Tracks for Seen {
     }
 }
 
-fn seen(samples: &[(usize, f64, f64, f64)], delta_m: f64) -> Footage {
+fn seen(samples: &[(usize, f64, f64, f64)], delta_m: f64) -> Timeline {
     let mut tracks = Seen(samples.to_vec(), ["a", "b", "c", "d"].map(str::to_owned).to_vec());
-    Footage::from_tracks("seen", &mut tracks, Some(delta_m)).expect("it can be drawn")
+    Timeline::from_tracks("seen", &mut tracks, Some(delta_m)).expect("it can be drawn")
 }
 
 #[test]
@@ -122,7 +130,7 @@ fn what_single_precision_cannot_draw_is_refused_with_vehicle_value_and_time() {
     assert_eq!(near.closest().map(|closest| closest.separation_m), Some(2.0 * FARTHEST_M));
     let samples = vec![(0, 0.0, 0.0, 0.0), (1, 0.0, 1.0, 0.0), (1, 0.5, 1.0, -1e300)];
     let mut tracks = Seen(samples, ["a", "b"].map(str::to_owned).to_vec());
-    let error = Footage::from_tracks("far", &mut tracks, None).expect_err("too far");
+    let error = Timeline::from_tracks("far", &mut tracks, None).expect_err("too far");
     assert_eq!(
         error.to_string(),
         "vehicle b has a coordinate of -1e300 m at 0.5 s; what is beyond 1e9 m cannot be drawn"
@@ -131,12 +139,12 @@ fn what_single_precision_cannot_draw_is_refused_with_vehicle_value_and_time() {
 
 #[test]
 fn two_that_meet_between_their_samples_have_met() {
-    let footage = seen(&[(0, 0.0, -2.0, 0.0), (1, 0.0, 2.0, 0.0), (0, 1.0, 2.0, 0.0), (1, 1.0, -2.0, 0.0)], 1.0);
+    let timeline = seen(&[(0, 0.0, -2.0, 0.0), (1, 0.0, 2.0, 0.0), (0, 1.0, 2.0, 0.0), (1, 1.0, -2.0, 0.0)], 1.0);
     let pair = Pair::new(0, 1);
-    assert_eq!(footage.closest(), Some(ClosestApproach { pair, separation_m: 0.0, time_s: 0.5 }));
-    assert_eq!(footage.violations(), [Span { pair, from_s: 0.375, to_s: 0.625 }]);
-    assert_eq!(footage.worst_s(&footage.violations()[0]), 0.5);
-    assert_eq!(footage.at(0.4).and_then(|moment| moment.so_far).map(|so_far| so_far.time_s), Some(0.4));
+    assert_eq!(timeline.closest(), Some(ClosestApproach { pair, separation_m: 0.0, time_s: 0.5 }));
+    assert_eq!(timeline.violations(), [ViolationSpan { pair, from_s: 0.375, to_s: 0.625 }]);
+    assert_eq!(timeline.worst_s(&timeline.violations()[0]), 0.5);
+    assert_eq!(timeline.at(0.4).and_then(|frame| frame.so_far).map(|so_far| so_far.time_s), Some(0.4));
 }
 
 #[test]
@@ -144,9 +152,9 @@ fn every_pair_that_is_too_close_is_kept_and_not_the_nearest_alone() {
     let still = [(0, 0.0, 0.0), (1, 0.5, 0.0), (2, 9.0, 0.0), (3, 9.8, 0.0)];
     let samples: Vec<_> =
         [0.0, 1.0, 2.0].iter().flat_map(|&time_s| still.map(|(vehicle, x, y)| (vehicle, time_s, x, y))).collect();
-    let footage = seen(&samples, 1.0);
-    let whole = |i, j| Span { pair: Pair::new(i, j), from_s: 0.0, to_s: 2.0 };
-    assert_eq!(footage.violations(), [whole(0, 1), whole(2, 3)]);
+    let timeline = seen(&samples, 1.0);
+    let whole = |i, j| ViolationSpan { pair: Pair::new(i, j), from_s: 0.0, to_s: 2.0 };
+    assert_eq!(timeline.violations(), [whole(0, 1), whole(2, 3)]);
     assert_eq!(seen(&samples, 0.5).violations(), [], "at delta is not below it");
 }
 
@@ -162,18 +170,18 @@ fn the_worst_of_a_violation_is_that_of_its_own_pair() {
             [(0, time_s, 0.0, 0.0), (1, time_s, 0.2, 0.0), (2, time_s, 20.0, 0.0), (3, time_s, 20.0, y)]
         })
         .collect();
-    let footage = seen(&samples, 2.0);
-    let other = footage.violations().iter().find(|span| span.pair == Pair::new(2, 3)).expect("a violation");
-    assert_eq!(footage.worst_s(other), 2.0);
+    let timeline = seen(&samples, 2.0);
+    let other = timeline.violations().iter().find(|span| span.pair == Pair::new(2, 3)).expect("a violation");
+    assert_eq!(timeline.worst_s(other), 2.0);
 }
 
 #[test]
 fn pairs_that_the_flight_does_not_have_are_passed_over() {
-    let mut footage = Footage::new("one", 1);
+    let mut timeline = Timeline::new("one", 1);
     let swarm = Swarm::at_rest(Rows::zeros(1));
     let (pair, time_s) = (Pair::new(3, 9), 0.0);
     let separation = Some(ClosestApproach { pair, separation_m: 1.0, time_s });
-    footage.take(&Sample {
+    timeline.take(&Sample {
         time_s,
         step: 0,
         swarm: &swarm,
@@ -182,7 +190,7 @@ fn pairs_that_the_flight_does_not_have_are_passed_over() {
         energy: None,
         channels: &[],
     });
-    footage.note(&Event::ViolationBegan { pair, time_s });
-    assert_eq!((footage.closest(), footage.violations().len()), (None, 0));
-    assert!(footage.at(0.0).expect("a moment").nearest.is_none());
+    timeline.note(&Event::ViolationBegan { pair, time_s });
+    assert_eq!((timeline.closest(), timeline.violations().len()), (None, 0));
+    assert!(timeline.at(0.0).expect("a frame").nearest.is_none());
 }

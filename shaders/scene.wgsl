@@ -1,3 +1,46 @@
+// What every shader knows of a picture. Coordinates "seen" are the camera's: right, up, towards it, in metres.
+
+struct Camera {
+    right: vec4<f32>,
+    up: vec4<f32>,
+    back: vec4<f32>,
+    eye: vec4<f32>,
+    // Half of width and height (tangents in perspective, metres in parallel projection), 1 in perspective, unused.
+    lens: vec4<f32>,
+    // Nearest and farthest depth in metres, width and height in pixels.
+    range: vec4<f32>,
+}
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+
+fn seen(point: vec3<f32>) -> vec3<f32> {
+    let from_eye = point - camera.eye.xyz;
+    return vec3(dot(camera.right.xyz, from_eye), dot(camera.up.xyz, from_eye), dot(camera.back.xyz, from_eye));
+}
+
+fn is_perspective() -> bool {
+    return camera.lens.z > 0.5;
+}
+
+// Depth is 1 at the nearest and 0 at the farthest, so that floating point is as fine as the view is near.
+fn clipped(at: vec3<f32>) -> vec4<f32> {
+    let near = camera.range.x;
+    let far = camera.range.y;
+    let flat = at.xy / camera.lens.xy;
+    let depth = (far + at.z) / (far - near);
+    if is_perspective() {
+        return vec4(flat, near * depth, -at.z);
+    }
+    return vec4(flat, depth, 1.0);
+}
+
+// IEC 61966-2-1.
+fn light_of(srgb: vec4<f32>) -> vec4<f32> {
+    let low = srgb.rgb / 12.92;
+    let high = pow((srgb.rgb + 0.055) / 1.055, vec3(2.4));
+    return vec4(select(high, low, srgb.rgb <= vec3(0.04045)), srgb.a);
+}
+
 // Balls as flat pieces on which every pixel finds its own point of the sphere.
 
 struct Ball {
@@ -6,7 +49,7 @@ struct Ball {
     @location(2) colour: vec4<f32>,
 }
 
-struct Corner {
+struct BallCorner {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) centre: vec3<f32>,
     @location(1) @interpolate(flat) radius: f32,
@@ -25,7 +68,7 @@ const AMBIENT = 0.38;
 const GLOSS = 0.16;
 
 @vertex
-fn corner(@builtin(vertex_index) index: u32, ball: Ball) -> Corner {
+fn ball_corner(@builtin(vertex_index) index: u32, ball: Ball) -> BallCorner {
     let side = vec2(f32(index & 1u), f32(index >> 1u)) * 2.0 - 1.0;
     let centre = seen(ball.centre);
     let distance = length(centre);
@@ -38,7 +81,7 @@ fn corner(@builtin(vertex_index) index: u32, ball: Ball) -> Corner {
         position = vec4(side, 0.5, 1.0);
     } else if is_perspective() {
         // The circle in which the cone of sight around the ball cuts the plane through its centre, and a pixel more.
-        let pixel = 2.0 * frame.lens.y * distance / frame.range.w;
+        let pixel = 2.0 * camera.lens.y * distance / camera.range.w;
         let axis = centre / distance;
         let across = normalize(cross(vec3(0.0, 1.0, 0.0), axis));
         let along = cross(axis, across);
@@ -46,12 +89,12 @@ fn corner(@builtin(vertex_index) index: u32, ball: Ball) -> Corner {
         let reach = ball.radius / sqrt(1.0 - sine * sine) + pixel;
         position = clipped(centre + (across * side.x + along * side.y) * reach);
     } else {
-        let pixel = 2.0 * frame.lens.y / frame.range.w;
+        let pixel = 2.0 * camera.lens.y / camera.range.w;
         position = clipped(centre + vec3(side * (ball.radius + pixel), 0.0));
     }
     // The depth is that of the sphere and found for each pixel.
     position.z = 0.5 * position.w;
-    return Corner(position, centre, ball.radius, light_of(ball.colour));
+    return BallCorner(position, centre, ball.radius, light_of(ball.colour));
 }
 
 struct Ray {
@@ -60,7 +103,7 @@ struct Ray {
 }
 
 fn ray_at(pixel: vec2<f32>) -> Ray {
-    let flat = (pixel / frame.range.zw * vec2(2.0, -2.0) + vec2(-1.0, 1.0)) * frame.lens.xy;
+    let flat = (pixel / camera.range.zw * vec2(2.0, -2.0) + vec2(-1.0, 1.0)) * camera.lens.xy;
     if is_perspective() {
         return Ray(vec3(0.0), vec3(flat, -1.0));
     }
@@ -84,7 +127,7 @@ struct Hit {
     inside: bool,
 }
 
-fn hit(corner: Corner) -> Hit {
+fn hit(corner: BallCorner) -> Hit {
     // Where the four samples of a pixel are.
     var offsets = array(vec2(0.375, 0.125), vec2(0.875, 0.375), vec2(0.125, 0.625), vec2(0.625, 0.875));
     let pixel = floor(corner.position.xy);
@@ -113,7 +156,7 @@ fn hit(corner: Corner) -> Hit {
 }
 
 @fragment
-fn solid(corner: Corner) -> Shade {
+fn solid(corner: BallCorner) -> Shade {
     let hit = hit(corner);
     if hit.samples == 0u {
         discard;
@@ -124,7 +167,7 @@ fn solid(corner: Corner) -> Shade {
 }
 
 @fragment
-fn shell(corner: Corner) -> Shade {
+fn shell(corner: BallCorner) -> Shade {
     let hit = hit(corner);
     if hit.samples == 0u {
         discard;
@@ -132,4 +175,56 @@ fn shell(corner: Corner) -> Shade {
     let rim = 1.0 - abs(dot(hit.normal, hit.view));
     let opacity = corner.colour.a * (0.10 + 0.90 * rim * rim * rim);
     return Shade(vec4(corner.colour.rgb, opacity), hit.depth, hit.samples);
+}
+
+// Straight lines of a width in pixels.
+
+struct Line {
+    @location(0) first: vec3<f32>,
+    @location(1) second: vec3<f32>,
+    @location(2) first_colour: vec4<f32>,
+    @location(3) second_colour: vec4<f32>,
+    @location(4) width: f32,
+}
+
+struct LineCorner {
+    @builtin(position) position: vec4<f32>,
+    @location(0) colour: vec4<f32>,
+}
+
+// The part of the line that is ahead of the camera.
+fn ahead(point: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
+    let near = camera.range.x;
+    if !is_perspective() || -point.z >= near || -other.z <= near {
+        return point;
+    }
+    return mix(point, other, (near + point.z) / (point.z - other.z));
+}
+
+@vertex
+fn line_corner(@builtin(vertex_index) index: u32, line: Line) -> LineCorner {
+    let first = seen(line.first);
+    let second = seen(line.second);
+    let ends = array(clipped(ahead(first, second)), clipped(ahead(second, first)));
+    let half_size = camera.range.zw / 2.0;
+    let run = (ends[1].xy / ends[1].w - ends[0].xy / ends[0].w) * half_size;
+    var across = vec2(0.0, 1.0);
+    if dot(run, run) > 0.0 {
+        across = normalize(vec2(-run.y, run.x));
+    }
+    let at_end = (index & 1u) == 1u;
+    let side = select(-0.5, 0.5, (index >> 1u) == 1u);
+    var position = ends[0];
+    var colour = line.first_colour;
+    if at_end {
+        position = ends[1];
+        colour = line.second_colour;
+    }
+    position += vec4(across * side * line.width / half_size * position.w, 0.0, 0.0);
+    return LineCorner(position, light_of(colour));
+}
+
+@fragment
+fn stroke(corner: LineCorner) -> @location(0) vec4<f32> {
+    return corner.colour;
 }

@@ -1,0 +1,13 @@
+//! What every format of films does.
+
+use crate::render::error::RenderError;
+use crate::render::picture::Picture;
+
+/// Writes pictures of one size as a film.
+pub(super) trait FilmEncoder: Send {
+    /// Adds pictures in order. What can be done to each by itself is done side by side.
+    fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError>;
+
+    /// Writes the end of the film.
+    fn finish(self: Box<Self>) -> Result<(), RenderError>;
+}

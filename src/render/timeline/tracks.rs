@@ -1,0 +1,178 @@
+//! A timeline of recorded motion, whoever recorded it.
+
+use nalgebra::Vector3;
+
+use super::frame::Keyframe;
+use super::history::{BUDGET_BYTES, Timeline, UNKNOWN_RADIUS_M, nearer};
+use super::interval::{Interval, nearest_present};
+use crate::render::error::{RenderError, check_lengths};
+use crate::swarm::{Rows, set_row};
+use crate::track::{Item, Piece, Tracks};
+
+/// Keyframes a second at which known curves are drawn \[Hz\].
+const CURVE_HZ: f64 = 30.0;
+/// Keyframes of vehicles that were seen at times of their own, over those of the one that was seen most often.
+const SHARED: usize = 2;
+
+/// Why recorded motion cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum TracksError<E> {
+    /// It cannot be read.
+    #[error("{0}")]
+    Read(E),
+    /// It can be read and not be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+/// What is known of one vehicle.
+#[derive(Default)]
+struct VehicleTrack {
+    samples: Vec<(f64, Vector3<f64>)>,
+    pieces: Vec<Piece>,
+    radius_m: Option<f64>,
+}
+
+impl Timeline {
+    /// Reads recorded motion. Vehicles that were seen at times of their own are put on common ones, with straight lines
+    /// between; one that has not been seen yet, or no longer, is not there. Separations, and violations of `delta_m`
+    /// \[m\], are those of the straight lines.
+    ///
+    /// The result may be without keyframes.
+    ///
+    /// # Errors
+    /// [`TracksError`] when the recording cannot be read, or a vehicle is beyond
+    /// [`FARTHEST_M`](crate::render::FARTHEST_M).
+    pub fn from_tracks<T: Tracks + ?Sized>(
+        name: &str,
+        recording: &mut T,
+        delta_m: Option<f64>,
+    ) -> Result<Self, TracksError<T::Error>> {
+        let tracks = read(recording)?;
+        let mut timeline = Self::new(name, tracks.len());
+        timeline.delta_m = delta_m;
+        timeline.vehicles = (0..tracks.len()).map(|k| vehicle(recording, k)).collect();
+        timeline.radius_m = tracks.iter().map(|track| track.radius_m.unwrap_or(UNKNOWN_RADIUS_M)).collect();
+        if tracks.iter().any(|track| track.radius_m.is_none()) {
+            timeline.notes.push(format!("vehicles of unknown radius are drawn with {UNKNOWN_RADIUS_M} m"));
+        }
+        let mut places = vec![0; tracks.len()];
+        for time_s in common_times(&tracks) {
+            let mut positions_m = Rows::zeros(tracks.len());
+            for (k, track) in tracks.iter().enumerate() {
+                let position_m = track.at(time_s, &mut places[k]);
+                // Curves may go far between times that do not.
+                check_lengths(position_m.iter(), "coordinate", time_s, || timeline.vehicles[k].clone())?;
+                set_row(&mut positions_m, k, position_m);
+            }
+            timeline.see(time_s, positions_m);
+        }
+        timeline.violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        timeline.latest.clear();
+        timeline.notes.extend_from_slice(recording.notes());
+        Ok(timeline)
+    }
+
+    /// Takes the next positions, with who came how near on the straight lines to them.
+    fn see(&mut self, time_s: f64, positions_m: Rows) {
+        // Nothing came nearer than the nearest now, unless it did on the way.
+        let now_m = nearest_present(&positions_m).map_or(0.0, |(_, distance_m)| distance_m);
+        let reach_m = now_m.max(self.delta_m.unwrap_or(0.0));
+        let mut keyframe = Keyframe { time_s, positions_m, control_m_s2: None, closest: None, so_far: None };
+        let interval = Interval::between(self.keyframes.last().unwrap_or(&keyframe), &keyframe);
+        // A little more, for rounding.
+        let near = interval.near(reach_m * (1.0 + 4.0 * f64::EPSILON));
+        let closest = near.iter().map(|&pair| interval.approach(pair)).fold(None, nearer);
+        let inside = self.delta_m.map_or_else(Vec::new, |delta_m| {
+            near.iter().filter_map(|&pair| Some((pair, interval.inside_s(pair, delta_m)?))).collect()
+        });
+        for (pair, [from_s, to_s]) in inside {
+            match self.latest.get(&pair).map(|&k| &mut self.violations[k]) {
+                Some(span) if span.to_s >= from_s => span.to_s = to_s,
+                _ => self.violated(pair, [from_s, to_s]),
+            }
+        }
+        keyframe.closest = closest;
+        self.push(keyframe);
+    }
+}
+
+/// Everything that is recorded, by vehicle.
+fn read<T: Tracks + ?Sized>(recording: &mut T) -> Result<Vec<VehicleTrack>, TracksError<T::Error>> {
+    let (mut tracks, mut items): (Vec<VehicleTrack>, _) = (Vec::new(), Vec::new());
+    let mut more = true;
+    while more {
+        more = recording.read(&mut items).map_err(TracksError::Read)?;
+        for item in items.drain(..) {
+            let k = item.vehicle();
+            if tracks.len() <= k {
+                tracks.resize_with(k + 1, VehicleTrack::default);
+            }
+            match item {
+                Item::Sample(sample) => {
+                    let name = || vehicle(recording, k);
+                    check_lengths(sample.position_m.iter(), "coordinate", sample.time_s, name)?;
+                    check_lengths(&sample.radius_m, "radius", sample.time_s, name)?;
+                    tracks[k].radius_m = sample.radius_m.or(tracks[k].radius_m);
+                    tracks[k].samples.push((sample.time_s, sample.position_m));
+                }
+                Item::Piece(piece) => tracks[k].pieces.push(piece),
+            }
+        }
+    }
+    Ok(tracks)
+}
+
+/// The name of a vehicle; its number where it has none.
+fn vehicle<T: Tracks + ?Sized>(recording: &T, k: usize) -> String {
+    recording.vehicles().get(k).cloned().unwrap_or_else(|| (k + 1).to_string())
+}
+
+impl VehicleTrack {
+    /// Where the vehicle is at a time that is not before the time of the last call; `place` is kept between calls.
+    fn at(&self, time_s: f64, place: &mut usize) -> Vector3<f64> {
+        let nowhere = Vector3::repeat(f64::NAN);
+        if self.pieces.is_empty() {
+            while self.samples.get(*place + 1).is_some_and(|next| next.0 <= time_s) {
+                *place += 1;
+            }
+            return match (self.samples.get(*place), self.samples.get(*place + 1)) {
+                (Some(here), _) if here.0 == time_s => here.1,
+                (Some(here), Some(next)) if here.0 < time_s => {
+                    here.1 + (next.1 - here.1) * ((time_s - here.0) / (next.0 - here.0))
+                }
+                _ => nowhere,
+            };
+        }
+        while self.pieces.get(*place).is_some_and(|piece| piece.to_s < time_s) {
+            *place += 1;
+        }
+        self.pieces.get(*place).filter(|piece| piece.from_s <= time_s).map_or(nowhere, |piece| {
+            let t = time_s - piece.from_s;
+            piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * t + coefficient)
+        })
+    }
+}
+
+/// The times of all samples where they are few, else evenly spaced ones.
+fn common_times(tracks: &[VehicleTrack]) -> Vec<f64> {
+    let mut times: Vec<f64> = Vec::new();
+    for track in tracks {
+        times.extend(track.samples.iter().map(|sample| sample.0));
+        times.extend(track.pieces.iter().flat_map(|piece| [piece.from_s, piece.to_s]));
+    }
+    times.retain(|time| time.is_finite());
+    times.sort_unstable_by(f64::total_cmp);
+    times.dedup();
+    let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return times };
+    let most = BUDGET_BYTES / (tracks.len().max(1) * 6 * size_of::<f64>());
+    let has_curves = tracks.iter().any(|track| !track.pieces.is_empty());
+    let longest = tracks.iter().map(|track| track.samples.len()).max().unwrap_or(0);
+    if !has_curves && times.len() <= most && times.len() <= SHARED * longest {
+        return times;
+    }
+    let wanted = if has_curves { (last - first) * CURVE_HZ } else { longest as f64 };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded by both")]
+    let steps = wanted.ceil().clamp(1.0, most.max(2) as f64) as usize;
+    (0..=steps).map(|k| first + (last - first) * (k as f64 / steps as f64)).collect()
+}
