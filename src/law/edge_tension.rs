@@ -40,7 +40,9 @@ impl Default for EdgeTensionKeys {
 
 impl EdgeTensionKeys {
     /// No key follows from others.
-    pub(super) fn complete(&mut self, _a22_per_s: f64) {}
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
 
     pub(super) fn gains(&self) -> Vec<Gain> {
         vec![Gain::positive("law.alpha", "alpha", self.alpha)]

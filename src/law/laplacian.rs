@@ -40,8 +40,8 @@ impl Default for LaplacianKeys {
 
 impl LaplacianKeys {
     /// Puts in what follows from other keys.
-    pub(super) fn complete(&mut self, a22_per_s: f64) {
-        self.f2_per_s.get_or_insert(1.0 + a22_per_s);
+    pub(super) fn complete(self, a22_per_s: f64) -> Self {
+        Self { f2_per_s: self.f2_per_s.or(Some(1.0 + a22_per_s)), ..self }
     }
 
     pub(super) fn gains(&self) -> Vec<Gain> {

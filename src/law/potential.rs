@@ -33,7 +33,9 @@ impl Default for PotentialKeys {
 
 impl PotentialKeys {
     /// No key follows from others.
-    pub(super) fn complete(&mut self, _a22_per_s: f64) {}
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
 
     pub(super) fn gains(&self) -> Vec<Gain> {
         vec![
@@ -100,7 +102,7 @@ impl PotentialLaw {
         })
     }
 
-    /// 1/rho - 1/rho_R \[1/m\] and 1/rho at a distance \[m\] within the range.
+    /// `1/rho - 1/rho_R` \[1/m\] and 1/rho at a distance \[m\] within the range.
     fn steepness(&self, pair: Pair, separation_m: f64) -> Result<(f64, f64), LawError> {
         if separation_m <= self.delta_m {
             return Err(LawError::Collision { pair, separation_m, delta_m: self.delta_m });
@@ -195,7 +197,7 @@ impl Law for PotentialLaw {
         Some(self.range_m)
     }
 
-    /// The links add at most k to omega^2. A near pair adds at most U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3 at
+    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3` at
     /// `nearest_m` along its line (and less across it), a vehicle has at most as many near ones as balls of that diameter
     /// fit around it within R + `nearest_m`/2, and the eigenvalues of a sum over pairs are at most twice the sum at a
     /// vehicle.

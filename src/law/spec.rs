@@ -34,9 +34,10 @@ macro_rules! laws {
                 Ok(match self { $(Self::$kind(keys) => Box::new(keys.build(setting)?),)+ })
             }
 
-            /// Puts in the keys that follow from others where they are not given.
-            pub fn complete(&mut self, a22_per_s: f64) {
-                match self { $(Self::$kind(keys) => keys.complete(a22_per_s),)+ }
+            /// With the keys that follow from others where they are not given.
+            #[must_use]
+            pub fn complete(self, a22_per_s: f64) -> Self {
+                match self { $(Self::$kind(keys) => Self::$kind(keys.complete(a22_per_s)),)+ }
             }
         }
     };

@@ -8,11 +8,11 @@ use crate::swarm::Swarm;
 /// Solver steps of continuous time within one delay, so that the past is interpolated finely enough.
 const STEPS_PER_DELAY: f64 = 8.0;
 
-/// The state of the whole swarm, own state included, as it was `delay_s` ago; before that has passed, as it was at the
-/// start. As far as a law sees, time stands `delay_s` late.
+/// The state of the whole swarm, own state included, as it was some seconds ago; before that has passed, as it was at the
+/// start. As far as a law sees, its clock is right and what it reads is old.
 #[derive(Clone, Debug)]
 pub struct Delay {
-    delay_s: f64,
+    by_s: f64,
     history: History,
     sensed: Swarm,
 }
@@ -21,13 +21,13 @@ impl Delay {
     /// A delay of so many seconds, of a swarm that starts like this.
     #[must_use]
     pub fn new(delay_s: f64, start: &Swarm) -> Self {
-        Self { delay_s, history: History::new(delay_s), sensed: start.clone() }
+        Self { by_s: delay_s, history: History::new(delay_s), sensed: start.clone() }
     }
 }
 
 impl Link for Delay {
     fn sense<'a>(&'a mut self, time_s: f64, _truth: &'a Swarm) -> Sensed<'a> {
-        self.history.at(time_s - self.delay_s, &mut self.sensed);
+        self.history.at(time_s - self.by_s, &mut self.sensed);
         Sensed { own: &self.sensed, others: Others::Shared }
     }
 
@@ -40,6 +40,6 @@ impl Link for Delay {
     }
 
     fn longest_step_s(&self) -> f64 {
-        self.delay_s / STEPS_PER_DELAY
+        self.by_s / STEPS_PER_DELAY
     }
 }

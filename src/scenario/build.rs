@@ -28,8 +28,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     check_memory(count, edge_count(&document.graph.kind, count))?;
     check_counts(&document, count)?;
     let space = space(&document)?;
-    let (mut law, delta_m) = (document.law.kind, document.law.delta_m);
-    law.complete(document.swarm.a22_per_s);
+    let (law, delta_m) = (document.law.kind.complete(document.swarm.a22_per_s), document.law.delta_m);
     Ok(Scenario {
         start: start(&document.start, count, space, delta_m)?,
         mass_kg: per_vehicle(document.swarm.mass_kg, count),

@@ -49,8 +49,7 @@ impl Scenario {
 
 impl From<&Scenario> for Document {
     fn from(scenario: &Scenario) -> Self {
-        let mut law = scenario.law.clone();
-        law.complete(scenario.a22_per_s);
+        let law = scenario.law.clone().complete(scenario.a22_per_s);
         let (kind, precision) = match scenario.plant {
             PlantSpec::Rapier(precision) => (PlantKind::Rapier, Some(precision)),
             PlantSpec::Ideal => (PlantKind::Ideal, None),

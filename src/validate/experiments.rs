@@ -113,7 +113,7 @@ impl Experiment {
     }
 
     fn last_edge_error_m(&self) -> f64 {
-        largest_edge_error_m(self.last_positions_m(), &self.scenario.formation(), &self.scenario.graph)
+        largest_edge_error_m(self.last_positions_m(), self.scenario.formation(), &self.scenario.graph)
     }
 
     /// The paper's statement about a figure under the edge-tension law: formed, and never below delta.
