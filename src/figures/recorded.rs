@@ -1,6 +1,6 @@
 //! Two of a recording: their distance over time, and their closest approach from above.
 
-use super::axis::{Axis, Scale};
+use super::axis::{Axis, Scale, extent};
 use super::chart::{Band, Chart, Mark};
 use super::figure::Figure;
 use super::svg::{INK, PALETTE, Stroke};
@@ -49,8 +49,7 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     let least = if all().any(|point| point.1 < 0.0) { f64::NEG_INFINITY } else { 0.0 };
     let numbers = all().flat_map(|&(_, distance, slack)| [(distance - slack).max(least), distance + slack]);
     let y = Axis::distances(unit, &numbers.chain([limit]).collect::<Vec<_>>(), limit);
-    let from_s = all().map(|point| point.0).fold(f64::INFINITY, f64::min);
-    let to_s = all().map(|point| point.0).fold(f64::NEG_INFINITY, f64::max);
+    let (from_s, to_s) = extent(all().map(|point| point.0)).unwrap_or((0.0, 0.0));
     // A logarithmic axis has no place for what may be zero.
     let least = if y.scale == Scale::Log { 10_f64.powf(y.from) } else { least };
     let mut chart = Chart::new(Axis::time(from_s, to_s), y);

@@ -11,7 +11,7 @@ pub(crate) fn a_search_of_near_pairs_that_has_grown_allocates_nothing() {
     let mut near = NearPairs::default();
     near.update(&positions_m, 3.0);
     let region = Region::new(ALLOCATOR);
-    for range_m in [3.0, 2.0, 1.0] {
+    for range_m in [3.0, 2.0, 1.8] {
         near.update(&positions_m, range_m);
     }
     let change = region.change();
