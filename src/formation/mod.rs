@@ -4,6 +4,7 @@
 //! here do not see those either.
 
 mod fit;
+mod flat;
 
 use nalgebra::Vector3;
 
@@ -11,7 +12,8 @@ use crate::graph::Graph;
 use crate::space::closest_pair;
 use crate::swarm::{Pair, Rows, row, separation, set_row};
 
-pub use fit::{RigidMotion, affine_dimension, best_rigid_motion, procrustes_rms_m};
+pub use fit::{RigidMotion, best_rigid_motion, procrustes_rms_m};
+pub use flat::affine_dimension;
 
 /// The target shape: slot `h_i` for vehicle i.
 #[derive(Clone, Debug, PartialEq)]

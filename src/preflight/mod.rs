@@ -4,6 +4,7 @@
 //! [`Preflight::of`] computes numbers from a scenario alone, without flying it, and says in [`Warning`]s what stands in
 //! the way. Its fields are the keys of `tautline check --json`.
 
+mod numbers;
 mod rigidity;
 mod words;
 
@@ -16,11 +17,7 @@ use crate::scenario::{PlantSpec, Precision, Scenario, Space};
 use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
 
-pub use rigidity::{MOST_RANKED, RANK_TOLERANCE, Rigidity};
-
-/// Offsets below this share of the extent do not make a start or a formation leave its line or plane: far above rounding
-/// (1e-16), far below any offset that is meant.
-pub const FLATNESS: f64 = 1e-9;
+pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 
 /// Part of the fastest mode's time 1/omega that a step may take (theory: semi-implicit Euler is stable below 2/omega and
 /// keeps an honest energy up to about this).
@@ -191,7 +188,7 @@ impl Preflight {
             message: format!(
                 "Relative velocities are not damped: their margin is {} 1/s and must be positive. Add edges to the graph, \
                  or reduce swarm.a22_per_s.",
-                words::rate(margin.per_s)
+                numbers::rate(margin.per_s)
             ),
         })
     }
@@ -275,8 +272,8 @@ impl Preflight {
             message: format!(
                 "The step of {} s is longer than {} s, {STEP_PER_MODE} of the time of the fastest possible mode: a flight \
                  that comes so near may gain energy. The audit judges what is flown; reduce time.dt_s to be sure.",
-                words::significant(self.dt_s),
-                words::significant(dt_max_s)
+                numbers::significant(self.dt_s),
+                numbers::significant(dt_max_s)
             ),
         })
     }

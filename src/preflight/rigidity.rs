@@ -3,10 +3,13 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::FLATNESS;
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::swarm::row;
+
+/// Offsets below this share of the extent do not make a start or a formation leave its line or plane: far above rounding
+/// (1e-16), far below any offset that is meant.
+pub const FLATNESS: f64 = 1e-9;
 
 /// Most vehicles for which the rank is computed on a graph that is not complete, at O((3 N)^3): a second or two.
 pub const MOST_RANKED: usize = 200;

@@ -315,5 +315,5 @@ fn the_words_say_what_the_numbers_say() {
     let line = check(&scenario("pentagon-collinear", &[]));
     assert_eq!(line.headline(), "REFUSED: start-on-line");
     assert!(line.warnings[0].to_string().starts_with("warning [start-on-line]: The start lies on a line"));
-    assert_eq!([0.0, 0.3, 1.5, 2.5e-7].map(words::significant), ["0.00", "0.300", "1.50", "2.50e-7"]);
+    assert_eq!([0.0, 0.3, 1.5, 2.5e-7].map(numbers::significant), ["0.00", "0.300", "1.50", "2.50e-7"]);
 }

@@ -2,23 +2,9 @@
 
 use std::fmt::Write as _;
 
+use super::numbers::{rate, significant};
 use super::{Code, Preflight, Warning};
-use crate::text::{self, at_least, counted};
-
-/// A rate \[1/s\] to six decimals, with its sign.
-pub(super) fn rate(rate_per_s: f64) -> String {
-    // Adding zero takes the sign from what rounds to zero.
-    format!("{:.6}", (rate_per_s * 1e6).round() / 1e6 + 0.0)
-}
-
-/// A positive number to three significant digits.
-pub(super) fn significant(number: f64) -> String {
-    if number == 0.0 || (1e-6..1e6).contains(&number.abs()) {
-        text::significant(number, 3)
-    } else {
-        format!("{number:.2e}")
-    }
-}
+use crate::text::{at_least, counted};
 
 impl Code {
     /// The stable name, such as `start-on-line`.
