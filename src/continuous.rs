@@ -25,6 +25,7 @@ use crate::law::{Law, LawError};
 use crate::observation::Observation;
 use crate::plant::Path;
 use crate::scenario::Scenario;
+use crate::space::NearPairs;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 /// What closes the loop: the accelerations u(t, p, v).
@@ -49,11 +50,16 @@ pub trait Feedback {
 struct Exact<'a> {
     law: &'a mut dyn Law,
     scenario: &'a Scenario,
+    near: NearPairs,
 }
 
 impl Feedback for Exact<'_> {
     fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
-        self.law.command(&Observation { time_s, ..self.scenario.observation(truth) }, command)
+        if let Some(range_m) = self.law.sensing_range_m() {
+            self.near.update(&truth.positions_m, range_m);
+        }
+        let near = self.near.pairs();
+        self.law.command(&Observation { time_s, near, ..self.scenario.observation(truth) }, command)
     }
 }
 
@@ -144,7 +150,7 @@ pub fn solve(
     if let Some(entry) = (0..times_s.len()).find(|entry| !in_order(entry)) {
         return Err(IdealError::Times { entry });
     }
-    let mut feedback = Exact { law, scenario };
+    let mut feedback = Exact { law, scenario, near: NearPairs::default() };
     let flow = Flow::new(&mut feedback, &scenario.start, scenario.a22_per_s, 0.0);
     let mut solver = Solver::begin(&flow, 0.0, &packed(&scenario.start), tolerances, FIRST_STEP_S)?;
     let mut closest = None;

@@ -14,6 +14,8 @@ pub struct Metrics<'a> {
     legs: &'a [Leg],
     graph: &'a Graph,
     arrival: Arrival,
+    /// The leg under way, from 0.
+    leg: usize,
     /// Legs that have ended.
     ended: Vec<LegSummary>,
     samples: u64,
@@ -86,6 +88,7 @@ impl<'a> Metrics<'a> {
             legs,
             graph,
             arrival,
+            leg: 0,
             ended: Vec::new(),
             samples: 0,
             good_since_s: None,
@@ -102,9 +105,9 @@ impl<'a> Metrics<'a> {
     pub fn observe(&mut self, sample: &Sample<'_>) {
         self.samples += 1;
         self.last_s = sample.time_s;
-        if let Some(leg) = self.legs.get(self.ended.len()) {
-            self.distance = Distance::of(sample.swarm, &leg.formation, self.graph);
-        }
+        let leg = self.legs.get(self.leg);
+        self.distance =
+            leg.map_or_else(Distance::unknown, |leg| Distance::of(sample.swarm, &leg.formation, self.graph));
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
         self.observe_energy(sample.energy);
@@ -119,6 +122,7 @@ impl<'a> Metrics<'a> {
         let told_s = by_event.then(|| self.good_since_s.unwrap_or(time_s - self.arrival.hold_s));
         self.ended.push(LegSummary { ended_at_s: time_s, reached_at_s: held_since_s.or(told_s) });
         self.good_since_s = None;
+        self.leg = leg;
     }
 
     /// The legs that have ended, in order. [`Metrics::finish`] is about the one after them.

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::space::Shape;
+use crate::space::Obstacle;
 use crate::swarm::{Swarm, row};
 use crate::target::Target;
 
@@ -29,7 +29,7 @@ pub struct Observation<'a> {
     /// none for a law that senses nobody.
     pub near: &'a [(usize, usize)],
     /// What stands in the way.
-    pub obstacles: &'a [Shape],
+    pub obstacles: &'a [Obstacle],
 }
 
 /// What vehicles know of each other.
@@ -70,7 +70,8 @@ impl Neighbour {
 }
 
 impl<'a> Observation<'a> {
-    /// The true present state, known to everybody, of a swarm on its way to a formation at rest.
+    /// The true present state, known to everybody, of a swarm on its way to a formation at rest. Near pairs and obstacles
+    /// are for the caller to add.
     #[must_use]
     pub fn exact(swarm: &'a Swarm, links: &'a Graph, formation: &'a Formation) -> Self {
         Self {

@@ -24,6 +24,12 @@ pub enum Void {
     GraphNotComplete,
     /// Each vehicle is fed more than it is braked: the energy may grow.
     VelocityUndamped,
+    /// The target changes while the swarm flies.
+    TargetChanges,
+    /// What the vehicles know is not the true present state, or what they command does not arrive as given.
+    InexactLink,
+    /// Accelerations came from outside in the place of the law's.
+    CommandsFromOutside,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
     StartRefused(LawError),
 }
@@ -33,6 +39,16 @@ impl Certificate {
     #[must_use]
     pub fn void(reason: Void) -> Self {
         Self { certified_m: None, energy_initial: None, void: vec![reason] }
+    }
+
+    /// The same, promising nothing for one more reason where `breaks` says so.
+    #[must_use]
+    pub fn void_where(mut self, breaks: bool, reason: Void) -> Self {
+        if breaks && !self.void.contains(&reason) {
+            self.certified_m = None;
+            self.void.push(reason);
+        }
+        self
     }
 }
 
@@ -44,6 +60,9 @@ impl Void {
             Self::NoBarrier => "no-barrier",
             Self::GraphNotComplete => "graph-not-complete",
             Self::VelocityUndamped => "velocity-undamped",
+            Self::TargetChanges => "target-changes",
+            Self::InexactLink => "inexact-link",
+            Self::CommandsFromOutside => "commands-from-outside",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
         }
@@ -60,6 +79,11 @@ impl fmt::Display for Void {
             Self::VelocityUndamped => {
                 f.write_str("The vehicles are fed more than the law brakes them: the energy may grow.")
             }
+            Self::TargetChanges => {
+                f.write_str("The target changes: what holds for the first leg need not for the next.")
+            }
+            Self::InexactLink => f.write_str("The vehicles do not know the true present state."),
+            Self::CommandsFromOutside => f.write_str("The vehicles were commanded from outside."),
             Self::StartRefused(fault) => write!(f, "The law has no answer for the start: {fault}."),
         }
     }
@@ -77,6 +101,9 @@ mod tests {
             Void::NoBarrier,
             Void::GraphNotComplete,
             Void::VelocityUndamped,
+            Void::TargetChanges,
+            Void::InexactLink,
+            Void::CommandsFromOutside,
             Void::StartRefused(collision),
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
         ];

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::error::LawError;
 use super::interface::VelocityMargin;
 use crate::graph::Graph;
-use crate::observation::{Neighbour, Observation};
+use crate::observation::{Held, Neighbour, Observation, Others};
 use crate::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 
 /// Whether a state is of `count` vehicles and finite.
@@ -59,12 +59,22 @@ pub(super) fn sum_of_squares_about_mean(count: usize, x: impl Fn(usize) -> Vecto
 pub(super) fn consensus_margin(count: usize, gain_per_s: f64, connectivity: f64, a22_per_s: f64) -> VelocityMargin {
     let count = count.max(1) as f64;
     let worst = if gain_per_s < 0.0 { count } else { connectivity };
-    VelocityMargin { per_s: gain_per_s * (worst / count) - a22_per_s, terms_per_s: gain_per_s.abs() + a22_per_s.abs() }
+    VelocityMargin {
+        per_s: gain_per_s * (worst / count) - a22_per_s,
+        terms_per_s: gain_per_s.abs() + a22_per_s.abs(),
+        remedy: "Add edges to the graph, or reduce swarm.a22_per_s.",
+    }
 }
 
 /// Whether an observation is of `count` vehicles and finite, and the table of accelerations of as many.
 pub(super) fn check_observation(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
     check_state(count, at.own)?;
+    if let Others::Held(held) = at.others {
+        let Held { heard, ages_s, seen } = held;
+        [heard.len(), ages_s.len(), seen.len()].into_iter().try_for_each(|found| check_count(count, found))?;
+        heard.iter().chain(seen).try_for_each(|swarm| check_state(count, swarm))?;
+        ages_s.iter().try_for_each(|ages_s| check_count(count, ages_s.len()))?;
+    }
     check_count(count, command.nrows())
 }
 

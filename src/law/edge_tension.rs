@@ -17,6 +17,7 @@ use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::Observation;
 use crate::swarm::{Pair, Rows, Swarm, separation};
+use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "edge-tension"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -140,22 +141,6 @@ impl EdgeTensionLaw {
         Ok(())
     }
 
-    /// Follows a target whose distances have changed: O(edges), and nothing where they have not.
-    fn follow(&mut self, at: &Observation<'_>) -> Result<(), LawError> {
-        if at.target.revision == self.revision {
-            return Ok(());
-        }
-        check_count(self.graph.count(), at.target.formation.count())?;
-        self.formation.slots_m.copy_from(&at.target.formation.slots_m);
-        self.set_rest_lengths().map_err(|(pair, _)| LawError::Target {
-            pair,
-            distance_m: self.formation.desired_distance(pair.first(), pair.second()),
-            delta_m: self.parameters.delta_m,
-        })?;
-        self.revision = at.target.revision;
-        Ok(())
-    }
-
     /// Adds `w_ij (p_i - p_j) / alpha` over what each vehicle heard of its neighbours.
     fn add_heard_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
@@ -220,7 +205,6 @@ impl Law for EdgeTensionLaw {
 
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         check_observation(self.graph.count(), at, command)?;
-        self.follow(at)?;
         command.fill(0.0);
         let per_vehicle = -1.0 / at.own.count().max(1) as f64;
         let EdgeTensionParameters { alpha, a22_per_s, .. } = self.parameters;
@@ -235,6 +219,28 @@ impl Law for EdgeTensionLaw {
             add_heard(at, command, |_, own, _, heard| Ok(velocity_gain * (own.velocity_m_s - heard.velocity_m_s)))?;
         }
         check_range(command)
+    }
+
+    /// Takes the tension of each edge from the new slots: O(edges), and nothing where they have not changed.
+    fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
+        if target.revision == self.revision {
+            return Ok(());
+        }
+        check_count(self.graph.count(), target.formation.count())?;
+        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        for (i, j) in self.graph.edges() {
+            let distance_m = target.formation.desired_distance(i, j);
+            EdgeTension::new(alpha, delta_m, distance_m).map_err(|_| LawError::Target {
+                pair: Pair::new(i, j),
+                distance_m,
+                delta_m,
+            })?;
+        }
+        self.formation.slots_m.copy_from(&target.formation.slots_m);
+        self.revision = target.revision;
+        // Every edge has a tension, as was just seen.
+        let _ = self.set_rest_lengths();
+        Ok(())
     }
 
     fn energy(&self, at: &Observation<'_>) -> Option<f64> {

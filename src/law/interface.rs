@@ -6,6 +6,7 @@ use super::certificate::{Certificate, Void};
 use super::error::LawError;
 use crate::observation::Observation;
 use crate::swarm::Rows;
+use crate::target::Target;
 
 /// A control law: a function from what the vehicles know to an acceleration for each.
 ///
@@ -24,6 +25,14 @@ pub trait Law: DynClone + Send {
     /// [`LawError`] where the law is not defined, such as a pair at or inside the keep-out distance of a barrier.
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError>;
 
+    /// Takes note of a target whose slots have changed, before it is asked about it.
+    ///
+    /// # Errors
+    /// [`LawError`] where the law is not defined for that target; it then goes on for the one before.
+    fn follow(&mut self, _target: &Target<'_>) -> Result<(), LawError> {
+        Ok(())
+    }
+
     /// The law's Lyapunov function E \[m^2/s^2\] where it has one.
     fn energy(&self, _at: &Observation<'_>) -> Option<f64> {
         None
@@ -35,7 +44,8 @@ pub trait Law: DynClone + Send {
     }
 
     /// Distance at which the law's barrier is infinite \[m\], where it has a barrier. The loop refuses a step that
-    /// takes more than half of some pair's clearance above it.
+    /// takes more than half of the clearance above it from a linked pair, or from any pair where the law has a
+    /// [sensing range](Law::sensing_range_m).
     fn barrier_m(&self) -> Option<f64> {
         None
     }
@@ -88,4 +98,6 @@ pub struct VelocityMargin {
     pub per_s: f64,
     /// The size of the terms that it is the difference of \[1/s\]: a margin of a 1e-12th of that is rounding.
     pub terms_per_s: f64,
+    /// What to do where it is not positive, a sentence.
+    pub remedy: &'static str,
 }

@@ -4,13 +4,16 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
-use super::consensus::{add_heard, add_laplacian_product, check_observation, check_range, check_state};
+use super::consensus::{add_heard, add_laplacian_product, check_count, check_observation, check_range, check_state};
 use super::error::{LawError, ParameterError};
 use super::interface::{Law, VelocityMargin};
 use super::setting::{Gain, Setting};
+use super::tension::TensionError;
+use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::Observation;
 use crate::swarm::{Pair, Rows, row, set_row};
+use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "potential"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,7 +73,7 @@ impl PotentialKeys {
 /// links and near pairs, no saturation, no disturbance, continuous time.
 ///
 /// # Cost
-/// O(links + near pairs) a step without allocation.
+/// O(links + near pairs) a step without allocation; the energy compares all pairs.
 #[derive(Clone, Debug)]
 pub struct PotentialLaw {
     graph: Graph,
@@ -79,6 +82,8 @@ pub struct PotentialLaw {
     a22_per_s: f64,
     /// R \[m\].
     range_m: f64,
+    /// That of the target that R is taken from.
+    revision: u64,
     /// Scratch: `p_i - h_i`.
     errors_m: Rows,
 }
@@ -92,12 +97,17 @@ impl PotentialLaw {
     pub fn new(setting: &Setting<'_>, keys: PotentialKeys) -> Result<Self, ParameterError> {
         let gains = [("k", keys.k_per_s2), ("c", keys.c_per_s), ("eta", keys.eta_m4_per_s2)];
         ParameterError::check(setting.links, setting.formation, &gains)?;
+        let range_m = range(setting.formation, setting.delta_m).map_err(|(pair, rest_m)| ParameterError::Tension {
+            pair,
+            source: TensionError::Rest { rest_m, delta_m: setting.delta_m },
+        })?;
         Ok(Self {
             graph: setting.links.clone(),
             keys,
             delta_m: setting.delta_m,
             a22_per_s: setting.a22_per_s,
-            range_m: setting.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m),
+            range_m,
+            revision: 0,
             errors_m: Rows::zeros(setting.links.count()),
         })
     }
@@ -143,6 +153,15 @@ impl PotentialLaw {
     }
 }
 
+/// R of a formation \[m\]: the smallest distance of two slots, which must be more than delta. Where it is not, the two and
+/// their distance are the error.
+fn range(formation: &Formation, delta_m: f64) -> Result<f64, (Pair, f64)> {
+    match formation.min_distance() {
+        Some((pair, distance_m)) if distance_m <= delta_m => Err((pair, distance_m)),
+        nearest => Ok(nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m)),
+    }
+}
+
 impl Law for PotentialLaw {
     fn name(&self) -> &'static str {
         "potential"
@@ -169,6 +188,20 @@ impl Law for PotentialLaw {
             }
         }
         check_range(command)
+    }
+
+    fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
+        if target.revision != self.revision {
+            check_count(self.graph.count(), target.formation.count())?;
+            let delta_m = self.delta_m;
+            self.range_m = range(target.formation, delta_m).map_err(|(pair, distance_m)| LawError::Target {
+                pair,
+                distance_m,
+                delta_m,
+            })?;
+            self.revision = target.revision;
+        }
+        Ok(())
     }
 
     fn energy(&self, at: &Observation<'_>) -> Option<f64> {
@@ -208,12 +241,15 @@ impl Law for PotentialLaw {
         let packed = (1.0 + 2.0 * self.range_m / nearest_m).powi(3) - 1.0;
         let near = packed.min(self.graph.count().saturating_sub(1) as f64);
         let omega = (self.keys.k_per_s2 + 2.0 * near * curvature).sqrt();
-        Some(omega.max((self.keys.c_per_s - a22_per_s).abs()))
+        let half = 0.5 * (self.keys.c_per_s - a22_per_s).abs();
+        // A mode that the repulsion pushes apart grows at up to this rate, and no other is faster.
+        Some(half + half.hypot(omega))
     }
 
     fn velocity_margin(&self, _connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
         let terms_per_s = self.keys.c_per_s + a22_per_s.abs();
-        Some(VelocityMargin { per_s: self.keys.c_per_s - a22_per_s, terms_per_s })
+        let remedy = "Raise law.c_per_s, or reduce swarm.a22_per_s.";
+        Some(VelocityMargin { per_s: self.keys.c_per_s - a22_per_s, terms_per_s, remedy })
     }
 
     fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {

@@ -24,16 +24,16 @@ impl History {
     /// Adds the state at a time later than all before; at the same time it takes the place of the last.
     pub fn push(&mut self, time_s: f64, swarm: &Swarm) {
         self.forget_after(time_s.next_down());
+        self.states.push_back((time_s, swarm.clone()));
+    }
+
+    /// Drops what is older than the span before this time, which will not be taken back.
+    pub fn settle(&mut self, time_s: f64) {
         // The state before the span begins is needed to interpolate up to it.
         let oldest_s = time_s - self.span_s;
-        let mut spare = None;
         while self.states.get(1).is_some_and(|(second_s, _)| *second_s <= oldest_s) {
-            spare = self.states.pop_front();
+            self.states.pop_front();
         }
-        let mut state = spare.unwrap_or_else(|| (time_s, swarm.clone()));
-        state.0 = time_s;
-        state.1.clone_from(swarm);
-        self.states.push_back(state);
     }
 
     /// Drops every state after this time.
@@ -104,6 +104,8 @@ mod tests {
     fn what_is_older_than_the_span_is_dropped_and_what_did_not_happen_is_forgotten() {
         let mut history = History::new(0.5);
         (0..=8).for_each(|k| history.push(0.25 * f64::from(k), &cubic(0.25 * f64::from(k))));
+        assert_eq!(history.states.len(), 9, "a step that may be taken back drops nothing");
+        history.settle(2.0);
         assert_eq!(history.states.front().map(|(time_s, _)| *time_s), Some(1.5));
         history.forget_after(1.6);
         history.push(1.6, &cubic(0.0));

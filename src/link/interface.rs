@@ -24,6 +24,14 @@ pub trait Link: DynClone + Send {
     /// What was accepted after this time has not happened: a step was refused.
     fn forget_after(&mut self, _time_s: f64) {}
 
+    /// What was accepted up to this time stays.
+    fn settle(&mut self, _time_s: f64) {}
+
+    /// Whether every vehicle knows the true present state of all, and commands arrive as given: what certificates assume.
+    fn is_exact(&self) -> bool {
+        false
+    }
+
     /// Longest step of continuous time that its memory allows \[s\].
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
@@ -51,5 +59,9 @@ pub struct Direct;
 impl Link for Direct {
     fn sense<'a>(&'a mut self, _time_s: f64, truth: &'a Swarm) -> Sensed<'a> {
         Sensed { own: truth, others: Others::Shared }
+    }
+
+    fn is_exact(&self) -> bool {
+        true
     }
 }

@@ -7,6 +7,6 @@ mod delay;
 mod history;
 mod interface;
 
-pub use delay::Delay;
+pub use delay::{Delay, DelayError};
 pub use history::History;
 pub use interface::{Direct, Link, Sensed};

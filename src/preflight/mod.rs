@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::formation::affine_dimension;
 use crate::graph::Graph;
-use crate::law::{Controls, Law, ParameterError};
+use crate::law::{Controls, Law, ParameterError, Void};
 use crate::scenario::{PlantSpec, Precision, Scenario, Space};
 use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
@@ -130,7 +130,9 @@ impl Preflight {
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
         let law = scenario.law()?;
-        let certificate = law.certificate(&scenario.observation(&scenario.start));
+        let certificate = law
+            .certificate(&scenario.observation(&scenario.start))
+            .void_where(scenario.legs.len() > 1, Void::TargetChanges);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = connectivity(&scenario.graph);
         let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
@@ -186,9 +188,9 @@ impl Preflight {
         (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| Warning {
             code: Code::RelativeVelocityUnstable,
             message: format!(
-                "Relative velocities are not damped: their margin is {} 1/s and must be positive. Add edges to the graph, \
-                 or reduce swarm.a22_per_s.",
-                numbers::rate(margin.per_s)
+                "Relative velocities are not damped: their margin is {} 1/s and must be positive. {}",
+                numbers::rate(margin.per_s),
+                margin.remedy
             ),
         })
     }
@@ -258,8 +260,13 @@ impl Preflight {
         (rate_per_s > 0.0).then(|| Warning {
             code: Code::CommonModeUnstable,
             message: format!(
-                "The mean velocity grows as exp({rate_per_s} t), since the law cannot move the centre of mass: rounding of \
-                 {rounding:.0e} m/s grows to 1 m/s in {:.0} s.",
+                "The mean velocity grows as exp({rate_per_s} t), since {}: rounding of {rounding:.0e} m/s grows to 1 m/s in \
+                 {:.0} s.",
+                if rate_per_s < scenario.a22_per_s {
+                    "the law brakes it too little"
+                } else {
+                    "the law cannot move the centre of mass"
+                },
                 -rounding.ln() / rate_per_s
             ),
         })

@@ -16,7 +16,7 @@ use crate::swarm::Rows;
 impl Scenario {
     /// The scenario as TOML with every default written out; reading it gives an equal scenario, bit for bit.
     ///
-    /// Start and formation are lists of points, so the text depends on no random number, no shape and no version of
+    /// Of several legs, which the file has no keys for, the first alone is written. Start and formation are lists of points, so the text depends on no random number, no shape and no version of
     /// either. Equal scenarios have equal texts.
     #[must_use]
     pub fn resolved_toml(&self) -> String {

@@ -1,5 +1,7 @@
 //! A complete flight as plain data.
 
+use std::sync::LazyLock;
+
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -109,13 +111,11 @@ impl Scenario {
         self.start.count()
     }
 
-    /// The formation of the first leg.
-    ///
-    /// # Panics
-    /// Without a leg, which a validated scenario has.
+    /// The formation of the first leg; one without slots where there is no leg, which a validated scenario has.
     #[must_use]
     pub fn formation(&self) -> &Formation {
-        &self.legs[0].formation
+        static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
+        self.legs.first().map_or(&NOWHERE, |leg| &leg.formation)
     }
 
     /// The law that this scenario asks for, ready to fly.

@@ -11,6 +11,7 @@ use crate::graph::Graph;
 use crate::law::Gain;
 use crate::space::Spaced;
 use crate::swarm::{Pair, Rows, mean_row, row};
+use crate::target::Begins;
 
 /// Largest error of a22 by the engine's rounding, as a share of a22.
 const DAMPING_RESOLUTION: f64 = 0.01;
@@ -37,6 +38,7 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         check_name(&self.name)?;
         check_count(self.count())?;
+        self.check_legs()?;
         self.check_lengths()?;
         check_memory(self.count(), self.graph.edge_count() as u128)?;
         self.check_law()?;
@@ -87,7 +89,8 @@ impl Scenario {
                 .at("plant.precision"))
         };
         let (dt_s, half_ulp) = (self.time.dt_s, 0.5 * f64::from(f32::EPSILON));
-        let extent_m = extent_m(&self.start.positions_m).max(extent_m(&self.formation().slots_m));
+        let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
+        let extent_m = slots_m.fold(extent_m(&self.start.positions_m), f64::max);
         let stalled_m_s = half_ulp * extent_m / dt_s;
         if stalled_m_s > self.arrival.disagreement_m_s {
             return refuse(format!(
@@ -112,11 +115,31 @@ impl Scenario {
         }
     }
 
+    /// The number of slots of the first leg that does not have one for each vehicle.
+    fn slots_of_a_wrong_leg(&self) -> Option<usize> {
+        self.legs.iter().map(|leg| leg.formation.count()).find(|&slots| slots != self.count())
+    }
+
+    fn check_legs(&self) -> Result<(), ScenarioError> {
+        let times_s = self.legs.iter().filter_map(|leg| match leg.begins {
+            Begins::At(time_s) => Some(time_s),
+            Begins::Reached => None,
+        });
+        let said = if self.legs.is_empty() {
+            "there is no formation to fly to"
+        } else if times_s.clone().any(|time_s| !(time_s >= 0.0 && time_s.is_finite())) || !times_s.is_sorted() {
+            "legs begin at finite times from 0, one after the other"
+        } else {
+            return Ok(());
+        };
+        Err(ScenarioError::new(said).with_help("give at least one leg, in the order of time").at("formation"))
+    }
+
     fn check_lengths(&self) -> Result<(), ScenarioError> {
         let count = self.count();
         let lengths = [
             ("start.velocities_m_s", "start velocities", self.start.velocities_m_s.nrows()),
-            ("formation.points_m", "slots in the formation", self.formation().count()),
+            ("formation.points_m", "slots in the formation", self.slots_of_a_wrong_leg().unwrap_or(count)),
             ("swarm.mass_kg", "masses", self.mass_kg.len()),
             ("swarm.hull_radius_m", "hull radii", self.hull_radius_m.len()),
             ("graph.edges", "vehicles in the graph", self.graph.count()),
@@ -151,12 +174,12 @@ impl Scenario {
 
     fn check_motion(&self) -> Result<(), ScenarioError> {
         require_finite("a22", self.a22_per_s).map_err(|error| error.at("swarm.a22_per_s"))?;
-        let tables = [
+        let start = [
             ("start.positions_m", "the start position", &self.start.positions_m),
             ("start.velocities_m_s", "the start velocity", &self.start.velocities_m_s),
-            ("formation.points_m", "the slot", &self.formation().slots_m),
         ];
-        for (key, what, rows) in tables {
+        let slots = self.legs.iter().map(|leg| ("formation.points_m", "the slot", &leg.formation.slots_m));
+        for (key, what, rows) in start.into_iter().chain(slots) {
             for i in 0..rows.nrows() {
                 for axis in 0..3 {
                     let name = ["x", "y", "z"][axis];
@@ -192,7 +215,9 @@ impl Scenario {
                 .at_entry("start.positions_m", pair.first())
                 .at("law.delta_m"));
         }
-        if let Some((pair, distance_m)) = first_within(&self.formation().slots_m, delta_m * (1.0 + SLOT_MARGIN)) {
+        let least_m = delta_m * (1.0 + SLOT_MARGIN);
+        if let Some((pair, distance_m)) = self.legs.iter().find_map(|leg| first_within(&leg.formation.slots_m, least_m))
+        {
             let [a, b] = pair.numbers();
             let said = if distance_m == 0.0 {
                 format!("the slots of vehicles {a} and {b} are the same point")

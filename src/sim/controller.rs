@@ -32,11 +32,14 @@ impl Controller {
     }
 
     /// Lets the supervisor look at the swarm as it is sensed, at an instant of the flight.
-    pub(super) fn supervise(&mut self, time_s: f64, truth: &Swarm) {
-        if !self.supervisor.is_idle() {
-            let sensed = self.link.sense(time_s, truth);
-            self.supervisor.supervise(time_s, sensed.own, &mut self.target);
+    /// The law follows a target that has changed.
+    pub(super) fn supervise(&mut self, time_s: f64, truth: &Swarm) -> Result<(), LawError> {
+        if self.supervisor.is_idle() {
+            return Ok(());
         }
+        let sensed = self.link.sense(time_s, truth);
+        self.supervisor.supervise(time_s, sensed.own, &mut self.target);
+        self.law.follow(&self.target.view())
     }
 
     /// The law's energy of a true state.

@@ -1,6 +1,7 @@
 //! What moves the vehicles between two instants at which the law is asked.
 
-use crate::continuous::{Continuous, IdealError};
+use crate::continuous::{Continuous, Feedback, IdealError};
+use crate::law::LawError;
 use crate::plant::{Path, Plant, PlantError, rapier};
 use crate::scenario::{PlantSpec, Scenario};
 use crate::swarm::{Pair, Rows, Swarm};
@@ -15,6 +16,16 @@ pub enum Motion {
     Sampled(Box<dyn Plant>),
     /// Continuous time: the law is asked all the way along.
     Continuous(Box<Continuous>),
+}
+
+/// Accelerations that do not change over a step.
+struct Held<'a>(&'a Rows);
+
+impl Feedback for Held<'_> {
+    fn command(&mut self, _time_s: f64, _truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
+        command.copy_from(self.0);
+        Ok(())
+    }
 }
 
 impl<P: Plant + 'static> From<P> for Motion {
@@ -33,10 +44,12 @@ impl Motion {
         }
     }
 
-    /// Moves from `from_s` over `dt_s` seconds, and says where the vehicles are then.
+    /// Moves from `from_s` over `dt_s` seconds, and says where the vehicles are then. In continuous time accelerations that
+    /// are `held` stand in the place of the law's.
     pub(super) fn advance(
         &mut self,
         (step, from_s, dt_s): (u64, f64, f64),
+        held: Option<&Rows>,
         controller: &mut Controller,
         end: &mut Swarm,
         path: &mut Path,
@@ -47,7 +60,12 @@ impl Motion {
                 .advance(dt_s, end, path)
                 .map_err(|PlantError::NotFinite { vehicle }| Breakdown::StateNotFinite { step, vehicle }.into()),
             Self::Continuous(solution) => {
-                solution.advance((from_s, dt_s), controller, end, path).map_err(|error| match error {
+                let mut still = held.map(Held);
+                let feedback: &mut dyn Feedback = match &mut still {
+                    Some(held) => held,
+                    None => controller,
+                };
+                solution.advance((from_s, dt_s), feedback, end, path).map_err(|error| match error {
                     IdealError::Law { source, .. } => Ending::LawUndefined(source),
                     IdealError::Stalled { .. } | IdealError::Times { .. } | IdealError::Tolerances => {
                         Breakdown::Stalled { step }.into()

@@ -8,10 +8,11 @@ use super::motion::Motion;
 use super::parts::Parts;
 use crate::audit::{Auditor, StepFinding, Violation, swept_separation_m};
 use crate::continuous::Feedback as _;
-use crate::law::Certificate;
+use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Sample};
 use crate::scenario::{MAX_HALVINGS, Scenario};
+use crate::space::NearPairs;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, first_row_not_finite, row};
 use crate::target::CurrentTarget;
 
@@ -49,6 +50,8 @@ pub struct Simulation {
     state: Swarm,
     next: Swarm,
     path: Path,
+    /// Pairs that a step may have brought too near.
+    near: NearPairs,
     control: Rows,
     /// Whether `control` was given from outside and the law has not been asked about the present state.
     overruled: bool,
@@ -86,7 +89,10 @@ impl Simulation {
     /// [`SimError`] where there is no judge.
     pub fn with(scenario: &Scenario, parts: Parts) -> Result<Self, SimError> {
         let Parts { law, motion, link, supervisor } = parts;
-        let certificate = law.certificate(&scenario.observation(&scenario.start));
+        let certificate = law
+            .certificate(&scenario.observation(&scenario.start))
+            .void_where(!supervisor.is_idle(), Void::TargetChanges)
+            .void_where(!link.is_exact(), Void::InexactLink);
         let mut state = scenario.start.clone();
         motion.observe(&mut state);
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
@@ -97,6 +103,7 @@ impl Simulation {
             auditor: Auditor::new(scenario.count(), scenario.delta_m)?,
             next: state.clone(),
             path: Path::default(),
+            near: NearPairs::default(),
             control: Rows::zeros(scenario.count()),
             overruled: false,
             state,
@@ -141,7 +148,8 @@ impl Simulation {
     /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked.
     ///
     /// # Errors
-    /// [`SimError::Commands`] where there is not a finite row for each vehicle; nothing is flown then.
+    /// [`SimError::Commands`] where there is not a finite row for each vehicle; nothing is flown then. After the end nothing
+    /// is flown either. A certificate that the law gave is void from then on.
     pub fn step_with(&mut self, commands: &Rows) -> Result<(), SimError> {
         let count = self.state.count();
         if commands.nrows() != count || first_row_not_finite(commands).is_some() {
@@ -149,6 +157,7 @@ impl Simulation {
         }
         if self.ending.is_none() {
             self.overruled = true;
+            self.certificate = self.certificate.clone().void_where(true, Void::CommandsFromOutside);
             self.control.clone_from(commands);
             self.motion.apply(commands, &mut self.state);
         }
@@ -242,8 +251,8 @@ impl Simulation {
         Saved(self.clone())
     }
 
-    /// Goes on from what was saved, with the same bits as if it had never been interrupted; with a `noise_seed`, random
-    /// numbers begin anew from it and nothing else changes.
+    /// Becomes what was saved, of whatever scenario, and goes on with the same bits as if it had never been interrupted; with a `noise_seed`, the random
+    /// numbers of the link begin anew from it and nothing else changes.
     pub fn load(&mut self, saved: &Saved, noise_seed: Option<u64>) {
         self.clone_from(&saved.0);
         if let Some(seed) = noise_seed {
@@ -318,7 +327,9 @@ impl Simulation {
     /// Moves the vehicles from `state` to `next`.
     fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<(), Ending> {
         let began = Instant::now();
-        self.motion.advance((step, self.time_s, dt_s), &mut self.controller, &mut self.next, &mut self.path)?;
+        let held = self.overruled.then_some(&self.control);
+        let interval = (step, self.time_s, dt_s);
+        self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
         self.performance.physics += began.elapsed();
         match self.next.first_not_finite() {
             Some(vehicle) => Err(Breakdown::StateNotFinite { step, vehicle }.into()),
@@ -327,7 +338,7 @@ impl Simulation {
     }
 
     /// Whether the move from `state` to `next` takes more than half of some pair's clearance above the barrier.
-    fn is_refused(&self) -> bool {
+    fn is_refused(&mut self) -> bool {
         let Some(barrier_m) = self.controller.law.barrier_m() else { return false };
         let start = &self.state.positions_m;
         let instants = || self.path.passed().map(|(_, rows)| rows).chain([&self.next.positions_m]);
@@ -338,12 +349,18 @@ impl Simulation {
         if 2.0 * moved_m <= 0.5 * (self.nearest_m - barrier_m) {
             return false;
         }
-        self.controller.links.edges().any(|(i, j)| {
+        let loses_half = |(i, j): (usize, usize)| {
             let apart = |rows: &Rows| row(rows, j) - row(rows, i);
             let mut from = apart(start);
             let least_m = barrier_m + 0.5 * (from.norm() - barrier_m);
             instants().map(apart).any(|to| swept_separation_m(std::mem::replace(&mut from, to), to) < least_m)
-        })
+        };
+        if self.controller.law.sensing_range_m().is_none() {
+            return self.controller.links.edges().any(loses_half);
+        }
+        // A pair that begins farther apart keeps half of its clearance.
+        self.near.update(start, barrier_m + 4.0 * moved_m);
+        self.near.pairs().iter().copied().any(loses_half)
     }
 
     /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
@@ -353,7 +370,8 @@ impl Simulation {
             return Err(Breakdown::Audit { step: number, why }.into());
         }
         self.controller.accept(self.time_s, &self.state);
-        self.supervise();
+        self.controller.link.settle(self.time_s);
+        self.supervise()?;
         let Self { auditor, controller, state, control, time_s, overruled, .. } = self;
         let (state, time_s, overruled): (&Swarm, f64, bool) = (state, *time_s, *overruled);
         let audit = move || {
@@ -411,12 +429,17 @@ impl Simulation {
         checked
     }
 
-    fn supervise(&mut self) {
+    fn supervise(&mut self) -> Result<(), Ending> {
+        let before = self.controller.target.view().leg;
+        let followed = self.controller.supervise(self.time_s, &self.state);
         let leg = self.controller.target.view().leg;
-        self.controller.supervise(self.time_s, &self.state);
-        for leg in leg + 1..=self.controller.target.view().leg {
+        if leg != before {
             self.events.push(Event::LegBegan { leg, time_s: self.time_s });
         }
+        if followed.is_err() {
+            self.control = Rows::zeros(0);
+        }
+        Ok(followed?)
     }
 
     fn note_engine_contacts(&mut self) {

@@ -12,3 +12,14 @@ pub use closest::closest_pair;
 pub use near::NearPairs;
 pub use shape::Shape;
 pub use spaced::Spaced;
+
+use nalgebra::Vector3;
+
+/// A solid at its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Obstacle {
+    /// Where the shape's own origin is \[m\].
+    pub place_m: Vector3<f64>,
+    /// The solid.
+    pub shape: Shape,
+}

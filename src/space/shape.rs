@@ -75,7 +75,7 @@ fn from_core(off: Vector3<f64>, radius_m: f64, instead: Vector3<f64>) -> (f64, V
 
 /// The same for a box along the axes around the origin.
 fn from_box(point: Vector3<f64>, half_m: Vector3<f64>) -> (f64, Vector3<f64>) {
-    let off = point.zip_map(&half_m, |x, half| x - x.clamp(-half, half));
+    let off = point.zip_map(&half_m, |x, half| x - x.clamp(-half.max(0.0), half.max(0.0)));
     if off.norm_squared() > 0.0 {
         return from_core(off, 0.0, Vector3::z());
     }

@@ -4,18 +4,21 @@
 use std::ops::ControlFlow;
 
 use proptest::strategy::{Strategy as _, ValueTree as _};
-use tautline::formation::Formation;
-use tautline::law::{LaplacianKeys, LawSpec};
-use tautline::link::Delay;
+use tautline::continuous::{self, Tolerances};
+use tautline::formation::{Formation, largest_edge_error_m};
+use tautline::graph::Graph;
+use tautline::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, Void};
+use tautline::link::{Delay, Link, Sensed};
 use tautline::metrics::Metrics;
+use tautline::observation::{Held, Others};
 use tautline::record::{Event, Sink, StateHash};
 use tautline::run::run;
 use tautline::scenario::{PlantSpec, Precision, Scenario};
 use tautline::sim::{self, Ending, Parts, SimError, Simulation};
 use tautline::swarm::{Rows, Swarm};
-use tautline::target::{Begins, Leg};
+use tautline::target::{Begins, CurrentTarget, Leg, Supervisor};
 
-use crate::flight::{Log, builtin};
+use crate::flight::{Log, builtin, fly};
 
 /// Hands what is due to a hash.
 fn record(simulation: &mut Simulation, hash: &mut StateHash) {
@@ -178,7 +181,7 @@ fn left_after(delay_s: f64) -> f64 {
     scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
     scenario.plant = PlantSpec::Ideal;
     (scenario.time.dt_s, scenario.time.record_hz, scenario.time.max_halvings) = (0.05, 20.0, 10);
-    let link = Box::new(Delay::new(delay_s, &scenario.start));
+    let link = Box::new(Delay::new(delay_s, &scenario.start).expect("a delay"));
     let parts = Parts { link, ..Parts::of(&scenario).expect("parts") };
     let mut log = Log::default();
     sim::fly(&scenario, parts, &mut log, &mut |_| ControlFlow::Continue(())).expect("a flight");
@@ -196,6 +199,169 @@ fn a_delayed_link_in_continuous_time_loses_stability_at_the_delay_of_the_closed_
     let (below, above) = (left_after(0.95 * margin_s), left_after(1.05 * margin_s));
     assert!(below < 0.002, "below the margin the error of 0.01 m decays: {below}");
     assert!(above > 0.05, "above it grows: {above}");
+}
+
+#[test]
+fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
+    let end = |dt_s: f64| {
+        let mut start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.5, 0.2, 0.0]));
+        start.velocities_m_s[(0, 1)] = 0.5;
+        let mut scenario = Scenario::new("late", start, Formation::line(2, 3.0), 0.5, 4.0);
+        (scenario.plant, scenario.time.dt_s, scenario.time.record_hz) = (PlantSpec::Ideal, dt_s, 1.0);
+        let link = Box::new(Delay::new(0.05, &scenario.start).expect("a delay"));
+        let parts = Parts { link, ..Parts::of(&scenario).expect("parts") };
+        let mut log = Log::default();
+        let flight = sim::fly(&scenario, parts, &mut log, &mut |_| ControlFlow::Continue(())).expect("a flight");
+        let refused = log.events.iter().any(|event| matches!(event, Event::StepRefined { .. }));
+        assert!(flight.certificate.void.contains(&Void::InexactLink), "nothing is promised about late knowledge");
+        (flight.last.positions_m, refused)
+    };
+    let ((coarse, refused), (fine, _)) = (end(0.4), end(0.4 / 128.0));
+    assert!(refused, "a step of 0.4 s bends");
+    // The past is a cubic between solver steps of at most 6 ms.
+    assert!((coarse - fine).amax() < 1e-9);
+}
+
+/// A hub, and two vehicles without a link that fly at each other.
+fn head_on() -> Scenario {
+    let mut start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 12.0, 0.0, -2.5, 0.0, 0.0, 2.5, 0.0, 0.0]));
+    (start.velocities_m_s[(1, 0)], start.velocities_m_s[(2, 0)]) = (3.0, -3.0);
+    let slots = Rows::from_row_slice(&[0.0, 12.0, 0.0, -3.0, 0.0, 0.0, 3.0, 0.0, 0.0]);
+    let mut scenario = Scenario::new("head-on", start, Formation::points(slots), 2.0, 5.0);
+    (scenario.law, scenario.graph) = (LawSpec::Potential(PotentialKeys::default()), Graph::star(3));
+    (scenario.plant, scenario.time.dt_s) = (PlantSpec::Rapier(Precision::Double), 1.0 / 60.0);
+    scenario
+}
+
+#[test]
+fn a_step_that_takes_too_much_from_a_pair_without_a_link_is_refused_where_the_law_senses_it() {
+    let scenario = head_on();
+    let (flight, log) = fly(&scenario);
+    assert!(log.events.iter().any(|event| matches!(event, Event::StepRefined { .. })));
+    let (closest, certified_m) = (flight.audit.closest.expect("pairs"), flight.certificate.certified_m);
+    assert!(closest.separation_m > certified_m.expect("a promise on a star"), "{closest:?} {certified_m:?}");
+    // Taken as they are, the same steps jump the barrier.
+    let mut blind = scenario;
+    blind.time.max_halvings = 0;
+    assert!(fly(&blind).0.audit.closest.is_some_and(|closest| Some(closest.separation_m) < certified_m));
+}
+
+#[test]
+fn a_law_that_senses_is_solved_as_it_is_flown() {
+    let mut scenario = head_on();
+    let mut law = scenario.law().expect("a law");
+    let solved = continuous::solve(&scenario, law.as_mut(), &[5.0], Tolerances::default()).expect("a solution");
+    scenario.plant = PlantSpec::Ideal;
+    let flown = fly(&scenario).0;
+    assert!((&solved.states[0].positions_m - &flown.last.positions_m).amax() < 1e-8);
+    let (solved, flown) = (solved.closest.expect("pairs"), flown.audit.closest.expect("pairs"));
+    // The audit sweeps chords that bend by 1e-5 m.
+    assert!((solved.separation_m - flown.separation_m).abs() < 2e-5, "{solved:?} {flown:?}");
+}
+
+#[test]
+fn commands_from_outside_are_flown_in_continuous_time_too_and_void_the_certificate() {
+    let scenario = builtin("pentagon", &["time.duration_s=3", "plant.kind=ideal", "swarm.a22_per_s=0"]);
+    let mut still = Simulation::new(&scenario).expect("a simulation");
+    (0..240).for_each(|_| still.step_with(&Rows::zeros(5)).expect("finite commands"));
+    assert_eq!(still.state(), &scenario.start, "nobody is accelerated");
+    let certificate = still.finish().certificate;
+    assert_eq!((certificate.certified_m, certificate.void), (None, vec![Void::CommandsFromOutside]));
+}
+
+#[test]
+fn a_certificate_for_one_leg_is_none_for_two_and_every_law_follows_its_target() {
+    for law in [LawSpec::EdgeTension(EdgeTensionKeys::default()), LawSpec::Potential(PotentialKeys::default())] {
+        let slots = Formation::pentagon(4.0);
+        let mut scenario = Scenario::new("nearer", Swarm::at_rest(slots.slots_m.clone()), slots, 1.0, 60.0);
+        scenario.law = law;
+        scenario.legs.push(Leg { formation: Formation::pentagon(2.5), begins: Begins::At(2.0) });
+        scenario.validate().expect("two legs");
+        let (flight, _) = fly(&scenario);
+        assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![Void::TargetChanges]));
+        let off_m = largest_edge_error_m(&flight.last.positions_m, &scenario.legs[1].formation, &scenario.graph);
+        assert!(off_m < 0.01, "{}: {off_m}", flight.law);
+    }
+}
+
+#[test]
+fn legs_that_cannot_be_flown_are_refused() {
+    let good = two_legs(Begins::At(50.0));
+    assert!(good.validate().is_ok());
+    type Break = fn(&mut Scenario);
+    let breaks: [Break; 6] = [
+        |scenario| scenario.legs.clear(),
+        |scenario| scenario.legs[1].formation = Formation::line(4, 3.0),
+        |scenario| scenario.legs[1].formation.slots_m[(2, 0)] = f64::NAN,
+        |scenario| scenario.legs[1].formation = Formation::pentagon(1.0),
+        |scenario| scenario.legs[1].formation.slots_m[(2, 2)] = 1.0,
+        |scenario| scenario.legs[1].begins = Begins::At(f64::NAN),
+    ];
+    for (number, broken) in breaks.into_iter().enumerate() {
+        let mut scenario = good.clone();
+        broken(&mut scenario);
+        assert!(scenario.validate().is_err(), "break {number}");
+    }
+    let mut none = good;
+    none.legs.clear();
+    assert!(Simulation::new(&none).is_err());
+}
+
+/// Goes to a leg that the scenario does not have.
+#[derive(Clone)]
+struct Astray;
+
+impl Supervisor for Astray {
+    fn supervise(&mut self, time_s: f64, _: &Swarm, target: &mut CurrentTarget) {
+        if time_s >= 1.0 && target.view().leg == 0 {
+            target.begin(7, &Formation::pentagon(30.0));
+        }
+    }
+}
+
+#[test]
+fn a_leg_that_nobody_knows_is_never_reached() {
+    let scenario = builtin("pentagon", &["time.duration_s=60"]);
+    let parts = Parts { supervisor: Box::new(Astray), ..Parts::of(&scenario).expect("parts") };
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
+    sim::fly(&scenario, parts, &mut metrics, &mut |_| ControlFlow::Continue(())).expect("a flight");
+    assert_eq!((metrics.finish().reached_at_s, metrics.ended_legs().len()), (None, 1));
+}
+
+/// What everybody knows, as a picture of its own for each.
+#[derive(Clone)]
+struct Copied(Option<Held>);
+
+impl Link for Copied {
+    fn sense<'a>(&'a mut self, _: f64, truth: &'a Swarm) -> Sensed<'a> {
+        let count = truth.count();
+        let held = Held {
+            heard: vec![truth.clone(); count],
+            ages_s: vec![vec![0.0; count]; count],
+            seen: vec![truth.clone(); count],
+        };
+        Sensed { own: truth, others: Others::Held(self.0.insert(held)) }
+    }
+}
+
+#[test]
+fn what_each_vehicle_holds_is_flown_like_what_all_share() {
+    let laws = [
+        LawSpec::EdgeTension(EdgeTensionKeys::default()),
+        LawSpec::Laplacian(LaplacianKeys::default()),
+        LawSpec::Potential(PotentialKeys::default()),
+    ];
+    for (law, graph) in laws.into_iter().zip([Graph::complete(5), Graph::ring(5), Graph::star(5)]) {
+        let mut scenario = builtin("pentagon", &["time.duration_s=2", "plant.precision=double"]);
+        (scenario.law, scenario.graph) = (law, graph);
+        let shared = fly(&scenario).0;
+        let parts = Parts { link: Box::new(Copied(None)), ..Parts::of(&scenario).expect("parts") };
+        let held = sim::fly(&scenario, parts, &mut (), &mut |_| ControlFlow::Continue(())).expect("a flight");
+        let off = (&shared.last.positions_m - &held.last.positions_m).amax();
+        // Sums in another order.
+        assert!(off < 1e-12, "{}: {off}", held.law);
+        assert!(held.steps == 480 && (&shared.last.positions_m - &scenario.start.positions_m).amax() > 0.1);
+    }
 }
 
 /// A sink that refuses.
