@@ -43,7 +43,10 @@ fn the_pentagon_has_its_golden_bits() {
     let start = Swarm::at_rest(Rows::from_row_slice(start.as_flattened()));
     let mut pentagon = Scenario::new("pentagon", start, Formation::pentagon(3.0), 2.0, 120.0);
     pentagon.a22_per_s = 0.1;
-    let golden = ["e6b7e3682089a8f146c886bd3336d892beedfb47e38743d3d76b8523c8810f6c", ""];
+    let golden = [
+        "e6b7e3682089a8f146c886bd3336d892beedfb47e38743d3d76b8523c8810f6c",
+        "c092e5bea4a00f8fb74f2874f07dac2190f3d9648bf0662c7b349c5feefe4a0f",
+    ];
     assert_eq!(hashes(&pentagon), golden);
 }
 
@@ -56,6 +59,10 @@ fn a_crowd_has_its_golden_bits() {
     let start = Rows::from_fn(count, |i, axis| grid[(i, axis)] + jitter(i, axis));
     let mut crowd = Scenario::new("crowd", Swarm::at_rest(start), Formation::circle(count, 200.0), 2.0, 0.1);
     crowd.a22_per_s = 0.1;
-    let golden = ["", ""];
+    crowd.arrival.hold_s = 0.1;
+    let golden = [
+        "a92695c582e41e2869c26c3d1112df89486cd35c890a9f54ac2fafbb77da9f7a",
+        "afe2940afa42c41e8ff0ab45bc770a52a21f4b16590c588e86b3e30cd81e509d",
+    ];
     assert_eq!(hashes(&crowd), golden);
 }
