@@ -21,30 +21,13 @@ use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinar
 use differential_equations::ode::{ODE, OrdinaryNumericalMethod as _};
 use nalgebra::Vector3;
 
+use crate::feedback::Feedback;
 use crate::law::{Law, LawError};
 use crate::observation::Observation;
 use crate::plant::Path;
 use crate::scenario::Scenario;
 use crate::space::NearPairs;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
-
-/// What closes the loop: the accelerations u(t, p, v).
-pub trait Feedback {
-    /// Writes the accelerations \[m/s^2\], N x 3, for a true state at a time \[s\]. Trial states are asked about too, in
-    /// any order of time.
-    ///
-    /// # Errors
-    /// [`LawError`] where there are none.
-    fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError>;
-
-    /// The solution has come to this state, in the order of time: what a delayed sensor remembers.
-    fn accept(&mut self, _time_s: f64, _truth: &Swarm) {}
-
-    /// Longest solver step that the memory of the feedback allows \[s\].
-    fn longest_step_s(&self) -> f64 {
-        f64::INFINITY
-    }
-}
 
 /// A law that knows the present state.
 struct Exact<'a> {

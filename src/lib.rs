@@ -38,8 +38,12 @@
 pub mod audit;
 #[cfg(feature = "program")]
 pub mod cli;
+#[cfg(feature = "ideal")]
 pub mod continuous;
+#[cfg(feature = "recordings")]
 pub mod export;
+pub mod feedback;
+#[cfg(feature = "reports")]
 pub mod figures;
 pub mod formation;
 pub mod graph;
@@ -49,11 +53,14 @@ pub mod metrics;
 pub mod observation;
 pub mod plant;
 pub mod preflight;
+#[cfg(feature = "recordings")]
 pub mod read;
 pub mod record;
-#[cfg(feature = "viewer")]
+#[cfg(feature = "pictures")]
 pub mod render;
+#[cfg(feature = "reports")]
 pub mod report;
+#[cfg(feature = "reports")]
 pub mod run;
 pub mod scenario;
 pub mod sim;
@@ -62,4 +69,5 @@ pub mod swarm;
 pub mod target;
 mod text;
 pub mod track;
+#[cfg(feature = "reports")]
 pub mod validate;

@@ -59,7 +59,8 @@ fn report(
         formation_dimension: preflight.formation_dimension,
         certificate: &flight.certificate,
         audit: &flight.audit,
-        engine_contact_pairs: (scenario.plant != PlantSpec::Ideal).then_some(flight.engine_contacts.len() as u64),
+        engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))
+            .then_some(flight.engine_contacts.len() as u64),
         summary: &metrics.finish(),
         run: &Run {
             duration_s: flight.duration_s,

@@ -1,4 +1,5 @@
 //! Numbers as people read them.
+#![cfg_attr(not(feature = "program"), allow(dead_code, reason = "each feature says some of them"))]
 
 /// A number with so many decimals, or in powers of ten where that would fill a line.
 pub(crate) fn fixed(number: f64, decimals: usize) -> String {

@@ -9,6 +9,7 @@ mod csv;
 mod error;
 mod mcap;
 mod npz;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod sampled;
 mod source;
@@ -26,6 +27,7 @@ pub enum Format {
     /// A long table in text.
     Csv,
     /// A long table in Parquet.
+    #[cfg(feature = "parquet")]
     Parquet,
     /// `NumPy` arrays.
     Npz,
@@ -35,13 +37,20 @@ pub enum Format {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 4] = [Self::Csv, Self::Parquet, Self::Npz, Self::Mcap];
+    pub const ALL: [Self; 3 + cfg!(feature = "parquet") as usize] = [
+        Self::Csv,
+        #[cfg(feature = "parquet")]
+        Self::Parquet,
+        Self::Npz,
+        Self::Mcap,
+    ];
 
     /// What `--format` calls it, and the extension of its files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Csv => "csv",
+            #[cfg(feature = "parquet")]
             Self::Parquet => "parquet",
             Self::Npz => "npz",
             Self::Mcap => "mcap",
@@ -88,6 +97,7 @@ pub fn export(
     let mut exported = Exported { vehicles: about.names.len(), samples: about.samples, notes: about.notes.clone() };
     match format {
         Format::Csv => exported.notes.extend(csv::write(&source, &about, file)?),
+        #[cfg(feature = "parquet")]
         Format::Parquet => parquet::write(&source, &about, file)?,
         Format::Npz => npz::write(&source, &about, file)?,
         Format::Mcap => mcap::write(&source, &about, file)?,

@@ -255,7 +255,10 @@ impl Preflight {
         let rate_per_s = self.common_mode_rate_per_s;
         let rounding = match scenario.plant {
             PlantSpec::Rapier(Precision::Single) => f64::from(f32::EPSILON),
-            PlantSpec::Rapier(Precision::Double) | PlantSpec::Ideal => f64::EPSILON,
+            #[cfg(feature = "double")]
+            PlantSpec::Rapier(Precision::Double) => f64::EPSILON,
+            #[cfg(feature = "ideal")]
+            PlantSpec::Ideal => f64::EPSILON,
         };
         (rate_per_s > 0.0).then(|| Warning {
             code: Code::CommonModeUnstable,
@@ -273,7 +276,7 @@ impl Preflight {
     }
 
     fn dt_too_large(&self, scenario: &Scenario) -> Option<Warning> {
-        let dt_max_s = self.dt_max_s.filter(|_| scenario.plant != PlantSpec::Ideal)?;
+        let dt_max_s = self.dt_max_s.filter(|_| matches!(scenario.plant, PlantSpec::Rapier(_)))?;
         (self.dt_s > dt_max_s).then(|| Warning {
             code: Code::DtTooLarge,
             message: format!(

@@ -127,6 +127,9 @@ pub enum Fault {
     /// The content is of no known format.
     #[error("its content is of no format that is known")]
     UnknownFormat,
+    /// Nothing in this build reads the format.
+    #[error("it is {}, which this build does not read", .0.title())]
+    NotBuilt(Format),
     /// The content is not of the format that was asked for.
     #[error("it is not {}: {reason}", .format.title())]
     WrongFormat {
@@ -301,6 +304,7 @@ impl Fault {
             Self::UnknownFormat => {
                 "name the format with --format: csv, text, parquet, npz, mcap, crazyflie or skybrush"
             }
+            Self::NotBuilt(_) => "build it with the feature of the format's name",
             Self::WrongFormat { .. } => "leave --format away to have the content recognised, or name another format",
             Self::NoHeader => {
                 "put a header above: t,id,x,y,z with a row for each vehicle and time, or t,x1,y1,z1,x2,... with a row \

@@ -26,12 +26,14 @@ mod npy;
 mod npz;
 mod options;
 mod order;
+#[cfg(feature = "parquet")]
 pub(crate) mod parquet;
 mod recognise;
 mod skybrush;
 mod source;
 mod table;
 
+#[cfg(feature = "parquet")]
 pub use self::parquet::is_guarded;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
@@ -69,7 +71,10 @@ fn try_open(path: &Path, options: &ReadOptions) -> Result<Recording, FaultAt> {
         Format::Crazyflie => crazyflie::open(path, options),
         Format::Mcap => mcap::open(source, options),
         Format::Npz => npz::open(source, options),
+        #[cfg(feature = "parquet")]
         Format::Parquet => parquet::open(source, options),
+        #[cfg(not(feature = "parquet"))]
+        Format::Parquet => Err(Fault::NotBuilt(format).into()),
         Format::Skybrush => skybrush::open(source, options),
     }
 }

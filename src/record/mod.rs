@@ -4,6 +4,7 @@
 //! Several recorders of one run are joined as a pair: `(first, (second, third))` is a recorder again.
 
 mod hash;
+#[cfg(feature = "recordings")]
 pub mod mcap;
 
 pub use hash::{StateHash, sha256_hex};

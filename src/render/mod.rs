@@ -16,6 +16,7 @@
 //! ```
 
 mod error;
+#[cfg(feature = "film")]
 mod film;
 mod foxglove_scene;
 pub mod gpu;
@@ -23,9 +24,11 @@ mod picture;
 pub mod scene;
 mod snapshots;
 mod timeline;
+#[cfg(feature = "window")]
 mod window;
 
 pub use error::{FARTHEST_M, RenderError};
+#[cfg(feature = "film")]
 pub use film::{Film, FilmFormat};
 pub use foxglove_scene::{FoxgloveScene, SCENE_HZ};
 pub use gpu::{AdapterChoice, Renderer};
@@ -33,4 +36,5 @@ pub use picture::{Picture, contact_sheet, data_uri};
 pub use scene::{CameraSpec, Extent, Layers, Scene, Theme, View};
 pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
 pub use timeline::{Frame, Keyframe, Plan, Timeline, TracksError, ViolationSpan};
+#[cfg(feature = "window")]
 pub use window::{LiveUpdate, is_in_window_library, show};

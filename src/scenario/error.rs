@@ -66,6 +66,7 @@ impl ScenarioError {
         self
     }
 
+    #[cfg(feature = "files")]
     pub(super) fn with_place(mut self, place: Place) -> Self {
         self.place = Some(Box::new(place));
         self
@@ -90,6 +91,7 @@ impl ScenarioError {
     }
 
     /// All keys that are part of what is wrong.
+    #[cfg(feature = "files")]
     pub(super) fn fields(&self) -> &[Field] {
         &self.fields
     }

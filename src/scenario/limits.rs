@@ -68,6 +68,7 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
 }
 
 /// Number of pairs of `count` vehicles.
+#[cfg(feature = "files")]
 pub(super) fn pair_count(count: usize) -> u128 {
     let count = count as u128;
     count * count.saturating_sub(1) / 2

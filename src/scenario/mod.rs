@@ -5,20 +5,30 @@
 //! keys of the TOML; [`Scenario::resolved_toml`] writes the same document with nothing left to be derived. `builtin`
 //! holds the embedded scenarios.
 
+#[cfg(feature = "files")]
 mod build;
+#[cfg(feature = "files")]
 pub mod builtin;
+#[cfg(feature = "files")]
 mod deserializer;
+#[cfg(feature = "files")]
 mod document;
 mod error;
 mod limits;
+#[cfg(feature = "files")]
 mod overrides;
+#[cfg(feature = "files")]
 mod resolved;
 #[cfg(feature = "schema")]
 mod schema;
+#[cfg(feature = "files")]
 mod source;
 mod spec;
+#[cfg(feature = "files")]
 mod start;
+#[cfg(feature = "files")]
 mod suggest;
+#[cfg(feature = "files")]
 mod text;
 mod time;
 mod validate;
@@ -28,10 +38,13 @@ pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,
 };
+#[cfg(feature = "files")]
 pub use overrides::Override;
 #[cfg(feature = "schema")]
 pub use schema::schema;
+#[cfg(feature = "files")]
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Scenario, Space};
+#[cfg(feature = "reports")]
 pub(crate) use start::{offset, random, scatter};
 pub use time::TimeSpec;

@@ -66,6 +66,7 @@ pub enum PlantSpec {
     /// Rapier rigid bodies at the given floating-point precision.
     Rapier(Precision),
     /// The equation of motion solved in continuous time with the law inside, in double precision.
+    #[cfg(feature = "ideal")]
     Ideal,
 }
 
@@ -77,6 +78,7 @@ pub enum Precision {
     /// 32 bits.
     Single,
     /// 64 bits.
+    #[cfg(feature = "double")]
     Double,
 }
 

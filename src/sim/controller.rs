@@ -1,6 +1,6 @@
 //! From the true state to the accelerations that reach the vehicles: sense, supervise, command, actuate.
 
-use crate::continuous::Feedback;
+use crate::feedback::Feedback;
 use crate::graph::Graph;
 use crate::law::{Law, LawError};
 use crate::link::{Link, Sensed};

@@ -1,6 +1,10 @@
 //! What moves the vehicles between two instants at which the law is asked.
 
-use crate::continuous::{Continuous, Feedback, IdealError};
+#[cfg(feature = "ideal")]
+use crate::continuous::{Continuous, IdealError};
+#[cfg(feature = "ideal")]
+use crate::feedback::Feedback;
+#[cfg(feature = "ideal")]
 use crate::law::LawError;
 use crate::plant::{Path, Plant, PlantError, rapier};
 use crate::scenario::{PlantSpec, Scenario};
@@ -15,12 +19,15 @@ pub enum Motion {
     /// A plant that holds the command of the beginning of a step (sample-and-hold).
     Sampled(Box<dyn Plant>),
     /// Continuous time: the law is asked all the way along.
+    #[cfg(feature = "ideal")]
     Continuous(Box<Continuous>),
 }
 
 /// Accelerations that do not change over a step.
+#[cfg(feature = "ideal")]
 struct Held<'a>(&'a Rows);
 
+#[cfg(feature = "ideal")]
 impl Feedback for Held<'_> {
     fn command(&mut self, _time_s: f64, _truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
         command.copy_from(self.0);
@@ -40,12 +47,14 @@ impl Motion {
     pub fn of(scenario: &Scenario) -> Self {
         match scenario.plant {
             PlantSpec::Rapier(precision) => Self::Sampled(rapier::plant(scenario, precision)),
+            #[cfg(feature = "ideal")]
             PlantSpec::Ideal => Self::Continuous(Box::new(Continuous::new(scenario))),
         }
     }
 
     /// Moves from `from_s` over `dt_s` seconds, and says where the vehicles are then. In continuous time accelerations that
     /// are `held` stand in the place of the law's.
+    #[cfg_attr(not(feature = "ideal"), expect(unused_variables, reason = "a plant is not told the time"))]
     pub(super) fn advance(
         &mut self,
         (step, from_s, dt_s): (u64, f64, f64),
@@ -59,6 +68,7 @@ impl Motion {
             Self::Sampled(plant) => plant
                 .advance(dt_s, end, path)
                 .map_err(|PlantError::NotFinite { vehicle }| Breakdown::StateNotFinite { step, vehicle }.into()),
+            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => {
                 let mut still = held.map(Held);
                 let feedback: &mut dyn Feedback = match &mut still {
@@ -77,14 +87,17 @@ impl Motion {
 
     /// Completes the state with the law's command, which is held from now on.
     pub(super) fn apply(&mut self, command: &Rows, state: &mut Swarm) {
-        if let Self::Sampled(plant) = self {
-            plant.apply(command, state);
+        match self {
+            Self::Sampled(plant) => plant.apply(command, state),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(_) => {}
         }
     }
 
     pub(super) fn observe(&self, state: &mut Swarm) {
         match self {
             Self::Sampled(plant) => plant.observe(state),
+            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.observe(state),
         }
     }
@@ -92,13 +105,16 @@ impl Motion {
     pub(super) fn restore(&mut self, state: &Swarm) {
         match self {
             Self::Sampled(plant) => plant.restore(state),
+            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.restore(state),
         }
     }
 
     pub(super) fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        if let Self::Sampled(plant) = self {
-            plant.keep_out_contacts(pairs);
+        match self {
+            Self::Sampled(plant) => plant.keep_out_contacts(pairs),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(_) => {}
         }
     }
 }

@@ -7,7 +7,7 @@ use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError
 use super::motion::Motion;
 use super::parts::Parts;
 use crate::audit::{Auditor, StepFinding, Violation, swept_separation_m};
-use crate::continuous::Feedback as _;
+use crate::feedback::Feedback as _;
 use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Sample};

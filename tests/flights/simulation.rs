@@ -224,12 +224,12 @@ fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
 
 /// A hub, and two vehicles without a link that fly at each other.
 fn head_on() -> Scenario {
-    let mut start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 12.0, 0.0, -2.5, 0.0, 0.0, 2.5, 0.0, 0.0]));
-    (start.velocities_m_s[(1, 0)], start.velocities_m_s[(2, 0)]) = (3.0, -3.0);
-    let slots = Rows::from_row_slice(&[0.0, 12.0, 0.0, -3.0, 0.0, 0.0, 3.0, 0.0, 0.0]);
+    let mut start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 30.0, 0.0, -5.0, 0.0, 0.0, 5.0, 0.0, 0.0]));
+    (start.velocities_m_s[(1, 0)], start.velocities_m_s[(2, 0)]) = (20.0, -20.0);
+    let slots = Rows::from_row_slice(&[0.0, 30.0, 0.0, -5.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
     let mut scenario = Scenario::new("head-on", start, Formation::points(slots), 2.0, 5.0);
     (scenario.law, scenario.graph) = (LawSpec::Potential(PotentialKeys::default()), Graph::star(3));
-    (scenario.plant, scenario.time.dt_s) = (PlantSpec::Rapier(Precision::Double), 1.0 / 60.0);
+    (scenario.plant, scenario.time.dt_s) = (PlantSpec::Rapier(Precision::Double), 0.05);
     scenario
 }
 

@@ -1,8 +1,6 @@
-//! Same scenario, same bits: over runs, thread counts, ways to talk, and builds.
+//! Same scenario, same bits: over runs, thread counts and ways to talk. Over builds: `tests/bits.rs`.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
@@ -95,30 +93,4 @@ fn the_built_in_scenarios_have_their_golden_hashes() {
     let mut runs = Runs::new();
     let found = GOLDEN.map(|(name, _)| (name, runs.run(TAUTLINE, name, &["--quiet"]).0));
     assert_eq!(found.each_ref().map(|(name, hash)| (*name, hash.as_str())), GOLDEN);
-}
-
-/// The program built by the other profile, and kept up to date: release for a debug build under test, and the reverse.
-fn other_build() -> PathBuf {
-    let folder = Path::new(TAUTLINE).parent().expect("a folder");
-    let target = folder.parent().expect("the target folder");
-    let (profile, other) = if folder.ends_with("release") { ("dev", "debug") } else { ("release", "release") };
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--bin", "tautline", "--profile", profile, "--target-dir"])
-        .arg(target)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .status();
-    assert!(built.expect("cargo").success(), "the {profile} build of the program");
-    target.join(other).join("tautline").with_extension(std::env::consts::EXE_EXTENSION)
-}
-
-#[test]
-fn debug_and_release_builds_fly_the_same_bits() {
-    let mut runs = Runs::new();
-    let other = other_build();
-    let other = other.to_str().expect("a path in UTF-8");
-    for scenario in ["pentagon", "many.toml"] {
-        let (here, there) = (runs.run(TAUTLINE, scenario, &[]), runs.run(other, scenario, &[]));
-        assert_eq!(here.0, there.0, "{scenario}");
-        assert!(here.1 == there.1, "{scenario}: the recordings differ");
-    }
 }

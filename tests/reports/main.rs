@@ -2,8 +2,6 @@
 
 #[path = "../support/browser.rs"]
 mod browser;
-#[path = "../support/release.rs"]
-mod release;
 
 mod figures;
 mod opened;

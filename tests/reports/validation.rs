@@ -29,7 +29,7 @@ fn differences(page: &str, program: &str) -> String {
 fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |arguments: &[&str]| {
-        Command::new(crate::release::program()).arg("validate").args(arguments).current_dir(folder.path()).output()
+        Command::new(env!("CARGO_BIN_EXE_tautline")).arg("validate").args(arguments).current_dir(folder.path()).output()
     };
     let done = run(&["--markdown", "--quiet"]).expect("the program");
     let out = folder.path().join("out/validate");

@@ -23,6 +23,7 @@ mod single {
     include!("bodies.rs");
 }
 
+#[cfg(feature = "double")]
 mod double {
     use rapier3d_f64 as engine;
     include!("bodies.rs");
@@ -33,6 +34,7 @@ mod double {
 pub fn plant(scenario: &Scenario, precision: Precision) -> Box<dyn Plant> {
     match precision {
         Precision::Single => Box::new(single::Bodies::new(scenario)),
+        #[cfg(feature = "double")]
         Precision::Double => Box::new(double::Bodies::new(scenario)),
     }
 }

@@ -14,6 +14,7 @@ mod target;
 pub use adapter::AdapterChoice;
 
 pub(crate) use adapter::{Gpu, instance};
+#[cfg(feature = "window")]
 pub(crate) use overlay::paint;
 
 use super::error::RenderError;

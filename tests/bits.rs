@@ -1,0 +1,68 @@
+//! Every build flies the same bits: debug or release, the core alone or with everything.
+
+use std::ops::ControlFlow;
+
+use tautline::formation::Formation;
+use tautline::record::{Event, RecordError, Sample, Sink, StateHash, sha256_hex};
+use tautline::scenario::Scenario;
+use tautline::sim::{self, Parts};
+use tautline::swarm::{Rows, Swarm};
+
+/// The states, and separations and energies in words that read back to the same bits.
+#[derive(Default)]
+struct Everything {
+    states: StateHash,
+    others: String,
+}
+
+impl Sink for Everything {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        let closest = sample.separation.map(|closest| (closest.separation_m, closest.time_s));
+        self.others += &format!("{} {closest:?} {:?}\n", sample.step, sample.energy);
+        self.states.sample(sample)
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+/// Hashes of the states, and of separations and energies.
+fn hashes(scenario: &Scenario) -> [String; 2] {
+    scenario.validate().expect("a scenario that can be flown");
+    let mut everything = Everything::default();
+    let parts = Parts::of(scenario).expect("a law");
+    sim::fly(scenario, parts, &mut everything, &mut |_| ControlFlow::Continue(())).expect("a flight");
+    [everything.states.finish(), sha256_hex(&everything.others)]
+}
+
+/// `pentagon` as it is built in.
+#[test]
+fn the_pentagon_has_its_golden_bits() {
+    let start = [[3.0, -0.05, 0.0], [9.0, -0.05, 0.0], [6.0, 0.05, 0.0], [0.0, 0.05, 0.0], [12.0, 0.05, 0.0]];
+    let start = Swarm::at_rest(Rows::from_row_slice(start.as_flattened()));
+    let mut pentagon = Scenario::new("pentagon", start, Formation::pentagon(3.0), 2.0, 120.0);
+    pentagon.a22_per_s = 0.1;
+    let golden = [
+        "e6b7e3682089a8f146c886bd3336d892beedfb47e38743d3d76b8523c8810f6c",
+        "c092e5bea4a00f8fb74f2874f07dac2190f3d9648bf0662c7b349c5feefe4a0f",
+    ];
+    assert_eq!(hashes(&pentagon), golden);
+}
+
+/// As many vehicles as it takes for law and audit to run side by side where there are two threads.
+#[test]
+fn a_crowd_has_its_golden_bits() {
+    let count = 520;
+    let jitter = |i: usize, axis: usize| [0.02, 0.03, 0.0][axis] * ((7 * i + axis) % 11) as f64;
+    let grid = Formation::grid(count, 3.0).slots_m;
+    let start = Rows::from_fn(count, |i, axis| grid[(i, axis)] + jitter(i, axis));
+    let mut crowd = Scenario::new("crowd", Swarm::at_rest(start), Formation::circle(count, 200.0), 2.0, 0.1);
+    crowd.a22_per_s = 0.1;
+    crowd.arrival.hold_s = 0.1;
+    let golden = [
+        "a92695c582e41e2869c26c3d1112df89486cd35c890a9f54ac2fafbb77da9f7a",
+        "afe2940afa42c41e8ff0ab45bc770a52a21f4b16590c588e86b3e30cd81e509d",
+    ];
+    assert_eq!(hashes(&crowd), golden);
+}
