@@ -1,6 +1,8 @@
 //! `validate.html`.
 
-use super::{Claim, Group, Kind, Rung, Validation};
+use super::claim::{Claim, Group, Kind};
+use super::convergence::Refinement;
+use super::result::Validation;
 use crate::report::page::{Badge, Block, Cell, Column, Page, Section, Table, Tone};
 
 /// What the claims rest on.
@@ -12,17 +14,19 @@ const ASSUMED: [&str; 3] = [
 ];
 
 impl Validation {
-    /// The result as a self-contained page: claims, figures and the ladder. Two validations by one program give the same
+    /// The result as a self-contained page: claims, figures and the convergence. Two validations by one program give the same
     /// bytes.
     #[must_use]
     pub fn to_html(&self) -> String {
         let failed = self.claims().filter(|claim| !claim.pass);
         let mut sections: Vec<Section> = self.groups.iter().map(section).collect();
-        let convergence = |name: &str| name == "convergence";
-        let (of_ladder, of_paper): (Vec<_>, Vec<_>) =
-            self.figures.iter().cloned().partition(|figure| convergence(&figure.name));
+        let (of_convergence, of_paper): (Vec<_>, Vec<_>) =
+            self.figures.iter().cloned().partition(|figure| figure.name == "convergence");
         sections.extend([
-            Section::new("Convergence ladder", vec![Block::Table(ladder(&self.ladder)), Block::Figures(of_ladder)]),
+            Section::new(
+                "Convergence ladder",
+                vec![Block::Table(convergence(&self.convergence)), Block::Figures(of_convergence)],
+            ),
             Section::new("The paper's figures", vec![Block::Figures(of_paper)]),
             Section::new("What was assumed", vec![Block::List(ASSUMED.map(str::to_owned).to_vec())]),
             Section::new("Repeat it", vec![Block::Command("tautline validate".to_owned())]),
@@ -83,7 +87,7 @@ fn row(claim: &Claim) -> Vec<Cell> {
     ]
 }
 
-fn ladder(rungs: &[Rung]) -> Table {
+fn convergence(refinements: &[Refinement]) -> Table {
     let number = |x: f64| Cell::from(format!("{x:.2e}"));
     Table {
         caption: "Largest position error of Rapier on the pentagon's flight, by step".to_owned(),
@@ -94,15 +98,15 @@ fn ladder(rungs: &[Rung]) -> Table {
             Column::numbers("Single precision [m]"),
             Column::numbers("Energy excess [m²/s²]"),
         ],
-        rows: rungs
+        rows: refinements
             .iter()
-            .map(|rung| {
+            .map(|refinement| {
                 vec![
-                    Cell::from(format!("1/{:.0}", 1.0 / rung.dt_s)),
-                    number(rung.double_m),
-                    Cell::from(rung.order.map_or("–".to_owned(), |order| format!("{order:.3}"))),
-                    number(rung.single_m),
-                    number(rung.energy_excess_m2_s2),
+                    Cell::from(format!("1/{:.0}", 1.0 / refinement.dt_s)),
+                    number(refinement.double_m),
+                    Cell::from(refinement.order.map_or("–".to_owned(), |order| format!("{order:.3}"))),
+                    number(refinement.single_m),
+                    number(refinement.energy_excess_m2_s2),
                 ]
             })
             .collect(),

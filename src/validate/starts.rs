@@ -1,9 +1,9 @@
 //! Random swarms and shapes, the same on every machine.
 
-use super::ValidateError;
+use super::interface::Untried;
 use crate::formation::Formation;
 use crate::scenario::{Space, offset, random, scatter};
-use crate::swarm::{Rows, Swarm, set_row};
+use crate::swarm::{Swarm, set_row};
 
 /// Fewest and most vehicles of a random start.
 pub(super) const COUNTS: std::ops::RangeInclusive<usize> = 3..=8;
@@ -25,7 +25,7 @@ pub(super) struct RandomStart {
 }
 
 /// So many starts: the numbers of vehicles take turns, so do plane and space, and every other start moves.
-pub(super) fn random_starts(seed: u64, count: usize, delta_m: f64) -> Result<Vec<RandomStart>, ValidateError> {
+pub(super) fn random_starts(seed: u64, count: usize, delta_m: f64) -> Result<Vec<RandomStart>, Untried> {
     let sizes: Vec<usize> = COUNTS.collect();
     (0..count)
         .map(|trial| {
@@ -39,17 +39,11 @@ pub(super) fn random_starts(seed: u64, count: usize, delta_m: f64) -> Result<Vec
             let formation = Formation::points(points(SLOT_EXTENT, SLOT_SPACING)?);
             let mut swarm = Swarm::at_rest(points(START_EXTENT, START_SPACING)?);
             if (round / 2).is_multiple_of(2) {
-                swarm.velocities_m_s = velocities(vehicles, |_| offset(SPEED_M_S, space, &mut random));
+                for i in 0..vehicles {
+                    set_row(&mut swarm.velocities_m_s, i, offset(SPEED_M_S, space, &mut random));
+                }
             }
             Ok(RandomStart { swarm, formation, space })
         })
         .collect()
-}
-
-fn velocities(count: usize, mut of: impl FnMut(usize) -> nalgebra::Vector3<f64>) -> Rows {
-    let mut rows = Rows::zeros(count);
-    for i in 0..count {
-        set_row(&mut rows, i, of(i));
-    }
-    rows
 }
