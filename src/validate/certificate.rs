@@ -3,7 +3,7 @@
 use super::claim::{Claim, Kind};
 use super::flights::{certified_m, continuous, engine_to_any_end, larger, separation_m, times, with_step};
 use super::interface::{Judged, Progress, Untried, try_each};
-use super::starts::{COUNTS, RandomStart, random_starts};
+use super::starts::{COUNTS, DELTA_M, random_starts};
 use crate::continuous::{self, IdealError, Tolerances};
 use crate::formation::Formation;
 use crate::law::{EdgeTension, EdgeTensionKeys, Law, LawSpec, ParameterError};
@@ -15,7 +15,6 @@ use crate::text::bound;
 /// Random starts.
 pub(super) const STARTS: usize = 500;
 const SEED: u64 = 2;
-const DELTA_M: f64 = 1.0;
 /// Flight from each start \[s\]; the closest approach comes within the first seconds.
 const DURATION_S: f64 = 10.0;
 /// Looks at the energy per second \[Hz\].
@@ -36,7 +35,6 @@ const TIGHT: f64 = 0.15;
 /// What one start gave.
 #[derive(Clone, Copy, Debug)]
 struct Trial {
-    delta_m: f64,
     certified_m: f64,
     /// Closest approach in continuous time and in the engine \[m\].
     continuous_m: f64,
@@ -48,15 +46,6 @@ struct Trial {
     engine_energy_rise: f64,
     /// Largest excess of E over E(0), over E(0), in the engine.
     engine_energy_excess: f64,
-}
-
-/// The scenario that a random start is flown as.
-fn scenario(start: &RandomStart) -> Scenario {
-    let mut scenario = Scenario::new("start", start.swarm.clone(), start.formation.clone(), DELTA_M, DURATION_S);
-    scenario.space = start.space;
-    // The certificate does not depend on a22, the motion of the centre of mass does.
-    scenario.a22_per_s = 0.1;
-    scenario
 }
 
 /// The longest step that resolves the tension at the certified separation.
@@ -72,8 +61,9 @@ type MakeLaw = fn(&Scenario) -> Result<Box<dyn Law>, ParameterError>;
 
 /// Flies a start under this law by the promise of the scenario's own. A flight in which the law loses its answer, or the
 /// solver its step, has no closest approach that keeps a promise.
-fn fly(start: &RandomStart, make_law: MakeLaw) -> Result<Trial, Untried> {
-    let scenario = scenario(start);
+fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, Untried> {
+    // The certificate does not depend on a22, the motion of the centre of mass does.
+    let scenario = Scenario { a22_per_s: 0.1, ..start.clone() };
     let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start));
     let certified_m = certificate.certified_m.unwrap_or(f64::NAN);
     let energy_initial = certificate.energy_initial.unwrap_or(f64::NAN);
@@ -100,20 +90,11 @@ fn fly(start: &RandomStart, make_law: MakeLaw) -> Result<Trial, Untried> {
         lowest = lowest.min(energy);
     })?;
     let engine_m = if flight.ending == Ending::Completed { separation_m(flight.audit.closest) } else { f64::NAN };
-    Ok(Trial {
-        delta_m: scenario.delta_m,
-        certified_m,
-        continuous_m,
-        engine_m,
-        dt_s,
-        energy_rise,
-        engine_energy_rise,
-        engine_energy_excess,
-    })
+    Ok(Trial { certified_m, continuous_m, engine_m, dt_s, energy_rise, engine_energy_rise, engine_energy_excess })
 }
 
 pub(super) fn judge(progress: &Progress<'_>) -> Judged {
-    let trials = try_each(&random_starts(SEED, STARTS, DELTA_M)?, progress, |start| fly(start, Scenario::law))?;
+    let trials = try_each(&random_starts(SEED, STARTS, DURATION_S)?, progress, |start| fly(start, Scenario::law))?;
     let tight = tight()?;
     progress(1);
     Ok(vec![energy(&trials), energy_in_the_engine(&trials), in_continuous_time(&trials), tight, in_the_engine(&trials)])
@@ -183,7 +164,7 @@ fn population() -> String {
 /// promised.
 fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
     let margins_m = trials.iter().map(|trial| closest_m(trial) - trial.certified_m);
-    let ratios = trials.iter().map(|trial| (closest_m(trial) - trial.delta_m) / (trial.certified_m - trial.delta_m));
+    let ratios = trials.iter().map(|trial| (closest_m(trial) - DELTA_M) / (trial.certified_m - DELTA_M));
     // A NaN keeps no promise.
     let broken = trials.len() - margins_m.clone().filter(|&margin_m| margin_m >= 0.0).count();
     (broken, margins_m.fold(f64::INFINITY, f64::min), ratios.fold(f64::INFINITY, f64::min))
@@ -245,7 +226,6 @@ mod tests {
     /// Starts in a short form of the claim.
     const FEW: usize = 24;
     const GOOD: Trial = Trial {
-        delta_m: DELTA_M,
         certified_m: 1.1,
         continuous_m: 1.2,
         engine_m: 1.2,
@@ -256,7 +236,7 @@ mod tests {
     };
 
     fn fly_few() -> Vec<Trial> {
-        let starts = random_starts(SEED, FEW, DELTA_M).expect("starts");
+        let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
         starts.par_iter().map(|start| fly(start, Scenario::law).expect("a flight")).collect()
     }
 
@@ -336,7 +316,7 @@ mod tests {
 
     #[test]
     fn with_the_sign_of_the_tension_flipped_energy_and_certificate_fail_and_are_still_named() {
-        let starts = random_starts(SEED, FEW, DELTA_M).expect("starts");
+        let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
         let flipped: MakeLaw = |scenario| Ok(Box::new(Flipped(scenario.law()?, scenario.start.clone())));
         let trials: Vec<Trial> = starts.par_iter().map(|start| fly(start, flipped).expect("a trial")).collect();
         for claim in

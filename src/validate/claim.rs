@@ -55,10 +55,11 @@ pub struct Group {
     pub claims: Vec<Claim>,
 }
 
-/// A claim is built up by the methods of its fields' names; it fails until [`Claim::pass`] or [`Claim::at_most`] judges it.
+/// A claim is built up by the methods of its fields' names; it fails until [`Claim::pass`] or [`Claim::at_most`] judges
+/// it.
 impl Claim {
     pub(super) fn new(kind: Kind, id: &'static str, source: &'static str) -> Self {
-        Self { kind, id, source, ..Self::default() }
+        Self { id, source, kind, ..Self::default() }
     }
 
     /// What stands in the place of claims that could not be tried.

@@ -69,11 +69,7 @@ struct Experiment {
 }
 
 impl Experiment {
-    fn fly(name: &str) -> Result<Self, Untried> {
-        Self::of(builtin(name)?)
-    }
-
-    fn of(scenario: Scenario) -> Result<Self, Untried> {
+    fn fly(scenario: Scenario) -> Result<Self, Untried> {
         let times_s = times(DURATION_S, RATE_HZ);
         let solution = continuous(&scenario, &times_s, Tolerances::default())?;
         Ok(Self { scenario, times_s, solution })
@@ -138,7 +134,7 @@ pub(super) fn judge(progress: &Progress<'_>) -> Judged {
 }
 
 fn pentagon() -> Judged {
-    let flight = Experiment::fly("pentagon")?;
+    let flight = Experiment::fly(builtin("pentagon")?)?;
     let mut law = flight.scenario.law()?;
     let mut control = Rows::zeros(flight.scenario.count());
     law.command(&flight.scenario.observation(&flight.scenario.start), &mut control)?;
@@ -166,7 +162,7 @@ fn pentagon() -> Judged {
 }
 
 fn circle() -> Judged {
-    let flight = Experiment::fly("circle")?;
+    let flight = Experiment::fly(builtin("circle")?)?;
     let (min_m, min_at_s) = flight.closest();
     let checks = [
         check("energy_initial_m2_s2", 8, 4.479_772_16, flight.energy_initial()?),
@@ -185,7 +181,7 @@ fn circle() -> Judged {
 }
 
 fn baseline() -> Result<Claim, Untried> {
-    let flight = Experiment::fly("pentagon-laplacian")?;
+    let flight = Experiment::fly(builtin("pentagon-laplacian")?)?;
     let (min_m, min_at_s) = flight.closest();
     let (delta_m, error_m) = (flight.scenario.delta_m, flight.last_edge_error_m());
     Ok(Claim::new(Kind::PaperHolds, "figure-4", "Fig. 4, equation (3)")
@@ -206,7 +202,7 @@ fn baseline() -> Result<Claim, Untried> {
 }
 
 fn straight_line() -> Result<Claim, Untried> {
-    let flight = Experiment::fly("pentagon-collinear")?;
+    let flight = Experiment::fly(builtin("pentagon-collinear")?)?;
     let (min_m, _) = flight.closest();
     let error_m = flight.last_edge_error_m();
     let states = &flight.solution.states;
@@ -228,7 +224,7 @@ fn straight_line() -> Result<Claim, Untried> {
 
 /// F6: turn and mirror the start, and everything that follows is turned and mirrored with it.
 fn up_to_rigid_motion() -> Result<Claim, Untried> {
-    let straight = Experiment::fly("pentagon")?;
+    let straight = Experiment::fly(builtin("pentagon")?)?;
     let (sin, cos) = libm::sincos(TURN_RAD);
     let mut scenario = straight.scenario.clone();
     for i in 0..scenario.count() {
@@ -236,7 +232,7 @@ fn up_to_rigid_motion() -> Result<Claim, Untried> {
         let turned = Vector3::new(cos * start.x + sin * start.y, sin * start.x - cos * start.y, 0.0);
         set_row(&mut scenario.start.positions_m, i, turned);
     }
-    let turned = Experiment::of(scenario)?;
+    let turned = Experiment::fly(scenario)?;
     let formation = &turned.scenario.formation();
     let positions_m = turned.last_positions_m();
     let fits_m = [straight.last_positions_m(), positions_m].map(|end_m| procrustes_rms_m(end_m, formation));

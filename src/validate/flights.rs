@@ -21,7 +21,7 @@ pub(super) fn builtin(name: &str) -> Result<Scenario, Untried> {
 
 /// 0, 1/rate, 2/rate, ... up to a duration \[s\], for a rate \[Hz\] that divides it.
 pub(super) fn times(duration_s: f64, rate_hz: f64) -> Vec<f64> {
-    (0_u32..).map(|k| f64::from(k) / rate_hz).take_while(|&time_s| time_s <= duration_s).collect()
+    (0..u32::MAX).map(|k| f64::from(k) / rate_hz).take_while(|&time_s| time_s <= duration_s).collect()
 }
 
 /// The scenario in continuous time, with its states at these times \[s\].

@@ -69,26 +69,23 @@ fn row(claim: &Claim) -> Vec<Cell> {
         (true, Kind::PaperRefuted) => Tone::Neutral,
         (true, _) => Tone::Good,
     };
+    let Claim { id, source, expected, tolerance, reason, .. } = claim;
+    let finding = claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default();
+    let judged = format!("Expected: {expected}. Tolerance: {tolerance} ({reason}).");
     vec![
-        Cell::Noted(
-            claim.statement.to_owned(),
-            format!(
-                "{}{}; {}",
-                claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default(),
-                claim.id,
-                claim.source
-            ),
-        ),
-        Cell::Noted(
-            claim.measured.clone(),
-            format!("Expected: {}. Tolerance: {} ({}).", claim.expected, claim.tolerance, claim.reason),
-        ),
+        Cell::Noted(claim.statement.to_owned(), format!("{finding}{id}; {source}")),
+        Cell::Noted(claim.measured.clone(), judged),
         Cell::Badge(Badge { tone, word: claim.outcome().to_owned() }),
     ]
 }
 
 fn convergence(refinements: &[Refinement]) -> Table {
     let number = |x: f64| Cell::from(format!("{x:.2e}"));
+    let row = |&Refinement { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. }: &Refinement| {
+        let order = order.map_or("–".to_owned(), |order| format!("{order:.3}"));
+        let step = Cell::from(format!("1/{:.0}", 1.0 / dt_s));
+        vec![step, number(double_m), Cell::from(order), number(single_m), number(energy_excess_m2_s2)]
+    };
     Table {
         caption: "Largest position error of Rapier on the pentagon's flight, by step".to_owned(),
         columns: vec![
@@ -98,17 +95,6 @@ fn convergence(refinements: &[Refinement]) -> Table {
             Column::numbers("Single precision [m]"),
             Column::numbers("Energy excess [m²/s²]"),
         ],
-        rows: refinements
-            .iter()
-            .map(|refinement| {
-                vec![
-                    Cell::from(format!("1/{:.0}", 1.0 / refinement.dt_s)),
-                    number(refinement.double_m),
-                    Cell::from(refinement.order.map_or("–".to_owned(), |order| format!("{order:.3}"))),
-                    number(refinement.single_m),
-                    number(refinement.energy_excess_m2_s2),
-                ]
-            })
-            .collect(),
+        rows: refinements.iter().map(row).collect(),
     }
 }

@@ -3,7 +3,7 @@
 use super::claim::{Claim, Kind};
 use super::flights::{relative_speed_squared, relative_velocities};
 use super::interface::{Judged, Progress, Untried};
-use super::starts::{RandomStart, random_starts};
+use super::starts::{DELTA_M, random_starts};
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law as _};
@@ -14,7 +14,6 @@ use crate::text::bound;
 /// Random states that each claim is tried on; every one with each kind of graph.
 const STATES: usize = 200;
 const SEED: u64 = 1;
-const DELTA_M: f64 = 1.0;
 /// Sums of up to 8 vectors, each rounded a few times.
 const ROUNDING: f64 = 1e-13;
 const SUM: &str = "rounding of sums of up to 8 terms, relative to the largest";
@@ -77,12 +76,17 @@ impl State {
 /// shape of random slots.
 fn states() -> Result<Vec<State>, Untried> {
     let mut states = Vec::new();
-    for (k, RandomStart { swarm, formation, .. }) in random_starts(SEED, STATES, DELTA_M)?.into_iter().enumerate() {
-        let count = swarm.count();
+    for (k, scenario) in random_starts(SEED, STATES, 1.0)?.into_iter().enumerate() {
+        let count = scenario.count();
         for graph in [Graph::complete(count), Graph::ring(count), Graph::star(count)] {
             let parameters =
                 EdgeTensionParameters { alpha: 1.0, delta_m: DELTA_M, a22_per_s: A22_PER_S[k % A22_PER_S.len()] };
-            states.push(State { swarm: swarm.clone(), graph, formation: formation.clone(), parameters });
+            states.push(State {
+                swarm: scenario.start.clone(),
+                graph,
+                formation: scenario.formation().clone(),
+                parameters,
+            });
         }
     }
     Ok(states)

@@ -69,7 +69,8 @@ pub fn work() -> u64 {
     PARTS.iter().map(|part| part.work).sum::<u64>() + ENGINE_WORK
 }
 
-/// Judges the claims of one group that needs no figure: `tension`, `law`, `certificate`, `figures`, `equilibria` or `rates`.
+/// Judges the claims of one group that needs no figure, by its name: `tension`, `law`, `certificate`, `figures`,
+/// `equilibria` or `rates`. None where there is no such group.
 #[must_use]
 pub fn judge(id: &str) -> Option<Group> {
     PARTS.iter().find(|part| part.id == id).map(|part| part.group(&|_| ()))

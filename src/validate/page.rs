@@ -81,17 +81,9 @@ fn capitalised(text: &str) -> String {
 }
 
 fn entry(claim: &Claim) -> String {
-    format!(
-        "\n### {}: `{}`\n\n{} ({})\n\n- expected: {}\n- measured: {}\n- tolerance: {} ({})\n",
-        capitalised(claim.outcome()),
-        claim.id,
-        claim.statement,
-        claim.source,
-        claim.expected,
-        claim.measured,
-        claim.tolerance,
-        claim.reason
-    )
+    let Claim { id, statement, source, expected, measured, tolerance, reason, .. } = claim;
+    let head = format!("\n### {}: `{id}`\n\n{statement} ({source})\n\n", capitalised(claim.outcome()));
+    head + &format!("- expected: {expected}\n- measured: {measured}\n- tolerance: {tolerance} ({reason})\n")
 }
 
 #[cfg(test)]
