@@ -21,7 +21,7 @@ const DURATION_S: f64 = 10.0;
 const COMPARED_HZ: f64 = 10.0;
 /// Semi-implicit Euler is of order 1.
 const ORDER: std::ops::RangeInclusive<f64> = 0.9..=1.1;
-/// Rounding to 6e-8 of velocities of some 1 m/s, adding up one-sidedly over the 20000 steps of the best step, moves a
+/// Rounding to 6e-8 of velocities of some 1 m/s, adding up one-sidedly over the 20000 steps of the best flight, moves a
 /// vehicle by at most 20000 * 6e-8 m.
 const SINGLE_FLOOR_M: f64 = 1.2e-3;
 

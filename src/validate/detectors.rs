@@ -59,10 +59,8 @@ fn violating(flight: &Flight) -> Vec<Pair> {
 }
 
 fn names(pairs: &[Pair]) -> String {
-    if pairs.is_empty() {
-        return "none".to_owned();
-    }
-    pairs.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    let names = pairs.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    if names.is_empty() { "none".to_owned() } else { names }
 }
 
 /// Flies all three.

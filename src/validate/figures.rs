@@ -2,7 +2,8 @@
 
 use super::convergence::Refinement;
 use super::detectors::{Flights, Flown};
-use super::{Untried, tension};
+use super::interface::Untried;
+use super::tension;
 use crate::figures::{self, Figure, Step};
 
 /// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
