@@ -1,23 +1,20 @@
 //! The energy and what it certifies, on random starts.
 
-use rayon::prelude::*;
-
 use super::claim::{Claim, Kind};
-use super::flights::{engine_to_any_end, times, with_step};
-use super::starts::{COUNTS, RandomStart, random_starts};
-use super::{Progress, ValidateError};
+use super::flights::{certified_m, continuous, engine_to_any_end, larger, separation_m, times, with_step};
+use super::interface::{Judged, Progress, Untried, try_each};
+use super::starts::{COUNTS, DELTA_M, random_starts};
 use crate::continuous::{self, IdealError, Tolerances};
 use crate::formation::Formation;
 use crate::law::{EdgeTension, EdgeTensionKeys, Law, LawSpec, ParameterError};
 use crate::scenario::{Precision, Scenario};
 use crate::sim::Ending;
-use crate::swarm::{ClosestApproach, Swarm};
+use crate::swarm::Swarm;
 use crate::text::bound;
 
 /// Random starts.
 pub(super) const STARTS: usize = 500;
 const SEED: u64 = 2;
-const DELTA_M: f64 = 1.0;
 /// Flight from each start \[s\]; the closest approach comes within the first seconds.
 const DURATION_S: f64 = 10.0;
 /// Looks at the energy per second \[Hz\].
@@ -38,7 +35,6 @@ const TIGHT: f64 = 0.15;
 /// What one start gave.
 #[derive(Clone, Copy, Debug)]
 struct Trial {
-    delta_m: f64,
     certified_m: f64,
     /// Closest approach in continuous time and in the engine \[m\].
     continuous_m: f64,
@@ -52,23 +48,8 @@ struct Trial {
     engine_energy_excess: f64,
 }
 
-impl Trial {
-    fn margin_m(&self, closest_m: f64) -> f64 {
-        closest_m - self.certified_m
-    }
-}
-
-/// The scenario that a random start is flown as.
-fn scenario(start: &RandomStart) -> Scenario {
-    let mut scenario = Scenario::new("start", start.swarm.clone(), start.formation.clone(), DELTA_M, DURATION_S);
-    scenario.space = start.space;
-    // The certificate does not depend on a22, the motion of the centre of mass does.
-    scenario.a22_per_s = 0.1;
-    scenario
-}
-
 /// The longest step that resolves the tension at the certified separation.
-fn honest_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, ValidateError> {
+fn honest_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, Untried> {
     let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = scenario.law else { return Ok(LONGEST_STEP_S) };
     let Some((_, rest_m)) = scenario.formation().min_distance() else { return Ok(LONGEST_STEP_S) };
     let stiffness = EdgeTension::new(alpha, scenario.delta_m, rest_m)?.second_derivative(certified_m);
@@ -78,14 +59,11 @@ fn honest_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, ValidateE
 /// Makes the law of a scenario.
 type MakeLaw = fn(&Scenario) -> Result<Box<dyn Law>, ParameterError>;
 
-fn fly(start: &RandomStart) -> Result<Trial, ValidateError> {
-    fly_under(start, Scenario::law)
-}
-
 /// Flies a start under this law by the promise of the scenario's own. A flight in which the law loses its answer, or the
 /// solver its step, has no closest approach that keeps a promise.
-fn fly_under(start: &RandomStart, make_law: MakeLaw) -> Result<Trial, ValidateError> {
-    let scenario = scenario(start);
+fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, Untried> {
+    // The certificate does not depend on a22, the motion of the centre of mass does.
+    let scenario = Scenario { a22_per_s: 0.1, ..start.clone() };
     let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start));
     let certified_m = certificate.certified_m.unwrap_or(f64::NAN);
     let energy_initial = certificate.energy_initial.unwrap_or(f64::NAN);
@@ -112,111 +90,70 @@ fn fly_under(start: &RandomStart, make_law: MakeLaw) -> Result<Trial, ValidateEr
         lowest = lowest.min(energy);
     })?;
     let engine_m = if flight.ending == Ending::Completed { separation_m(flight.audit.closest) } else { f64::NAN };
-    Ok(Trial {
-        delta_m: scenario.delta_m,
-        certified_m,
-        continuous_m,
-        engine_m,
-        dt_s,
-        energy_rise,
-        engine_energy_rise,
-        engine_energy_excess,
-    })
+    Ok(Trial { certified_m, continuous_m, engine_m, dt_s, energy_rise, engine_energy_rise, engine_energy_excess })
 }
 
-fn separation_m(closest: Option<ClosestApproach>) -> f64 {
-    closest.map_or(f64::NAN, |closest| closest.separation_m)
-}
-
-/// The larger number; NaN where either is.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-}
-
-pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
-    let trials = random_starts(SEED, STARTS, DELTA_M)?
-        .par_iter()
-        .map(|start| fly(start).inspect(|_| progress.advance(1)))
-        .collect::<Result<Vec<_>, _>>()?;
+pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+    let trials = try_each(&random_starts(SEED, STARTS, DURATION_S)?, progress, |start| fly(start, Scenario::law))?;
     let tight = tight()?;
-    progress.advance(1);
+    progress(1);
     Ok(vec![energy(&trials), energy_in_the_engine(&trials), in_continuous_time(&trials), tight, in_the_engine(&trials)])
 }
 
 /// Two vehicles head on, from twice delta, at this closing speed of each \[m/s\]: clearance left over clearance certified.
-fn head_on(speed_m_s: f64) -> Result<f64, ValidateError> {
+fn head_on(speed_m_s: f64) -> Result<f64, Untried> {
     let mut swarm = Swarm::at_rest(Formation::line(2, 2.0 * DELTA_M).slots_m);
     (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (speed_m_s, -speed_m_s);
     let scenario = Scenario::new("head-on", swarm, Formation::line(2, 2.0 * DELTA_M), DELTA_M, 1.0);
-    let certified_m =
-        scenario.law()?.certificate(&scenario.observation(&scenario.start)).certified_m.unwrap_or(f64::NAN);
-    let mut law = scenario.law()?;
-    let end_s = [scenario.time.duration_s];
-    let closest = continuous::solve(&scenario, law.as_mut(), &end_s, Tolerances::default())?.closest;
-    let min_m = closest.map_or(f64::NAN, |closest| closest.separation_m);
-    Ok((min_m - DELTA_M) / (certified_m - DELTA_M))
+    let closest = continuous(&scenario, &[scenario.time.duration_s], Tolerances::default())?.closest;
+    Ok((separation_m(closest) - DELTA_M) / (certified_m(&scenario)? - DELTA_M))
 }
 
-fn tight() -> Result<Claim, ValidateError> {
+fn tight() -> Result<Claim, Untried> {
     let ratios = HEAD_ON_M_S.iter().map(|&speed_m_s| head_on(speed_m_s)).collect::<Result<Vec<_>, _>>()?;
     let list = HEAD_ON_M_S.iter().zip(&ratios).map(|(speed_m_s, ratio)| format!("{ratio:.3} at {speed_m_s} m/s"));
     let last = ratios.last().copied().unwrap_or(f64::NAN);
-    Ok(Claim {
-        id: "certificate-is-tight",
-        source: "the collision theorem",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "The certificate is tight for two vehicles: head on they use it up as they get faster.",
-        expected: "clearance left over clearance certified falls towards 1".to_owned(),
-        measured: list.collect::<Vec<_>>().join(", "),
-        values: super::Values(HEAD_ON_NAMES.into_iter().zip(ratios.iter().copied()).collect()),
-        tolerance: format!("{TIGHT} at the fastest"),
-        reason: "damping over the last metre takes a share of 1/speed of the energy",
-        pass: ratios.is_sorted_by(|a, b| a > b) && (1.0..1.0 + TIGHT).contains(&last),
-    })
+    Ok(Claim::new(Kind::Ours, "certificate-is-tight", "the collision theorem")
+        .statement("The certificate is tight for two vehicles: head on they use it up as they get faster.")
+        .expected("clearance left over clearance certified falls towards 1")
+        .measured(list.collect::<Vec<_>>().join(", "))
+        .values(HEAD_ON_NAMES.into_iter().zip(ratios.iter().copied()))
+        .tolerance(format!("{TIGHT} at the fastest"))
+        .reason("damping over the last metre takes a share of 1/speed of the energy")
+        .pass(ratios.is_sorted_by(|a, b| a > b) && (1.0..1.0 + TIGHT).contains(&last)))
 }
 
 fn energy(trials: &[Trial]) -> Claim {
     let rise = trials.iter().map(|trial| trial.energy_rise).fold(0.0, larger);
-    Claim {
-        id: "energy-never-increases",
-        source: "the stability theorem, complete graph",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "In continuous time the energy E never increases.",
-        expected: "no rise from one look to the next".to_owned(),
-        measured: format!(
+    Claim::new(Kind::Ours, "energy-never-increases", "the stability theorem, complete graph")
+        .statement("In continuous time the energy E never increases.")
+        .expected("no rise from one look to the next")
+        .measured(format!(
             "largest rise {} of E(0) over {STARTS} random starts of {DURATION_S} s with {LOOKS_HZ} looks a second",
             bound(rise, ENERGY_TOLERANCE)
-        ),
-        values: [("largest_rise_over_initial", rise)].into(),
-        tolerance: format!("{ENERGY_TOLERANCE:e}"),
-        reason: "the solver's tolerance of 1e-12 a step, summed over the steps",
-        pass: rise <= ENERGY_TOLERANCE,
-    }
+        ))
+        .at_most("largest_rise_over_initial", rise, ENERGY_TOLERANCE)
+        .reason("the solver's tolerance of 1e-12 a step, summed over the steps")
 }
 
 fn energy_in_the_engine(trials: &[Trial]) -> Claim {
     let excess = trials.iter().map(|trial| trial.engine_energy_excess).fold(0.0, larger);
     let rise = trials.iter().map(|trial| trial.engine_energy_rise).fold(0.0, larger);
-    Claim {
-        id: "energy-in-the-engine",
-        source: "the stability theorem, in discrete time",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "In Rapier, with a step that resolves the tension at the certified separation, E never exceeds E(0).",
-        expected: "no excess at any step".to_owned(),
-        measured: format!(
-            "largest excess {} of E(0) over every step of {}; from its lowest value so far E rises by up to {rise:.1e} of \
-             E(0), as the method's does where a mode oscillates",
+    Claim::new(Kind::Ours, "energy-in-the-engine", "the stability theorem, in discrete time")
+        .statement(
+            "In Rapier, with a step that resolves the tension at the certified separation, E never exceeds E(0).",
+        )
+        .expected("no excess at any step")
+        .measured(format!(
+            "largest excess {} of E(0) over every step of {}; from its lowest value so far E rises by up to \
+             {rise:.1e} of E(0), as the method's does where a mode oscillates",
             bound(excess, ENERGY_TOLERANCE),
             population()
-        ),
-        values: [("largest_excess_over_initial", excess), ("largest_rise_over_initial", rise)].into(),
-        tolerance: format!("{ENERGY_TOLERANCE:e}"),
-        reason: "rounding, summed over the steps",
-        pass: excess <= ENERGY_TOLERANCE,
-    }
+        ))
+        .values([("largest_excess_over_initial", excess), ("largest_rise_over_initial", rise)])
+        .tolerance(format!("{ENERGY_TOLERANCE:e}"))
+        .reason("rounding, summed over the steps")
+        .pass(excess <= ENERGY_TOLERANCE)
 }
 
 fn population() -> String {
@@ -226,36 +163,27 @@ fn population() -> String {
 /// How many trials broke the certificate, the smallest margin, and the smallest ratio of what was left to what was
 /// promised.
 fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
+    let margins_m = trials.iter().map(|trial| closest_m(trial) - trial.certified_m);
+    let ratios = trials.iter().map(|trial| (closest_m(trial) - DELTA_M) / (trial.certified_m - DELTA_M));
     // A NaN keeps no promise.
-    let broken = trials.len() - trials.iter().filter(|trial| trial.margin_m(closest_m(trial)) >= 0.0).count();
-    let margin_m = trials.iter().map(|trial| trial.margin_m(closest_m(trial))).fold(f64::INFINITY, f64::min);
-    let ratio = trials
-        .iter()
-        .map(|trial| (closest_m(trial) - trial.delta_m) / (trial.certified_m - trial.delta_m))
-        .fold(f64::INFINITY, f64::min);
-    (broken, margin_m, ratio)
+    let broken = trials.len() - margins_m.clone().filter(|&margin_m| margin_m >= 0.0).count();
+    (broken, margins_m.fold(f64::INFINITY, f64::min), ratios.fold(f64::INFINITY, f64::min))
 }
 
 fn in_continuous_time(trials: &[Trial]) -> Claim {
     let (broken, margin_m, ratio) = kept(trials, |trial| trial.continuous_m);
-    Claim {
-        id: "certificate",
-        source: "the collision theorem, complete graph",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "No pair ever comes closer than the separation certified before the first step.",
-        expected: "never broken".to_owned(),
-        measured: format!(
+    Claim::new(Kind::Ours, "certificate", "the collision theorem, complete graph")
+        .statement("No pair ever comes closer than the separation certified before the first step.")
+        .expected("never broken")
+        .measured(format!(
             "broken {broken} times in {}; smallest margin {margin_m:.4} m, where clearance above delta was {ratio:.2} \
              times the certified one or more",
             population()
-        ),
-        values: [("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)]
-            .into(),
-        tolerance: "0".to_owned(),
-        reason: "continuous time is what the proof is about",
-        pass: broken == 0,
-    }
+        ))
+        .values([("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)])
+        .tolerance("0")
+        .reason("continuous time is what the proof is about")
+        .pass(broken == 0)
 }
 
 fn in_the_engine(trials: &[Trial]) -> Claim {
@@ -263,36 +191,34 @@ fn in_the_engine(trials: &[Trial]) -> Claim {
     let differences_m = trials.iter().map(|trial| (trial.engine_m - trial.continuous_m).abs());
     let difference_m = differences_m.fold(0.0, larger);
     let shortest_s = trials.iter().map(|trial| trial.dt_s).fold(f64::INFINITY, f64::min);
-    Claim {
-        id: "certificate-in-the-engine",
-        source: "the collision theorem, in discrete time",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "In Rapier, with a step that resolves the tension at the certified separation, the certificate holds \
-                    too.",
-        expected: "never broken".to_owned(),
-        measured: format!(
-            "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} m \
-             of continuous time; steps of {:.2} ms to {:.2} ms, double precision",
+    Claim::new(Kind::Ours, "certificate-in-the-engine", "the collision theorem, in discrete time")
+        .statement(
+            "In Rapier, with a step that resolves the tension at the certified separation, the certificate \
+             holds too.",
+        )
+        .expected("never broken")
+        .measured(format!(
+            "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} \
+             m of continuous time; steps of {:.2} ms to {:.2} ms, double precision",
             population(),
             shortest_s * 1e3,
             LONGEST_STEP_S * 1e3
-        ),
-        values: [
+        ))
+        .values([
             ("broken", broken as f64),
             ("smallest_margin_m", margin_m),
             ("largest_difference_m", difference_m),
             ("shortest_dt_s", shortest_s),
-        ]
-        .into(),
-        tolerance: "0".to_owned(),
-        reason: "a step with omega dt <= 0.3 errs by less than what damping leaves of the certified clearance",
-        pass: broken == 0,
-    }
+        ])
+        .tolerance("0")
+        .reason("a step with omega dt <= 0.3 errs by less than what damping leaves of the certified clearance")
+        .pass(broken == 0)
 }
 
 #[cfg(test)]
 mod tests {
+    use rayon::prelude::*;
+
     use super::*;
     use crate::law::LawError;
     use crate::swarm::Rows;
@@ -300,7 +226,6 @@ mod tests {
     /// Starts in a short form of the claim.
     const FEW: usize = 24;
     const GOOD: Trial = Trial {
-        delta_m: DELTA_M,
         certified_m: 1.1,
         continuous_m: 1.2,
         engine_m: 1.2,
@@ -311,8 +236,8 @@ mod tests {
     };
 
     fn fly_few() -> Vec<Trial> {
-        let starts = random_starts(SEED, FEW, DELTA_M).expect("starts");
-        starts.par_iter().map(|start| fly(start).expect("a flight")).collect()
+        let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
+        starts.par_iter().map(|start| fly(start, Scenario::law).expect("a flight")).collect()
     }
 
     #[test]
@@ -391,9 +316,9 @@ mod tests {
 
     #[test]
     fn with_the_sign_of_the_tension_flipped_energy_and_certificate_fail_and_are_still_named() {
-        let starts = random_starts(SEED, FEW, DELTA_M).expect("starts");
+        let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
         let flipped: MakeLaw = |scenario| Ok(Box::new(Flipped(scenario.law()?, scenario.start.clone())));
-        let trials: Vec<Trial> = starts.par_iter().map(|start| fly_under(start, flipped).expect("a trial")).collect();
+        let trials: Vec<Trial> = starts.par_iter().map(|start| fly(start, flipped).expect("a trial")).collect();
         for claim in
             [energy(&trials), energy_in_the_engine(&trials), in_continuous_time(&trials), in_the_engine(&trials)]
         {

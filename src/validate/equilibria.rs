@@ -1,11 +1,11 @@
 //! Where the law comes to rest, from many starts: F3.
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use super::claim::{Claim, Kind};
-use super::{Progress, ValidateError};
-use crate::continuous::{self, Tolerances};
+use super::flights::{continuous, end};
+use super::interface::{Judged, Progress, Untried, try_each};
+use crate::continuous::Tolerances;
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::scenario::{Scenario, Space, offset, random, scatter};
 use crate::swarm::{Rows, Swarm, row, set_row};
@@ -53,38 +53,23 @@ impl Rest {
     }
 }
 
-/// Flies without the common mode (a22 = 0, on which relative motion does not depend) for a time.
-fn rest(
-    start: Rows,
-    formation: &Formation,
-    delta_m: f64,
-    duration_s: f64,
-    tolerances: Tolerances,
-) -> Result<Rest, ValidateError> {
-    let scenario = Scenario::new("rest", Swarm::at_rest(start), formation.clone(), delta_m, duration_s);
-    let mut law = scenario.law()?;
-    let solution = continuous::solve(&scenario, law.as_mut(), &[duration_s], tolerances)?;
+/// Flies to the pentagon without the common mode (a22 = 0, on which relative motion does not depend).
+fn rest(start: Rows, tolerances: Tolerances) -> Result<Rest, Untried> {
+    let formation = Formation::pentagon(SIDE_M);
+    let scenario = Scenario::new("rest", Swarm::at_rest(start), formation, DELTA_M, ORDERING_S);
+    let last = end(&scenario, tolerances)?;
     let mut control = Rows::zeros(scenario.count());
-    let last = solution.states.last().unwrap_or(&scenario.start);
-    law.command(&scenario.observation(last), &mut control)?;
+    scenario.law()?.command(&scenario.observation(&last), &mut control)?;
     Ok(Rest {
-        edge_error_m: largest_edge_error_m(&last.positions_m, formation, &scenario.graph),
+        edge_error_m: largest_edge_error_m(&last.positions_m, scenario.formation(), &scenario.graph),
         pull_m_s2: (0..scenario.count()).map(|i| row(&control, i).norm()).fold(0.0, f64::max),
     })
 }
 
 /// All orders of the vehicles 0 to 4, one of each pair of mirror images.
 fn orderings() -> Vec<[usize; 5]> {
-    let mut all = Vec::new();
-    for code in 0..5_usize.pow(5) {
-        let order = [0, 1, 2, 3, 4].map(|place| code / 5_usize.pow(place) % 5);
-        let is_permutation = (0..5).all(|vehicle| order.contains(&vehicle));
-        if is_permutation && order[0] < order[4] {
-            all.push(order);
-        }
-    }
-    all.sort_unstable();
-    all
+    let codes = (0..5_usize.pow(5)).map(|code| [4, 3, 2, 1, 0].map(|place| code / 5_usize.pow(place) % 5));
+    codes.filter(|order| (0..5).all(|vehicle| order.contains(&vehicle)) && order[0] < order[4]).collect()
 }
 
 /// A line along x in this order with transverse noise.
@@ -99,25 +84,18 @@ fn line(order: [usize; 5], stream: u64) -> Rows {
     positions_m
 }
 
-pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
+pub(super) fn judge(progress: &Progress<'_>) -> Judged {
     let (orderings, polygon) = rayon::join(|| pentagon_orderings(progress), || polygon(progress));
     Ok(vec![orderings?, polygon?])
 }
 
-fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
-    let formation = Formation::pentagon(SIDE_M);
+fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, Untried> {
     let orderings = orderings();
-    let fly = |place: usize, order: [usize; 5]| {
-        let start = line(order, place as u64);
-        let fly = |tolerances| rest(start.clone(), &formation, DELTA_M, ORDERING_S, tolerances);
-        Ok((fly(Tolerances::default())?, fly(COARSE)?))
-    };
-    let rests = orderings
-        .par_iter()
-        .enumerate()
-        .map(|(place, &order)| fly(place, order).inspect(|_| progress.advance(1)))
-        .collect::<Result<Vec<_>, ValidateError>>()?;
-
+    let places: Vec<usize> = (0..orderings.len()).collect();
+    let rests = try_each(&places, progress, |&place| {
+        let start = line(orderings[place], place as u64);
+        Ok((rest(start.clone(), Tolerances::default())?, rest(start, COARSE)?))
+    })?;
     let reached = rests.iter().filter(|(rest, _)| rest.reached()).count();
     let elsewhere: Vec<&Rest> = rests.iter().map(|(rest, _)| rest).filter(|rest| !rest.reached()).collect();
     let pull_m_s2 = elsewhere.iter().map(|rest| rest.pull_m_s2).fold(0.0, f64::max);
@@ -125,22 +103,20 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
     let most_m = elsewhere.iter().map(|rest| rest.edge_error_m).fold(0.0, f64::max);
     let changed = rests.iter().filter(|(fine, coarse)| fine.reached() != coarse.reached()).count();
     let in_order_m = rests.first().map_or(f64::NAN, |(rest, _)| rest.edge_error_m);
-    Ok(Claim {
-        id: "pentagon-orderings",
-        source: "the convergence theorem",
-        finding: Some("F3"),
-        kind: Kind::PaperRefuted,
-        statement: "The law drives the vehicles to the desired formation from any start that is not on a line.",
-        expected: "many starts come to rest elsewhere: the law has other equilibria".to_owned(),
-        measured: format!(
-            "{reached} of the {} orderings of five vehicles near a line ({SPACING_M} m apart, up to {NOISE_M} m off) reach the pentagon; the other {} come to rest \
-             with every pull {} m/s^2 and a largest edge error of {least_m:.2} m to {most_m:.2} m (ordering 1, 2, 3, \
-             4, 5: {in_order_m:.2} m); {changed} outcomes change with a hundred times the solver's tolerance",
+    Ok(Claim::new(Kind::PaperRefuted, "pentagon-orderings", "the convergence theorem")
+        .finding("F3")
+        .statement("The law drives the vehicles to the desired formation from any start that is not on a line.")
+        .expected("many starts come to rest elsewhere: the law has other equilibria")
+        .measured(format!(
+            "{reached} of the {} orderings of five vehicles near a line ({SPACING_M} m apart, up to {NOISE_M} m off) \
+             reach the pentagon; the other {} come to rest with every pull {} m/s^2 and a largest edge error of \
+             {least_m:.2} m to {most_m:.2} m (ordering 1, 2, 3, 4, 5: {in_order_m:.2} m); {changed} outcomes \
+             change with a hundred times the solver's tolerance",
             orderings.len(),
             elsewhere.len(),
             bound(pull_m_s2, REST_M_S2)
-        ),
-        values: [
+        ))
+        .values([
             ("orderings", orderings.len() as f64),
             ("reached", reached as f64),
             ("largest_pull_elsewhere_m_s2", pull_m_s2),
@@ -148,21 +124,21 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
             ("most_edge_error_elsewhere_m", most_m),
             ("edge_error_in_order_m", in_order_m),
             ("outcomes_changed", changed as f64),
-        ]
-        .into(),
-        tolerance: format!("at rest: {REST_M_S2:e} m/s^2; elsewhere: more than {REACHED_M} m off"),
-        reason: "after 600 s a flight that is still converging pulls more than that",
-        pass: orderings.len() as u64 == ORDERINGS
-            && reached > 0
-            && !elsewhere.is_empty()
-            && pull_m_s2 < REST_M_S2
-            && least_m > 10.0 * REACHED_M
-            && changed == 0,
-    })
+        ])
+        .tolerance(format!("at rest: {REST_M_S2:e} m/s^2; elsewhere: more than {REACHED_M} m off"))
+        .reason("after 600 s a flight that is still converging pulls more than that")
+        .pass(
+            orderings.len() as u64 == ORDERINGS
+                && reached > 0
+                && !elsewhere.is_empty()
+                && pull_m_s2 < REST_M_S2
+                && least_m > 10.0 * REACHED_M
+                && changed == 0,
+        ))
 }
 
 /// How many flights have reached the 12-gon at each of the times.
-fn polygon(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
+fn polygon(progress: &Progress<'_>) -> Result<Claim, Untried> {
     let formation = Formation::circle(POLYGON_COUNT, POLYGON_RADIUS_M);
     let fly = |stream: u64| {
         let mut random = random(SEED + 1);
@@ -170,36 +146,31 @@ fn polygon(progress: &Progress<'_>) -> Result<Claim, ValidateError> {
         let (space, extent_m, spacing_m) = (Space::Plane, POLYGON_HALF_EXTENT_M, POLYGON_SPACING_M);
         let start = scatter(POLYGON_COUNT, space, extent_m, spacing_m, &mut random)?;
         let scenario = Scenario::new("polygon", Swarm::at_rest(start), formation.clone(), POLYGON_DELTA_M, 1.0);
-        let mut law = scenario.law()?;
-        let states = continuous::solve(&scenario, law.as_mut(), &POLYGON_TIMES_S, COARSE)?.states;
+        let states = continuous(&scenario, &POLYGON_TIMES_S, COARSE)?.states;
         let error_m = |state: &Swarm| largest_edge_error_m(&state.positions_m, &formation, &scenario.graph);
         Ok(states.iter().map(|state| error_m(state) < REACHED_M).collect::<Vec<_>>())
     };
-    let flights = (0..POLYGON_STARTS)
-        .into_par_iter()
-        .map(|stream| fly(stream).inspect(|_| progress.advance(1)))
-        .collect::<Result<Vec<_>, ValidateError>>()?;
+    let streams: Vec<u64> = (0..POLYGON_STARTS).collect();
+    let flights = try_each(&streams, progress, |&stream| fly(stream))?;
     let reached_by = |k: usize| flights.iter().filter(|flight| flight.get(k) == Some(&true)).count() as u64;
     let reached = [0, 1, 2, 3].map(reached_by);
     let list = POLYGON_TIMES_S.iter().zip(reached).map(|(time_s, reached)| format!("{reached} after {time_s} s"));
-    Ok(Claim {
-        id: "polygon-random-starts",
-        source: "the convergence theorem",
-        finding: Some("F3"),
-        kind: Kind::Ours,
-        statement: "The regular 12-gon is formed from random starts in the plane, but so slowly that after a minute it seems \
+    Ok(Claim::new(Kind::Ours, "polygon-random-starts", "the convergence theorem")
+        .finding("F3")
+        .statement(
+            "The regular 12-gon is formed from random starts in the plane, but so slowly that after a minute it seems \
                     never to be.",
-        expected: "at most 1 in 10 within a minute, at least 9 in 10 within 1000 s".to_owned(),
-        measured: format!(
+        )
+        .expected("at most 1 in 10 within a minute, at least 9 in 10 within 1000 s")
+        .measured(format!(
             "so many of {POLYGON_STARTS} starts have formed it (radius {POLYGON_RADIUS_M} m, delta {POLYGON_DELTA_M} \
              m): {}",
             list.collect::<Vec<_>>().join(", ")
-        ),
-        values: super::Values(POLYGON_NAMES.into_iter().zip(reached.map(|n| n as f64)).collect()),
-        tolerance: "4 of 40 starts".to_owned(),
-        reason: "a count of 40 random starts scatters by a few; a short look and a long one must differ by more",
-        pass: reached[0] * 10 <= POLYGON_STARTS && reached[3] * 10 >= 9 * POLYGON_STARTS,
-    })
+        ))
+        .values(POLYGON_NAMES.into_iter().zip(reached.map(|n| n as f64)))
+        .tolerance("4 of 40 starts")
+        .reason("a count of 40 random starts scatters by a few; a short look and a long one must differ by more")
+        .pass(reached[0] * 10 <= POLYGON_STARTS && reached[3] * 10 >= 9 * POLYGON_STARTS))
 }
 
 #[cfg(test)]

@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use super::ValidateError;
+use nalgebra::Vector3;
+
+use super::interface::Untried;
 use crate::continuous::{self, Solution, Tolerances};
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
@@ -10,36 +12,66 @@ use crate::law::Law;
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::scenario::{PlantSpec, Precision, Scenario, Source};
 use crate::sim::{self, Ending, Flight, Parts};
-use crate::swarm::Swarm;
+use crate::swarm::{ClosestApproach, Swarm, mean_row, row};
 
 /// The embedded scenario of this name.
-pub(super) fn builtin(name: &str) -> Result<Scenario, ValidateError> {
+pub(super) fn builtin(name: &str) -> Result<Scenario, Untried> {
     Ok(Scenario::read(&Source::Builtin(name.to_owned()), &[])?)
 }
 
 /// 0, 1/rate, 2/rate, ... up to a duration \[s\], for a rate \[Hz\] that divides it.
 pub(super) fn times(duration_s: f64, rate_hz: f64) -> Vec<f64> {
-    let mut times = Vec::new();
-    let mut k = 0.0;
-    while k / rate_hz <= duration_s {
-        times.push(k / rate_hz);
-        k += 1.0;
-    }
-    times
+    (0..u32::MAX).map(|k| f64::from(k) / rate_hz).take_while(|&time_s| time_s <= duration_s).collect()
 }
 
 /// The scenario in continuous time, with its states at these times \[s\].
-pub(super) fn continuous(scenario: &Scenario, times_s: &[f64]) -> Result<Solution, ValidateError> {
+pub(super) fn continuous(scenario: &Scenario, times_s: &[f64], tolerances: Tolerances) -> Result<Solution, Untried> {
     let mut law = scenario.law()?;
-    Ok(continuous::solve(scenario, law.as_mut(), times_s, Tolerances::default())?)
+    Ok(continuous::solve(scenario, law.as_mut(), times_s, tolerances)?)
+}
+
+/// Where the scenario is in continuous time after its duration.
+pub(super) fn end(scenario: &Scenario, tolerances: Tolerances) -> Result<Swarm, Untried> {
+    let last = continuous(scenario, &[scenario.time.duration_s], tolerances)?.states.pop();
+    Ok(last.unwrap_or_else(|| scenario.start.clone()))
+}
+
+/// The separation certified before the first step \[m\]; NaN where there is none.
+pub(super) fn certified_m(scenario: &Scenario) -> Result<f64, Untried> {
+    let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start));
+    Ok(certificate.certified_m.unwrap_or(f64::NAN))
+}
+
+/// The separation of a closest approach \[m\]; NaN where there is none.
+pub(super) fn separation_m(closest: Option<ClosestApproach>) -> f64 {
+    closest.map_or(f64::NAN, |closest| closest.separation_m)
+}
+
+/// The larger number; NaN where either is.
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// `v_i - mean v` \[m/s\].
+pub(super) fn relative_velocities(swarm: &Swarm) -> impl Iterator<Item = Vector3<f64>> + '_ {
+    let mean = mean_row(&swarm.velocities_m_s);
+    (0..swarm.count()).map(move |i| row(&swarm.velocities_m_s, i) - mean)
+}
+
+/// `sum |v_i - mean v|^2`
+pub(super) fn relative_speed_squared(swarm: &Swarm) -> f64 {
+    relative_velocities(swarm).map(|v| v.norm_squared()).sum()
 }
 
 /// The scenario in the physics engine, step by step, to its duration; `observe` sees every recorded sample.
-pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> Result<Flight, ValidateError> {
+pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> Result<Flight, Untried> {
     let flight = engine_to_any_end(scenario, scenario.law()?, observe)?;
     match flight.ending {
         Ending::Completed => Ok(flight),
-        ending => Err(ValidateError::EndedEarly { scenario: scenario.name.clone(), time_s: flight.duration_s, ending }),
+        ending => {
+            let (name, time_s) = (&scenario.name, flight.duration_s);
+            Err(format!("the flight of {name} ended early, at {time_s} s: {ending:?}").into())
+        }
     }
 }
 
@@ -48,7 +80,7 @@ pub(super) fn engine_to_any_end(
     scenario: &Scenario,
     law: Box<dyn Law>,
     observe: impl FnMut(&Sample<'_>),
-) -> Result<Flight, ValidateError> {
+) -> Result<Flight, Untried> {
     let go_on = &mut |_| ControlFlow::Continue(());
     Ok(sim::fly(scenario, Parts::under(scenario, law), &mut Watch(observe), go_on)?)
 }
@@ -103,6 +135,7 @@ mod tests {
         scenario.time.max_halvings = 0;
         scenario.start.velocities_m_s[(0, 0)] = 600.0;
         let error = engine(&scenario, |_| ()).expect_err("the law is undefined below delta");
-        assert!(matches!(error, ValidateError::EndedEarly { ending: Ending::LawUndefined(_), .. }), "{error}");
+        assert!(error.to_string().starts_with("the flight of pentagon ended early, at "), "{error}");
+        assert!(error.to_string().contains("LawUndefined("), "{error}");
     }
 }

@@ -1,6 +1,8 @@
 //! `validate.html`.
 
-use super::{Claim, Group, Kind, Rung, Validation};
+use super::claim::{Claim, Group, Kind};
+use super::convergence::Refinement;
+use super::result::Validation;
 use crate::report::page::{Badge, Block, Cell, Column, Page, Section, Table, Tone};
 
 /// What the claims rest on.
@@ -12,17 +14,19 @@ const ASSUMED: [&str; 3] = [
 ];
 
 impl Validation {
-    /// The result as a self-contained page: claims, figures and the ladder. Two validations by one program give the same
+    /// The result as a self-contained page: claims, figures and the convergence. Two validations by one program give the same
     /// bytes.
     #[must_use]
     pub fn to_html(&self) -> String {
         let failed = self.claims().filter(|claim| !claim.pass);
         let mut sections: Vec<Section> = self.groups.iter().map(section).collect();
-        let convergence = |name: &str| name == "convergence";
-        let (of_ladder, of_paper): (Vec<_>, Vec<_>) =
-            self.figures.iter().cloned().partition(|figure| convergence(&figure.name));
+        let (of_convergence, of_paper): (Vec<_>, Vec<_>) =
+            self.figures.iter().cloned().partition(|figure| figure.name == "convergence");
         sections.extend([
-            Section::new("Convergence ladder", vec![Block::Table(ladder(&self.ladder)), Block::Figures(of_ladder)]),
+            Section::new(
+                "Convergence ladder",
+                vec![Block::Table(convergence(&self.convergence)), Block::Figures(of_convergence)],
+            ),
             Section::new("The paper's figures", vec![Block::Figures(of_paper)]),
             Section::new("What was assumed", vec![Block::List(ASSUMED.map(str::to_owned).to_vec())]),
             Section::new("Repeat it", vec![Block::Command("tautline validate".to_owned())]),
@@ -65,26 +69,23 @@ fn row(claim: &Claim) -> Vec<Cell> {
         (true, Kind::PaperRefuted) => Tone::Neutral,
         (true, _) => Tone::Good,
     };
+    let Claim { id, source, expected, tolerance, reason, .. } = claim;
+    let finding = claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default();
+    let judged = format!("Expected: {expected}. Tolerance: {tolerance} ({reason}).");
     vec![
-        Cell::Noted(
-            claim.statement.to_owned(),
-            format!(
-                "{}{}; {}",
-                claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default(),
-                claim.id,
-                claim.source
-            ),
-        ),
-        Cell::Noted(
-            claim.measured.clone(),
-            format!("Expected: {}. Tolerance: {} ({}).", claim.expected, claim.tolerance, claim.reason),
-        ),
+        Cell::Noted(claim.statement.to_owned(), format!("{finding}{id}; {source}")),
+        Cell::Noted(claim.measured.clone(), judged),
         Cell::Badge(Badge { tone, word: claim.outcome().to_owned() }),
     ]
 }
 
-fn ladder(rungs: &[Rung]) -> Table {
+fn convergence(refinements: &[Refinement]) -> Table {
     let number = |x: f64| Cell::from(format!("{x:.2e}"));
+    let row = |&Refinement { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. }: &Refinement| {
+        let order = order.map_or("–".to_owned(), |order| format!("{order:.3}"));
+        let step = Cell::from(format!("1/{:.0}", 1.0 / dt_s));
+        vec![step, number(double_m), Cell::from(order), number(single_m), number(energy_excess_m2_s2)]
+    };
     Table {
         caption: "Largest position error of Rapier on the pentagon's flight, by step".to_owned(),
         columns: vec![
@@ -94,17 +95,6 @@ fn ladder(rungs: &[Rung]) -> Table {
             Column::numbers("Single precision [m]"),
             Column::numbers("Energy excess [m²/s²]"),
         ],
-        rows: rungs
-            .iter()
-            .map(|rung| {
-                vec![
-                    Cell::from(format!("1/{:.0}", 1.0 / rung.dt_s)),
-                    number(rung.double_m),
-                    Cell::from(rung.order.map_or("–".to_owned(), |order| format!("{order:.3}"))),
-                    number(rung.single_m),
-                    number(rung.energy_excess_m2_s2),
-                ]
-            })
-            .collect(),
+        rows: refinements.iter().map(row).collect(),
     }
 }

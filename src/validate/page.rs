@@ -1,6 +1,8 @@
 //! The result in words: a line a claim for the terminal, tables for `docs/validation.md`.
 
-use super::{Claim, Kind, Rung, Validation};
+use super::claim::{Claim, Kind};
+use super::convergence::Refinement;
+use super::result::Validation;
 
 impl Validation {
     /// The result in one line.
@@ -40,7 +42,7 @@ impl Validation {
                 page += &entry(claim);
             }
         }
-        page + "\n## Convergence ladder\n\n" + &self.ladder_table()
+        page + "\n## Convergence ladder\n\n" + &self.convergence_table()
     }
 
     fn errata(&self) -> String {
@@ -58,15 +60,17 @@ impl Validation {
         table
     }
 
-    fn ladder_table(&self) -> String {
+    fn convergence_table(&self) -> String {
         let head = "Largest position error on the pentagon's flight against continuous time, 10 looks a second for 10 \
                     seconds.\n\n| step [s] | double precision [m] | order | single precision [m] | energy excess \
                     [m^2/s^2] |\n| --- | --- | --- | --- | --- |\n";
-        let rows = self.ladder.iter().map(|Rung { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. }| {
-            let order = order.map_or("-".to_owned(), |order| format!("{order:.2}"));
-            let hz = 1.0 / dt_s;
-            format!("| 1/{hz:.0} | {double_m:.1e} | {order} | {single_m:.0e} | {energy_excess_m2_s2:.1e} |\n")
-        });
+        let rows = self.convergence.iter().map(
+            |Refinement { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. }| {
+                let order = order.map_or("-".to_owned(), |order| format!("{order:.2}"));
+                let hz = 1.0 / dt_s;
+                format!("| 1/{hz:.0} | {double_m:.1e} | {order} | {single_m:.0e} | {energy_excess_m2_s2:.1e} |\n")
+            },
+        );
         std::iter::once(head.to_owned()).chain(rows).collect()
     }
 }
@@ -77,50 +81,31 @@ fn capitalised(text: &str) -> String {
 }
 
 fn entry(claim: &Claim) -> String {
-    format!(
-        "\n### {}: `{}`\n\n{} ({})\n\n- expected: {}\n- measured: {}\n- tolerance: {} ({})\n",
-        capitalised(claim.outcome()),
-        claim.id,
-        claim.statement,
-        claim.source,
-        claim.expected,
-        claim.measured,
-        claim.tolerance,
-        claim.reason
-    )
+    let Claim { id, statement, source, expected, measured, tolerance, reason, .. } = claim;
+    let head = format!("\n### {}: `{id}`\n\n{statement} ({source})\n\n", capitalised(claim.outcome()));
+    head + &format!("- expected: {expected}\n- measured: {measured}\n- tolerance: {tolerance} ({reason})\n")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Group, Performance, Tool, Values};
+    use super::super::claim::Group;
     use super::*;
 
     fn claim(id: &'static str, kind: Kind, pass: bool) -> Claim {
-        Claim {
-            id,
-            source: "equation (0)",
-            finding: (kind == Kind::PaperRefuted).then_some("F9"),
-            kind,
-            statement: "Nothing moves.",
-            expected: "no motion".to_owned(),
-            measured: "none".to_owned(),
-            values: Values::from([("speed_m_s", 0.0), ("unknown", f64::NAN)]),
-            tolerance: "0".to_owned(),
-            reason: "exact",
-            pass,
-        }
+        let claim = Claim::new(kind, id, "equation (0)")
+            .statement("Nothing moves.")
+            .expected("no motion")
+            .measured("none")
+            .values([("speed_m_s", 0.0), ("unknown", f64::NAN)])
+            .tolerance("0")
+            .reason("exact")
+            .pass(pass);
+        if kind == Kind::PaperRefuted { claim.finding("F9") } else { claim }
     }
 
     fn validation(claims: Vec<Claim>) -> Validation {
-        Validation {
-            schema_version: 1,
-            tool: Tool { name: "tautline", version: "0" },
-            pass: claims.iter().all(|claim| claim.pass),
-            groups: vec![Group { id: "still", title: "Stillness", claims }],
-            ladder: Vec::new(),
-            figures: Vec::new(),
-            performance: Performance { wall_s: 1.0 },
-        }
+        let groups = vec![Group { id: "still", title: "Stillness", claims }];
+        Validation::new(groups, Vec::new(), Vec::new(), 1.0)
     }
 
     #[test]

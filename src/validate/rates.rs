@@ -1,17 +1,16 @@
 //! Rates of growth and decay near the formation: F4, F5 and the star.
 
 use nalgebra::{DMatrix, Vector3};
-use rayon::prelude::*;
 
 use super::claim::{Claim, Kind};
-use super::flights::{engine, engine_to_any_end, with_step};
-use super::{Progress, ValidateError};
-use crate::continuous::{self, Tolerances};
+use super::flights::{continuous, end, engine, engine_to_any_end, separation_m, with_step};
+use super::interface::{Judged, Progress, Untried, try_each};
+use crate::continuous::Tolerances;
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
 use crate::scenario::{Precision, Scenario, Space};
 use crate::sim::Ending;
-use crate::swarm::{Rows, Swarm, set_row};
+use crate::swarm::{Rows, Swarm, mean_row, set_row};
 use crate::text::bound;
 
 const A22_PER_S: f64 = 0.1;
@@ -52,10 +51,10 @@ const STAR_TOLERANCE_PER_S: f64 = 1e-6;
 /// Far below the speeds of the star.
 const FINE: Tolerances = Tolerances { relative: 1e-12, absolute: 1e-18 };
 
-pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
-    let parts: [fn() -> Result<Claim, ValidateError>; 5] =
+pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+    let parts: [fn() -> Result<Claim, Untried>; 5] =
         [bent_hexagon, common_mode, common_mode_in_the_engine, lost_to_rounding, stars];
-    parts.par_iter().map(|part| part().inspect(|_| progress.advance(1))).collect()
+    try_each(&parts, progress, |part| part())
 }
 
 fn hexagon() -> Formation {
@@ -64,7 +63,7 @@ fn hexagon() -> Formation {
 
 /// How far a swarm is from its best plane, root sum of squares \[m\].
 fn bend_m(positions_m: &Rows) -> f64 {
-    let centre = crate::swarm::mean_row(positions_m);
+    let centre = mean_row(positions_m);
     let centred = DMatrix::from_fn(positions_m.nrows(), 3, |i, axis| positions_m[(i, axis)] - centre[axis]);
     centred.singular_values().iter().copied().fold(f64::INFINITY, f64::min)
 }
@@ -79,29 +78,24 @@ fn bent() -> Scenario {
     Scenario::new("bent", start, hexagon(), DELTA_M, LOST_S)
 }
 
-fn bent_hexagon() -> Result<Claim, ValidateError> {
+fn bent_hexagon() -> Result<Claim, Untried> {
     let scenario = bent();
-    let mut law = scenario.law()?;
-    let solution = continuous::solve(&scenario, law.as_mut(), &BEND_TIMES_S, Tolerances::default())?;
+    let solution = continuous(&scenario, &BEND_TIMES_S, Tolerances::default())?;
     let at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
     let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
-    Ok(Claim {
-        id: "bent-hexagon",
-        source: "the convergence theorem",
-        finding: Some("F4"),
-        kind: Kind::PaperRefuted,
-        statement: "The law converges to the formation exponentially, in space as in the plane.",
-        expected: "a flat formation in space is reached as t^(-1/2): nothing resists a bend to first order".to_owned(),
-        measured: format!(
+    Ok(Claim::new(Kind::PaperRefuted, "bent-hexagon", "the convergence theorem")
+        .finding("F4")
+        .statement("The law converges to the formation exponentially, in space as in the plane.")
+        .expected("a flat formation in space is reached as t^(-1/2): nothing resists a bend to first order")
+        .measured(format!(
             "a hexagon bent by {BEND_M} m still is by {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s and \
              {at_10000_m:.3} m after 10000 s; exponent {exponent:.2} between 10000 s and 30000 s"
-        ),
-        values: [("after_100_s_m", at_100_m), ("after_300_s_m", at_300_m), ("exponent", exponent)].into(),
-        tolerance: format!("{EXPONENT_TOLERANCE} in the exponent"),
-        reason: "the power law is the limit for late times",
-        pass: (exponent + 0.5).abs() <= EXPONENT_TOLERANCE,
-    })
+        ))
+        .values([("after_100_s_m", at_100_m), ("after_300_s_m", at_300_m), ("exponent", exponent)])
+        .tolerance(format!("{EXPONENT_TOLERANCE} in the exponent"))
+        .reason("the power law is the limit for late times")
+        .pass((exponent + 0.5).abs() <= EXPONENT_TOLERANCE))
 }
 
 /// The hexagon in formation, moving as a whole.
@@ -115,54 +109,35 @@ fn drifting() -> Scenario {
     scenario
 }
 
-fn rate_per_s(last: &Swarm, duration_s: f64) -> f64 {
-    (last.mean_velocity_m_s().norm() / COMMON_M_S).ln() / duration_s
-}
-
-fn common_rate(id: &'static str, kind: Kind, statement: &'static str, rate_per_s: f64) -> Claim {
+fn common_rate(kind: Kind, id: &'static str, last: &Swarm, duration_s: f64) -> Claim {
+    let rate_per_s = (last.mean_velocity_m_s().norm() / COMMON_M_S).ln() / duration_s;
     let error_per_s = rate_per_s - A22_PER_S;
-    Claim {
-        id,
-        source: "the stability theorem",
-        finding: Some("F5"),
-        kind,
-        statement,
-        expected: format!("the common velocity grows at a22 = {A22_PER_S} 1/s"),
-        measured: format!(
+    Claim::new(kind, id, "the stability theorem")
+        .finding("F5")
+        .expected(format!("the common velocity grows at a22 = {A22_PER_S} 1/s"))
+        .measured(format!(
             "{rate_per_s:.6} 1/s over {COMMON_S} s, error {} 1/s",
             bound(error_per_s, COMMON_TOLERANCE_PER_S)
-        ),
-        values: [("rate_per_s", rate_per_s)].into(),
-        tolerance: format!("{COMMON_TOLERANCE_PER_S:e} 1/s"),
-        reason: "the solver's tolerance, or the rounding of the steps, over 100 s",
-        pass: error_per_s.abs() <= COMMON_TOLERANCE_PER_S,
-    }
+        ))
+        .values([("rate_per_s", rate_per_s)])
+        .tolerance(format!("{COMMON_TOLERANCE_PER_S:e} 1/s"))
+        .reason("the solver's tolerance, or the rounding of the steps, over 100 s")
+        .pass(error_per_s.abs() <= COMMON_TOLERANCE_PER_S)
 }
 
-fn common_mode() -> Result<Claim, ValidateError> {
-    let scenario = drifting();
-    let mut law = scenario.law()?;
-    let solution = continuous::solve(&scenario, law.as_mut(), &[COMMON_S], Tolerances::default())?;
-    let last = solution.states.last().unwrap_or(&scenario.start);
-    Ok(common_rate(
-        "common-mode",
-        Kind::PaperRefuted,
-        "The formation is asymptotically stable for a22 > 0.",
-        rate_per_s(last, COMMON_S),
-    ))
+fn common_mode() -> Result<Claim, Untried> {
+    let last = end(&drifting(), Tolerances::default())?;
+    Ok(common_rate(Kind::PaperRefuted, "common-mode", &last, COMMON_S)
+        .statement("The formation is asymptotically stable for a22 > 0."))
 }
 
-fn common_mode_in_the_engine() -> Result<Claim, ValidateError> {
+fn common_mode_in_the_engine() -> Result<Claim, Untried> {
     let flight = engine(&with_step(&drifting(), Precision::Double, ENGINE_STEP_S), |_| ())?;
-    Ok(common_rate(
-        "common-mode-in-the-engine",
-        Kind::Ours,
-        "In Rapier as in continuous time the common velocity grows at a22, which the law cannot touch.",
-        rate_per_s(&flight.last, flight.duration_s),
-    ))
+    Ok(common_rate(Kind::Ours, "common-mode-in-the-engine", &flight.last, flight.duration_s)
+        .statement("In Rapier as in continuous time the common velocity grows at a22, which the law cannot touch."))
 }
 
-fn lost_to_rounding() -> Result<Claim, ValidateError> {
+fn lost_to_rounding() -> Result<Claim, Untried> {
     let mut scenario = drifting();
     scenario.start.velocities_m_s.fill(0.0);
     scenario.time.duration_s = LOST_S;
@@ -177,42 +152,39 @@ fn lost_to_rounding() -> Result<Claim, ValidateError> {
         }
     })?;
     let common_m_s = flight.last.mean_velocity_m_s().norm();
-    let min_m = flight.audit.closest.map_or(f64::NAN, |closest| closest.separation_m);
-    let end = match flight.ending {
+    let min_m = separation_m(flight.audit.closest);
+    let ending = match flight.ending {
         Ending::Completed => "flown to its end",
         Ending::Interrupted => "interrupted",
         Ending::LawUndefined(_) => "ended by a collision",
         Ending::BrokeDown(_) => "ended by numbers that ran out",
     };
     let lost = if lost_at_s.is_nan() { "never lost".to_owned() } else { format!("lost after {lost_at_s:.0} s") };
-    Ok(Claim {
-        id: "lost-to-rounding",
-        source: "the stability theorem",
-        finding: Some("F5"),
-        kind: Kind::Ours,
-        statement: "With a22 > 0 rounding alone destroys a formation at rest: the common velocity grows until positions \
+    Ok(Claim::new(Kind::Ours, "lost-to-rounding", "the stability theorem")
+        .finding("F5")
+        .statement(
+            "With a22 > 0 rounding alone destroys a formation at rest: the common velocity grows until positions \
                     have no digits left for their differences.",
-        expected: format!("the hexagon lost before {LOST_S} s with a22 = {A22_PER_S} 1/s"),
-        measured: format!(
-            "the hexagon, at rest in formation, is {lost} in double precision; the flight is {end} at \
+        )
+        .expected(format!("the hexagon lost before {LOST_S} s with a22 = {A22_PER_S} 1/s"))
+        .measured(format!(
+            "the hexagon, at rest in formation, is {lost} in double precision; the flight is {ending} at \
              {:.0} s with a common speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
             flight.duration_s
-        ),
-        values: [
+        ))
+        .values([
             ("lost_at_s", lost_at_s),
             ("end_s", flight.duration_s),
             ("final_common_m_s", common_m_s),
             ("min_m", min_m),
-        ]
-        .into(),
-        tolerance: format!("lost: a largest edge error above {LOST_M} m"),
-        reason: "e^120 is 1e52, rounding starts near 1e-17 m/s",
-        pass: lost_at_s < LOST_S && common_m_s > RUNAWAY_M_S,
-    })
+        ])
+        .tolerance(format!("lost: a largest edge error above {LOST_M} m"))
+        .reason("e^120 is 1e52, rounding starts near 1e-17 m/s")
+        .pass(lost_at_s < LOST_S && common_m_s > RUNAWAY_M_S))
 }
 
 /// Growth rate of the relative velocities of a star of so many vehicles in formation \[1/s\].
-fn star_rate_per_s(count: usize) -> Result<f64, ValidateError> {
+fn star_rate_per_s(count: usize) -> Result<f64, Untried> {
     let mut slots_m = Rows::zeros(count);
     let rim = Formation::circle(count - 1, STAR_RADIUS_M);
     slots_m.rows_mut(1, count - 1).copy_from(&rim.slots_m);
@@ -224,35 +196,25 @@ fn star_rate_per_s(count: usize) -> Result<f64, ValidateError> {
     scenario.space = Space::Volume;
     scenario.graph = Graph::star(count);
     scenario.a22_per_s = A22_PER_S;
-    let mut law = scenario.law()?;
-    let solution = continuous::solve(&scenario, law.as_mut(), &[STAR_S], FINE)?;
-    let last = solution.states.last().unwrap_or(&scenario.start);
-    Ok((last.disagreement_m_s() / scenario.start.disagreement_m_s()).ln() / STAR_S)
+    Ok((end(&scenario, FINE)?.disagreement_m_s() / scenario.start.disagreement_m_s()).ln() / STAR_S)
 }
 
-fn stars() -> Result<Claim, ValidateError> {
+fn stars() -> Result<Claim, Untried> {
     let expected = STARS.map(|count| A22_PER_S - (1.0 + A22_PER_S) / count as f64);
-    let rates = STARS.par_iter().map(|&count| star_rate_per_s(count)).collect::<Result<Vec<_>, _>>()?;
+    let rates = try_each(&STARS, &|_| (), |&count| star_rate_per_s(count))?;
     let error_per_s = rates.iter().zip(expected).map(|(rate, expected)| (rate - expected).abs()).fold(0.0, f64::max);
     let list = |rates: &[f64]| {
         let entries = STARS.iter().zip(rates).map(|(count, rate)| format!("N = {count}: {:+.6} 1/s", rate + 0.0));
         entries.collect::<Vec<_>>().join(", ")
     };
-    Ok(Claim {
-        id: "star",
-        source: "general graphs, a22 < (1 + a22) lambda2/N",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "Relative velocities on a star grow at a22 - (1 + a22)/N: damped for 10 vehicles, not for 12.",
-        expected: list(&expected),
-        measured: format!("{}; largest error {} 1/s", list(&rounded(&rates)), bound(error_per_s, STAR_TOLERANCE_PER_S)),
-        values: super::Values(
-            ["rate_10_per_s", "rate_11_per_s", "rate_12_per_s"].into_iter().zip(rates.iter().copied()).collect(),
-        ),
-        tolerance: format!("{STAR_TOLERANCE_PER_S:e} 1/s"),
-        reason: "edges that bend by 1e-4 m pull back with 1e-6 of the speed",
-        pass: error_per_s <= STAR_TOLERANCE_PER_S,
-    })
+    Ok(Claim::new(Kind::Ours, "star", "general graphs, a22 < (1 + a22) lambda2/N")
+        .statement("Relative velocities on a star grow at a22 - (1 + a22)/N: damped for 10 vehicles, not for 12.")
+        .expected(list(&expected))
+        .measured(format!("{}; largest error {} 1/s", list(&rounded(&rates)), bound(error_per_s, STAR_TOLERANCE_PER_S)))
+        .values(["rate_10_per_s", "rate_11_per_s", "rate_12_per_s"].into_iter().zip(rates.iter().copied()))
+        .tolerance(format!("{STAR_TOLERANCE_PER_S:e} 1/s"))
+        .reason("edges that bend by 1e-4 m pull back with 1e-6 of the speed")
+        .pass(error_per_s <= STAR_TOLERANCE_PER_S))
 }
 
 /// To what is printed, so that a rate of rounding size has no sign.

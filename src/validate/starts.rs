@@ -1,12 +1,14 @@
 //! Random swarms and shapes, the same on every machine.
 
-use super::ValidateError;
+use super::interface::Untried;
 use crate::formation::Formation;
-use crate::scenario::{Space, offset, random, scatter};
-use crate::swarm::{Rows, Swarm, set_row};
+use crate::scenario::{Scenario, Space, offset, random, scatter};
+use crate::swarm::{Swarm, set_row};
 
 /// Fewest and most vehicles of a random start.
 pub(super) const COUNTS: std::ops::RangeInclusive<usize> = 3..=8;
+/// Safety distance \[m\].
+pub(super) const DELTA_M: f64 = 1.0;
 /// Smallest separation of start positions and of slots over delta: starts may be tight.
 const START_SPACING: f64 = 1.05;
 const SLOT_SPACING: f64 = 1.2;
@@ -16,16 +18,9 @@ const SLOT_EXTENT: f64 = 3.0;
 /// Largest velocity component \[m/s\] of a moving start.
 const SPEED_M_S: f64 = 0.5;
 
-/// A random swarm with the random shape that it is to form.
-#[derive(Clone, Debug)]
-pub(super) struct RandomStart {
-    pub(super) swarm: Swarm,
-    pub(super) formation: Formation,
-    pub(super) space: Space,
-}
-
-/// So many starts: the numbers of vehicles take turns, so do plane and space, and every other start moves.
-pub(super) fn random_starts(seed: u64, count: usize, delta_m: f64) -> Result<Vec<RandomStart>, ValidateError> {
+/// So many flights of a random swarm to a random shape: the numbers of vehicles take turns, so do plane and space, and
+/// every other start moves.
+pub(super) fn random_starts(seed: u64, count: usize, duration_s: f64) -> Result<Vec<Scenario>, Untried> {
     let sizes: Vec<usize> = COUNTS.collect();
     (0..count)
         .map(|trial| {
@@ -35,21 +30,15 @@ pub(super) fn random_starts(seed: u64, count: usize, delta_m: f64) -> Result<Vec
             let mut random = random(seed);
             random.set_stream(trial as u64);
             let mut points =
-                |extent: f64, spacing: f64| scatter(vehicles, space, extent * delta_m, spacing * delta_m, &mut random);
+                |extent: f64, spacing: f64| scatter(vehicles, space, extent * DELTA_M, spacing * DELTA_M, &mut random);
             let formation = Formation::points(points(SLOT_EXTENT, SLOT_SPACING)?);
             let mut swarm = Swarm::at_rest(points(START_EXTENT, START_SPACING)?);
             if (round / 2).is_multiple_of(2) {
-                swarm.velocities_m_s = velocities(vehicles, |_| offset(SPEED_M_S, space, &mut random));
+                for i in 0..vehicles {
+                    set_row(&mut swarm.velocities_m_s, i, offset(SPEED_M_S, space, &mut random));
+                }
             }
-            Ok(RandomStart { swarm, formation, space })
+            Ok(Scenario { space, ..Scenario::new("start", swarm, formation, DELTA_M, duration_s) })
         })
         .collect()
-}
-
-fn velocities(count: usize, mut of: impl FnMut(usize) -> nalgebra::Vector3<f64>) -> Rows {
-    let mut rows = Rows::zeros(count);
-    for i in 0..count {
-        set_row(&mut rows, i, of(i));
-    }
-    rows
 }

@@ -1,8 +1,8 @@
 //! The edge tension (5), (6): its minimum and its derivatives.
 
 use super::claim::{Claim, Kind};
-use super::{Progress, ValidateError};
-use crate::law::{EdgeTension, TensionError};
+use super::interface::{Judged, Progress, Untried};
+use crate::law::EdgeTension;
 use crate::text::bound;
 
 /// Figure 1 plots the tension for alpha = K = 1 and delta = 0.5 m, and prints the constant of delta = 1 m.
@@ -20,71 +20,62 @@ const STEP: f64 = 1.0 / 1024.0;
 /// A difference of fourth order with this step is off by 4 STEP^4 = 4e-12 for truncation and by 1.5 eps/STEP = 3e-13 for
 /// rounding, relative to the terms that it subtracts; six times that.
 const DIFFERENCE_TOLERANCE: f64 = 3e-11;
+const DIFFERENCE: &str = "truncation and rounding of a fourth-order difference with a step of 1/1024 of the clearance";
 /// A few roundings of numbers of order 1.
 const ROUNDING: f64 = 1e-14;
 
-pub(super) fn judge(progress: &Progress<'_>) -> Result<Vec<Claim>, ValidateError> {
+pub(super) fn judge(progress: &Progress<'_>) -> Judged {
     let claims = vec![minimum()?, figure_1()?, slope()?, curvature()?];
-    progress.advance(1);
+    progress(1);
     Ok(claims)
 }
 
 /// The tension of these lengths for alpha = 1.
-fn unit_tension(delta_m: f64, k_m: f64) -> Result<EdgeTension, ValidateError> {
-    let tension = EdgeTension::new(1.0, delta_m, delta_m + k_m * 1.0_f64.asinh());
-    tension.map_err(|error: TensionError| ValidateError::Tension(error))
+fn unit_tension(delta_m: f64, k_m: f64) -> Result<EdgeTension, Untried> {
+    Ok(EdgeTension::new(1.0, delta_m, delta_m + k_m * 1.0_f64.asinh())?)
 }
 
 /// The tension that Figure 1 plots.
-pub(super) fn of_figure_1() -> Result<EdgeTension, ValidateError> {
+pub(super) fn of_figure_1() -> Result<EdgeTension, Untried> {
     unit_tension(FIGURE_1_DELTA_M, FIGURE_1_K_M)
 }
 
-fn minimum() -> Result<Claim, ValidateError> {
+fn minimum() -> Result<Claim, Untried> {
     let tension = unit_tension(2.0, 1.0 / 1.0_f64.asinh())?;
     let rest_m = tension.rest_m();
     // V' changes sign between the neighbours of d in double precision.
     let bracketed = tension.derivative(rest_m.next_down()) <= 0.0 && tension.derivative(rest_m.next_up()) >= 0.0;
     let literal = 1.0 / (1.0_f64.asinh()).tanh() + rest_m / tension.k_m() - tension.minimum();
     let (value, slope) = (tension.value(rest_m), tension.derivative(rest_m));
-    Ok(Claim {
-        id: "tension-minimum",
-        source: "equations (5), (6)",
-        finding: None,
-        kind: Kind::PaperHolds,
-        statement: "The tension has its only minimum, 0, at the desired distance d = delta + K ln(3 + 2 sqrt 2)/2.",
-        expected: "V(d) = V'(d) = 0, and V' changes sign at d".to_owned(),
-        measured: format!(
+    Ok(Claim::new(Kind::PaperHolds, "tension-minimum", "equations (5), (6)")
+        .statement("The tension has its only minimum, 0, at the desired distance d = delta + K ln(3 + 2 sqrt 2)/2.")
+        .expected("V(d) = V'(d) = 0, and V' changes sign at d")
+        .measured(format!(
             "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) evaluated literally {}; V' {}",
             bound(value, ROUNDING),
             bound(slope, ROUNDING),
             bound(literal, ROUNDING),
             if bracketed { "changes sign" } else { "does not change sign" }
-        ),
-        values: [("value_m2_s2", value), ("slope_m_s2", slope), ("literal_m2_s2", literal)].into(),
-        tolerance: format!("{ROUNDING:e} m^2/s^2"),
-        reason: "a few roundings of numbers of order 1",
-        pass: bracketed && [value, slope, literal].iter().all(|x| x.abs() <= ROUNDING),
-    })
+        ))
+        .values([("value_m2_s2", value), ("slope_m_s2", slope), ("literal_m2_s2", literal)])
+        .tolerance(format!("{ROUNDING:e} m^2/s^2"))
+        .reason("a few roundings of numbers of order 1")
+        .pass(bracketed && [value, slope, literal].iter().all(|x| x.abs() <= ROUNDING)))
 }
 
-fn figure_1() -> Result<Claim, ValidateError> {
+fn figure_1() -> Result<Claim, Untried> {
     let of_caption = of_figure_1()?.minimum();
     let of_other = unit_tension(PRINTED_FOR_DELTA_M, FIGURE_1_K_M)?.minimum();
     let is_of_other = (of_other - FIGURE_1_PRINTED).abs() <= PRINTED_RESOLUTION;
-    Ok(Claim {
-        id: "figure-1-caption",
-        source: "Fig. 1, equation (5)",
-        finding: Some("F1"),
-        kind: Kind::PaperRefuted,
-        statement: "With delta = 0.5, alpha = K = 1 the constant Vmin is 3.2956.",
-        expected: "another number; 3.2956 is the constant of delta = 1".to_owned(),
-        measured: format!("Vmin = {of_caption:.9} for delta = 0.5 and {of_other:.9} for delta = 1"),
-        values: [("minimum_delta_0_5_m2_s2", of_caption), ("minimum_delta_1_m2_s2", of_other)].into(),
-        tolerance: format!("{PRINTED_RESOLUTION:e}"),
-        reason: "half a unit of the last printed digit",
-        pass: is_of_other && (of_caption - FIGURE_1_PRINTED).abs() > PRINTED_RESOLUTION,
-    })
+    Ok(Claim::new(Kind::PaperRefuted, "figure-1-caption", "Fig. 1, equation (5)")
+        .finding("F1")
+        .statement("With delta = 0.5, alpha = K = 1 the constant Vmin is 3.2956.")
+        .expected("another number; 3.2956 is the constant of delta = 1")
+        .measured(format!("Vmin = {of_caption:.9} for delta = 0.5 and {of_other:.9} for delta = 1"))
+        .values([("minimum_delta_0_5_m2_s2", of_caption), ("minimum_delta_1_m2_s2", of_other)])
+        .tolerance(format!("{PRINTED_RESOLUTION:e}"))
+        .reason("half a unit of the last printed digit")
+        .pass(is_of_other && (of_caption - FIGURE_1_PRINTED).abs() > PRINTED_RESOLUTION))
 }
 
 /// The derivative at `x` of `f` by the difference of fourth order over x - 2h .. x + 2h.
@@ -114,7 +105,7 @@ fn decades() -> f64 {
     f64::from(CLEARANCE_EXPONENTS.end() - CLEARANCE_EXPONENTS.start()) * std::f64::consts::LOG10_2
 }
 
-fn slope() -> Result<Claim, ValidateError> {
+fn slope() -> Result<Claim, Untried> {
     let tension = unit_tension(2.0, 1.0)?;
     let (alpha, k_m) = (tension.alpha(), tension.k_m());
     // Where V' changes sign its two terms are the scale: (alpha/K) (1 + csch^2 s) = 2 alpha/K - V'.
@@ -124,22 +115,15 @@ fn slope() -> Result<Claim, ValidateError> {
         |l| tension.derivative(l),
         |l, _| (2.0 * alpha / k_m - tension.derivative(l)).abs(),
     );
-    Ok(Claim {
-        id: "tension-slope",
-        source: "equation (6)",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "V'(l) = (alpha/K) [1 - csch^2 s] is the derivative of V, from the barrier to far away.",
-        expected: "equal to differences of V".to_owned(),
-        measured: format!("largest relative error {error:.0e} over {:.0} decades of clearance", decades()),
-        values: [("largest_relative_error", error)].into(),
-        tolerance: format!("{DIFFERENCE_TOLERANCE:e}"),
-        reason: "truncation and rounding of a fourth-order difference with a step of 1/1024 of the clearance",
-        pass: error <= DIFFERENCE_TOLERANCE,
-    })
+    Ok(Claim::new(Kind::Ours, "tension-slope", "equation (6)")
+        .statement("V'(l) = (alpha/K) [1 - csch^2 s] is the derivative of V, from the barrier to far away.")
+        .expected("equal to differences of V")
+        .measured(format!("largest relative error {error:.0e} over {:.0} decades of clearance", decades()))
+        .at_most("largest_relative_error", error, DIFFERENCE_TOLERANCE)
+        .reason(DIFFERENCE))
 }
 
-fn curvature() -> Result<Claim, ValidateError> {
+fn curvature() -> Result<Claim, Untried> {
     let tension = unit_tension(2.0, 1.0)?;
     // Far out V'' vanishes beside the change of V' that rounding alone makes.
     let error = largest_difference(
@@ -153,21 +137,16 @@ fn curvature() -> Result<Claim, ValidateError> {
         // Beyond some 350 K it is smaller than any double.
         curvature > 0.0 || (curvature == 0.0 && e > 8)
     });
-    Ok(Claim {
-        id: "tension-curvature",
-        source: "equation (6)",
-        finding: None,
-        kind: Kind::Ours,
-        statement: "V''(l) = (2 alpha/K^2) coth(s) csch^2(s) is the derivative of V' and never negative: V is convex.",
-        expected: "equal to differences of V'".to_owned(),
-        measured: format!(
+    Ok(Claim::new(Kind::Ours, "tension-curvature", "equation (6)")
+        .statement("V''(l) = (2 alpha/K^2) coth(s) csch^2(s) is the derivative of V' and never negative: V is convex.")
+        .expected("equal to differences of V'")
+        .measured(format!(
             "largest relative error {error:.0e} over {:.0} decades of clearance; {}",
             decades(),
             if positive { "never negative" } else { "negative somewhere" }
-        ),
-        values: [("largest_relative_error", error)].into(),
-        tolerance: format!("{DIFFERENCE_TOLERANCE:e}"),
-        reason: "truncation and rounding of a fourth-order difference with a step of 1/1024 of the clearance",
-        pass: positive && error <= DIFFERENCE_TOLERANCE,
-    })
+        ))
+        .values([("largest_relative_error", error)])
+        .tolerance(format!("{DIFFERENCE_TOLERANCE:e}"))
+        .reason(DIFFERENCE)
+        .pass(positive && error <= DIFFERENCE_TOLERANCE))
 }

@@ -1,26 +1,22 @@
 //! The ideal plant solves p'' = a22 v + u: reference flights, free motion, energy, and the edge of the law.
 
 use std::ops::ControlFlow;
+use std::sync::LazyLock;
 
 use nalgebra::Vector3;
 use tautline::audit::Auditor;
 use tautline::continuous::{self, IdealError, Solution, Tolerances};
-use tautline::formation::{Formation, largest_edge_error_m};
+use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, Law, LawError};
 use tautline::observation::Observation;
 use tautline::scenario::{Override, PlantSpec, Scenario, Source};
 use tautline::sim::{self, Breakdown, Ending, Parts};
 use tautline::swarm::{Pair, Rows, Swarm, row, set_row};
+use tautline::validate::{self, Claim, Group};
 
 /// The reference values are printed with 7 digits after the point.
 const PRINTED_M: f64 = 1e-7;
-/// The reference minima are printed with 6 digits after the point.
-const PRINTED_MINIMUM_M: f64 = 1e-6;
-/// Reference times of closest approach are printed with 3 digits (2 for the circle) after the point.
-const PRINTED_TIME_S: f64 = 6e-3;
-/// Energies are printed with 8 digits after the point.
-const PRINTED_ENERGY: f64 = 1e-8;
 /// Rounding of an energy of a few m^2/s^2 and the solver's error in it.
 const ENERGY_ROUNDING: f64 = 1e-9;
 /// Solver error of a flight of tens of seconds at 1e-12 a step, amplified by a22 > 0 where it is.
@@ -34,10 +30,6 @@ fn scenario(name: &str, sets: &[&str]) -> Scenario {
 fn solve(scenario: &Scenario, times_s: &[f64]) -> Solution {
     let mut law = scenario.law().expect("a law");
     continuous::solve(scenario, law.as_mut(), times_s, Tolerances::default()).expect("a solution")
-}
-
-fn edge_error_m(scenario: &Scenario, swarm: &Swarm) -> f64 {
-    largest_edge_error_m(&swarm.positions_m, scenario.formation(), &scenario.graph)
 }
 
 /// A law that commands nothing.
@@ -74,21 +66,33 @@ fn solve_under(
     continuous::solve(&from(start.clone(), a22_per_s), law, times_s, tolerances)
 }
 
+/// A claim about the paper's figures, which are flown once.
+fn claim(id: &str) -> &'static Claim {
+    static FIGURES: LazyLock<Group> = LazyLock::new(|| validate::judge("figures").expect("a group of claims"));
+    FIGURES.claims.iter().find(|claim| claim.id == id).unwrap_or_else(|| panic!("{id} in {FIGURES:?}"))
+}
+
+fn assert_holds(id: &str) {
+    assert!(claim(id).pass, "{:?}", claim(id));
+}
+
+/// Formed as well as doubles can hold it.
+fn assert_formed(id: &str) {
+    assert_holds(id);
+    assert!(claim(id).value("final_edge_error_m").is_some_and(|error_m| error_m < SOLVED_M), "{:?}", claim(id));
+}
+
 #[test]
 fn the_pentagon_flies_as_the_reference_says() {
-    let pentagon = scenario("pentagon", &[]);
-    let solution = solve(&pentagon, &[10.0, 120.0]);
-    let reference = Vector3::new(4.318_055_1, -1.043_487_6, 0.0);
-    let found = row(&solution.states[0].positions_m, 0);
-    assert!((found - reference).amax() < PRINTED_M, "{found}");
-    let closest = solution.closest.expect("a closest approach");
-    assert!((closest.separation_m - 2.460_353).abs() < PRINTED_MINIMUM_M, "{closest:?}");
-    assert!((closest.time_s - 2.151).abs() < PRINTED_TIME_S, "{closest:?}");
-    assert!([Pair::new(0, 2), Pair::new(1, 2)].contains(&closest.pair), "{closest:?}");
-    let error_m = edge_error_m(&pentagon, &solution.states[1]);
-    assert!(error_m < 1e-11, "{error_m}");
-    let energy = pentagon.law().expect("a law").energy(&pentagon.observation(&pentagon.start)).expect("an energy");
-    assert!((energy - 3.656_742_96).abs() < PRINTED_ENERGY, "{energy}");
+    assert_formed("figure-2");
+    assert_holds("figure-2-reference");
+}
+
+#[test]
+fn the_closest_pairs_are_those_of_the_reference() {
+    let closest_pair = |name: &str| solve(&scenario(name, &[]), &[10.0]).closest.expect("a closest approach").pair;
+    assert!([Pair::new(0, 2), Pair::new(1, 2)].contains(&closest_pair("pentagon")), "mirror images");
+    assert_eq!(closest_pair("circle"), Pair::new(2, 3));
 }
 
 #[test]
@@ -101,34 +105,18 @@ fn a_wrong_sign_of_a22_does_not_fly_as_the_reference_says() {
 
 #[test]
 fn the_circle_flies_as_the_reference_says() {
-    let circle = scenario("circle", &[]);
-    let solution = solve(&circle, &[44.2, 44.3, 120.0]);
-    let closest = solution.closest.expect("a closest approach");
-    assert!((closest.separation_m - 1.238_135).abs() < PRINTED_MINIMUM_M, "{closest:?}");
-    assert!((closest.time_s - 4.18).abs() < PRINTED_TIME_S, "{closest:?}");
-    assert_eq!(closest.pair, Pair::new(2, 3));
-    let energy = circle.law().expect("a law").energy(&circle.observation(&circle.start)).expect("an energy");
-    assert!((energy - 4.479_772_16).abs() < PRINTED_ENERGY, "{energy}");
-    let errors = solution.states.iter().map(|state| edge_error_m(&circle, state)).collect::<Vec<_>>();
-    assert!(errors[0] > 1e-2 && errors[1] < 1e-2 && errors[2] < 1e-11, "{errors:?}");
+    assert_formed("figure-3");
+    assert_holds("figure-3-reference");
 }
 
 #[test]
 fn the_baseline_collides_as_the_reference_says() {
-    let solution = solve(&scenario("pentagon-laplacian", &[]), &[20.0]);
-    let closest = solution.closest.expect("a closest approach");
-    assert!((closest.separation_m - 1.5327).abs() < 1e-4 && (closest.time_s - 3.63).abs() < PRINTED_TIME_S);
+    assert_holds("figure-4");
 }
 
 #[test]
 fn a_straight_line_is_never_left_and_its_minimum_is_the_known_one() {
-    let line = scenario("pentagon-collinear", &[]);
-    let solution = solve(&line, &[120.0]);
-    let last = &solution.states[0];
-    assert_eq!(last.positions_m.column(1).amax(), 0.0);
-    let closest = solution.closest.expect("a closest approach");
-    assert!((closest.separation_m - 2.458_145).abs() < PRINTED_MINIMUM_M, "{closest:?}");
-    assert!((edge_error_m(&line, last) - 8.57).abs() < 1e-2);
+    assert_holds("straight-line");
 }
 
 #[test]

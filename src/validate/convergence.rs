@@ -1,0 +1,253 @@
+//! The physics engine against continuous time, step by half step.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::claim::{Claim, Kind};
+use super::flights::{builtin, continuous, engine, larger, relative_speed_squared, times, with_step};
+use super::interface::{Progress, Untried};
+use crate::continuous::Tolerances;
+use crate::plant::{Path, rapier};
+use crate::scenario::{Precision, Scenario};
+use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::text::bound;
+
+/// Steps per second, from coarse to fine.
+pub(super) const STEPS_HZ: [f64; 9] = [60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0, 7680.0, 15360.0];
+/// Length of the flights \[s\]: all encounters of the pentagon are over by then.
+const DURATION_S: f64 = 10.0;
+/// Instants that are compared \[Hz\].
+const COMPARED_HZ: f64 = 10.0;
+/// Semi-implicit Euler is of order 1.
+const ORDER: std::ops::RangeInclusive<f64> = 0.9..=1.1;
+/// Rounding to 6e-8 of velocities of some 1 m/s, adding up one-sidedly over the 20000 steps of the best flight, moves a
+/// vehicle by at most 20000 * 6e-8 m.
+const SINGLE_FLOOR_M: f64 = 1.2e-3;
+
+/// Free decay: coefficients \[1/s\], steps taken, and their lengths in turn \[s\].
+const FREE_A22_PER_S: [f64; 3] = [-1.0, -0.1, 0.1];
+const FREE_STEPS: usize = 6000;
+const FREE_STEP_S: [f64; 3] = [1.0 / 60.0, 1.0 / 240.0, 1.0 / 1000.0];
+/// Rounding of 6000 steps, relative: a few eps each.
+const FREE_DOUBLE: f64 = 1e-11;
+const FREE_SINGLE: f64 = 2e-3;
+
+/// One step length and the errors of a flight in such steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Refinement {
+    /// Step \[s\].
+    pub dt_s: f64,
+    /// Largest distance of a vehicle from its place in continuous time, in double precision \[m\].
+    pub double_m: f64,
+    /// The same in single precision \[m\].
+    pub single_m: f64,
+    /// Observed order from the coarser step before, in double precision; none for the first.
+    pub order: Option<f64>,
+    /// Largest excess of E over what the dissipation leaves of E(0), in double precision \[m^2/s^2\].
+    pub energy_excess_m2_s2: f64,
+    /// Largest rise of E above its lowest value so far, in double precision \[m^2/s^2\].
+    pub energy_rise_m2_s2: f64,
+}
+
+/// What one flight gave.
+#[derive(Clone, Copy, Debug, Default)]
+struct Flown {
+    error_m: f64,
+    excess: f64,
+    rise: f64,
+}
+
+fn largest_distance_m(a: &Swarm, b: &Swarm) -> f64 {
+    let distance = |i: usize| (row(&a.positions_m, i) - row(&b.positions_m, i)).norm();
+    (0..a.count()).map(distance).fold(0.0, larger)
+}
+
+/// Flies with every step recorded and compares with the states of continuous time.
+fn fly(scenario: &Scenario, precision: Precision, steps_hz: f64, reference: &[Swarm]) -> Result<Flown, Untried> {
+    let scenario = with_step(scenario, precision, 1.0 / steps_hz);
+    let every = steps_hz / COMPARED_HZ;
+    let mut flown = Flown::default();
+    let (mut allowed, mut lowest, mut power) = (f64::NAN, f64::INFINITY, f64::NAN);
+    engine(&scenario, |sample| {
+        let entry = sample.step as f64 / every;
+        if entry.fract() == 0.0 {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
+            let state = reference.get(entry as usize);
+            let error_m = state.map_or(f64::NAN, |state| largest_distance_m(state, sample.swarm));
+            flown.error_m = larger(flown.error_m, error_m);
+        }
+        let energy = sample.energy.unwrap_or(f64::NAN);
+        let power_now = relative_speed_squared(sample.swarm);
+        // dE/dt = -sum |v~|^2, by the trapezoidal rule.
+        allowed = if sample.step == 0 { energy } else { allowed - 0.5 * (power + power_now) / steps_hz };
+        flown.excess = larger(flown.excess, energy - allowed);
+        flown.rise = larger(flown.rise, energy - lowest);
+        (lowest, power) = (lowest.min(energy), power_now);
+    })?;
+    Ok(flown)
+}
+
+fn order(coarse: f64, fine: f64) -> f64 {
+    (coarse / fine).log2()
+}
+
+/// The convergence of the pentagon.
+pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, Untried> {
+    let mut scenario = builtin("pentagon")?;
+    scenario.time.duration_s = DURATION_S;
+    let reference = continuous(&scenario, &times(DURATION_S, COMPARED_HZ), Tolerances::default())?.states;
+    let flown = STEPS_HZ
+        .par_iter()
+        .map(|&steps_hz| {
+            let fly = |precision| fly(&scenario, precision, steps_hz, &reference).inspect(|_| progress(1));
+            let (double, single) = rayon::join(|| fly(Precision::Double), || fly(Precision::Single));
+            Ok((double?, single?))
+        })
+        .collect::<Result<Vec<_>, Untried>>()?;
+    let mut refinements: Vec<Refinement> = Vec::new();
+    for (steps_hz, (double, single)) in STEPS_HZ.into_iter().zip(flown) {
+        refinements.push(Refinement {
+            dt_s: 1.0 / steps_hz,
+            double_m: double.error_m,
+            single_m: single.error_m,
+            order: refinements.last().map(|coarse| order(coarse.double_m, double.error_m)),
+            energy_excess_m2_s2: double.excess,
+            energy_rise_m2_s2: double.rise,
+        });
+    }
+    Ok(refinements)
+}
+
+/// The claims about it.
+pub(super) fn claims(refinements: &[Refinement]) -> Vec<Claim> {
+    vec![converges(refinements), single_precision(refinements), energy_excess(refinements), energy_rise(refinements)]
+}
+
+fn steps() -> String {
+    format!("dt = 1/{} s to 1/{} s", STEPS_HZ[0], STEPS_HZ[STEPS_HZ.len() - 1])
+}
+
+/// Judges that a number of each flight falls in proportion to the step. The names are those of its values, the measurement
+/// is said of its first and last.
+fn of_first_order(
+    claim: Claim,
+    refinements: &[Refinement],
+    names: [&'static str; 2],
+    number: fn(&Refinement) -> f64,
+    measured: impl Fn(f64, f64) -> String,
+) -> Claim {
+    let numbers: Vec<f64> = refinements.iter().map(number).collect();
+    let orders: Vec<f64> = numbers.windows(2).map(|pair| order(pair[0], pair[1])).collect();
+    let (low, high) =
+        (orders.iter().copied().fold(f64::INFINITY, f64::min), orders.iter().copied().fold(f64::NEG_INFINITY, larger));
+    let [first, .., last] = numbers[..] else { return claim };
+    claim
+        .measured(format!("order {low:.2} to {high:.2} over {}; {}", steps(), measured(first, last)))
+        .values([("lowest_order", low), ("highest_order", high), (names[0], first), (names[1], last)])
+        .tolerance("0.1")
+        .reason("second-order terms of the coarsest step")
+        .pass(orders.iter().all(|order| ORDER.contains(order)))
+}
+
+fn converges(refinements: &[Refinement]) -> Claim {
+    let claim = Claim::new(Kind::Ours, "order-of-the-engine", "discrete time")
+        .statement("In double precision Rapier converges to continuous time with order 1.")
+        .expected(format!("an observed order of {} to {} from each step to its half", ORDER.start(), ORDER.end()));
+    let names = ["coarsest_error_m", "finest_error_m"];
+    let measured = |first, last| format!("largest position error {first:.1e} m to {last:.1e} m");
+    of_first_order(claim, refinements, names, |one| one.double_m, measured)
+}
+
+fn single_precision(refinements: &[Refinement]) -> Claim {
+    let best = refinements.iter().min_by(|a, b| a.single_m.total_cmp(&b.single_m)).copied().unwrap_or_default();
+    let finest = refinements.last().copied().unwrap_or_default();
+    Claim::new(Kind::Ours, "single-precision-floor", "discrete time")
+        .statement("In single precision the error falls to a floor of rounding, and no shorter step is better.")
+        .expected(format!("a floor of at most {SINGLE_FLOOR_M:e} m, above that of double precision, and more beyond"))
+        .measured(format!(
+            "floor {:.1e} m at dt = 1/{:.0} s; {:.1e} m at dt = 1/{:.0} s",
+            best.single_m,
+            1.0 / best.dt_s,
+            finest.single_m,
+            1.0 / finest.dt_s
+        ))
+        .values([("floor_m", best.single_m), ("floor_dt_s", best.dt_s), ("finest_error_m", finest.single_m)])
+        .tolerance(format!("{SINGLE_FLOOR_M:e} m"))
+        .reason("velocities of 1 m/s rounded to 6e-8 at every step of some 20000, all to one side")
+        .pass(
+            best.single_m <= SINGLE_FLOOR_M
+                && best.single_m > best.double_m
+                && finest.dt_s < best.dt_s
+                && finest.single_m > 2.0 * best.single_m,
+        )
+}
+
+fn energy_excess(refinements: &[Refinement]) -> Claim {
+    let claim = Claim::new(Kind::Ours, "energy-excess-of-the-engine", "discrete time, dE/dt = -sum |v_i - mean v|^2")
+        .statement("In Rapier, E exceeds what the dissipation leaves of E(0) only in proportion to dt.")
+        .expected(format!("an observed order of {} to {}", ORDER.start(), ORDER.end()));
+    let names = ["coarsest_excess_m2_s2", "finest_excess_m2_s2"];
+    let measured = |first, last| format!("excess {first:.1e} to {last:.1e} m^2/s^2");
+    of_first_order(claim, refinements, names, |one| one.energy_excess_m2_s2, measured)
+}
+
+fn energy_rise(refinements: &[Refinement]) -> Claim {
+    const ROUNDING: f64 = 1e-12;
+    let rise = refinements.iter().map(|one| one.energy_rise_m2_s2).fold(0.0, larger);
+    Claim::new(Kind::Ours, "energy-of-the-engine", "the stability theorem, in discrete time")
+        .statement("In Rapier, E never rises along the pentagon's flight.")
+        .expected("no rise above its lowest value so far")
+        .measured(format!("largest rise {} m^2/s^2 over {}", bound(rise, ROUNDING), steps()))
+        .values([("largest_rise_m2_s2", rise)])
+        .tolerance(format!("{ROUNDING:e} m^2/s^2"))
+        .reason("rounding of E, which starts at 3.7 m^2/s^2")
+        .pass(rise <= ROUNDING)
+}
+
+/// Largest relative error of a free velocity against v(0) exp(a22 t).
+fn free_decay_error(precision: Precision) -> Result<f64, Untried> {
+    let mut largest = 0.0;
+    for a22_per_s in FREE_A22_PER_S {
+        let mut scenario = builtin("pentagon")?;
+        scenario.a22_per_s = a22_per_s;
+        for i in 0..scenario.count() {
+            let velocity = Vector3::new(1.0, -0.5, 0.0) * (1.0 + i as f64);
+            set_row(&mut scenario.start.velocities_m_s, i, velocity);
+        }
+        let (mut plant, mut path) = (rapier::plant(&scenario, precision), Path::default());
+        let (mut state, mut time_s) = (scenario.start.clone(), 0.0);
+        plant.apply(&Rows::zeros(scenario.count()), &mut state);
+        for step in 0..FREE_STEPS {
+            let dt_s = FREE_STEP_S[step % FREE_STEP_S.len()];
+            plant.advance(dt_s, &mut state, &mut path)?;
+            time_s += dt_s;
+        }
+        plant.observe(&mut state);
+        let exact = &scenario.start.velocities_m_s * libm::exp(a22_per_s * time_s);
+        for i in 0..scenario.count() {
+            let error = (row(&state.velocities_m_s, i) - row(&exact, i)).norm() / row(&exact, i).norm();
+            largest = larger(largest, error);
+        }
+    }
+    Ok(largest)
+}
+
+/// The claim about free motion.
+pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, Untried> {
+    let (double, single) = rayon::join(|| free_decay_error(Precision::Double), || free_decay_error(Precision::Single));
+    let (double, single) = (double?, single?);
+    progress(1);
+    Ok(Claim::new(Kind::Ours, "free-decay", "equation (1) with u = 0")
+        .statement("In Rapier a free velocity is v(0) exp(a22 t), whatever the step.")
+        .expected("exact to rounding")
+        .measured(format!(
+            "largest relative error {} in double and {single:.0e} in single precision after {FREE_STEPS} steps of \
+             mixed lengths with a22 of {FREE_A22_PER_S:?} 1/s",
+            bound(double, FREE_DOUBLE)
+        ))
+        .values([("double_relative_error", double), ("single_relative_error", single)])
+        .tolerance(format!("{FREE_DOUBLE:e} in double, {FREE_SINGLE:e} in single precision"))
+        .reason("a few roundings a step")
+        .pass(double <= FREE_DOUBLE && single <= FREE_SINGLE))
+}
