@@ -108,16 +108,23 @@ mod tests {
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
         ];
         let codes = reasons.map(|reason| reason.code());
-        assert_eq!(
-            codes,
-            ["no-barrier", "graph-not-complete", "velocity-undamped", "start-too-close", "start-refused"]
-        );
+        let expected = [
+            "no-barrier",
+            "graph-not-complete",
+            "velocity-undamped",
+            "target-changes",
+            "inexact-link",
+            "commands-from-outside",
+            "start-too-close",
+            "start-refused",
+        ];
+        assert_eq!(codes, expected);
         for reason in reasons {
             let sentence = reason.to_string();
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[3].to_string(),
+            reasons[6].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

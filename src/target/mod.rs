@@ -127,7 +127,11 @@ impl CurrentTarget {
 
     /// Changes the slots within the leg.
     pub fn set_formation(&mut self, formation: &Formation) {
-        self.formation.slots_m.copy_from(&formation.slots_m);
+        if self.formation.count() == formation.count() {
+            self.formation.slots_m.copy_from(&formation.slots_m);
+        } else {
+            self.formation.clone_from(formation);
+        }
         self.revision += 1;
     }
 
