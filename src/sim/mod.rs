@@ -7,6 +7,7 @@
 
 mod controller;
 mod ending;
+mod finding;
 mod motion;
 mod parts;
 mod simulation;

@@ -4,9 +4,10 @@ use std::time::{Duration, Instant};
 
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError};
+use super::finding::{note, note_contacts};
 use super::motion::Motion;
 use super::parts::Parts;
-use crate::audit::{Auditor, StepFinding, Violation, swept_separation_m};
+use crate::audit::{Auditor, swept_separation_m};
 use crate::feedback::Feedback as _;
 use crate::law::{Certificate, Void};
 use crate::plant::Path;
@@ -436,35 +437,13 @@ impl Simulation {
         if leg != before {
             self.events.push(Event::LegBegan { leg, time_s: self.time_s });
         }
-        if followed.is_err() {
-            self.control = Rows::zeros(0);
-        }
-        Ok(followed?)
+        followed.inspect_err(|_| self.control = Rows::zeros(0))?;
+        Ok(())
     }
 
     fn note_engine_contacts(&mut self) {
         self.contacts_now.clear();
         self.motion.keep_out_contacts(&mut self.contacts_now);
-        for &pair in &self.contacts_now {
-            if let Err(place) = self.engine_contacts.binary_search(&pair) {
-                self.engine_contacts.insert(place, pair);
-                self.events.push(Event::EngineContact { pair, time_s: self.time_s });
-            }
-        }
-    }
-}
-
-/// Keeps what the judge found in a sweep.
-fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest_m: &mut f64, events: &mut Vec<Event>) {
-    if let Some(new) = finding.closest {
-        *nearest_m = new.separation_m;
-        *closest = closest.filter(|before| before.separation_m <= new.separation_m).or(Some(new));
-    }
-    for violation in finding.began {
-        events.push(Event::ViolationBegan { pair: violation.pair, time_s: violation.from_s });
-    }
-    for violation in finding.ended {
-        let &Violation { pair, to_s, min_m, .. } = violation;
-        events.push(Event::ViolationEnded { pair, time_s: to_s, min_m });
+        note_contacts(&self.contacts_now, &mut self.engine_contacts, self.time_s, &mut self.events);
     }
 }
