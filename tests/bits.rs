@@ -1,5 +1,6 @@
 //! Every build flies the same bits: debug or release, the core alone or with everything.
 
+use std::fmt::Write as _;
 use std::ops::ControlFlow;
 
 use tautline::formation::Formation;
@@ -18,7 +19,8 @@ struct Everything {
 impl Sink for Everything {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         let closest = sample.separation.map(|closest| (closest.separation_m, closest.time_s));
-        self.others += &format!("{} {closest:?} {:?}\n", sample.step, sample.energy);
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.others, "{} {closest:?} {:?}", sample.step, sample.energy);
         self.states.sample(sample)
     }
 
