@@ -48,6 +48,7 @@ struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
+#[cfg_attr(not(feature = "viewer"), expect(clippy::large_enum_variant, reason = "there is one of it"))]
 enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),

@@ -29,7 +29,7 @@ impl Watched {
         let taken = viewer::snapshots(self.camera, folder, console);
         #[cfg(not(feature = "viewer"))]
         let taken = {
-            let _ = (folder, console);
+            let _ = (self, folder, console);
             Ok(Vec::new())
         };
         taken

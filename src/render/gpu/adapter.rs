@@ -42,6 +42,7 @@ pub(crate) fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>
 pub(crate) struct Gpu {
     pub(crate) name: String,
     pub(crate) largest_px: u32,
+    #[cfg(feature = "window")]
     pub(crate) adapter: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -78,7 +79,15 @@ impl Gpu {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             kept.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
         }));
-        Ok(Self { name, largest_px, adapter, device, queue, trouble })
+        Ok(Self {
+            name,
+            largest_px,
+            #[cfg(feature = "window")]
+            adapter,
+            device,
+            queue,
+            trouble,
+        })
     }
 
     pub(crate) fn check_size(&self, [width, height]: [u32; 2]) -> Result<(), RenderError> {

@@ -16,6 +16,7 @@ mod ground;
 mod labels;
 mod view;
 
+#[cfg(feature = "window")]
 pub(super) use camera::TAN_HALF_VIEW;
 pub use camera::{Camera, CameraSpec, Lens, Orbit, Projected};
 pub(super) use caption::metres;
