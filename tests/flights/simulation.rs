@@ -286,9 +286,9 @@ fn a_certificate_for_one_leg_is_none_for_two_and_every_law_follows_its_target() 
 
 #[test]
 fn legs_that_cannot_be_flown_are_refused() {
+    type Break = fn(&mut Scenario);
     let good = two_legs(Begins::At(50.0));
     assert!(good.validate().is_ok());
-    type Break = fn(&mut Scenario);
     let breaks: [Break; 6] = [
         |scenario| scenario.legs.clear(),
         |scenario| scenario.legs[1].formation = Formation::line(4, 3.0),
