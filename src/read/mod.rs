@@ -1,11 +1,11 @@
 //! Recordings of any origin as a stream of [`Item`](crate::track::Item)s.
 //!
-//! [`open`] recognises the format by the content of the file and gives a [`Tracks`]: items in order of time, a clock, and
+//! [`open`] recognises the format by the content of the file and gives a [`Tracks`](crate::track::Tracks): items in order of time, a clock, and
 //! what a person should know. A format is a file of this room that turns its content into rows or into pieces of curves;
 //! order, clocks and limits are the same for all.
 //!
 //! Memory is bounded by what is read at a time, not by the file: a recording in order of time is streamed. One that is
-//! not is sorted, in memory, and says so in [`Tracks::notes`].
+//! not is sorted, in memory, and says so in [`Tracks::notes`](crate::track::Tracks::notes).
 //!
 //! # What is refused
 //! Numbers that are not finite, a vehicle that is in two places at a time, time that runs backwards where each time is a

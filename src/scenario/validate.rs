@@ -28,7 +28,8 @@ impl Scenario {
     /// to be checked before it is flown.
     ///
     /// What holds afterwards: at least two vehicles, and one row or entry for each everywhere; expected memory, steps
-    /// and magnitudes within [`MAX_MEMORY_BYTES`], [`MAX_STEPS`], [`SMALLEST`] and [`LARGEST`]; all numbers finite;
+    /// and magnitudes within [`MAX_MEMORY_BYTES`](super::MAX_MEMORY_BYTES), [`MAX_STEPS`](super::MAX_STEPS),
+    /// [`SMALLEST`](super::SMALLEST) and [`LARGEST`](super::LARGEST); all numbers finite;
     /// every two starts and every two slots more than delta apart; any two hulls fit within delta; the graph
     /// connected; z = 0 everywhere in the plane.
     ///

@@ -55,7 +55,7 @@ pub struct Group {
     pub claims: Vec<Claim>,
 }
 
-/// A claim is built up by the methods of its fields' names; it fails until [`Claim::pass`] or [`Claim::at_most`] judges
+/// A claim is built up by the methods of its fields' names; it fails until `pass` or `at_most` judges
 /// it.
 impl Claim {
     pub(super) fn new(kind: Kind, id: &'static str, source: &'static str) -> Self {

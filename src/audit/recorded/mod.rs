@@ -1,6 +1,6 @@
 //! The audit of recorded motion: did any two vehicles come too close, by what a recording says?
 //!
-//! A recording is a stream of [`Item`]s, each vehicle at times of its own. What happens between two samples is stated
+//! A recording is a stream of [`Item`](crate::track::Item)s, each vehicle at times of its own. What happens between two samples is stated
 //! ([`Motion`]), never assumed silently, and the answer is one of three: **clear** (proved, under that motion), a
 //! **violation**, or **undecided**, with the interval in which the smallest distance lies.
 //!
