@@ -38,6 +38,7 @@ fn timeline(count: usize) -> Timeline {
             control: &control,
             separation,
             energy: None,
+            peaks: tautline::record::Peaks::default(),
             channels: &[],
         });
     }

@@ -164,6 +164,12 @@ impl Continuous {
         Self { swarm: scenario.start.clone(), a22_per_s: scenario.a22_per_s, step_s: FIRST_STEP_S }
     }
 
+    /// Number of vehicles N.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.swarm.count()
+    }
+
     /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end; `path` gets how far the
     /// way there bends.
     ///

@@ -1,11 +1,11 @@
 //! Numbers of a run, folded from its samples one at a time.
 //!
-//! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. What it knows
-//! of the time between samples is nothing; peaks are those of the samples.
+//! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Peaks are over the
+//! steps between samples too where a sample tells them, see [`crate::record::Peaks`].
 
 use crate::graph::Graph;
-use crate::record::{Event, RecordError, Sample, Sink};
-use crate::swarm::{Rows, row};
+use crate::record::{Event, Peaks, RecordError, Sample, Sink};
+use crate::swarm::{Rows, largest_row_norm};
 use crate::target::{Arrival, Begins, Distance, Leg};
 
 /// Folds samples, in the order of time, into a [`Summary`].
@@ -57,7 +57,7 @@ pub struct Summary {
     pub disagreement_m_s: f64,
     /// Speed of the mean velocity at the end \[m/s\].
     pub common_m_s: f64,
-    /// Largest commanded acceleration of a vehicle, Euclidean norm, over all samples \[m/s^2\].
+    /// Largest commanded acceleration of a vehicle, Euclidean norm, over all steps \[m/s^2\].
     pub peak_control_m_s2: f64,
     /// Largest commanded acceleration of a vehicle at the end \[m/s^2\]; NaN where the law had no answer there.
     pub final_control_m_s2: f64,
@@ -65,7 +65,7 @@ pub struct Summary {
     pub energy_initial: Option<f64>,
     /// Energy of the last sample that has one \[m^2/s^2\].
     pub energy_final: Option<f64>,
-    /// Largest energy over all samples \[m^2/s^2\].
+    /// Largest energy over all steps \[m^2/s^2\].
     pub energy_max: Option<f64>,
     /// `energy_max` over `energy_initial`: 1 where the energy never exceeded its start; none for a start without energy.
     pub energy_max_over_initial: Option<f64>,
@@ -111,6 +111,7 @@ impl<'a> Metrics<'a> {
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
         self.observe_energy(sample.energy);
+        self.observe_peaks(sample.peaks);
         let good = self.arrival.is_within(&self.distance) && sample.swarm.first_not_finite().is_none();
         self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
     }
@@ -137,8 +138,18 @@ impl<'a> Metrics<'a> {
             self.final_control_m_s2 = f64::NAN;
             return;
         }
-        self.final_control_m_s2 = largest_norm(control);
+        self.final_control_m_s2 = largest_row_norm(control);
         self.peak_control_m_s2 = larger(self.peak_control_m_s2, self.final_control_m_s2);
+    }
+
+    /// What was larger between the samples.
+    fn observe_peaks(&mut self, peaks: Peaks) {
+        if let Some(control_m_s2) = peaks.control_m_s2 {
+            self.peak_control_m_s2 = larger(self.peak_control_m_s2, control_m_s2);
+        }
+        if let (Some(range), Some(energy)) = (&mut self.energy, peaks.energy) {
+            range.max = larger(range.max, energy);
+        }
     }
 
     /// A sample without energy has none at the end either.
@@ -206,11 +217,6 @@ impl Sink for Metrics<'_> {
     }
 }
 
-/// Largest Euclidean norm of a row; NaN where there is one.
-fn largest_norm(rows: &Rows) -> f64 {
-    (0..rows.nrows()).map(|i| row(rows, i).norm()).fold(0.0, larger)
-}
-
 /// The larger number; NaN where either is, which `f64::max` would hide.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
@@ -246,6 +252,7 @@ mod tests {
                 control: &control,
                 separation: None,
                 energy: None,
+                peaks: crate::record::Peaks::default(),
                 channels: &[],
             });
         }
@@ -297,6 +304,7 @@ mod tests {
                 control: &control,
                 separation: None,
                 energy: None,
+                peaks: crate::record::Peaks::default(),
                 channels: &[],
             });
         }
@@ -334,6 +342,7 @@ mod tests {
                 control: &control,
                 separation: None,
                 energy: Some(energy),
+                peaks: crate::record::Peaks::default(),
                 channels: &[],
             });
         }
@@ -367,6 +376,7 @@ mod tests {
             control: &control,
             separation: None,
             energy: Some(0.0),
+            peaks: crate::record::Peaks::default(),
             channels: &[],
         });
         assert_eq!(metrics.finish().energy_max_over_initial, None);

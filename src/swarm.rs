@@ -81,6 +81,13 @@ pub fn mean_row(rows: &Rows) -> Vector3<f64> {
     Vector3::new(rows.column(0).sum() / n, rows.column(1).sum() / n, rows.column(2).sum() / n)
 }
 
+/// Largest Euclidean norm of a row, 0 for an empty table; NaN where there is one.
+#[must_use]
+pub fn largest_row_norm(rows: &Rows) -> f64 {
+    let norms = (0..rows.nrows()).map(|i| row(rows, i).norm());
+    norms.fold(0.0, |a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) })
+}
+
 /// The first row that holds a number that is not finite.
 #[must_use]
 pub fn first_row_not_finite(rows: &Rows) -> Option<usize> {

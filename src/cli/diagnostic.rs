@@ -195,7 +195,9 @@ impl From<SimError> for Failure {
         match error {
             SimError::Record(error) => error.into(),
             SimError::Law(error) => error.into(),
-            SimError::NoLeg | SimError::Commands { .. } => Self::plain(Exit::WrongInput, error.to_string()),
+            SimError::NoLeg | SimError::Vehicles { .. } | SimError::Commands { .. } => {
+                Self::plain(Exit::WrongInput, error.to_string())
+            }
             SimError::Audit(error) => {
                 Self::input(error.to_string(), "choose a safety distance and a number of vehicles that can be judged")
             }

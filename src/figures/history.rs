@@ -277,6 +277,7 @@ mod tests {
                 control: &control,
                 separation: Some(separation),
                 energy: Some(value),
+                peaks: crate::record::Peaks::default(),
                 channels: &[],
             });
         }
@@ -331,6 +332,7 @@ mod tests {
             control: &control,
             separation: None,
             energy: None,
+            peaks: crate::record::Peaks::default(),
             channels: &[],
         });
         assert_eq!((history.samples(), history.end_s()), (3, 0.02));

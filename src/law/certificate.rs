@@ -30,6 +30,8 @@ pub enum Void {
     InexactLink,
     /// Accelerations came from outside in the place of the law's.
     CommandsFromOutside,
+    /// Each command is held for a period of its own.
+    CommandsHeld,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
     StartRefused(LawError),
 }
@@ -63,6 +65,7 @@ impl Void {
             Self::TargetChanges => "target-changes",
             Self::InexactLink => "inexact-link",
             Self::CommandsFromOutside => "commands-from-outside",
+            Self::CommandsHeld => "commands-held",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
         }
@@ -84,6 +87,9 @@ impl fmt::Display for Void {
             }
             Self::InexactLink => f.write_str("The vehicles do not know the true present state."),
             Self::CommandsFromOutside => f.write_str("The vehicles were commanded from outside."),
+            Self::CommandsHeld => {
+                f.write_str("The vehicles hold each command while the swarm moves on (time.control_hz).")
+            }
             Self::StartRefused(fault) => write!(f, "The law has no answer for the start: {fault}."),
         }
     }
@@ -104,6 +110,7 @@ mod tests {
             Void::TargetChanges,
             Void::InexactLink,
             Void::CommandsFromOutside,
+            Void::CommandsHeld,
             Void::StartRefused(collision),
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
         ];
@@ -115,6 +122,7 @@ mod tests {
             "target-changes",
             "inexact-link",
             "commands-from-outside",
+            "commands-held",
             "start-too-close",
             "start-refused",
         ];
@@ -124,7 +132,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[6].to_string(),
+            reasons[7].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

@@ -11,6 +11,7 @@ use super::consensus::{
 use super::error::{LawError, ParameterError};
 use super::interface::{Controls, Law, VelocityMargin};
 use super::kernel::Kernel;
+use super::memo::Memo;
 use super::setting::{Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
@@ -96,6 +97,8 @@ pub struct EdgeTensionLaw {
     tightest: Option<EdgeTension>,
     /// That of the target whose distances are desired.
     revision: u64,
+    /// (1/alpha) sum of V over the edges.
+    memo: Memo,
 }
 
 impl EdgeTensionLaw {
@@ -121,6 +124,7 @@ impl EdgeTensionLaw {
             kernel: Kernel::new(graph, parameters.delta_m, inverse_k_per_m),
             tightest: None,
             revision: 0,
+            memo: Memo::new(graph.count()),
         };
         law.set_rest_lengths().map_err(|(pair, source)| ParameterError::Tension { pair, source })?;
         Ok(law)
@@ -130,6 +134,7 @@ impl EdgeTensionLaw {
     fn set_rest_lengths(&mut self) -> Result<(), (Pair, TensionError)> {
         let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
         self.tightest = None;
+        self.memo.forget();
         for ((i, j), inverse_k_per_m) in self.graph.edges().zip(self.kernel.inverse_k_per_m_mut()) {
             let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))
                 .map_err(|source| (Pair::new(i, j), source))?;
@@ -192,7 +197,10 @@ impl EdgeTensionLaw {
 
     fn try_energy(&self, swarm: &Swarm) -> Result<f64, LawError> {
         check_state(self.graph.count(), swarm)?;
-        let potential = self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?;
+        let potential = match self.memo.of(&swarm.positions_m) {
+            Some(potential) => potential,
+            None => self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?,
+        };
         let energy = relative_kinetic_energy(swarm) + self.parameters.alpha * potential / swarm.count().max(1) as f64;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
@@ -210,7 +218,8 @@ impl Law for EdgeTensionLaw {
         let EdgeTensionParameters { alpha, a22_per_s, .. } = self.parameters;
         let velocity_gain = (1.0 + a22_per_s) * per_vehicle;
         if let Some(swarm) = at.shared() {
-            self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
+            let potential = self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
+            self.memo.keep(&swarm.positions_m, potential);
             *command *= alpha * per_vehicle;
             add_laplacian_product(&self.graph, &swarm.velocities_m_s, velocity_gain, command);
         } else {

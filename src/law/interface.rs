@@ -56,6 +56,9 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Begins its random numbers anew.
+    fn reseed(&mut self, _seed: u64) {}
+
     /// What the law holds vehicles to.
     fn controls(&self) -> Controls {
         Controls::Displacements

@@ -59,15 +59,16 @@ impl Kernel {
         &mut self.inverse_k_per_m
     }
 
-    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
+    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\], and
+    /// returns (1/alpha) sum of V over all edges, which costs next to nothing here.
     /// Both tables have a row for each vehicle of the graph.
-    pub(super) fn add_pulls(&self, positions_m: &Rows, sums: &mut Rows) -> Result<(), OutOfDomain> {
+    pub(super) fn add_pulls(&self, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
         self.arch.dispatch(AddPulls { kernel: self, axes: columns(positions_m), sums: columns_mut(sums) })
     }
 
     /// (1/alpha) sum of V over all edges.
     pub(super) fn potential(&self, positions_m: &Rows) -> Result<f64, OutOfDomain> {
-        self.arch.dispatch(Potential { kernel: self, axes: columns(positions_m) })
+        self.add_pulls(positions_m, &mut Rows::zeros(positions_m.nrows()))
     }
 }
 
@@ -79,12 +80,13 @@ struct AddPulls<'a> {
 }
 
 impl WithSimd for AddPulls<'_> {
-    type Output = Result<(), OutOfDomain>;
+    type Output = Result<f64, OutOfDomain>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let Self { kernel, axes, mut sums } = self;
         let mut block = Block::new(kernel.delta_m);
+        let mut potential = [0.0; LANES];
         match &kernel.edges {
             Edges::All(count) => {
                 for (i, row) in rows(*count, &kernel.inverse_k_per_m) {
@@ -92,7 +94,7 @@ impl WithSimd for AddPulls<'_> {
                     for (c, inverse) in row.chunks(BLOCK).enumerate() {
                         let first = i + 1 + c * BLOCK;
                         block.fill_from_row(i, first, inverse, axes);
-                        block.turn_into_pulls();
+                        block.turn_into_pulls(&mut potential);
                         for axis in 0..3 {
                             let pulls = &block.edges_m[axis];
                             for lanes in pulls.as_chunks::<LANES>().0.iter().take(inverse.len().div_ceil(LANES)) {
@@ -112,7 +114,7 @@ impl WithSimd for AddPulls<'_> {
             Edges::Listed(edges) => {
                 for (edges, inverse) in edges.chunks(BLOCK).zip(kernel.inverse_k_per_m.chunks(BLOCK)) {
                     block.fill_from_list(edges, inverse, axes);
-                    block.turn_into_pulls();
+                    block.turn_into_pulls(&mut potential);
                     for (sums, pulls) in sums.iter_mut().zip(&block.edges_m) {
                         for (&[i, j], pull) in edges.iter().zip(pulls) {
                             sums[i] += pull;
@@ -122,41 +124,7 @@ impl WithSimd for AddPulls<'_> {
                 }
             }
         }
-        block.within()
-    }
-}
-
-/// Arguments of [`Kernel::potential`].
-struct Potential<'a> {
-    kernel: &'a Kernel,
-    axes: [&'a [f64]; 3],
-}
-
-impl WithSimd for Potential<'_> {
-    type Output = Result<f64, OutOfDomain>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let Self { kernel, axes } = self;
-        let mut block = Block::new(kernel.delta_m);
-        let mut sum = [0.0; LANES];
-        match &kernel.edges {
-            Edges::All(count) => {
-                for (i, row) in rows(*count, &kernel.inverse_k_per_m) {
-                    for (c, inverse) in row.chunks(BLOCK).enumerate() {
-                        block.fill_from_row(i, i + 1 + c * BLOCK, inverse, axes);
-                        block.add_values(&mut sum);
-                    }
-                }
-            }
-            Edges::Listed(edges) => {
-                for (edges, inverse) in edges.chunks(BLOCK).zip(kernel.inverse_k_per_m.chunks(BLOCK)) {
-                    block.fill_from_list(edges, inverse, axes);
-                    block.add_values(&mut sum);
-                }
-            }
-        }
-        block.within().map(|()| total(sum))
+        block.within().map(|()| total(potential))
     }
 }
 
@@ -225,38 +193,27 @@ impl Block {
         }
     }
 
-    /// Multiplies each edge by `w_ij/alpha = V'/(alpha l)`.
+    /// Multiplies each edge by `w_ij/alpha = V'/(alpha l)`, and adds V/alpha of each to `potential`.
     #[inline(always)]
-    fn turn_into_pulls(&mut self) {
+    fn turn_into_pulls(&mut self, potential: &mut Lanes) {
         let chunks = self.len.div_ceil(LANES);
+        let mut values = [[0.0; LANES]; BLOCK / LANES];
         let [x, y, z] = self.edges_m.each_mut().map(|edges| edges.as_chunks_mut::<LANES>().0);
         let inverse = self.inverse_k_per_m.as_chunks::<LANES>().0;
-        for (((x, y), z), inverse_k) in x.iter_mut().zip(y).zip(z).zip(inverse).take(chunks) {
+        for ((((x, y), z), inverse_k), values) in x.iter_mut().zip(y).zip(z).zip(inverse).zip(&mut values).take(chunks)
+        {
             let outside;
-            ([*x, *y, *z], outside) = pulls(self.delta_m, [*x, *y, *z], *inverse_k);
+            ([*x, *y, *z], *values, outside) = pulls(self.delta_m, [*x, *y, *z], *inverse_k);
             self.outside |= outside;
+        }
+        values.as_flattened_mut()[self.len..].fill(0.0);
+        for values in &values {
+            for k in 0..LANES {
+                potential[k] += values[k];
+            }
         }
         for edges in &mut self.edges_m {
             edges[self.len..].iter_mut().take(LANES).for_each(|pull| *pull = 0.0);
-        }
-    }
-
-    /// Adds V/alpha of each edge to `sum`, and leaves it in the place of the x axis.
-    #[inline(always)]
-    fn add_values(&mut self, sum: &mut Lanes) {
-        let chunks = self.len.div_ceil(LANES);
-        let [x, y, z] = self.edges_m.each_mut().map(|edges| edges.as_chunks_mut::<LANES>().0);
-        let inverse = self.inverse_k_per_m.as_chunks::<LANES>().0;
-        for (((x, y), z), inverse_k) in x.iter_mut().zip(y).zip(z).zip(inverse).take(chunks) {
-            let outside;
-            (*x, outside) = values(self.delta_m, [*x, *y, *z], *inverse_k);
-            self.outside |= outside;
-        }
-        self.edges_m[0][self.len..].iter_mut().take(LANES).for_each(|value| *value = 0.0);
-        for values in self.edges_m[0].as_chunks::<LANES>().0.iter().take(chunks) {
-            for k in 0..LANES {
-                sum[k] += values[k];
-            }
         }
     }
 }
@@ -268,38 +225,25 @@ fn distance_m(delta_m: f64, x: f64, y: f64, z: f64) -> (f64, u64) {
     (distance_m, u64::from(!(distance_m > delta_m && distance_m < f64::INFINITY)))
 }
 
-/// The edges times `w_ij/alpha`, and 1 where some length is not in (delta, infinity). Arrays go in and out by value:
-/// with nothing that may alias, the loop becomes vector instructions.
+/// The edges times `w_ij/alpha`, their V/alpha, and 1 where some length is not in (delta, infinity). Arrays go in and out
+/// by value: with nothing that may alias, the loop becomes vector instructions.
 #[inline(always)]
-fn pulls(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> ([Lanes; 3], u64) {
+fn pulls(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> ([Lanes; 3], Lanes, u64) {
     let [mut x, mut y, mut z] = edges_m;
-    let mut outside = 0;
-    for k in 0..LANES {
-        let (distance_m, out) = distance_m(delta_m, x[k], y[k], z[k]);
-        outside |= out;
-        let s = (distance_m - delta_m) * inverse_k_per_m[k];
-        let (numerator, denominator) = tension::slope_fraction(s, s - tension::REST);
-        let weight = inverse_k_per_m[k] * numerator / (denominator * distance_m);
-        x[k] *= weight;
-        y[k] *= weight;
-        z[k] *= weight;
-    }
-    ([x, y, z], outside)
-}
-
-/// V/alpha of the edges, and 1 where some length is not in (delta, infinity).
-#[inline(always)]
-fn values(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> (Lanes, u64) {
-    let [x, y, z] = edges_m;
     let mut values = [0.0; LANES];
     let mut outside = 0;
     for k in 0..LANES {
         let (distance_m, out) = distance_m(delta_m, x[k], y[k], z[k]);
         outside |= out;
         let s = (distance_m - delta_m) * inverse_k_per_m[k];
-        values[k] = tension::value(s, s - tension::REST);
+        let (slope_per_m, value) = tension::slope_and_value_over(distance_m, s, s - tension::REST);
+        let weight = inverse_k_per_m[k] * slope_per_m;
+        x[k] *= weight;
+        y[k] *= weight;
+        z[k] *= weight;
+        values[k] = value;
     }
-    (values, outside)
+    ([x, y, z], values, outside)
 }
 
 #[inline(always)]

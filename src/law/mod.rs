@@ -11,6 +11,7 @@ mod error;
 mod interface;
 mod kernel;
 mod laplacian;
+mod memo;
 mod potential;
 mod setting;
 mod spec;

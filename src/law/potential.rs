@@ -7,6 +7,7 @@ use super::certificate::{Certificate, Void};
 use super::consensus::{add_heard, add_laplacian_product, check_count, check_observation, check_range, check_state};
 use super::error::{LawError, ParameterError};
 use super::interface::{Law, VelocityMargin};
+use super::memo::Memo;
 use super::setting::{Gain, Setting};
 use super::tension::TensionError;
 use crate::formation::Formation;
@@ -73,7 +74,7 @@ impl PotentialKeys {
 /// links and near pairs, no saturation, no disturbance, continuous time.
 ///
 /// # Cost
-/// O(links + near pairs) a step without allocation; the energy compares all pairs.
+/// O(links + near pairs) a step without allocation, and so is its energy; that of any other state compares all pairs.
 #[derive(Clone, Debug)]
 pub struct PotentialLaw {
     graph: Graph,
@@ -86,6 +87,8 @@ pub struct PotentialLaw {
     revision: u64,
     /// Scratch: `p_i - h_i`.
     errors_m: Rows,
+    /// Sum of U over the near pairs.
+    memo: Memo,
 }
 
 impl PotentialLaw {
@@ -109,6 +112,7 @@ impl PotentialLaw {
             range_m,
             revision: 0,
             errors_m: Rows::zeros(setting.links.count()),
+            memo: Memo::new(setting.links.count()),
         })
     }
 
@@ -121,15 +125,27 @@ impl PotentialLaw {
         Ok((inverse - 1.0 / (self.range_m - self.delta_m), inverse))
     }
 
-    /// What vehicle `i` makes of vehicle `j` whom it sees.
-    fn repulsion(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<Vector3<f64>, LawError> {
-        let apart_m = row(&at.own.positions_m, i) - at.seen(i, j).position_m;
+    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and U.
+    fn repulsion(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError> {
         let separation_m = apart_m.norm();
         if separation_m >= self.range_m {
-            return Ok(Vector3::zeros());
+            return Ok((Vector3::zeros(), 0.0));
         }
         let (steep, inverse) = self.steepness(Pair::new(i, j), separation_m)?;
-        Ok(apart_m * (self.keys.eta_m4_per_s2 * steep * inverse * inverse / separation_m))
+        let eta_m4_per_s2 = self.keys.eta_m4_per_s2;
+        let push_m_s2 = apart_m * (eta_m4_per_s2 * steep * inverse * inverse / separation_m);
+        Ok((push_m_s2, 0.5 * eta_m4_per_s2 * steep * steep))
+    }
+
+    /// Sum of U over all pairs \[m^2/s^2\].
+    fn repulsive_potential(&self, positions_m: &Rows) -> Result<f64, LawError> {
+        let mut sum = 0.0;
+        for i in 0..positions_m.nrows() {
+            for j in i + 1..positions_m.nrows() {
+                sum += self.repulsion(i, j, row(positions_m, i) - row(positions_m, j))?.1;
+            }
+        }
+        Ok(sum)
     }
 
     fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
@@ -137,16 +153,7 @@ impl PotentialLaw {
         let (positions_m, slots_m) = (&at.own.positions_m, &at.target.formation.slots_m);
         let error_m = |i| row(positions_m, i) - row(slots_m, i);
         let attraction: f64 = self.graph.edges().map(|(i, j)| (error_m(i) - error_m(j)).norm_squared()).sum();
-        let mut repulsion = 0.0;
-        for i in 0..at.own.count() {
-            for j in i + 1..at.own.count() {
-                let separation_m = (row(positions_m, j) - row(positions_m, i)).norm();
-                if separation_m < self.range_m {
-                    let (steep, _) = self.steepness(Pair::new(i, j), separation_m)?;
-                    repulsion += 0.5 * self.keys.eta_m4_per_s2 * steep * steep;
-                }
-            }
-        }
+        let repulsion = self.memo.of(positions_m).map_or_else(|| self.repulsive_potential(positions_m), Ok)?;
         let kinetic = 0.5 * at.own.velocities_m_s.norm_squared();
         let energy = kinetic + 0.5 * self.keys.k_per_s2 / at.own.count().max(1) as f64 * attraction + repulsion;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
@@ -181,11 +188,18 @@ impl Law for PotentialLaw {
                 Ok(gain * ((own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j))))
             })?;
         }
+        let mut potential = 0.0;
         for &(a, b) in at.near {
             for (i, j) in [(a, b), (b, a)] {
-                let sum = row(command, i) + self.repulsion(at, i, j)?;
+                let apart_m = row(&at.own.positions_m, i) - at.seen(i, j).position_m;
+                let (push_m_s2, of_pair) = self.repulsion(i, j, apart_m)?;
+                let sum = row(command, i) + push_m_s2;
                 set_row(command, i, sum);
+                potential += 0.5 * of_pair;
             }
+        }
+        if let Some(swarm) = at.shared() {
+            self.memo.keep(&swarm.positions_m, potential);
         }
         check_range(command)
     }
@@ -200,6 +214,7 @@ impl Law for PotentialLaw {
                 delta_m,
             })?;
             self.revision = target.revision;
+            self.memo.forget();
         }
         Ok(())
     }

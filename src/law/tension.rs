@@ -214,15 +214,17 @@ pub(super) fn value(s: f64, h: f64) -> f64 {
 /// V' K/alpha = 1 - csch^2(s) at the scaled clearance s > 0, with h = s - asinh(1).
 #[inline(always)]
 pub(super) fn slope(s: f64, h: f64) -> f64 {
-    let (numerator, denominator) = slope_fraction(s, h);
-    numerator / denominator
+    let (of_s, of_h) = decay_complements(s, h);
+    of_h * (1.0 - REST_DECAY * (1.0 - of_s)) / (of_s * of_s)
 }
 
-/// Numerator and denominator of [`slope`].
+/// [`slope`] over a length, and [`value`], with one division for both.
 #[inline(always)]
-pub(super) fn slope_fraction(s: f64, h: f64) -> (f64, f64) {
+pub(super) fn slope_and_value_over(length: f64, s: f64, h: f64) -> (f64, f64) {
     let (of_s, of_h) = decay_complements(s, h);
-    (of_h * (1.0 - REST_DECAY * (1.0 - of_s)), of_s * of_s)
+    let ratio = of_h / (of_s * of_s * length);
+    let slope = ratio * (1.0 - REST_DECAY * (1.0 - of_s));
+    (slope, h - REST_DECAY_ROOT * (ratio * (of_s * length)))
 }
 
 /// 1 - e^(-2s) and 1 - e^(-2h) for s > 0 and h = s - asinh(1), both to a few units in the last place.

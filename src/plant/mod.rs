@@ -20,6 +20,9 @@ use crate::swarm::{Pair, Rows, Swarm};
 ///
 /// All of a plant's memory is saved with a simulation, so it must be [`Clone`].
 pub trait Plant: DynClone + Send {
+    /// Number of vehicles N.
+    fn count(&self) -> usize;
+
     /// Moves every vehicle over `dt_s` seconds and writes into `predicted` where it is then and how fast it is expected
     /// to be; `path` gets what the way there was like beside a straight line.
     ///
@@ -27,8 +30,9 @@ pub trait Plant: DynClone + Send {
     /// [`PlantError`]; the plant then holds no state that may be observed.
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError>;
 
-    /// Takes the accelerations u \[m/s^2\], N x 3, to be held over the next step, and changes `state` from what was
-    /// predicted to what is. A plant whose prediction needs no completion leaves `state` as it is.
+    /// Takes the accelerations u \[m/s^2\], N x 3, to be held over the next step, and changes the velocities of `state` from
+    /// what was predicted to what they are; positions stay, for they have been judged. Called again at the same instant it
+    /// changes nothing but what is held.
     fn apply(&mut self, command: &Rows, state: &mut Swarm);
 
     /// Writes the true state.
@@ -40,6 +44,9 @@ pub trait Plant: DynClone + Send {
     /// Appends the pairs whose keep-out balls overlapped when the plant's own collision detection last looked, in index
     /// order. A plant without one appends nothing.
     fn keep_out_contacts(&self, _pairs: &mut Vec<Pair>) {}
+
+    /// Begins its random numbers anew.
+    fn reseed(&mut self, _seed: u64) {}
 }
 
 dyn_clone::clone_trait_object!(Plant);

@@ -19,10 +19,6 @@ use crate::swarm::{Rows, Swarm, row, set_row};
 
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 
-/// Part of the fastest mode's time 1/omega that a step may take (theory: semi-implicit Euler is stable below 2/omega and
-/// keeps an honest energy up to about this).
-pub const STEP_PER_MODE: f64 = 0.3;
-
 /// Most vehicles for which the algebraic connectivity of a graph that is not complete is computed, at O(N^3): a second or
 /// two.
 pub const MOST_CONNECTED: usize = 1000;
@@ -58,7 +54,8 @@ pub struct Preflight {
     pub certificate_void: Vec<String>,
     /// The scenario's step \[s\].
     pub dt_s: f64,
-    /// Longest honest step \[s\], see [`Preflight::of`].
+    /// Steps are flown in parts where the law's fastest rate asks for shorter ones: these are at least so long \[s\], see
+    /// [`Preflight::of`].
     pub dt_max_s: Option<f64>,
     /// Dimension of the smallest flat that holds the start and its relative velocities: 0 point, 1 line, 2 plane, 3 space.
     pub start_dimension: usize,
@@ -103,8 +100,6 @@ pub enum Code {
     FlatFormationInSpace,
     /// The swarm's mean velocity grows by itself.
     CommonModeUnstable,
-    /// The step is longer than the certified separation asks for.
-    DtTooLarge,
 }
 
 impl Code {
@@ -122,8 +117,8 @@ impl Preflight {
     /// With v~ = v - mean v and a velocity gain g the energy obeys dE/dt <= -(g lambda2/N - a22) sum |v~_i|^2 on every
     /// connected graph.
     ///
-    /// # The longest step
-    /// [`STEP_PER_MODE`] of the inverse of the fastest rate that the law can have while no pair comes nearer than its
+    /// # The shortest part of a step
+    /// [`crate::scenario::TimeSpec::max_rate_dt`] of the inverse of the fastest rate that the law can have while no pair comes nearer than its
     /// certificate says, see [`Law::fastest_rate_per_s`].
     ///
     /// # Errors
@@ -132,7 +127,8 @@ impl Preflight {
         let law = scenario.law()?;
         let certificate = law
             .certificate(&scenario.observation(&scenario.start))
-            .void_where(scenario.legs.len() > 1, Void::TargetChanges);
+            .void_where(scenario.legs.len() > 1, Void::TargetChanges)
+            .void_where(scenario.time.control_hz.is_some(), Void::CommandsHeld);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = connectivity(&scenario.graph);
         let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
@@ -151,7 +147,7 @@ impl Preflight {
             dt_s: scenario.time.dt_s,
             dt_max_s: law
                 .fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s)
-                .map(|rate_per_s| STEP_PER_MODE / rate_per_s),
+                .map(|rate_per_s| scenario.time.max_rate_dt / rate_per_s),
             start_dimension: motion_dimension(&scenario.start),
             start_margin_m: margin(&scenario.start.positions_m),
             formation_dimension,
@@ -167,7 +163,6 @@ impl Preflight {
             found.not_rigid(scenario),
             found.flat_formation_in_space(),
             found.common_mode_unstable(scenario),
-            found.dt_too_large(scenario),
         ];
         found.warnings = warnings.into_iter().flatten().collect();
         Ok(found)
@@ -271,19 +266,6 @@ impl Preflight {
                     "the law cannot move the centre of mass"
                 },
                 -rounding.ln() / rate_per_s
-            ),
-        })
-    }
-
-    fn dt_too_large(&self, scenario: &Scenario) -> Option<Warning> {
-        let dt_max_s = self.dt_max_s.filter(|_| matches!(scenario.plant, PlantSpec::Rapier(_)))?;
-        (self.dt_s > dt_max_s).then(|| Warning {
-            code: Code::DtTooLarge,
-            message: format!(
-                "The step of {} s is longer than {} s, {STEP_PER_MODE} of the time of the fastest possible mode: a flight \
-                 that comes so near may gain energy. The audit judges what is flown; reduce time.dt_s to be sure.",
-                numbers::significant(self.dt_s),
-                numbers::significant(dt_max_s)
             ),
         })
     }

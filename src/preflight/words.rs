@@ -18,7 +18,6 @@ impl Code {
             Self::NotRigid => "not-rigid",
             Self::FlatFormationInSpace => "flat-formation-in-space",
             Self::CommonModeUnstable => "common-mode-unstable",
-            Self::DtTooLarge => "dt-too-large",
         }
     }
 }
@@ -93,8 +92,12 @@ impl Preflight {
     }
 
     fn step_line(&self) -> String {
-        let most = self.dt_max_s.map_or("no bound is known".to_owned(), |dt| format!("at most {} s", significant(dt)));
-        format!("{} s ({most})", significant(self.dt_s))
+        let parts = match self.dt_max_s {
+            Some(dt_max_s) if dt_max_s >= self.dt_s => "short enough for the law",
+            Some(_) => "flown in parts where the law asks for shorter ones",
+            None => "flown in parts where a clearance shrinks too fast",
+        };
+        format!("{} s, {parts}", significant(self.dt_s))
     }
 
     fn start_line(&self) -> String {

@@ -91,6 +91,7 @@ mod tests {
             control: &control,
             separation: None,
             energy: None,
+            peaks: crate::record::Peaks::default(),
             channels: &[],
         });
         hash.finish()

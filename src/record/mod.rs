@@ -54,8 +54,30 @@ pub struct Sample<'a> {
     pub separation: Option<ClosestApproach>,
     /// The law's energy E \[m^2/s^2\] where it has one.
     pub energy: Option<f64>,
+    /// What was largest over the steps since the sample before, its end included.
+    pub peaks: Peaks,
     /// What else is known of every vehicle, each under another name.
     pub channels: &'a [Channel],
+}
+
+/// What was largest over some steps; nothing where nothing is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Peaks {
+    /// Largest commanded acceleration of a vehicle, Euclidean norm \[m/s^2\].
+    pub control_m_s2: Option<f64>,
+    /// Largest energy E \[m^2/s^2\].
+    pub energy: Option<f64>,
+}
+
+impl Peaks {
+    /// Takes one more instant.
+    pub fn take(&mut self, control_m_s2: f64, energy: Option<f64>) {
+        let larger = |known: Option<f64>, new: f64| Some(known.map_or(new, |known| known.max(new)));
+        self.control_m_s2 = larger(self.control_m_s2, control_m_s2);
+        if let Some(energy) = energy {
+            self.energy = larger(self.energy, energy);
+        }
+    }
 }
 
 /// A [`Sample`] that owns its state, as a recording gives it back.
@@ -73,6 +95,8 @@ pub struct OwnedSample {
     pub separation: Option<ClosestApproach>,
     /// The law's energy E \[m^2/s^2\] where it has one.
     pub energy: Option<f64>,
+    /// What was largest over the steps since the sample before.
+    pub peaks: Peaks,
     /// What else is known of every vehicle.
     pub channels: Vec<Channel>,
 }
@@ -88,6 +112,7 @@ impl OwnedSample {
             control: &self.control,
             separation: self.separation,
             energy: self.energy,
+            peaks: self.peaks,
             channels: &self.channels,
         }
     }
@@ -102,6 +127,7 @@ impl From<&Sample<'_>> for OwnedSample {
             control: sample.control.clone(),
             separation: sample.separation,
             energy: sample.energy,
+            peaks: sample.peaks,
             channels: sample.channels.to_vec(),
         }
     }

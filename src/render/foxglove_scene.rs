@@ -163,8 +163,16 @@ mod tests {
 
     fn message(scene: &mut FoxgloveScene, time_s: f64, swarm: &Swarm) -> Option<Vec<u8>> {
         let control = Rows::zeros(swarm.count());
-        let sample =
-            Sample { time_s, step: 0, swarm, control: &control, separation: None, energy: None, channels: &[] };
+        let sample = Sample {
+            time_s,
+            step: 0,
+            swarm,
+            control: &control,
+            separation: None,
+            energy: None,
+            peaks: crate::record::Peaks::default(),
+            channels: &[],
+        };
         let mut bytes = Vec::new();
         scene.message(&sample, &mut bytes).expect("encoded").then_some(bytes)
     }

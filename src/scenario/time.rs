@@ -12,7 +12,7 @@ pub struct TimeSpec {
     /// Length of the flight in s.
     #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub duration_s: f64,
-    /// Control and physics step in s.
+    /// Physics step in s; the law is asked once a step. A step that is too long for the law is flown in parts.
     #[serde(default = "TimeSpec::default_dt_s")]
     #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub dt_s: f64,
@@ -20,9 +20,19 @@ pub struct TimeSpec {
     #[serde(default = "TimeSpec::default_record_hz")]
     #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub record_hz: f64,
-    /// How often a step that takes more than half of a clearance may be halved; 0 takes every step as it is.
+    /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
+    /// step as it is.
     #[serde(default = "TimeSpec::default_max_halvings")]
     pub max_halvings: u32,
+    /// Largest product of a step and the law's fastest rate at the present state; a step that is longer is flown in halves.
+    #[serde(default = "TimeSpec::default_max_rate_dt", skip_serializing_if = "TimeSpec::is_default_max_rate_dt")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    pub max_rate_dt: f64,
+    /// How often the law is asked in Hz, at most once a step, where vehicles hold each command in between as a real
+    /// controller makes them do. Unless given, commands stand for continuous control.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    pub control_hz: Option<f64>,
 }
 
 impl TimeSpec {
@@ -32,6 +42,10 @@ impl TimeSpec {
     pub const DEFAULT_RECORD_HZ: f64 = 60.0;
     /// Default number of halvings.
     pub const DEFAULT_MAX_HALVINGS: u32 = 10;
+
+    /// Default of [`TimeSpec::max_rate_dt`]: it keeps the energy of second-order integration below its start to a part in a
+    /// thousand, also where vehicles bounce hard off their barriers.
+    pub const DEFAULT_MAX_RATE_DT: f64 = 0.3;
 
     /// Part of a step, or of a recording period, that is rounding: two products of the same times differ by less.
     const ROUNDING: f64 = 1e-6;
@@ -48,6 +62,15 @@ impl TimeSpec {
         Self::DEFAULT_MAX_HALVINGS
     }
 
+    fn default_max_rate_dt() -> f64 {
+        Self::DEFAULT_MAX_RATE_DT
+    }
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+    fn is_default_max_rate_dt(max_rate_dt: &f64) -> bool {
+        *max_rate_dt == Self::DEFAULT_MAX_RATE_DT
+    }
+
     /// A flight of this length \[s\] with the default rates.
     #[must_use]
     pub fn lasting(duration_s: f64) -> Self {
@@ -56,6 +79,8 @@ impl TimeSpec {
             dt_s: Self::DEFAULT_DT_S,
             record_hz: Self::DEFAULT_RECORD_HZ,
             max_halvings: Self::DEFAULT_MAX_HALVINGS,
+            max_rate_dt: Self::DEFAULT_MAX_RATE_DT,
+            control_hz: None,
         }
     }
 
@@ -68,13 +93,38 @@ impl TimeSpec {
         steps
     }
 
-    /// Whether step `k` (its end, time k dt) is recorded: the start, the first step at or after each recording
-    /// period, and the last step.
+    /// When a step ends \[s\]; the last ends with the flight, and is shorter where steps do not divide the duration.
+    #[must_use]
+    pub fn end_s(&self, step: u64) -> f64 {
+        let end_s = step as f64 * self.dt_s;
+        if end_s - self.duration_s > Self::ROUNDING * self.dt_s { self.duration_s } else { end_s }
+    }
+
+    /// Length of a step, from 1 \[s\].
+    #[must_use]
+    pub fn length_s(&self, step: u64) -> f64 {
+        let (end_s, whole_s) = (self.end_s(step), step as f64 * self.dt_s);
+        if end_s < whole_s { end_s - (step - 1) as f64 * self.dt_s } else { self.dt_s }
+    }
+
+    /// Whether step `k` (its end) is recorded: the start, the first step at or after each recording period, and the last
+    /// step.
     #[must_use]
     pub fn records(&self, step: u64) -> bool {
-        let periods_per_step = (self.dt_s * self.record_hz).min(1.0);
+        step == self.steps() || self.begins_period(step, self.record_hz)
+    }
+
+    /// Whether the law is asked at the end of step `k`: after every step, or at the first at or after each period of
+    /// `control_hz`.
+    #[must_use]
+    pub fn commands(&self, step: u64) -> bool {
+        self.control_hz.is_none_or(|control_hz| self.begins_period(step, control_hz))
+    }
+
+    fn begins_period(&self, step: u64, hz: f64) -> bool {
+        let periods_per_step = (self.dt_s * hz).min(1.0);
         let periods = |k: u64| (k as f64 * periods_per_step + Self::ROUNDING).floor();
-        step == 0 || periods(step) > periods(step - 1) || step == self.steps()
+        step == 0 || periods(step) > periods(step - 1)
     }
 }
 
@@ -106,6 +156,23 @@ mod tests {
     fn the_last_step_is_always_recorded() {
         let time = TimeSpec { dt_s: 0.3, record_hz: 0.1, ..TimeSpec::lasting(1.0) };
         assert_eq!((time.steps(), recorded(time)), (4, vec![0, 4]));
+    }
+
+    #[test]
+    fn a_flight_ends_when_it_shall_and_its_last_step_is_what_is_left() {
+        let time = TimeSpec { dt_s: 3.0, ..TimeSpec::lasting(10.0) };
+        assert_eq!((time.steps(), time.end_s(3), time.end_s(4)), (4, 9.0, 10.0));
+        assert_eq!((time.length_s(3), time.length_s(4)), (3.0, 1.0));
+        let even = TimeSpec::lasting(120.0);
+        assert_eq!((even.end_s(even.steps()), even.length_s(even.steps())), (28_800.0 * even.dt_s, even.dt_s));
+    }
+
+    #[test]
+    fn the_law_is_asked_every_step_or_once_a_period_of_its_own() {
+        let time = TimeSpec { dt_s: 0.01, ..TimeSpec::lasting(1.0) };
+        assert!((0..=100).all(|step| time.commands(step)));
+        let held = TimeSpec { control_hz: Some(25.0), ..time };
+        assert_eq!((0..=12).filter(|&step| held.commands(step)).collect::<Vec<_>>(), [0, 4, 8, 12]);
     }
 
     #[test]

@@ -265,7 +265,7 @@ impl Scenario {
     }
 
     fn check_time(&self) -> Result<(), ScenarioError> {
-        let TimeSpec { duration_s, dt_s, record_hz, max_halvings } = self.time;
+        let TimeSpec { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz } = self.time;
         positive("time.dt_s", "the time step", dt_s)?;
         require_more_than_zero("the duration", duration_s).map_err(|error| error.at("time.duration_s"))?;
         if dt_s > duration_s {
@@ -294,6 +294,18 @@ impl Scenario {
             .at("time.dt_s"));
         }
         positive("time.record_hz", "the recording rate", record_hz)?;
+        positive("time.max_rate_dt", "the largest product of step and rate", max_rate_dt)?;
+        if let Some(control_hz) = control_hz {
+            positive("time.control_hz", "the control rate", control_hz)?;
+            if control_hz * dt_s > 1.0 + 1e-6 {
+                return Err(ScenarioError::new(format!(
+                    "a control rate of {control_hz} Hz asks the law more than once in a step of {dt_s} s"
+                ))
+                .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
+                .at("time.control_hz")
+                .at("time.dt_s"));
+            }
+        }
         if max_halvings > MAX_HALVINGS {
             return Err(ScenarioError::new(format!(
                 "a step is halved at most {MAX_HALVINGS} times, not {max_halvings}"

@@ -3,7 +3,7 @@
 use crate::feedback::Feedback;
 use crate::graph::Graph;
 use crate::law::{Law, LawError};
-use crate::link::{Link, Sensed};
+use crate::link::Link;
 use crate::observation::Observation;
 use crate::space::NearPairs;
 use crate::swarm::{Rows, Swarm};
@@ -31,15 +31,47 @@ impl Controller {
         Self { law, link, supervisor, target, links, near: NearPairs::default() }
     }
 
-    /// Lets the supervisor look at the swarm as it is sensed, at an instant of the flight.
-    /// The law follows a target that has changed.
-    pub(super) fn supervise(&mut self, time_s: f64, truth: &Swarm) -> Result<(), LawError> {
-        if self.supervisor.is_idle() {
-            return Ok(());
-        }
+    /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
+    /// target, which the law follows; then the law is asked, where there is a `command` to be written.
+    pub(super) fn act(&mut self, time_s: f64, truth: &Swarm, command: Option<&mut Rows>) -> Result<(), LawError> {
+        self.respond(time_s, truth, true, command)
+    }
+
+    fn respond(
+        &mut self,
+        time_s: f64,
+        truth: &Swarm,
+        supervised: bool,
+        command: Option<&mut Rows>,
+    ) -> Result<(), LawError> {
         let sensed = self.link.sense(time_s, truth);
-        self.supervisor.supervise(time_s, sensed.own, &mut self.target);
-        self.law.follow(&self.target.view())
+        if supervised && !self.supervisor.is_idle() {
+            self.supervisor.supervise(time_s, sensed.own, &mut self.target);
+            self.law.follow(&self.target.view())?;
+        }
+        let Some(command) = command else { return Ok(()) };
+        if let Some(range_m) = self.law.sensing_range_m() {
+            self.near.update(&sensed.own.positions_m, range_m);
+        }
+        let at = Observation {
+            time_s,
+            own: sensed.own,
+            others: sensed.others,
+            target: self.target.view(),
+            links: &self.links,
+            near: self.near.pairs(),
+            obstacles: &[],
+        };
+        self.law.command(&at, command)?;
+        self.link.actuate(time_s, command);
+        Ok(())
+    }
+
+    /// All random numbers begin anew.
+    pub(super) fn reseed(&mut self, seed: u64) {
+        self.law.reseed(seed);
+        self.link.reseed(seed);
+        self.supervisor.reseed(seed);
     }
 
     /// The law's energy of a true state.
@@ -51,22 +83,7 @@ impl Controller {
 
 impl Feedback for Controller {
     fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
-        let Sensed { own, others } = self.link.sense(time_s, truth);
-        if let Some(range_m) = self.law.sensing_range_m() {
-            self.near.update(&own.positions_m, range_m);
-        }
-        let at = Observation {
-            time_s,
-            own,
-            others,
-            target: self.target.view(),
-            links: &self.links,
-            near: self.near.pairs(),
-            obstacles: &[],
-        };
-        self.law.command(&at, command)?;
-        self.link.actuate(time_s, command);
-        Ok(())
+        self.respond(time_s, truth, false, Some(command))
     }
 
     fn accept(&mut self, time_s: f64, truth: &Swarm) {

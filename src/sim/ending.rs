@@ -122,6 +122,14 @@ pub enum SimError {
     /// The scenario has no formation to fly to.
     #[error("the scenario has no leg")]
     NoLeg,
+    /// Vehicles that are not those of the scenario.
+    #[error("the scenario has {expected} vehicles, and what moves them has {found}")]
+    Vehicles {
+        /// Number of vehicles of the scenario.
+        expected: usize,
+        /// Number of vehicles that are moved.
+        found: usize,
+    },
     /// Accelerations from outside that are not a finite row for each vehicle.
     #[error("{found} rows of accelerations for {expected} vehicles, or a number among them that is not finite")]
     Commands {

@@ -7,7 +7,7 @@
 
 mod controller;
 mod ending;
-mod finding;
+mod judge;
 mod motion;
 mod parts;
 mod simulation;

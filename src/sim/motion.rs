@@ -94,6 +94,28 @@ impl Motion {
         }
     }
 
+    pub(super) fn count(&self) -> usize {
+        match self {
+            Self::Sampled(plant) => plant.count(),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(solution) => solution.count(),
+        }
+    }
+
+    /// Whether a command is held over a step, and not made anew all the way along.
+    pub(super) fn holds_commands(&self) -> bool {
+        matches!(self, Self::Sampled(_))
+    }
+
+    /// All random numbers begin anew; continuous time has none.
+    pub(super) fn reseed(&mut self, seed: u64) {
+        match self {
+            Self::Sampled(plant) => plant.reseed(seed),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(_) => {}
+        }
+    }
+
     pub(super) fn observe(&self, state: &mut Swarm) {
         match self {
             Self::Sampled(plant) => plant.observe(state),

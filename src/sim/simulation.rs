@@ -4,17 +4,15 @@ use std::time::{Duration, Instant};
 
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError};
-use super::finding::{note, note_contacts};
+use super::judge::Judge;
 use super::motion::Motion;
 use super::parts::Parts;
-use crate::audit::{Auditor, swept_separation_m};
 use crate::feedback::Feedback as _;
 use crate::law::{Certificate, Void};
 use crate::plant::Path;
-use crate::record::{Event, Sample};
+use crate::record::{Event, Peaks, Sample};
 use crate::scenario::{MAX_HALVINGS, Scenario};
-use crate::space::NearPairs;
-use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, first_row_not_finite, row};
+use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
 use crate::target::CurrentTarget;
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
@@ -47,24 +45,20 @@ pub struct Simulation {
     controller: Controller,
     motion: Motion,
     certificate: Certificate,
-    auditor: Auditor,
+    judge: Judge,
     state: Swarm,
     next: Swarm,
     path: Path,
-    /// Pairs that a step may have brought too near.
-    near: NearPairs,
     control: Rows,
     /// Whether `control` was given from outside and the law has not been asked about the present state.
     overruled: bool,
     time_s: f64,
     steps: u64,
-    /// Closest approach since the last sample.
-    closest: Option<ClosestApproach>,
-    /// Smallest separation over the last sweep: bounds from below how near any pair is now.
-    nearest_m: f64,
-    engine_contacts: Vec<Pair>,
-    contacts_now: Vec<Pair>,
     events: Vec<Event>,
+    /// Energy of the present state \[m^2/s^2\].
+    energy: Option<f64>,
+    /// Since the last sample.
+    peaks: Peaks,
     sample_is_due: bool,
     ending: Option<Ending>,
     pub(super) performance: Performance,
@@ -90,10 +84,15 @@ impl Simulation {
     /// [`SimError`] where there is no judge.
     pub fn with(scenario: &Scenario, parts: Parts) -> Result<Self, SimError> {
         let Parts { law, motion, link, supervisor } = parts;
+        let count = scenario.count();
+        if motion.count() != count {
+            return Err(SimError::Vehicles { expected: count, found: motion.count() });
+        }
         let certificate = law
             .certificate(&scenario.observation(&scenario.start))
             .void_where(!supervisor.is_idle(), Void::TargetChanges)
-            .void_where(!link.is_exact(), Void::InexactLink);
+            .void_where(!link.is_exact(), Void::InexactLink)
+            .void_where(scenario.time.control_hz.is_some(), Void::CommandsHeld);
         let mut state = scenario.start.clone();
         motion.observe(&mut state);
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
@@ -101,20 +100,17 @@ impl Simulation {
             controller: Controller::new(law, link, supervisor, target, scenario.graph.clone()),
             motion,
             certificate,
-            auditor: Auditor::new(scenario.count(), scenario.delta_m)?,
+            judge: Judge::new(count, scenario.delta_m)?,
             next: state.clone(),
             path: Path::default(),
-            near: NearPairs::default(),
-            control: Rows::zeros(scenario.count()),
+            control: Rows::zeros(count),
             overruled: false,
             state,
             time_s: 0.0,
             steps: 0,
-            closest: None,
-            nearest_m: 0.0,
-            engine_contacts: Vec::new(),
-            contacts_now: Vec::new(),
             events: Vec::new(),
+            energy: None,
+            peaks: Peaks::default(),
             sample_is_due: false,
             ending: None,
             performance: Performance::default(),
@@ -130,14 +126,16 @@ impl Simulation {
         if let Some(vehicle) = self.state.first_not_finite() {
             return Err(Breakdown::StateNotFinite { step: 0, vehicle }.into());
         }
-        self.judge_and_command(None)
+        self.judge_and_command(None, true)
     }
 
-    /// Flies one step of the scenario's length, in halves where it is refused; nothing once the flight has ended.
+    /// Flies one step of the scenario's length, in parts where that is too long; nothing once the flight has ended.
     ///
-    /// A step that takes more than half of the clearance above the law's barrier from some pair is refused, undone and
-    /// flown in halves (at most [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between.
-    /// So is one on which a path bends by more than 1e-5 m from the straight line that the audit sweeps.
+    /// A step that is too long for the law's fastest rate at the present state
+    /// ([`crate::scenario::TimeSpec::max_rate_dt`]) is flown in halves (at most
+    /// [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between. A step that
+    /// takes more than half of the clearance above the law's barrier from some pair is refused, undone and flown in halves;
+    /// so is one on which a path bends by more than 1e-5 m from the straight line that the audit sweeps.
     pub fn step(&mut self) {
         if self.ending.is_none() && std::mem::take(&mut self.overruled) {
             let asked = self.ask();
@@ -190,7 +188,7 @@ impl Simulation {
     /// Ends the flight where it cannot go on; its last instant is recorded, unless it has been.
     fn end_on(&mut self, flown: Result<(), Ending>) {
         if let Err(ending) = flown {
-            self.sample_is_due = self.closest.is_some();
+            self.sample_is_due = self.judge.closest.is_some();
             self.ending = Some(ending);
         }
     }
@@ -240,8 +238,9 @@ impl Simulation {
             step: self.steps,
             swarm: &self.state,
             control: &self.control,
-            separation: self.closest.take(),
-            energy: self.controller.energy(self.time_s, &self.state),
+            separation: self.judge.closest.take(),
+            energy: self.energy,
+            peaks: std::mem::take(&mut self.peaks),
             channels: &[],
         })
     }
@@ -252,26 +251,28 @@ impl Simulation {
         Saved(self.clone())
     }
 
-    /// Becomes what was saved, of whatever scenario, and goes on with the same bits as if it had never been interrupted; with a `noise_seed`, the random
-    /// numbers of the link begin anew from it and nothing else changes.
+    /// Becomes what was saved, of whatever scenario, and goes on with the same bits as if it had never been interrupted;
+    /// with a `noise_seed`, all random numbers begin anew from it and nothing else changes.
     pub fn load(&mut self, saved: &Saved, noise_seed: Option<u64>) {
         self.clone_from(&saved.0);
         if let Some(seed) = noise_seed {
-            self.controller.link.reseed(seed);
+            self.controller.reseed(seed);
+            self.motion.reseed(seed);
         }
     }
 
     /// What the flight left behind besides its recording. One that is under way counts as interrupted here.
     #[must_use]
     pub fn finish(self) -> Flight {
+        let (audit, engine_contacts) = self.judge.finish();
         Flight {
             law: self.controller.law.name().to_owned(),
             ending: self.ending.unwrap_or(Ending::Interrupted),
             duration_s: self.time_s,
             steps: self.steps,
             certificate: self.certificate,
-            audit: self.auditor.finish(),
-            engine_contacts: self.engine_contacts,
+            audit,
+            engine_contacts,
             last: self.state,
             performance: self.performance,
         }
@@ -283,19 +284,33 @@ impl Simulation {
         let mut shortest = whole;
         let flown = self.fly_parts(step, whole, &mut shortest);
         if shortest < whole {
-            let dt_s = self.scenario.time.dt_s;
-            let (time_s, dt_s) = ((step - 1) as f64 * dt_s, dt_s * (shortest as f64 / whole as f64));
+            let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
+            let dt_s = length_s * (shortest as f64 / whole as f64);
             self.events.push(Event::StepRefined { time_s, dt_s });
         }
         flown
     }
 
-    /// Flies the `whole` parts of a step, as many at once as are not refused; the fewest at once are `shortest`.
+    /// Longest step that is honest at the present state \[s\]. Continuous time chooses its own.
+    fn longest_step_s(&self) -> f64 {
+        let (law, nearest_m) = (&self.controller.law, self.judge.nearest_m);
+        let rate_per_s = law.fastest_rate_per_s(Some(nearest_m), self.scenario.a22_per_s);
+        rate_per_s
+            .filter(|_| self.motion.holds_commands())
+            .map_or(f64::INFINITY, |rate_per_s| self.scenario.time.max_rate_dt / rate_per_s)
+    }
+
+    /// Flies the `whole` parts of a step, as many at once as are honest and not refused; the fewest at once that a refusal
+    /// left are `shortest`.
     fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<(), Ending> {
-        let dt_s = self.scenario.time.dt_s;
-        let seconds = |parts: u64| dt_s * (parts as f64 / whole as f64);
+        let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
+        let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
         let (mut flown, mut part) = (0, whole);
         while flown < whole {
+            let longest_s = self.longest_step_s();
+            while part > 1 && seconds(part) > longest_s {
+                part /= 2;
+            }
             self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();
             if part > 1 && (bend_m > MAX_BEND_M || self.is_refused()) {
@@ -312,12 +327,12 @@ impl Simulation {
             let from_s = self.time_s;
             if flown == whole {
                 self.steps = step;
-                self.time_s = step as f64 * dt_s;
+                self.time_s = self.scenario.time.end_s(step);
             } else {
-                self.time_s = (step - 1) as f64 * dt_s + seconds(flown);
+                self.time_s = begin_s + seconds(flown);
             }
             std::mem::swap(&mut self.state, &mut self.next);
-            self.judge_and_command(Some((step, from_s)))?;
+            self.judge_and_command(Some((step, from_s)), flown == whole)?;
             while part < whole && flown.is_multiple_of(2 * part) {
                 part *= 2;
             }
@@ -328,7 +343,8 @@ impl Simulation {
     /// Moves the vehicles from `state` to `next`.
     fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<(), Ending> {
         let began = Instant::now();
-        let held = self.overruled.then_some(&self.control);
+        let is_held = self.overruled || self.scenario.time.control_hz.is_some();
+        let held = is_held.then_some(&self.control);
         let interval = (step, self.time_s, dt_s);
         self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
         self.performance.physics += began.elapsed();
@@ -338,75 +354,54 @@ impl Simulation {
         }
     }
 
-    /// Whether the move from `state` to `next` takes more than half of some pair's clearance above the barrier.
     fn is_refused(&mut self) -> bool {
-        let Some(barrier_m) = self.controller.law.barrier_m() else { return false };
-        let start = &self.state.positions_m;
-        let instants = || self.path.passed().map(|(_, rows)| rows).chain([&self.next.positions_m]);
-        let moved_m = instants()
-            .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
-            .fold(0.0, f64::max);
-        // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
-        if 2.0 * moved_m <= 0.5 * (self.nearest_m - barrier_m) {
-            return false;
-        }
-        let loses_half = |(i, j): (usize, usize)| {
-            let apart = |rows: &Rows| row(rows, j) - row(rows, i);
-            let mut from = apart(start);
-            let least_m = barrier_m + 0.5 * (from.norm() - barrier_m);
-            instants().map(apart).any(|to| swept_separation_m(std::mem::replace(&mut from, to), to) < least_m)
-        };
-        if self.controller.law.sensing_range_m().is_none() {
-            return self.controller.links.edges().any(loses_half);
-        }
-        // A pair that begins farther apart keeps half of its clearance.
-        self.near.update(start, barrier_m + 4.0 * moved_m);
-        self.near.pairs().iter().copied().any(loses_half)
+        let Controller { law, links, .. } = &self.controller;
+        self.judge.refuses(law.as_ref(), links, &self.state, &self.path, &self.next)
     }
 
     /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
-    fn judge_and_command(&mut self, step: Option<(u64, f64)>) -> Result<(), Ending> {
+    /// Between whole steps a command that is held for a period of its own is kept.
+    fn judge_and_command(&mut self, step: Option<(u64, f64)>, is_whole: bool) -> Result<(), Ending> {
         let (number, from_s) = step.unwrap_or((0, self.time_s));
-        if let Err(why) = self.judge_passed(from_s) {
-            return Err(Breakdown::Audit { step: number, why }.into());
+        let refused = |why| Ending::from(Breakdown::Audit { step: number, why });
+        for (after_s, positions_m) in self.path.passed() {
+            self.judge.sweep(from_s + after_s, positions_m, &mut self.events).map_err(refused)?;
         }
         self.controller.accept(self.time_s, &self.state);
         self.controller.link.settle(self.time_s);
-        self.supervise()?;
-        let Self { auditor, controller, state, control, time_s, overruled, .. } = self;
-        let (state, time_s, overruled): (&Swarm, f64, bool) = (state, *time_s, *overruled);
-        let audit = move || {
+        let leg = self.controller.target.view().leg;
+        let time = &self.scenario.time;
+        let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));
+        if time.control_hz.is_some() {
+            self.motion.apply(&self.control, &mut self.state);
+        }
+        let Self { judge, controller, state, control, time_s, events, .. } = self;
+        let (state, time_s): (&Swarm, f64) = (state, *time_s);
+        let mut audit = || {
             let began = Instant::now();
-            let auditor = auditor;
-            let finding = match step {
-                None => auditor.start(time_s, &state.positions_m),
-                Some(_) => auditor.step(time_s, &state.positions_m),
+            let positions_m = &state.positions_m;
+            let judged = match step {
+                None => judge.start(time_s, positions_m, events),
+                Some(_) => judge.sweep(time_s, positions_m, events),
             };
-            (finding, began.elapsed())
+            (judged, began.elapsed())
         };
-        let mut command = || {
+        let mut act = || {
             let began = Instant::now();
-            let commanded = if overruled { Ok(()) } else { controller.command(time_s, state, control) };
-            (commanded, began.elapsed())
+            (controller.act(time_s, state, is_asked.then_some(control)), began.elapsed())
         };
         let side_by_side = state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
-        let ((finding, audit_time), (commanded, law_time)) =
-            if side_by_side { rayon::join(audit, command) } else { (audit(), command()) };
-        let noted = finding.map(|finding| note(finding, &mut self.closest, &mut self.nearest_m, &mut self.events));
+        let ((judged, audit_time), (commanded, law_time)) =
+            if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
         self.performance.audit += audit_time;
-        let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
-        noted.map_err(|why| Breakdown::Audit { step: number, why })?;
-        self.note_engine_contacts();
-        commanded
-    }
-
-    /// Audits the instants between the ends of the last step.
-    fn judge_passed(&mut self, from_s: f64) -> Result<(), crate::audit::AuditError> {
-        for (after_s, positions_m) in self.path.passed() {
-            let finding = self.auditor.step(from_s + after_s, positions_m)?;
-            note(finding, &mut self.closest, &mut self.nearest_m, &mut self.events);
+        let now = self.controller.target.view().leg;
+        if now != leg {
+            self.events.push(Event::LegBegan { leg: now, time_s });
         }
-        Ok(())
+        let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
+        judged.map_err(refused)?;
+        self.judge.note_engine_contacts(&self.motion, self.time_s, &mut self.events);
+        commanded
     }
 
     /// Asks the law about the present state.
@@ -423,27 +418,16 @@ impl Simulation {
             Some(vehicle) => Err(Breakdown::CommandNotFinite { step, vehicle }.into()),
             None => Ok(()),
         });
-        match checked {
-            Ok(()) => self.motion.apply(&self.control, &mut self.state),
-            Err(_) => self.control = Rows::zeros(0),
+        if checked.is_err() {
+            (self.control, self.energy) = (Rows::zeros(0), None);
+            return checked;
         }
-        checked
-    }
-
-    fn supervise(&mut self) -> Result<(), Ending> {
-        let before = self.controller.target.view().leg;
-        let followed = self.controller.supervise(self.time_s, &self.state);
-        let leg = self.controller.target.view().leg;
-        if leg != before {
-            self.events.push(Event::LegBegan { leg, time_s: self.time_s });
+        self.motion.apply(&self.control, &mut self.state);
+        if let Some(vehicle) = self.state.first_not_finite() {
+            return Err(Breakdown::StateNotFinite { step, vehicle }.into());
         }
-        followed.inspect_err(|_| self.control = Rows::zeros(0))?;
+        self.energy = self.controller.energy(self.time_s, &self.state);
+        self.peaks.take(largest_row_norm(&self.control), self.energy);
         Ok(())
-    }
-
-    fn note_engine_contacts(&mut self) {
-        self.contacts_now.clear();
-        self.motion.keep_out_contacts(&mut self.contacts_now);
-        note_contacts(&self.contacts_now, &mut self.engine_contacts, self.time_s, &mut self.events);
     }
 }

@@ -17,6 +17,9 @@ pub trait Supervisor: DynClone + Send {
     fn is_idle(&self) -> bool {
         false
     }
+
+    /// Begins its random numbers anew.
+    fn reseed(&mut self, _seed: u64) {}
 }
 
 dyn_clone::clone_trait_object!(Supervisor);

@@ -27,7 +27,7 @@ fn the_pentagon_is_ready_with_the_known_numbers() {
     let number = |key: &str| found[key].as_f64().expect("a number");
     assert!((number("certified_m") - 2.055_307).abs() < 1e-5);
     assert!((number("velocity_margin_per_s") - 1.0).abs() < 1e-9);
-    assert_eq!(codes(&found), ["common-mode-unstable", "dt-too-large"]);
+    assert_eq!(codes(&found), ["common-mode-unstable"]);
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn wrong_input_is_told_apart_from_a_bad_flight() {
 #[test]
 fn words_go_to_standard_output_and_quiet_says_nothing() {
     let (code, out, err) = tautline(&["check"]);
-    assert!(code == 0 && out.starts_with("READY: ") && out.contains("warning [dt-too-large]: ") && err.is_empty());
+    assert!(code == 0 && out.starts_with("READY: ") && out.contains("warning [common-mode-unstable]: ") && err.is_empty());
     assert_eq!(tautline(&["check", "pentagon-collinear", "--quiet"]), (1, String::new(), String::new()));
 }
 
@@ -87,7 +87,7 @@ fn run_warns_before_it_flies_and_not_when_quiet() {
     let run = ["run", "pentagon-collinear", "--set", "time.duration_s=1.5", "--force", "--out", out];
     let (code, _, err) = tautline(&run);
     assert!(
-        code == 1 && err.contains("warning [start-on-line]: ") && err.contains("warning [dt-too-large]: "),
+        code == 1 && err.contains("warning [start-on-line]: "),
         "{err}"
     );
     let (_, out, err) = tautline(&[&run[..], &["--quiet"]].concat());
@@ -105,7 +105,7 @@ fn run_flies_the_ideal_plant_when_asked() {
     assert_eq!(code, 1, "three seconds are too short to reach the formation");
     assert!((report["separation"]["min_m"].as_f64().expect("a number") - 2.460_353).abs() < 2e-6, "{report}");
     assert!(report["audit"]["rapier"]["contact_pairs"].is_null());
-    assert!(err.contains("common-mode-unstable") && !err.contains("dt-too-large"), "{err}");
+    assert!(err.contains("common-mode-unstable"), "{err}");
     let (code, ..) = tautline(&["run", "pentagon", "--plant", "perfect", "--out", out]);
     assert_eq!(code, 2);
 }

@@ -63,6 +63,7 @@ fn sample(vehicles: usize, k: usize) -> OwnedSample {
             time_s: time_s - 0.001,
         }),
         energy: known.then_some(1.0 / 3.0),
+        peaks: tautline::record::Peaks::default(),
         channels: Vec::new(),
     }
 }

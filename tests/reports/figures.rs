@@ -125,6 +125,7 @@ fn samples(count: usize, rise_m_s: f64, near_m: f64, take: &mut dyn FnMut(&Sampl
             control: &control,
             separation: closest,
             energy: Some(4.0 - 0.3 * time_s),
+            peaks: tautline::record::Peaks::default(),
             channels: &[],
         });
     }
@@ -289,6 +290,7 @@ fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
             control: &control,
             separation: Some(ClosestApproach { pair: Pair::new(4321, 4999), separation_m: 1.0, time_s: 7.0 }),
             energy: Some(f64::from(k % 7)),
+            peaks: tautline::record::Peaks::default(),
             channels: &[],
         });
     }

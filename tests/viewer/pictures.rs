@@ -132,6 +132,7 @@ fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
             control: &control,
             separation: None,
             energy: None,
+            peaks: tautline::record::Peaks::default(),
             channels: &[],
         });
     }
@@ -247,6 +248,7 @@ fn crossing() -> Timeline {
             control: &control,
             separation,
             energy: None,
+            peaks: tautline::record::Peaks::default(),
             channels: &[],
         });
     }

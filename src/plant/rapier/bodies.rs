@@ -23,13 +23,15 @@ pub(super) struct Bodies {
     handles: Vec<RigidBodyHandle>,
     /// Accelerations held over the step \[m/s^2\].
     held: Rows,
+    /// Length of the drift that waits for the second half of its kick \[s\]; 0 for a completed state.
+    drifted_s: f64,
     /// Where the engine's origin is: the middle of the start, so that single precision resolves the swarm's own extent
     /// wherever it flies.
     origin_m: Vector3<f64>,
     mass_kg: Vec<f64>,
     a22_per_s: f64,
-    dt_s: f64,
-    damping_per_s: Real,
+    /// Whether z is locked.
+    is_flat: bool,
 }
 
 impl Bodies {
@@ -37,30 +39,30 @@ impl Bodies {
         let mut world = empty_world();
         let origin_m = mean_row(&scenario.start.positions_m);
         let handles = (0..scenario.count()).map(|i| insert_vehicle(&mut world, scenario, origin_m, i)).collect();
-        let mut bodies = Self {
+        Self {
             world,
             handles,
             held: Rows::zeros(scenario.count()),
+            drifted_s: 0.0,
             origin_m,
             mass_kg: scenario.mass_kg.clone(),
             a22_per_s: scenario.a22_per_s,
-            dt_s: f64::NAN,
-            damping_per_s: 0.0,
-        };
-        bodies.set_dt(scenario.time.dt_s);
-        bodies
+            is_flat: scenario.space == Space::Plane,
+        }
     }
 
-    /// Sets the step and the damping that makes a free velocity exactly exp(a22 t) over it.
-    fn set_dt(&mut self, dt_s: f64) {
-        if dt_s != self.dt_s {
-            self.dt_s = dt_s;
-            self.damping_per_s = real(libm::expm1(-self.a22_per_s * dt_s) / dt_s);
-            self.world.integration_parameters.dt = real(dt_s);
-            for &handle in &self.handles {
-                self.world.bodies[handle].set_linear_damping(self.damping_per_s);
-            }
-        }
+    /// What half a step of free motion multiplies a velocity by: exp(a22 dt/2).
+    fn half_decay(&self, dt_s: f64) -> f64 {
+        libm::exp(0.5 * self.a22_per_s * dt_s)
+    }
+
+    /// Each vehicle's velocity \[m/s\] with the second half of the held acceleration's kick, where a drift waits for it.
+    fn velocities_m_s(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let half_decay = self.half_decay(self.drifted_s);
+        self.handles.iter().enumerate().map(move |(i, &handle)| {
+            let drift_m_s = doubles(self.world.bodies[handle].linvel());
+            (drift_m_s + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay
+        })
     }
 }
 
@@ -86,14 +88,23 @@ impl Clone for Bodies {
 }
 
 impl Plant for Bodies {
+    fn count(&self) -> usize {
+        self.handles.len()
+    }
+
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
-        self.set_dt(dt_s);
+        self.world.integration_parameters.dt = real(dt_s);
+        let half_decay = self.half_decay(dt_s);
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
+            let held_m_s2 = row(&self.held, i);
+            let drift_m_s = doubles(body.linvel()) * half_decay + 0.5 * dt_s * held_m_s2;
+            body.set_linvel(reals(drift_m_s - dt_s * held_m_s2), true);
             body.reset_forces(false);
-            body.add_force(reals(row(&self.held, i)) * real(self.mass_kg[i]), true);
+            body.add_force(reals(held_m_s2) * real(self.mass_kg[i]), true);
         }
         self.world.step();
+        self.drifted_s = dt_s;
         if let Some(lost) = self.world.quarantine().bodies().first() {
             let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
             return Err(PlantError::NotFinite { vehicle });
@@ -102,15 +113,28 @@ impl Plant for Bodies {
         Ok(())
     }
 
-    fn apply(&mut self, command: &Rows, _state: &mut Swarm) {
+    fn apply(&mut self, command: &Rows, state: &mut Swarm) {
         self.held.copy_from(command);
+        if self.is_flat {
+            self.held.column_mut(2).fill(0.0);
+        }
+        if self.drifted_s > 0.0 {
+            for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
+                set_row(&mut state.velocities_m_s, i, doubles(reals(velocity_m_s)));
+            }
+            for (i, &handle) in self.handles.iter().enumerate() {
+                self.world.bodies[handle].set_linvel(reals(row(&state.velocities_m_s, i)), true);
+            }
+            self.drifted_s = 0.0;
+        }
     }
 
     fn observe(&self, swarm: &mut Swarm) {
         for (i, &handle) in self.handles.iter().enumerate() {
-            let body = &self.world.bodies[handle];
-            set_row(&mut swarm.positions_m, i, self.origin_m + doubles(body.translation()));
-            set_row(&mut swarm.velocities_m_s, i, doubles(body.linvel()));
+            set_row(&mut swarm.positions_m, i, self.origin_m + doubles(self.world.bodies[handle].translation()));
+        }
+        for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
+            set_row(&mut swarm.velocities_m_s, i, velocity_m_s);
         }
     }
 
@@ -120,6 +144,7 @@ impl Plant for Bodies {
             body.set_translation(reals(row(&swarm.positions_m, i) - self.origin_m), true);
             body.set_linvel(reals(row(&swarm.velocities_m_s, i)), true);
         }
+        self.drifted_s = 0.0;
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {

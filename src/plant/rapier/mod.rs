@@ -5,10 +5,23 @@
 //! In the plane z = 0 translation along z is locked as well.
 //!
 //! # Motion within a step
-//! With one solver iteration and no contact the engine updates `v += u dt; p += v dt; v *= 1/(1 + c dt)`, so within a
-//! step a vehicle moves on a straight line and a linear sweep of the step is exact. (With n iterations the position
-//! would gain `u dt^2 (n+1)/(2n)` instead of `u dt^2`.) The damping coefficient `c = (exp(-a22 dt) - 1)/dt` makes a free
-//! velocity exactly `v(0) exp(a22 t)`, the free motion of equation (1); it is negative for a22 > 0.
+//! With one solver iteration and no contact the engine updates `v += u dt; p += v dt`, so within a step a vehicle moves on a
+//! straight line and a linear sweep of the step is exact. (With n iterations the position would gain
+//! `u dt^2 (n+1)/(2n)` instead of `u dt^2`.)
+//!
+//! # Second order
+//! Velocities are set around the engine's step so that the whole is kick, drift, kick, with one command a step. From a
+//! completed state (p, v) with the held acceleration u
+//!
+//! ```text
+//! w  = v e^(a22 dt/2) + (dt/2) u       the engine starts from w - dt u, adds dt u, and drifts: p' = p + dt w
+//! v~ = (w + (dt/2) u) e^(a22 dt/2)     predicted, from which the law makes the next command u'
+//! v' = (w + (dt/2) u') e^(a22 dt/2)    completed, and recorded
+//! ```
+//!
+//! A free velocity is exactly v(0) exp(a22 t), the free motion of equation (1); a command that is held (u' = u) gives the
+//! motion under a constant acceleration exactly, where a22 = 0. Forces u m go through the engine, so that what
+//! its contacts do to a velocity stays in w.
 //!
 //! # Contacts
 //! The engine looks for contacts before it moves the bodies, so those that it reports after a step are of the state

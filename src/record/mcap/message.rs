@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::Header;
 use super::topic::Topic;
-use crate::record::{Channel, Event, OwnedSample, ReadFault, Sample};
+use crate::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 /// A topic that every recording has.
@@ -152,6 +152,7 @@ impl SwarmMessage<Vec<f64>> {
             control: Rows::from_row_slice(&self.controls_m_s2),
             separation: summary.map(SummaryMessage::separation).transpose()?.flatten(),
             energy: summary.map(|summary| summary.energy_m2_s2).filter(|energy| !energy.is_nan()),
+            peaks: Peaks::default(),
             channels: channels.map(|channel| channel.into_channel(vehicles)).collect::<Result<_, _>>()?,
         })
     }

@@ -27,6 +27,7 @@ fn timeline() -> Timeline {
             control: &control,
             separation,
             energy: None,
+            peaks: crate::record::Peaks::default(),
             channels: &[],
         });
     }
@@ -188,6 +189,7 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
         control: &Rows::zeros(1),
         separation: None,
         energy: None,
+        peaks: crate::record::Peaks::default(),
         channels: &[],
     });
     assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
@@ -200,6 +202,7 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
         control: &Rows::zeros(1),
         separation: None,
         energy: None,
+        peaks: crate::record::Peaks::default(),
         channels: &[],
     });
     assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
@@ -247,6 +250,7 @@ fn what_is_too_small_to_see_is_a_dot() {
             control: &control,
             separation: None,
             energy: None,
+            peaks: crate::record::Peaks::default(),
             channels: &[],
         });
     }
@@ -292,6 +296,7 @@ fn of_many_vehicles_those_that_are_too_close_are_named() {
             control: &control,
             separation: None,
             energy: None,
+            peaks: crate::record::Peaks::default(),
             channels: &[],
         });
     }
@@ -320,6 +325,7 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
         control: &control,
         separation: None,
         energy: None,
+        peaks: crate::record::Peaks::default(),
         channels: &[],
     });
     let numbers = |view: &View| {

@@ -19,6 +19,7 @@ fn sample(timeline: &mut Timeline, time_s: f64, x: f64, separation_m: f64) {
         control: &control,
         separation,
         energy: None,
+        peaks: crate::record::Peaks::default(),
         channels: &[],
     });
 }
@@ -188,6 +189,7 @@ fn pairs_that_the_flight_does_not_have_are_passed_over() {
         control: &Rows::zeros(1),
         separation,
         energy: None,
+        peaks: crate::record::Peaks::default(),
         channels: &[],
     });
     timeline.note(&Event::ViolationBegan { pair, time_s });

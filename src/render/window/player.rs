@@ -133,6 +133,7 @@ mod tests {
             control: Rows::zeros(1),
             separation: None,
             energy: None,
+            peaks: crate::record::Peaks::default(),
             channels: Vec::new(),
         }
     }

@@ -1,0 +1,108 @@
+//! The judge's place in the loop: every way is swept, and what it finds is kept for the next sample.
+
+use crate::audit::{AuditError, AuditOutcome, Auditor, StepFinding, Violation, swept_separation_m};
+use crate::graph::Graph;
+use crate::law::Law;
+use crate::plant::Path;
+use crate::record::Event;
+use crate::space::NearPairs;
+use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
+
+use super::motion::Motion;
+
+/// The auditor with what the loop asks of it from step to step.
+#[derive(Clone)]
+pub(super) struct Judge {
+    auditor: Auditor,
+    /// Closest approach since the last sample.
+    pub(super) closest: Option<ClosestApproach>,
+    /// Smallest separation over the last sweep: bounds from below how near any pair is now.
+    pub(super) nearest_m: f64,
+    /// Pairs that a step may have brought too near.
+    near: NearPairs,
+    pub(super) engine_contacts: Vec<Pair>,
+    contacts_now: Vec<Pair>,
+}
+
+impl Judge {
+    pub(super) fn new(count: usize, delta_m: f64) -> Result<Self, AuditError> {
+        Ok(Self {
+            auditor: Auditor::new(count, delta_m)?,
+            closest: None,
+            nearest_m: 0.0,
+            near: NearPairs::default(),
+            engine_contacts: Vec::new(),
+            contacts_now: Vec::new(),
+        })
+    }
+
+    pub(super) fn start(&mut self, time_s: f64, positions_m: &Rows, events: &mut Vec<Event>) -> Result<(), AuditError> {
+        let finding = self.auditor.start(time_s, positions_m)?;
+        note(finding, &mut self.closest, &mut self.nearest_m, events);
+        Ok(())
+    }
+
+    /// Sweeps the straight line to these positions.
+    pub(super) fn sweep(&mut self, time_s: f64, positions_m: &Rows, events: &mut Vec<Event>) -> Result<(), AuditError> {
+        let finding = self.auditor.step(time_s, positions_m)?;
+        note(finding, &mut self.closest, &mut self.nearest_m, events);
+        Ok(())
+    }
+
+    /// Whether the move from `start` to `end` takes more than half of some pair's clearance above the law's barrier.
+    pub(super) fn refuses(&mut self, law: &dyn Law, links: &Graph, start: &Swarm, path: &Path, end: &Swarm) -> bool {
+        let Some(barrier_m) = law.barrier_m() else { return false };
+        let start = &start.positions_m;
+        let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
+        let moved_m = instants()
+            .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
+            .fold(0.0, f64::max);
+        // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
+        if 2.0 * moved_m <= 0.5 * (self.nearest_m - barrier_m) {
+            return false;
+        }
+        let loses_half = |(i, j): (usize, usize)| {
+            let apart = |rows: &Rows| row(rows, j) - row(rows, i);
+            let mut from = apart(start);
+            let least_m = barrier_m + 0.5 * (from.norm() - barrier_m);
+            instants().map(apart).any(|to| swept_separation_m(std::mem::replace(&mut from, to), to) < least_m)
+        };
+        if law.sensing_range_m().is_none() {
+            return links.edges().any(loses_half);
+        }
+        // A pair that begins farther apart keeps half of its clearance.
+        self.near.update(start, barrier_m + 4.0 * moved_m);
+        self.near.pairs().iter().copied().any(loses_half)
+    }
+
+    /// Keeps the pairs whose keep-out balls the engine sees overlap for the first time, in index order.
+    pub(super) fn note_engine_contacts(&mut self, motion: &Motion, time_s: f64, events: &mut Vec<Event>) {
+        self.contacts_now.clear();
+        motion.keep_out_contacts(&mut self.contacts_now);
+        for &pair in &self.contacts_now {
+            if let Err(place) = self.engine_contacts.binary_search(&pair) {
+                self.engine_contacts.insert(place, pair);
+                events.push(Event::EngineContact { pair, time_s });
+            }
+        }
+    }
+
+    pub(super) fn finish(self) -> (AuditOutcome, Vec<Pair>) {
+        (self.auditor.finish(), self.engine_contacts)
+    }
+}
+
+/// Keeps what the judge found in a sweep.
+fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest_m: &mut f64, events: &mut Vec<Event>) {
+    if let Some(new) = finding.closest {
+        *nearest_m = new.separation_m;
+        *closest = closest.filter(|before| before.separation_m <= new.separation_m).or(Some(new));
+    }
+    for violation in finding.began {
+        events.push(Event::ViolationBegan { pair: violation.pair, time_s: violation.from_s });
+    }
+    for violation in finding.ended {
+        let &Violation { pair, to_s, min_m, .. } = violation;
+        events.push(Event::ViolationEnded { pair, time_s: to_s, min_m });
+    }
+}
