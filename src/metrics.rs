@@ -3,9 +3,11 @@
 //! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Peaks are over the
 //! steps between samples too where a sample tells them, see [`crate::record::Peaks`].
 
+use nalgebra::Vector3;
+
 use crate::graph::Graph;
 use crate::record::{Event, Peaks, RecordError, Sample, Sink};
-use crate::swarm::{Rows, largest_row_norm};
+use crate::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
 use crate::target::{Arrival, Begins, Distance, Leg};
 
 /// Folds samples, in the order of time, into a [`Summary`].
@@ -27,6 +29,10 @@ pub struct Metrics<'a> {
     peak_control_m_s2: f64,
     final_control_m_s2: f64,
     energy: Option<EnergyRange>,
+    /// The middle of the first sample.
+    origin_m: Option<Vector3<f64>>,
+    extent_m: f64,
+    fastest_m_s: f64,
 }
 
 /// Energy \[m^2/s^2\] over the samples that have one.
@@ -61,6 +67,10 @@ pub struct Summary {
     pub peak_control_m_s2: f64,
     /// Largest commanded acceleration of a vehicle at the end \[m/s^2\]; NaN where the law had no answer there.
     pub final_control_m_s2: f64,
+    /// Largest distance of a vehicle from the middle of the first sample \[m\].
+    pub extent_m: f64,
+    /// Largest speed of a vehicle \[m/s\].
+    pub fastest_m_s: f64,
     /// Energy of the first sample that has one \[m^2/s^2\].
     pub energy_initial: Option<f64>,
     /// Energy of the last sample that has one \[m^2/s^2\].
@@ -98,6 +108,9 @@ impl<'a> Metrics<'a> {
             peak_control_m_s2: 0.0,
             final_control_m_s2: 0.0,
             energy: None,
+            origin_m: None,
+            extent_m: 0.0,
+            fastest_m_s: 0.0,
         }
     }
 
@@ -112,6 +125,7 @@ impl<'a> Metrics<'a> {
         self.observe_control(sample.control);
         self.observe_energy(sample.energy);
         self.observe_peaks(sample.peaks);
+        self.observe_extent(sample.swarm);
         let good = self.arrival.is_within(&self.distance) && sample.swarm.first_not_finite().is_none();
         self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
     }
@@ -140,6 +154,13 @@ impl<'a> Metrics<'a> {
         }
         self.final_control_m_s2 = largest_row_norm(control);
         self.peak_control_m_s2 = larger(self.peak_control_m_s2, self.final_control_m_s2);
+    }
+
+    fn observe_extent(&mut self, swarm: &Swarm) {
+        let origin_m = *self.origin_m.get_or_insert_with(|| mean_row(&swarm.positions_m));
+        let farthest_m = (0..swarm.count()).map(|i| (row(&swarm.positions_m, i) - origin_m).norm()).fold(0.0, larger);
+        self.extent_m = larger(self.extent_m, farthest_m);
+        self.fastest_m_s = larger(self.fastest_m_s, largest_row_norm(&swarm.velocities_m_s));
     }
 
     /// What was larger between the samples.
@@ -192,6 +213,8 @@ impl<'a> Metrics<'a> {
             common_m_s: self.common_m_s,
             peak_control_m_s2: self.peak_control_m_s2,
             final_control_m_s2: self.final_control_m_s2,
+            extent_m: self.extent_m,
+            fastest_m_s: self.fastest_m_s,
             energy_initial: self.energy.map(|energy| energy.initial),
             energy_final: self.energy.map(|energy| energy.last),
             energy_max: self.energy.map(|energy| energy.max),
@@ -226,7 +249,6 @@ fn larger(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::formation::Formation;
-    use crate::swarm::Swarm;
 
     /// Sums of a few numbers of order 1 are right to some 1e-15.
     const ROUNDING: f64 = 1e-12;

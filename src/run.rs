@@ -7,6 +7,7 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
+use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash};
@@ -84,6 +85,14 @@ pub fn verify(scenario: &Scenario, report: &Report) -> Result<Verification, SimE
     })
 }
 
+/// Whether the energy is proved never to grow: relative velocities are damped, and nothing voids the proof but that it
+/// certifies no distance.
+fn energy_falls(preflight: &Preflight, certificate: &Certificate) -> bool {
+    let holds = |void: &Void| matches!(void, Void::NoBarrier | Void::GraphNotComplete);
+    preflight.velocity_margin_per_s.is_some_and(|margin_per_s| margin_per_s >= 0.0)
+        && certificate.void.iter().all(holds)
+}
+
 fn report(
     scenario: &Scenario,
     preflight: &Preflight,
@@ -108,6 +117,8 @@ fn report(
         engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))
             .then_some(flight.engine_contacts.len() as u64),
         summary: &metrics.finish(),
+        energy_falls: energy_falls(preflight, &flight.certificate),
+        epsilon: scenario.plant.epsilon(),
         run: &Run {
             duration_s: flight.duration_s,
             dt_s: scenario.time.dt_s,

@@ -31,6 +31,10 @@ pub struct Findings<'a> {
     pub engine_contact_pairs: Option<u64>,
     /// Numbers of the samples.
     pub summary: &'a Summary,
+    /// Whether the law's energy is proved never to grow in this flight.
+    pub energy_falls: bool,
+    /// What part of their size the plant's numbers resolve.
+    pub epsilon: f64,
     /// Facts of the run.
     pub run: &'a Run,
     /// Wall-clock times.

@@ -6,6 +6,7 @@
 //! null.
 
 mod artefact;
+mod energy;
 mod findings;
 mod flight;
 mod html;

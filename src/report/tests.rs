@@ -19,6 +19,8 @@ fn passing(miss_m: f64) -> AuditOutcome {
 }
 
 const REACHED: Summary = Summary {
+    extent_m: 6.0,
+    fastest_m_s: 1.0,
     samples: 7201,
     end_s: 120.0,
     reached_at_s: Some(36.5),
@@ -44,12 +46,14 @@ struct Case {
     trap_dimension: Option<usize>,
     ended_early: Option<EndedEarly<'static>>,
     certificate: Certificate,
+    energy_falls: bool,
 }
 
 impl Case {
     fn good() -> Self {
         let certificate = Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![] };
-        Self { audit: passing(2.4607), summary: REACHED, trap_dimension: None, ended_early: None, certificate }
+        let audit = passing(2.4607);
+        Self { audit, summary: REACHED, trap_dimension: None, ended_early: None, certificate, energy_falls: true }
     }
 
     fn report(&self) -> Report {
@@ -64,6 +68,8 @@ impl Case {
             audit: &self.audit,
             engine_contact_pairs: Some(0),
             summary: &self.summary,
+            energy_falls: self.energy_falls,
+            epsilon: f64::from(f32::EPSILON),
             run: &Run {
                 duration_s: 120.0,
                 dt_s: 1.0 / 240.0,
@@ -334,4 +340,28 @@ fn a_report_on_disk_is_the_report() {
     assert!(text.ends_with("}\n"));
     assert_eq!(serde_json::from_str::<Report>(&text).expect("reads back"), report);
     assert!(report.write(&folder.path().join("missing/report.json")).is_err());
+}
+
+#[test]
+fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows() {
+    let risen = |share: f64, energy_falls: bool| {
+        let energy_max = REACHED.energy_initial.map(|initial| (1.0 + share) * initial);
+        let case = Case { summary: Summary { energy_max, ..REACHED }, energy_falls, ..Case::good() };
+        case.report().verdict
+    };
+    assert!(risen(0.9e-3, true).pass, "the error of integration");
+    let verdict = risen(0.77, true);
+    assert!(!verdict.pass && verdict.reasons[0].contains("rose from 3.6567e0 to 6.4724e0"), "{verdict:?}");
+    assert!(risen(0.77, false).pass, "nothing is proved there");
+}
+
+#[test]
+fn a_certificate_is_broken_by_a_share_of_its_clearance() {
+    let report = |certified_m: f64, closest_m: f64| {
+        let certificate = Certificate { certified_m: Some(certified_m), energy_initial: Some(3.656), void: vec![] };
+        Case { audit: passing(closest_m), certificate, ..Case::good() }.report().verdict
+    };
+    // A clearance of 1.451 mm of which a tenth is missing, and one of which nothing is but rounding.
+    assert!(!report(2.001_451, 2.001_314).pass);
+    assert!(report(2.001_451, 2.001_450_5).pass);
 }

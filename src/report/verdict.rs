@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::energy::{INTEGRATION, highest_honest};
 use super::findings::Findings;
 use crate::audit::Status;
 use crate::text::{metres, metres_below, seconds};
@@ -24,6 +25,7 @@ impl Verdict {
             disagreement(findings),
             undecided(findings),
             broken_certificate(findings),
+            risen_energy(findings),
             ended_early(findings),
             not_reached(findings),
             too_flat(findings),
@@ -78,20 +80,30 @@ fn ended_early(findings: &Findings<'_>) -> Option<String> {
     Some(format!("The run ended early, at {}: {}.", seconds(ended.time_s), ended.reason.trim_end_matches('.')))
 }
 
-/// How far below the certified separation rounding explains, relative to it: the engine's 24 bits at coordinates of some
-/// hundred separations, over many steps. A swarm that starts in its own formation certifies its own distances.
-const ROUNDING: f64 = 1e-4;
+/// Whether a separation is below what was certified, by more of the certified clearance above delta than integration may
+/// cost: near the barrier the energy of a pair is in inverse proportion to its clearance, so the part is that of the energy.
+pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f64) -> bool {
+    separation_m - delta_m < (certified_m - delta_m) * (1.0 - INTEGRATION)
+}
 
-/// Whether a separation is below what was certified, by more than rounding.
-pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64) -> bool {
-    separation_m < certified_m * (1.0 - ROUNDING)
+/// The proof says that the energy never grows: one that did was not flown by the law, but by a step too long for it or by
+/// numbers that ran out of digits.
+fn risen_energy(findings: &Findings<'_>) -> Option<String> {
+    let (summary, vehicles) = (findings.summary, findings.run.vehicles);
+    let (initial, most) = (summary.energy_initial?, summary.energy_max?);
+    let allowed = highest_honest(summary, vehicles, findings.epsilon)?;
+    (findings.energy_falls && most > allowed).then(|| {
+        format!(
+            "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2,              where integration and rounding explain {allowed:.4e}: what was flown is not the motion of the law. Shorten              time.dt_s, raise time.max_halvings, or set plant.precision to double.",
+        )
+    })
 }
 
 /// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier, or
 /// numbers that ran out of digits.
 fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
     let (certified_m, closest) = (findings.certificate.certified_m?, findings.audit.closest?);
-    breaks_certificate(closest.separation_m, certified_m).then(|| {
+    breaks_certificate(closest.separation_m, certified_m, findings.delta_m).then(|| {
         format!(
             "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
              the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits.",

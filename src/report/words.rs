@@ -20,7 +20,9 @@ impl Report {
                 let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
                 let broken = match (self.separation.min_m, self.separation.certified_m) {
-                    (Some(min_m), Some(certified_m)) if breaks_certificate(min_m, certified_m) => {
+                    (Some(min_m), Some(certified_m))
+                        if breaks_certificate(min_m, certified_m, self.separation.delta_m) =>
+                    {
                         ", which breaks the certificate"
                     }
                     _ => "",

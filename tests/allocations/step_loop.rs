@@ -14,7 +14,7 @@ use crate::ALLOCATOR;
 
 const FEW: u32 = 20;
 const MANY: u32 = 300;
-const ATTEMPTS: u32 = 4;
+const ATTEMPTS: u32 = 3;
 
 /// Semi-implicit Euler without an engine.
 #[derive(Clone)]
@@ -87,14 +87,10 @@ fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, motion: Motio
     change.allocations + change.reallocations
 }
 
-/// How much more often a long flight takes memory than a short one, once the threads have what they take at first. The
-/// least of some attempts: idle threads take some now and then, and what a step takes is in every attempt.
+/// How much more often a long flight takes memory than a short one, once the threads have what they take at first.
 fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, motion: impl Fn() -> Motion) -> usize {
-    let attempt = || {
-        let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law(), motion()));
-        many.saturating_sub(few)
-    };
-    (0..ATTEMPTS).map(|_| attempt()).min().expect("an attempt")
+    let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law(), motion()));
+    many.saturating_sub(few)
 }
 
 pub(crate) fn the_loop_allocates_nothing_per_step() {
@@ -114,8 +110,9 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
             let (state, held) = (scenario.start.clone(), Rows::zeros(scenario.count()));
             Motion::from(Euler { state, held, a22_per_s: scenario.a22_per_s })
         };
-        let grown = threads.install(|| growth(scenario, law, euler));
-        assert_eq!(grown, 0, "{name}");
+        // Idle threads take some memory now and then; what a step takes is in every attempt.
+        let takes_none = |_| threads.install(|| growth(scenario, law, euler)) == 0;
+        assert!((0..ATTEMPTS).any(takes_none), "{name}: a step takes memory");
 
         let wasteful = || -> Box<dyn Law> { Box::new(Wasteful(law())) };
         let grown = threads.install(|| growth(scenario, wasteful, euler));

@@ -292,7 +292,8 @@ fn a_law_without_a_barrier_is_never_refused_a_step() {
 
 #[test]
 fn a_step_too_long_for_the_fastest_rate_is_flown_in_parts_and_keeps_the_energy_below_its_start() {
-    let mut scenario = builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10", "plant.precision=double"]);
+    let mut scenario =
+        builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10", "plant.precision=double"]);
     let (honest, log) = fly(&scenario);
     assert_eq!(refinements(&log), [], "no step is refused that was shortened before");
     assert!(honest.audit.steps > honest.steps);

@@ -75,7 +75,9 @@ fn wrong_input_is_told_apart_from_a_bad_flight() {
 #[test]
 fn words_go_to_standard_output_and_quiet_says_nothing() {
     let (code, out, err) = tautline(&["check"]);
-    assert!(code == 0 && out.starts_with("READY: ") && out.contains("warning [common-mode-unstable]: ") && err.is_empty());
+    assert!(
+        code == 0 && out.starts_with("READY: ") && out.contains("warning [common-mode-unstable]: ") && err.is_empty()
+    );
     assert_eq!(tautline(&["check", "pentagon-collinear", "--quiet"]), (1, String::new(), String::new()));
 }
 
@@ -86,10 +88,7 @@ fn run_warns_before_it_flies_and_not_when_quiet() {
     let out = out.to_str().expect("a path in Unicode");
     let run = ["run", "pentagon-collinear", "--set", "time.duration_s=1.5", "--force", "--out", out];
     let (code, _, err) = tautline(&run);
-    assert!(
-        code == 1 && err.contains("warning [start-on-line]: "),
-        "{err}"
-    );
+    assert!(code == 1 && err.contains("warning [start-on-line]: "), "{err}");
     let (_, out, err) = tautline(&[&run[..], &["--quiet"]].concat());
     assert_eq!((out.as_str(), err.as_str()), ("", ""));
 }
