@@ -24,7 +24,8 @@ pub trait Plant: DynClone + Send {
     fn count(&self) -> usize;
 
     /// Moves every vehicle over `dt_s` seconds and writes into `predicted` where it is then and how fast it is expected
-    /// to be; `path` gets what the way there was like beside a straight line.
+    /// to be; `path` gets what the way there was like beside a straight line. Without an [`Plant::apply`] since the step
+    /// before, the command that is held goes on.
     ///
     /// # Errors
     /// [`PlantError`]; the plant then holds no state that may be observed.

@@ -3,7 +3,7 @@
 use crate::metrics::Summary;
 
 /// Part of E(0) that the error of second-order integration at the honest step stays below.
-pub const INTEGRATION: f64 = 1e-3;
+pub(super) const INTEGRATION: f64 = 1e-3;
 
 /// The largest energy \[m^2/s^2\] that a motion without gain may show in numbers that resolve a part `epsilon` of their size:
 ///

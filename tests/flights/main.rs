@@ -7,6 +7,7 @@ mod ideal_plant;
 mod law_properties;
 mod loop_claims;
 mod plant_claims;
+mod random_scenarios;
 mod reference_flights;
 mod scenario_files;
 mod simulation;

@@ -94,11 +94,13 @@ impl Plant for Bodies {
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
         self.world.integration_parameters.dt = real(dt_s);
-        let half_decay = self.half_decay(dt_s);
+        // A drift that waits for its command is completed with the one that is held.
+        let (completing, half_decay) = (self.half_decay(self.drifted_s), self.half_decay(dt_s));
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
             let held_m_s2 = row(&self.held, i);
-            let drift_m_s = doubles(body.linvel()) * half_decay + 0.5 * dt_s * held_m_s2;
+            let velocity_m_s = (doubles(body.linvel()) + 0.5 * self.drifted_s * held_m_s2) * completing;
+            let drift_m_s = velocity_m_s * half_decay + 0.5 * dt_s * held_m_s2;
             body.set_linvel(reals(drift_m_s - dt_s * held_m_s2), true);
             body.reset_forces(false);
             body.add_force(reals(held_m_s2) * real(self.mass_kg[i]), true);
