@@ -8,7 +8,7 @@ use flate2::bufread::DeflateDecoder;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::error::{Fault, FaultAt, Place};
+use super::error::{Fault, Place, ReadError};
 use super::source::Growing;
 
 /// Longest end of an archive: its last record with the longest comment \[bytes\].
@@ -24,7 +24,7 @@ impl Archive {
     pub(super) fn open(path: &Path) -> Result<Self, Fault> {
         let zip = ZipArchive::new(BufReader::new(File::open(path)?)).map_err(|error| match error {
             ZipError::InvalidArchive(_) if !has_end(path) => {
-                Fault::Truncated { what: "the end of the archive is missing".to_owned() }
+                Fault::Truncated("the end of the archive is missing".to_owned())
             }
             other => zip_fault(other),
         })?;
@@ -42,7 +42,7 @@ impl Archive {
     }
 
     /// The bytes of an entry, unpacked and compared with their checksum.
-    pub(super) fn entry(&mut self, name: &str) -> Result<Box<dyn Read>, FaultAt> {
+    pub(super) fn entry(&mut self, name: &str) -> Result<Box<dyn Read>, ReadError> {
         self.try_entry(name).map_err(|fault| fault.at(place(name)))
     }
 
@@ -74,7 +74,7 @@ impl Archive {
     }
 
     /// All bytes of an entry, unpacked.
-    pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, FaultAt> {
+    pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, ReadError> {
         let mut bytes = Vec::new();
         self.entry(name)?.read_to_end(&mut bytes).map_err(|error| Fault::from(error).at(place(name)))?;
         Ok(bytes)

@@ -3,10 +3,10 @@
 //! A *long* table has a row for each vehicle and time, a *wide* one a row for each time. Names are compared without
 //! regard to case, and a unit in brackets is left out.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
-use super::error::Fault;
+use super::error::{Fault, quoted};
 use super::options::ColumnNames;
 
 /// The columns of a position, and of what else is known of a vehicle.
@@ -24,118 +24,92 @@ pub(super) struct Layout {
     pub(super) time: usize,
     /// The unit in the name of the column of time.
     pub(super) unit: Option<TimeUnit>,
-    pub(super) shape: Shape,
+    /// The column of the vehicle in a long table.
+    pub(super) id: Option<usize>,
+    /// The vehicles of a wide table by name; none of a long one.
+    pub(super) names: Vec<String>,
+    /// The columns of each vehicle of a wide table, or of every row of a long one.
+    pub(super) bodies: Vec<Body>,
     /// Names of columns that mean nothing here.
     pub(super) unused: Vec<String>,
 }
 
-/// Long or wide.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Shape {
-    Long { id: usize, body: Body },
-    Wide { names: Vec<String>, bodies: Vec<Body> },
+/// What a column gives: its place among [`ColumnNames::ROLES`]. Axes follow each other.
+type Role = usize;
+const TIME: Role = 0;
+const ID: Role = 1;
+const POSITION: Role = 2;
+const VELOCITY: Role = 5;
+const RADIUS: Role = 8;
+
+const WORDS: [&str; 9] = [
+    "time",
+    "the vehicle",
+    "the position along x",
+    "the position along y",
+    "the position along z",
+    "the velocity along x",
+    "the velocity along y",
+    "the velocity along z",
+    "the radius",
+];
+
+/// The quantity of a plain name like `x`, `pos_x`, `vy` or `radius_m`.
+fn quantity(name: &str) -> Option<Role> {
+    if matches!(name, "radius" | "radius_m") {
+        return Some(RADIUS);
+    }
+    let is = |starts: &[&str], axis: &str, ends: &[&str]| {
+        let after = |start: &&str| name.strip_prefix(start)?.strip_prefix(axis);
+        starts.iter().filter_map(after).any(|end| ends.contains(&end))
+    };
+    ["x", "y", "z"].into_iter().enumerate().find_map(|(place, axis)| {
+        if is(&["", "p", "pos_", "pos.", "position_", "position."], axis, &["", "_m"]) {
+            Some(POSITION + place)
+        } else {
+            is(&["v", "vel_", "velocity_"], axis, &["", "_m_s"]).then_some(VELOCITY + place)
+        }
+    })
 }
 
-/// What a column gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Quantity {
-    Position(usize),
-    Velocity(usize),
-    Radius,
-}
-
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-impl Quantity {
-    fn words(self) -> String {
-        match self {
-            Self::Position(axis) => format!("the position along {}", AXES[axis]),
-            Self::Velocity(axis) => format!("the velocity along {}", AXES[axis]),
-            Self::Radius => "the radius".to_owned(),
-        }
-    }
-
-    fn option(self) -> &'static str {
-        match self {
-            Self::Position(axis) => AXES[axis],
-            Self::Velocity(axis) => ["vx", "vy", "vz"][axis],
-            Self::Radius => "radius",
-        }
-    }
-
-    /// The quantity of a plain name like `x`, `pos_x`, `vy` or `radius_m`.
-    fn from_name(name: &str) -> Option<Self> {
-        if matches!(name, "radius" | "radius_m") {
-            return Some(Self::Radius);
-        }
-        AXES.iter().enumerate().find_map(|(axis, letter)| {
-            let (position, velocity) =
-                (["", "p", "pos_", "pos.", "position_", "position."], ["v", "vel_", "velocity_"]);
-            let is = |starts: &[&str], ends: &[&str]| {
-                starts.iter().any(|start| {
-                    name.strip_prefix(start)
-                        .and_then(|rest| rest.strip_prefix(letter))
-                        .is_some_and(|end| ends.contains(&end))
-                })
-            };
-            if is(&position, &["", "_m"]) {
-                Some(Self::Position(axis))
-            } else {
-                is(&velocity, &["", "_m_s"]).then_some(Self::Velocity(axis))
-            }
-        })
-    }
+fn missing(header: &[String], role: Role, of: &str) -> Fault {
+    let problem = format!("there is no column for {}{of}; its columns are {}", WORDS[role], list(header));
+    let option = ColumnNames::ROLES[role];
+    Fault::content(problem, format!("name the column with --column {option}=NAME, or put it into the header"))
 }
 
 impl Layout {
     /// What the columns of this header mean.
     pub(super) fn of(header: &[String], given: &ColumnNames) -> Result<Self, Fault> {
         let plain: Vec<String> = header.iter().map(|name| plain(name)).collect();
-        let missing = |role: &str, option| Fault::MissingColumn {
-            role: role.to_owned(),
-            option,
-            columns: header.iter().filter(|name| !name.is_empty()).cloned().collect(),
-        };
-        let named = |name: &Option<String>, role: &str, option| match name {
-            None => Ok(None),
-            Some(name) => match header.iter().position(|column| column == name) {
-                Some(column) => Ok(Some(column)),
-                None => Err(missing(&format!("{role} with the name `{name}`"), option)),
-            },
-        };
+        let mut columns = Columns { header, found: BTreeMap::new() };
+        for (role, name) in given.given() {
+            let column = header.iter().position(|column| column == name);
+            let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
+            columns.found.insert((String::new(), role), column);
+        }
         let first = |is: fn(&str) -> bool| plain.iter().position(|name| is(name));
-        let time = named(&given.time, "time", "t")?.or_else(|| first(is_time)).ok_or_else(|| missing("time", "t"))?;
+        let time = columns.get("", TIME).or_else(|| first(is_time)).ok_or_else(|| missing(header, TIME, ""))?;
         let unit = plain[time].rsplit_once('_').and_then(|(_, unit)| TimeUnit::from_name(unit));
         let unit = unit.or_else(|| bracketed(&header[time]).and_then(TimeUnit::from_name));
-
-        let mut columns = Columns { header, found: BTreeMap::new() };
-        for (quantity, name) in given.quantities() {
-            if let Some(column) = named(name, &quantity.words(), quantity.option())? {
-                columns.found.insert((String::new(), quantity), column);
-            }
-        }
-        let is_given = |quantity| given.quantities().iter().any(|(q, name)| *q == quantity && name.is_some());
+        let id = columns.get("", ID).or_else(|| first(is_id));
         for (column, name) in plain.iter().enumerate().filter(|&(column, _)| column != time) {
-            if let Some(quantity) = Quantity::from_name(name).filter(|&quantity| !is_given(quantity)) {
-                columns.claim(String::new(), quantity, column)?;
+            if let Some(role) = quantity(name).filter(|&role| given.given().all(|(known, _)| known != role)) {
+                columns.claim(String::new(), role, column)?;
             }
         }
-        let id = named(&given.id, "the vehicle", "id")?.or_else(|| first(is_id));
-        let mut used = vec![time];
-        let shape = if let Some(id) = id {
-            let body = columns.body("").map_err(|quantity| missing(&quantity.words(), quantity.option()))?;
-            used.push(id);
-            Shape::Long { id, body }
-        } else {
-            if columns.found.contains_key(&(String::new(), Quantity::Position(0))) {
-                return Err(missing("the vehicle", "id"));
-            }
-            wide(&mut columns, &plain, time, &missing)?
+        let names = match id {
+            Some(_) => Vec::new(),
+            None if columns.get("", POSITION).is_some() => return Err(missing(header, ID, "")),
+            None => columns.claim_wide(&plain, time)?,
         };
-        used.extend(columns.found.values());
-        let unused = |&(column, name): &(usize, &String)| !used.contains(&column) && !name.is_empty();
-        let unused = header.iter().enumerate().filter(unused).map(|(_, name)| name.clone()).collect();
-        Ok(Self { time, unit, shape, unused })
+        let everyone = [String::new()];
+        let bodies = if id.is_some() { &everyone[..] } else { &names };
+        let bodies = bodies.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
+        let used: BTreeSet<usize> = columns.found.values().copied().chain([time]).chain(id).collect();
+        let unused = (0..header.len()).filter(|column| !used.contains(column) && !header[*column].is_empty());
+        let unused = unused.map(|column| header[column].clone()).collect();
+        Ok(Self { time, unit, id, names, bodies, unused })
     }
 
     /// Time and then x, y and z of each vehicle; none where the columns do not come out even.
@@ -143,41 +117,25 @@ impl Layout {
         if columns < 4 || !(columns - 1).is_multiple_of(3) {
             return None;
         }
-        let bodies = (1..columns).step_by(3).map(|x| Body {
-            position: [Some(x), Some(x + 1), Some(x + 2)],
-            velocity: None,
-            radius: None,
-        });
+        let body = |x| Body { position: [Some(x), Some(x + 1), Some(x + 2)], velocity: None, radius: None };
+        let bodies = (1..columns).step_by(3).map(body).collect();
         let names = (1..=(columns - 1) / 3).map(|number| number.to_string()).collect();
-        let shape = Shape::Wide { names, bodies: bodies.collect() };
-        Some(Self { time: 0, unit: None, shape, unused: Vec::new() })
+        Some(Self { time: 0, unit: None, id: None, names, bodies, unused: Vec::new() })
     }
 
     /// The columns that are read, each once, in rising order.
     pub(super) fn columns(&self) -> Vec<usize> {
         let of = |body: &Body| {
             let velocity = body.velocity.unwrap_or_default();
-            body.position.into_iter().chain(velocity).chain([body.radius]).flatten().collect::<Vec<_>>()
+            body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
-        let mut columns = vec![self.time];
-        match &self.shape {
-            Shape::Long { id, body } => {
-                columns.push(*id);
-                columns.extend(of(body));
-            }
-            Shape::Wide { bodies, .. } => columns.extend(bodies.iter().flat_map(of)),
-        }
-        columns.sort_unstable();
-        columns.dedup();
-        columns
+        let columns: BTreeSet<_> = self.bodies.iter().flat_map(of).chain([self.time]).chain(self.id).collect();
+        columns.into_iter().collect()
     }
 
     /// What a person should know about the columns.
     pub(super) fn notes(&self) -> Vec<String> {
-        let flat = match &self.shape {
-            Shape::Long { body, .. } => body.position[2].is_none(),
-            Shape::Wide { bodies, .. } => bodies.iter().any(|body| body.position[2].is_none()),
-        };
+        let flat = self.bodies.iter().any(|body| body.position[2].is_none());
         let flat = flat.then(|| "there is no column for z: it is taken as 0".to_owned());
         let unused = (!self.unused.is_empty()).then(|| format!("columns not used: {}", self.unused.join(", ")));
         flat.into_iter().chain(unused).collect()
@@ -187,82 +145,81 @@ impl Layout {
 /// Columns found so far: of a vehicle by its name, or of all vehicles under no name.
 struct Columns<'a> {
     header: &'a [String],
-    found: BTreeMap<(String, Quantity), usize>,
+    found: BTreeMap<(String, Role), usize>,
 }
 
 impl Columns<'_> {
-    fn claim(&mut self, vehicle: String, quantity: Quantity, column: usize) -> Result<(), Fault> {
-        let of = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
-        match self.found.insert((vehicle, quantity), column) {
-            None => Ok(()),
-            Some(first) => Err(Fault::TwoColumns {
-                role: quantity.words() + &of,
-                first: self.header[first].clone(),
-                second: self.header[column].clone(),
-            }),
-        }
+    fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
+        self.found.get(&(vehicle.to_owned(), role)).copied()
     }
 
-    /// The columns of a vehicle, or the quantity that is missing: x and y of its position, and its velocity along each
-    /// axis of its position where it has one along some axis.
-    fn body(&self, vehicle: &str) -> Result<Body, Quantity> {
-        let get = |quantity| self.found.get(&(vehicle.to_owned(), quantity)).copied();
-        let position = [0, 1, 2].map(|axis| get(Quantity::Position(axis)));
-        if let Some(axis) = position[..2].iter().position(Option::is_none) {
-            return Err(Quantity::Position(axis));
-        }
-        let velocity = [0, 1, 2].map(|axis| get(Quantity::Velocity(axis)));
-        let moves = velocity.iter().any(Option::is_some);
-        for axis in (0..3).filter(|_| moves) {
-            match (position[axis], velocity[axis]) {
-                (Some(_), None) => return Err(Quantity::Velocity(axis)),
-                (None, Some(_)) => return Err(Quantity::Position(axis)),
-                _ => {}
+    fn claim(&mut self, vehicle: String, role: Role, column: usize) -> Result<(), Fault> {
+        let of = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
+        let Some(first) = self.found.insert((vehicle, role), column) else { return Ok(()) };
+        let (first, second) = (&self.header[first], &self.header[column]);
+        let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[role]);
+        Err(Fault::content(problem, "name the one that is meant with --column, or take the other out"))
+    }
+
+    /// Finds the vehicles of a wide table, and gives their names in order of appearance.
+    fn claim_wide(&mut self, plain: &[String], time: usize) -> Result<Vec<String>, Fault> {
+        let mut names: Vec<String> = Vec::new();
+        for (column, (name, plain)) in self.header.iter().zip(plain).enumerate().filter(|&(column, _)| column != time) {
+            let Some((vehicle, role)) = vehicle_and_quantity(name, plain) else { continue };
+            let known = self.found.range((vehicle.clone(), 0)..).next();
+            if known.is_none_or(|((known, _), _)| *known != vehicle) {
+                names.push(vehicle.clone());
             }
+            self.claim(vehicle, role, column)?;
         }
-        Ok(Body { position, velocity: moves.then_some(velocity), radius: get(Quantity::Radius) })
+        if names.is_empty() {
+            let of = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
+            return Err(missing(self.header, ID, of));
+        }
+        Ok(names)
+    }
+
+    /// The columns of a vehicle: at least x and y of its position, and its velocity along each axis of its position where
+    /// it has one along some axis.
+    fn body(&self, vehicle: &str) -> Result<Body, Fault> {
+        let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
+        let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
+        let (position, velocity) = (axes(POSITION), axes(VELOCITY));
+        let moves = velocity.iter().any(Option::is_some);
+        for axis in 0..3 {
+            let lacks = match (position[axis], velocity[axis]) {
+                (None, moving) if axis < 2 || moving.is_some() => POSITION,
+                (Some(_), None) if moves => VELOCITY,
+                _ => continue,
+            };
+            return Err(missing(self.header, lacks + axis, &of));
+        }
+        Ok(Body { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
     }
 }
 
-fn wide(
-    columns: &mut Columns<'_>,
-    plain: &[String],
-    time: usize,
-    missing: &dyn Fn(&str, &'static str) -> Fault,
-) -> Result<Shape, Fault> {
-    let mut names: Vec<String> = Vec::new();
-    for (column, (name, plain)) in columns.header.iter().zip(plain).enumerate().filter(|&(column, _)| column != time) {
-        if let Some((vehicle, quantity)) = vehicle_and_quantity(name, plain) {
-            if !columns.found.keys().any(|(known, _)| *known == vehicle) {
-                names.push(vehicle.clone());
-            }
-            columns.claim(vehicle, quantity, column)?;
-        }
+/// The first dozen of some columns.
+fn list(names: &[String]) -> String {
+    const SHOWN: usize = 12;
+    let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
+    match names.len() {
+        0 => "none".to_owned(),
+        count if count > SHOWN => format!("{} and {} more", names[..SHOWN].join(", "), count - SHOWN),
+        _ => names.join(", "),
     }
-    if names.is_empty() {
-        return Err(missing("the vehicle and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)", "id"));
-    }
-    let body = |vehicle: &String| {
-        columns
-            .body(vehicle)
-            .map_err(|quantity| missing(&format!("{} of vehicle `{vehicle}`", quantity.words()), quantity.option()))
-    };
-    let bodies = names.iter().map(body).collect::<Result<_, _>>()?;
-    Ok(Shape::Wide { names, bodies })
 }
 
 /// Splits `x1`, `vx_2`, `cf1.x`, `leader/vy` or `drone3_z` into vehicle and quantity.
-fn vehicle_and_quantity(name: &str, plain: &str) -> Option<(String, Quantity)> {
+fn vehicle_and_quantity(name: &str, plain: &str) -> Option<(String, Role)> {
     let stem = plain.trim_end_matches(|c: char| c.is_ascii_digit());
     if stem.len() < plain.len() {
-        let quantity = Quantity::from_name(stem.strip_suffix('_').unwrap_or(stem));
-        return quantity.map(|quantity| (plain[stem.len()..].to_owned(), quantity));
+        return Some((plain[stem.len()..].to_owned(), quantity(stem.strip_suffix('_').unwrap_or(stem))?));
     }
     // The name of the vehicle keeps its case.
     let name = name.split(['[', '(']).next()?.trim();
     name.char_indices().filter(|&(_, c)| matches!(c, '.' | '/' | '_')).find_map(|(at, _)| {
-        let quantity = Quantity::from_name(&name[at + 1..].to_lowercase())?;
-        (at > 0).then(|| (name[..at].to_owned(), quantity))
+        let role = quantity(&name[at + 1..].to_lowercase())?;
+        (at > 0).then(|| (name[..at].to_owned(), role))
     })
 }
 
@@ -289,22 +246,6 @@ fn is_id(name: &str) -> bool {
     matches!(name, "id" | "name" | "vehicle" | "vehicle_id" | "drone" | "drone_id" | "uav" | "agent" | "robot")
 }
 
-impl ColumnNames {
-    fn quantities(&self) -> [(Quantity, &Option<String>); 7] {
-        let [x, y, z] = &self.position;
-        let [vx, vy, vz] = &self.velocity;
-        [
-            (Quantity::Position(0), x),
-            (Quantity::Position(1), y),
-            (Quantity::Position(2), z),
-            (Quantity::Velocity(0), vx),
-            (Quantity::Velocity(1), vy),
-            (Quantity::Velocity(2), vz),
-            (Quantity::Radius, &self.radius),
-        ]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,13 +264,13 @@ mod tests {
         let layout = layout("z,Y [m],id,x,time_ms,vx,vy,vz,battery").expect("a layout");
         let body = Body { position: at([3, 1, 0]), velocity: Some(at([5, 6, 7])), radius: None };
         assert_eq!((layout.time, layout.unit), (4, Some(TimeUnit::Milliseconds)));
-        assert_eq!(layout.shape, Shape::Long { id: 2, body });
+        assert_eq!((layout.id, layout.bodies), (Some(2), vec![body]));
         assert_eq!(layout.unused, ["battery"]);
     }
 
     #[test]
     fn what_moves_in_a_plane_needs_no_velocity_along_z() {
-        let Shape::Long { body, .. } = layout("t,id,x,y,vx,vy").expect("a layout").shape else { panic!("wide") };
+        let body = layout("t,id,x,y,vx,vy").expect("a layout").bodies.remove(0);
         assert_eq!((body.position[2], body.velocity), (None, Some([Some(4), Some(5), None])));
     }
 
@@ -340,7 +281,7 @@ mod tests {
             ("t (s),cf1.x,cf1.y,cf1.z,Leader.x,Leader.y,Leader.z", ["cf1", "Leader"]),
             ("t,a_b_x,a_b_y,a_b_z,c/x,c/y,c/z", ["a_b", "c"]),
         ] {
-            let Shape::Wide { names, bodies } = layout(header).expect("a layout").shape else { panic!("{header}") };
+            let Layout { id: None, names, bodies, .. } = layout(header).expect("a layout") else { panic!("{header}") };
             assert_eq!(names, vehicles, "{header}");
             assert_eq!([bodies[0].position, bodies[1].position], [at([1, 2, 3]), at([4, 5, 6])], "{header}");
         }

@@ -43,7 +43,6 @@ pub use order::Recording;
 
 use std::path::Path;
 
-use error::FaultAt;
 use recognise::{Recognised, recognise};
 use source::Source;
 
@@ -55,7 +54,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     try_open(path, options).map_err(|fault| fault.of(path))
 }
 
-fn try_open(path: &Path, options: &ReadOptions) -> Result<Recording, FaultAt> {
+fn try_open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     if !(options.scale.is_finite() && options.scale > 0.0) {
         let problem = format!("its lengths cannot be scaled by {}", options.scale);
         return Err(Fault::content(problem, "give a positive number of metres per unit of length").into());
@@ -74,7 +73,10 @@ fn try_open(path: &Path, options: &ReadOptions) -> Result<Recording, FaultAt> {
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::open(source, options),
         #[cfg(not(feature = "parquet"))]
-        Format::Parquet => Err(Fault::NotBuilt(format).into()),
+        Format::Parquet => {
+            let problem = "it is a Parquet file, which this build does not read";
+            Err(Fault::content(problem, "build it with the feature of the format's name").into())
+        }
         Format::Skybrush => skybrush::open(source, options),
     }
 }

@@ -13,31 +13,28 @@ pub enum AxisOrder {
     VehicleFirst,
 }
 
-/// Names of columns, where they are not the usual ones.
+/// Names of columns, where they are not the usual ones: one for each of [`ColumnNames::ROLES`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ColumnNames {
-    /// Time.
-    pub time: Option<String>,
-    /// The vehicle.
-    pub id: Option<String>,
-    /// Position along x, y and z \[m\].
-    pub position: [Option<String>; 3],
-    /// Velocity along x, y and z \[m/s\].
-    pub velocity: [Option<String>; 3],
-    /// Radius of the vehicle \[m\].
-    pub radius: Option<String>,
-}
+pub struct ColumnNames([Option<String>; 9]);
 
 impl ColumnNames {
-    /// Roles that a column can have, as [`ColumnNames::set`] calls them.
+    /// Roles that a column can have: time, vehicle, position \[m\], velocity \[m/s\] and radius \[m\] of the vehicle.
     pub const ROLES: [&str; 9] = ["t", "id", "x", "y", "z", "vx", "vy", "vz", "radius"];
 
     /// Gives the column of a role a name; `false` where there is no such role.
     pub fn set(&mut self, role: &str, name: &str) -> bool {
-        let ([x, y, z], [vx, vy, vz]) = (&mut self.position, &mut self.velocity);
-        let slots = [&mut self.time, &mut self.id, x, y, z, vx, vy, vz, &mut self.radius];
-        let slot = slots.into_iter().zip(Self::ROLES).find(|(_, known)| *known == role);
+        let slot = self.0.iter_mut().zip(Self::ROLES).find(|(_, known)| *known == role);
         slot.map(|(slot, _)| *slot = Some(name.to_owned())).is_some()
+    }
+
+    /// The name given for a role.
+    pub(super) fn get(&self, role: &str) -> Option<&String> {
+        self.0.iter().zip(Self::ROLES).find(|(_, known)| *known == role)?.0.as_ref()
+    }
+
+    /// Places of roles, and the names given for them.
+    pub(super) fn given(&self) -> impl Iterator<Item = (usize, &String)> {
+        self.0.iter().enumerate().filter_map(|(role, name)| Some((role, name.as_ref()?)))
     }
 }
 

@@ -11,8 +11,13 @@ use super::source::{GZIP_MAGIC, Source};
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;
 
-const PARQUET_MAGIC: &[u8] = b"PAR1";
-const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// How files of a format begin, where all of them do. Other archives begin as NPZ does.
+const MAGICS: [(Format, &[u8]); 4] = [
+    (Format::Parquet, b"PAR1"),
+    (Format::Mcap, b"\x89MCAP0\r\n"),
+    (Format::Npz, b"PK\x03\x04"),
+    (Format::Npz, b"PK\x05\x06"),
+];
 
 /// What a file is.
 pub(super) struct Recognised {
@@ -38,9 +43,8 @@ pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognise
         head = head_of(&source)?;
     }
     let format = match forced {
-        Some(format) if first_bytes(format).is_some_and(|bytes| !head.starts_with(bytes)) => {
-            let reason = "it does not begin as one does".to_owned();
-            return Err(Fault::WrongFormat { format, reason });
+        Some(format) if MAGICS.iter().any(|(known, _)| *known == format) && by_magic(&head) != Some(format) => {
+            return Err(Fault::WrongFormat(format));
         }
         Some(format) => format,
         None => format_of(&head)?,
@@ -59,27 +63,16 @@ fn head_of(source: &Source) -> Result<Vec<u8>, Fault> {
     if head.is_empty() { Err(Fault::Empty) } else { Ok(head) }
 }
 
-/// How every file of a format begins, if they all begin alike.
-fn first_bytes(format: Format) -> Option<&'static [u8]> {
-    match format {
-        Format::Parquet => Some(PARQUET_MAGIC),
-        Format::Mcap => Some(MCAP_MAGIC),
-        Format::Npz => Some(b"PK"),
-        Format::Csv | Format::Text | Format::Crazyflie | Format::Skybrush => None,
-    }
+fn by_magic(head: &[u8]) -> Option<Format> {
+    MAGICS.iter().find(|(_, magic)| head.starts_with(magic)).map(|(format, _)| *format)
 }
 
 fn format_of(head: &[u8]) -> Result<Format, Fault> {
-    if head.starts_with(PARQUET_MAGIC) {
-        return Ok(Format::Parquet);
-    }
-    if head.starts_with(MCAP_MAGIC) {
-        return Ok(Format::Mcap);
-    }
-    if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") {
+    match by_magic(head) {
         // Entries of NPZ archives end in .npy; a show holds show.json.
-        let arrays = memchr::memmem::find(head, b".npy").is_some();
-        return Ok(if arrays { Format::Npz } else { Format::Skybrush });
+        Some(Format::Npz) if memchr::memmem::find(head, b".npy").is_none() => return Ok(Format::Skybrush),
+        Some(format) => return Ok(format),
+        None => {}
     }
     if head.starts_with(b"\x93NUMPY") {
         let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";

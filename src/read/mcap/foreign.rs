@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::super::clock::{Probe, Stamp, TimeUnit};
-use super::super::error::{Fault, FaultAt, Place, quoted};
+use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted};
 use super::super::names::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows, survey};
@@ -12,7 +12,7 @@ use super::super::source::Source;
 use super::messages::{self, Seen, Who};
 use crate::record::mcap::topic::{CDR, Declared, Message, Part, TopicReader};
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let topics = TopicReader::open(&source.path)?;
     let notes = options.accept_unfinished(topics.is_complete())?;
     let poses = Poses {
@@ -69,7 +69,7 @@ fn reader_of(topic: &Declared) -> Option<messages::Reader> {
 
 impl Poses {
     /// Appends the rows of a message.
-    fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), FaultAt> {
+    fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), ReadError> {
         let Declared { topic, encoding, .. } = message.of;
         let Some(reader) = reader_of(message.of) else { return Ok(()) };
         self.messages += 1;
@@ -84,12 +84,12 @@ impl Poses {
         rows: &mut Vec<Row>,
     ) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        for seen in seen.map_err(|reason| Fault::Damaged { reason })? {
+        for seen in seen.map_err(Fault::Damaged)? {
             if !self.is_in_frame(&seen.frame, topic)? {
                 continue;
             }
             if let Some(odd) = seen.position.iter().find(|x| !x.is_finite()) {
-                return Err(Fault::NotFinite { column: "position".to_owned(), value: odd.to_string() });
+                return Err(Fault::not_finite("position", &odd.to_string(), UNSEEN));
             }
             let name = match seen.who {
                 Who::Topic => topic.clone(),
@@ -140,7 +140,7 @@ impl Poses {
 }
 
 impl Rows for Foreign {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             match self.topics.next()? {
@@ -156,7 +156,7 @@ impl Rows for Foreign {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), FaultAt> {
+    fn rewind(&mut self) -> Result<(), ReadError> {
         self.topics = TopicReader::open(&self.path)?;
         self.poses.messages = 0;
         Ok(())
@@ -194,7 +194,7 @@ impl Rows for Foreign {
     }
 
     /// Whether a channel says its times is known when all of it has been read.
-    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
+    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let probe = survey(self)?;
         if self.poses.stamped.is_disjoint(&self.poses.logged) {
             return Ok(probe);
