@@ -12,7 +12,7 @@ use super::reading::{self, ReadArguments, one_of};
 use super::run::interruption;
 use super::{Exit, Failure, outputs};
 use crate::export::{self, ExportOptions, WRITTEN};
-use crate::read::{self, Fault, Format, ReadError, Recording};
+use crate::read::{Fault, Format, ReadError, Recording};
 use crate::report::write_atomically_with;
 use crate::track::{Clock, Item, Tracks};
 
@@ -87,12 +87,13 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
         let message = format!("`{}` exists", path.display());
         return Err(Failure::input(message, "overwrite it with --force, or write another file"));
     }
-    outputs::check(&[("the recording", &arguments.reading.recording)], &[("--output", path)])?;
+    let inputs: Vec<_> = arguments.reading.paths().map(|path| ("the recording", path)).collect();
+    outputs::check(&inputs, &[("--output", path)])?;
     let options = ExportOptions { sample_hz: arguments.sample_hz };
     let interrupted = interruption()?;
     let recording = &arguments.reading.recording;
     let open = || -> Result<Recording, ReadError> {
-        let (tracks, path, interrupted) = (read::open(recording, &reading)?, recording.clone(), interrupted.clone());
+        let (tracks, path, interrupted) = (arguments.reading.open(&reading)?, recording.clone(), interrupted.clone());
         Ok(Box::new(Interruptible { tracks, path, interrupted }))
     };
     let exported =

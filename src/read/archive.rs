@@ -9,10 +9,15 @@ use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
 use super::error::{Fault, Place, ReadError};
-use super::source::Growing;
 
 /// Longest end of an archive: its last record with the longest comment \[bytes\].
 const END_LIMIT_BYTES: u64 = 22 + 65_535;
+
+/// Up to here compressed data may grow without being looked at \[bytes\].
+const FREE_GROWTH_BYTES: u64 = 64 * 1024 * 1024;
+
+/// Beyond [`FREE_GROWTH_BYTES`] data may grow by this factor. Deflate reaches 1032, recordings of real motion 20.
+const GROWTH_LIMIT: u64 = 200;
 
 /// An archive opened for reading.
 pub(super) struct Archive {
@@ -104,6 +109,33 @@ fn zip_fault(error: ZipError) -> Fault {
             "make it with deflate or unpacked",
         ),
         other => Fault::damaged(other),
+    }
+}
+
+/// Unpacked data that are refused once they grow beyond all measure.
+pub(super) struct Growing<R> {
+    inner: R,
+    packed_bytes: u64,
+    inflated_bytes: u64,
+}
+
+impl<R: Read> Growing<R> {
+    /// What is packed takes so much of the file \[bytes\].
+    pub(super) fn new(inner: R, packed_bytes: u64) -> Self {
+        Self { inner, packed_bytes, inflated_bytes: 0 }
+    }
+}
+
+impl<R: Read> Read for Growing<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let bytes = self.inner.read(buffer)?;
+        self.inflated_bytes += bytes as u64;
+        let Self { inflated_bytes, packed_bytes, .. } = *self;
+        if inflated_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT)) {
+            let grown = format!("it grows to more than {inflated_bytes} bytes out of {packed_bytes}");
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, grown));
+        }
+        Ok(bytes)
     }
 }
 

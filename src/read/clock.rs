@@ -43,7 +43,7 @@ impl TimeUnit {
         match self {
             Self::Seconds => (&["s", "sec", "secs", "second", "seconds"], 1),
             Self::Milliseconds => (&["ms", "msec", "millis", "milliseconds"], 1_000),
-            Self::Microseconds => (&["us", "µs", "usec", "micros", "microseconds"], 1_000_000),
+            Self::Microseconds => (&["us", "µs", "μs", "usec", "micros", "microseconds"], 1_000_000),
             Self::Nanoseconds => (&["ns", "nsec", "nanos", "nanoseconds"], 1_000_000_000),
         }
     }
@@ -208,7 +208,7 @@ impl Probe {
 #[derive(Clone, Debug)]
 pub(super) struct Timing {
     pub(super) clock: Clock,
-    unit: TimeUnit,
+    per_second: f64,
     /// Whole seconds in units.
     epoch: i64,
 }
@@ -231,12 +231,17 @@ impl Timing {
         let epoch = seconds.and_then(|s| Some((s.checked_mul(per_second)?, s.checked_mul(1_000_000_000)?)));
         let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
         let clock = Clock { unit: name, inferred: why.is_some(), by_steps: why == Some(BY_STEPS), epoch_ns };
-        (Self { clock, unit, epoch }, note)
+        (Self { clock, per_second: per_second as f64, epoch }, note)
+    }
+
+    /// A clock of which so many units make a second.
+    pub(super) fn given(per_second: f64) -> Self {
+        Self { clock: Clock { unit: "given", ..Clock::default() }, per_second, epoch: 0 }
     }
 
     /// Seconds since the epoch.
     pub(super) fn seconds(&self, stamp: Stamp) -> f64 {
-        stamp.since(self.epoch) / self.unit.per_second() as f64
+        stamp.since(self.epoch) / self.per_second
     }
 }
 

@@ -8,15 +8,11 @@
 //! holds a file for each vehicle, or a folder for each vehicle whose files follow each other. Files come in the order of
 //! the numbers in their names.
 
-use std::fmt::Write as _;
-use std::fs;
-use std::path::{Path, PathBuf};
-
 use nalgebra::Vector3;
 
 use super::csv::Text;
 use super::curves::{Curves, piece};
-use super::error::{Fault, ReadError};
+use super::error::{Fault, ReadError, quoted};
 use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -27,80 +23,39 @@ use crate::track::Item;
 /// Highest power that is read.
 const HIGHEST_POWER: usize = 15;
 
-/// Longest number in a file's name that is put in order by its value \[digits\].
-const LONGEST_NUMBER: usize = 20;
-
-/// Opens a folder of polynomials, or the file of a single vehicle.
-pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
+/// Opens polynomials of these vehicles, each of which flies its files one after the other.
+pub(super) fn open(vehicles: Vec<(String, Vec<Source>)>, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut notes = Vec::new();
-    let mut vehicles = Vec::new();
-    for (name, files) in vehicles_of(path)? {
-        let mut curve = Curve { vehicle: vehicles.len(), time_s: 0.0, scale: options.scale, items: Vec::new() };
+    let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
+    if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
+        let problem = format!("it has no vehicle {}, whose start is given", quoted(name));
+        return Err(Fault::content(problem, "name vehicles in --start as their files are called").into());
+    }
+    for (name, files) in vehicles {
+        let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.scale, items: Vec::new() };
         for file in &files {
-            curve.append(file).map_err(|fault| fault.of(file))?;
+            curve.append(file).map_err(|fault| fault.of(&file.shown()))?;
         }
         if files.len() > 1 && notes.is_empty() {
             notes.push(format!("`{name}` and others fly the files of their folders one after the other"));
         }
-        vehicles.push((name, curve.items));
-    }
-    Ok(Curves::recording(vehicles, notes))
-}
-
-/// Names and files of the vehicles, in order.
-fn vehicles_of(path: &Path) -> Result<Vec<(String, Vec<PathBuf>)>, ReadError> {
-    if path.is_file() {
-        return Ok(vec![(stem(path), vec![path.to_owned()])]);
-    }
-    let (files, folders) = entries(path)?;
-    if !files.is_empty() {
-        return Ok(files.into_iter().map(|file| (stem(&file), vec![file])).collect());
-    }
-    let mut vehicles = Vec::new();
-    for folder in folders {
-        vehicles.push((stem(&folder), entries(&folder)?.0));
-    }
-    vehicles.retain(|(_, files)| !files.is_empty());
-    if vehicles.is_empty() {
-        let remedy = "give a folder with a polynomial file (.csv) for each vehicle, or one with a folder for each";
-        return Err(Fault::content("there is no .csv file in the folder", remedy).into());
-    }
-    Ok(vehicles)
-}
-
-/// CSV files and folders of a folder, each in natural order.
-fn entries(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), ReadError> {
-    let error = |source| ReadError::new(folder, Fault::System(source));
-    let (mut files, mut folders) = (Vec::new(), Vec::new());
-    for entry in fs::read_dir(folder).map_err(error)? {
-        let path = entry.map_err(error)?.path();
-        if path.is_dir() {
-            folders.push(path);
-        } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-            files.push(path);
+        let start = options.starts.get(&name).copied().unwrap_or_default();
+        for item in &mut curve.items {
+            if let Item::Piece(piece) = item {
+                piece.coefficients[0] += Vector3::from(start);
+            }
         }
+        curves.push((name, curve.items));
     }
-    for paths in [&mut files, &mut folders] {
-        paths.sort();
-        paths.sort_by_cached_key(|path| natural(&stem(path)));
+    let first = |items: &[Item]| match items {
+        [Item::Piece(piece), ..] => Some(piece.coefficients[0]),
+        _ => None,
+    };
+    if curves.windows(2).any(|pair| first(&pair[0].1) == first(&pair[1].1)) {
+        let said = "curves begin at one place: where they are relative, say where each starts with --start NAME=X,Y,Z";
+        notes.push(said.to_owned());
     }
-    Ok((files, folders))
-}
-
-fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// A key that puts `cf9` before `cf10`: all numbers are as long.
-fn natural(name: &str) -> String {
-    let mut key = String::new();
-    for part in name.as_bytes().chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit()) {
-        let part = String::from_utf8_lossy(part);
-        let width = if part.starts_with(|c: char| c.is_ascii_digit()) { LONGEST_NUMBER } else { 0 };
-        // Writing to a string cannot fail.
-        let _ = write!(key, "{part:0>width$}");
-    }
-    key
+    Ok(Curves::recording(curves, notes))
 }
 
 /// Columns of the duration, and of x, y and z of each power.
@@ -144,8 +99,8 @@ struct Curve {
 }
 
 impl Curve {
-    fn append(&mut self, path: &Path) -> Result<(), ReadError> {
-        let mut table = Text::open(&Source { path: path.to_owned(), gzip: false }, Format::Crazyflie)?;
+    fn append(&mut self, file: &Source) -> Result<(), ReadError> {
+        let mut table = Text::open(file, Format::Crazyflie)?;
         let columns = Columns::of(table.header()).map_err(|fault| fault.at(Text::place(table.row())))?;
         let before = self.items.len();
         while table.advance()? {
@@ -170,17 +125,5 @@ impl Curve {
         self.items.push(Item::Piece(piece.ok_or_else(Fault::out_of_range)?));
         self.time_s = to_s;
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::natural;
-
-    #[test]
-    fn names_are_ordered_by_their_numbers() {
-        let mut names = ["cf10", "cf9", "a2_10", "a2_9", "cf1"];
-        names.sort_by_cached_key(|name| natural(name));
-        assert_eq!(names, ["a2_9", "a2_10", "cf1", "cf9", "cf10"]);
     }
 }

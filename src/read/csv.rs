@@ -11,8 +11,10 @@ use csv_core::ReadRecordResult;
 use super::clock::Stamp;
 use super::error::{Fault, Place, ReadError, quoted};
 use super::format::Format;
+use super::headerless;
+use super::heading;
 use super::layout::Layout;
-use super::options::ReadOptions;
+use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
 use super::source::{Lines, Source};
 use super::table::{self, Cells};
@@ -22,9 +24,14 @@ use super::table::{self, Cells};
 enum Separator {
     /// One of this byte.
     Byte(u8),
-    /// Any number of blanks and tabs.
-    Blanks,
+    /// Any number of these.
+    Any(&'static [u8]),
 }
+
+const BLANKS: Separator = Separator::Any(b" \t");
+
+/// Between the numbers of `t (x,y) (x,y)`.
+const TUPLES: Separator = Separator::Any(b" \t(),");
 
 /// A table in text.
 pub(super) struct Text {
@@ -32,6 +39,10 @@ pub(super) struct Text {
     lines: Lines,
     separator: Separator,
     has_header: bool,
+    /// The numbers of the first line below the header, where all are numbers.
+    first: Vec<f64>,
+    /// Whether names say what the numbers are.
+    named: bool,
     /// Whether a line that begins with `#` is a comment: below a header the first field may be a name that does.
     comments: bool,
     header: Vec<String>,
@@ -45,13 +56,19 @@ pub(super) struct Text {
 /// Opens a table.
 pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
     let text = Text::open(source, format)?;
-    let layout = if text.has_header {
-        Layout::of(&text.header, &options.columns)
-    } else {
-        let count = text.header.len();
-        let problem = format!("it has {count} numbers where time and three for each vehicle are expected");
-        let fault = || Fault::content(problem, "write t x y z x y z ..., a line for each time");
-        Layout::without_header(count).ok_or_else(fault)
+    let (stem, first) = (source.stem(), &text.first);
+    let numbers = || {
+        let dimensions = options.dimensions.or(text.tuples());
+        headerless::layout(first, &ReadOptions { dimensions, ..options.clone() }, &stem)
+    };
+    let layout = match Layout::of(&text.header, options, &stem) {
+        _ if !text.named => numbers(),
+        _ if options.dimensions.is_some() => {
+            Err(Fault::content("its header says which numbers are a vehicle's", "leave --dimensions away"))
+        }
+        // What stands above numbers may be a remark.
+        Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
+        layout => layout,
     };
     let layout = layout.map_err(|fault| fault.at(Text::place(text.row())))?;
     table::open(source, text, layout, None, 0, options)
@@ -61,41 +78,74 @@ impl Text {
     /// Opens a table and reads its header, or the first line where there is none above plain numbers.
     pub(super) fn open(source: &Source, format: Format) -> Result<Self, ReadError> {
         let mut lines = Lines::new(source)?;
-        if !next_line(&mut lines, true)? {
+        // The last comment above the first line may be its header.
+        let mut comment = Vec::new();
+        while next_line(&mut lines, false)? && lines.line().starts_with(b"#") {
+            let hashes = lines.line().iter().take_while(|&&byte| byte == b'#').count();
+            comment = lines.line()[hashes..].trim_ascii().to_vec();
+        }
+        if lines.line().is_empty() {
             return Err(Fault::Empty.into());
         }
-        let separator = separator(lines.line(), format);
-        let time = (Vec::new(), Stamp::Whole(0));
-        let (header, fields) = (Vec::new(), Fields::default());
-        let source = source.clone();
-        let mut text =
-            Self { source, lines, separator, has_header: true, comments: false, header, fields, wanted: None, time };
-        text.read_header(format).map_err(|fault| fault.at(Self::place(text.row())))?;
+        let mut text = Self {
+            source: source.clone(),
+            separator: separator(lines.line(), format),
+            lines,
+            has_header: true,
+            first: Vec::new(),
+            named: true,
+            comments: false,
+            header: Vec::new(),
+            fields: Fields::default(),
+            wanted: None,
+            time: (Vec::new(), Stamp::Whole(0)),
+        };
+        text.read_header(format, &comment).map_err(|fault| fault.at(Self::place(text.row())))?;
         Ok(text)
     }
 
-    fn read_header(&mut self, format: Format) -> Result<(), Fault> {
+    fn read_header(&mut self, format: Format, comment: &[u8]) -> Result<(), Fault> {
         let line = self.lines.line();
         if let Some(value) = decimal_comma(line) {
             let problem = format!("column `1` holds {}, a number with a decimal comma", quoted(&value));
             return Err(Fault::content(problem, "write numbers with a decimal point"));
         }
-        self.fields.split(line, self.separator, usize::MAX)?;
-        let names = (0..self.fields.ends.len()).map(|index| Ok(self.fields.text(line, index)?.trim().to_owned()));
-        self.header = names.collect::<Result<_, Fault>>()?;
+        self.header = names(line, self.separator)?;
         let numeric = self.header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
         self.has_header = !numeric;
         self.comments = numeric || format == Format::Crazyflie;
-        if !numeric {
+        let named = |names: &[String]| names.iter().any(|name| heading::is_time(name) || heading::is_frame(name));
+        let above = [self.separator, Separator::Byte(b','), BLANKS].map(|separator| names(comment, separator));
+        let above = above.into_iter().filter_map(Result::ok);
+        let above =
+            above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
+        if numeric {
+            self.first = self.header.iter().map(|number| number.parse()).collect::<Result<_, _>>().unwrap_or_default();
+        }
+        if let Some(names) = above {
+            (self.header, self.has_header, self.comments) = (names, false, true);
+        } else if !numeric {
             self.header.pop_if(|name| name.is_empty());
         } else if format == Format::Text {
             self.header = (1..=self.header.len()).map(|number| number.to_string()).collect();
+            self.named = false;
         } else {
             let remedy = "put a header above: t,id,x,y,z with a row for each vehicle and time, or t,x1,y1,z1,x2,... with \
                           a row for each time";
             return Err(Fault::content("the first line holds numbers and no names of columns", remedy));
         }
         Ok(())
+    }
+
+    /// What each vehicle has where its numbers are in brackets.
+    fn tuples(&self) -> Option<Dimensions> {
+        let (_, tuple) =
+            str::from_utf8(self.lines.line()).ok().filter(|_| self.separator == TUPLES)?.split_once('(')?;
+        match tuple.split(')').next()?.split(',').count() {
+            2 => Some(Dimensions::Plane),
+            3 => Some(Dimensions::Space),
+            _ => None,
+        }
     }
 
     /// Splits the current line.
@@ -193,12 +243,20 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
+/// The fields of a line of names.
+fn names(line: &[u8], separator: Separator) -> Result<Vec<String>, Fault> {
+    let mut fields = Fields::default();
+    fields.split(line, separator, usize::MAX)?;
+    (0..fields.ends.len()).map(|index| Ok(fields.text(line, index)?.trim().to_owned())).collect()
+}
+
 /// The separator that a line most likely uses.
 fn separator(line: &[u8], format: Format) -> Separator {
     let count = |byte| memchr::memchr_iter(byte, line).count();
     let (comma, semicolon, tab) = (count(b','), count(b';'), count(b'\t'));
     match format {
-        Format::Text if comma == 0 && semicolon == 0 => Separator::Blanks,
+        Format::Text if line.contains(&b'(') => TUPLES,
+        Format::Text if comma == 0 && semicolon == 0 => BLANKS,
         _ if semicolon > 0 && semicolon >= comma => Separator::Byte(b';'),
         _ if tab > comma => Separator::Byte(b'\t'),
         _ => Separator::Byte(b','),
@@ -256,9 +314,10 @@ impl Fields {
                 }
                 self.ends.push((start, line.len()));
             }
-            Separator::Blanks => {
+            Separator::Any(bytes) => {
                 let mut start = 0;
-                for end in memchr::memchr2_iter(b' ', b'\t', line).chain([line.len()]) {
+                let ends = (0..line.len()).filter(|&at| bytes.contains(&line[at]));
+                for end in ends.chain([line.len()]) {
                     if start < end {
                         self.ends.push((start, end));
                     }

@@ -184,6 +184,13 @@ impl Fault {
         Self::content(problem, "sort the lines by time, and look whether two recordings were joined")
     }
 
+    /// Times are numbers of frames, and nobody says how long one lasts.
+    pub(super) fn frames(problem: impl Into<String>) -> Self {
+        let remedy = "say how many there are in a second with --fps, such as --fps 30, or how many seconds each lasts \
+                      with --time-scale";
+        Self::content(problem, remedy)
+    }
+
     /// Numbers that are finite in the file are not in metres and seconds.
     pub(super) fn out_of_range() -> Self {
         Self::content("its numbers leave the range of numbers", "look at --scale and at the numbers themselves")

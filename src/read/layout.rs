@@ -1,13 +1,15 @@
 //! What the columns of a table mean, going by their names.
 //!
 //! A *long* table has a row for each vehicle and time, a *wide* one a row for each time. Names are compared without
-//! regard to case, and a unit in brackets is left out.
+//! regard to case. A unit that a name says is honoured, and one that is not known is refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted};
-use super::options::ColumnNames;
+use super::heading::{self, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_velocity};
+use super::options::{ColumnNames, ReadOptions};
+use super::units;
 
 /// The columns of a position, and of what else is known of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,9 +21,10 @@ pub(super) struct Body {
 }
 
 /// The columns of a table.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
-    pub(super) time: usize,
+    /// The column of time; none where the number of the row is the time.
+    pub(super) time: Option<usize>,
     /// The unit in the name of the column of time.
     pub(super) unit: Option<TimeUnit>,
     /// The column of the vehicle in a long table.
@@ -30,17 +33,11 @@ pub(super) struct Layout {
     pub(super) names: Vec<String>,
     /// The columns of each vehicle of a wide table, or of every row of a long one.
     pub(super) bodies: Vec<Body>,
-    /// Names of columns that mean nothing here.
-    pub(super) unused: Vec<String>,
+    /// What the numbers of each column are multiplied by: the size of the unit that its name says \[m or m/s\], or 1.
+    pub(super) metres: Vec<f64>,
+    /// What a person should know about the columns.
+    pub(super) notes: Vec<String>,
 }
-
-/// What a column gives: its place among [`ColumnNames::ROLES`]. Axes follow each other.
-type Role = usize;
-const TIME: Role = 0;
-const ID: Role = 1;
-const POSITION: Role = 2;
-const VELOCITY: Role = 5;
-const RADIUS: Role = 8;
 
 const WORDS: [&str; 9] = [
     "time",
@@ -54,73 +51,69 @@ const WORDS: [&str; 9] = [
     "the radius",
 ];
 
-/// The quantity of a plain name like `x`, `pos_x`, `vy` or `radius_m`.
-fn quantity(name: &str) -> Option<Role> {
-    if matches!(name, "radius" | "radius_m") {
-        return Some(RADIUS);
-    }
-    let is = |starts: &[&str], axis: &str, ends: &[&str]| {
-        let after = |start: &&str| name.strip_prefix(start)?.strip_prefix(axis);
-        starts.iter().filter_map(after).any(|end| ends.contains(&end))
-    };
-    ["x", "y", "z"].into_iter().enumerate().find_map(|(place, axis)| {
-        if is(&["", "p", "pos_", "pos.", "position_", "position."], axis, &["", "_m"]) {
-            Some(POSITION + place)
-        } else {
-            is(&["v", "vel_", "velocity_"], axis, &["", "_m_s"]).then_some(VELOCITY + place)
-        }
-    })
-}
-
 fn missing(header: &[String], role: Role, of: &str) -> Fault {
-    let problem = format!("there is no column for {}{of}; its columns are {}", WORDS[role], list(header));
+    let problem = format!("there is no column for {}{of}; its columns are {}", WORDS[role], list(header, 12));
     let option = ColumnNames::ROLES[role];
     Fault::content(problem, format!("name the column with --column {option}=NAME, or put it into the header"))
 }
 
 impl Layout {
-    /// What the columns of this header mean.
-    pub(super) fn of(header: &[String], given: &ColumnNames) -> Result<Self, Fault> {
-        let plain: Vec<String> = header.iter().map(|name| plain(name)).collect();
-        let mut columns = Columns { header, found: BTreeMap::new() };
-        for (role, name) in given.given() {
+    /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
+    pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
+        let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new() };
+        for (role, name) in options.columns.given() {
             let column = header.iter().position(|column| column == name);
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
             columns.found.insert((String::new(), role), column);
+            // A unit that is not known is the user's affair where the column is.
+            let unit = units::bracketed(name).1.filter(|unit| units::size_of(unit, is_velocity(role)).is_some());
+            columns.units.extend(unit.map(|unit| (column, unit)));
         }
-        let first = |is: fn(&str) -> bool| plain.iter().position(|name| is(name));
-        let time = columns.get("", TIME).or_else(|| first(is_time)).ok_or_else(|| missing(header, TIME, ""))?;
-        let unit = plain[time].rsplit_once('_').and_then(|(_, unit)| TimeUnit::from_name(unit));
-        let unit = unit.or_else(|| bracketed(&header[time]).and_then(TimeUnit::from_name));
-        let id = columns.get("", ID).or_else(|| first(is_id));
-        for (column, name) in plain.iter().enumerate().filter(|&(column, _)| column != time) {
-            if let Some(role) = quantity(name).filter(|&role| given.given().all(|(known, _)| known != role)) {
-                columns.claim(String::new(), role, column)?;
+        let first = |is: fn(&str) -> bool| header.iter().position(|name| is(name));
+        let time = columns.get("", TIME).or_else(|| first(heading::is_time)).or_else(|| first(heading::is_frame));
+        let time = time.ok_or_else(|| missing(header, TIME, ""))?;
+        let unit = unit_of_time(&header[time], options)?;
+        let id = columns.get("", ID).or_else(|| first(heading::is_id));
+
+        let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
+        let headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
+        for (column, heading) in headings.iter().filter(|(_, heading)| heading.vehicle.is_empty()) {
+            if options.columns.given().all(|(known, _)| known != heading.role) {
+                columns.claim("", heading, *column)?;
             }
         }
-        let names = match id {
-            Some(_) => Vec::new(),
-            None if columns.get("", POSITION).is_some() => return Err(missing(header, ID, "")),
-            None => columns.claim_wide(&plain, time)?,
-        };
-        let everyone = [String::new()];
-        let bodies = if id.is_some() { &everyone[..] } else { &names };
-        let bodies = bodies.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
-        let used: BTreeSet<usize> = columns.found.values().copied().chain([time]).chain(id).collect();
-        let unused = (0..header.len()).filter(|column| !used.contains(column) && !header[*column].is_empty());
-        let unused = unused.map(|column| header[column].clone()).collect();
-        Ok(Self { time, unit, id, names, bodies, unused })
-    }
-
-    /// Time and then x, y and z of each vehicle; none where the columns do not come out even.
-    pub(super) fn without_header(columns: usize) -> Option<Self> {
-        if columns < 4 || !(columns - 1).is_multiple_of(3) {
-            return None;
+        let one = columns.get("", POSITION).is_some();
+        // A table that repeats its columns has more vehicles than its rows name.
+        let repeated = headings.iter().filter(|(_, heading)| heading.is_numbered() && (one || id.is_some()));
+        for (column, heading) in repeated {
+            if columns.get("", heading.role).is_some() {
+                columns.claim("", heading, *column)?;
+            }
         }
-        let body = |x| Body { position: [Some(x), Some(x + 1), Some(x + 2)], velocity: None, radius: None };
-        let bodies = (1..columns).step_by(3).map(body).collect();
-        let names = (1..=(columns - 1) / 3).map(|number| number.to_string()).collect();
-        Some(Self { time: 0, unit: None, id: None, names, bodies, unused: Vec::new() })
+        let (vehicles, names) = match id {
+            Some(_) => (vec![String::new()], Vec::new()),
+            None if one => (vec![String::new()], vec![alone.to_owned()]),
+            None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
+        };
+        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
+        let mut layout = Self { time: Some(time), unit, id, names, bodies, metres: Vec::new(), notes: Vec::new() };
+        let used = layout.columns();
+        layout.metres = columns.metres(&used, options.scale)?;
+        let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
+        let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
+        if id.is_none() && one && !options.one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+            return Err(missing(header, ID, ""));
+        }
+        if layout.bodies.iter().any(|body| body.position[2].is_none()) {
+            layout.notes.push("there is no column for z: it is taken as 0".to_owned());
+        }
+        if !unused.is_empty() {
+            layout.notes.push(format!("columns not used: {}", unused.join(", ")));
+        }
+        if !layout.names.is_empty() && !options.one_vehicle {
+            layout.notes.push(format!("vehicles, going by the names of columns: {}", list(&layout.names, 50)));
+        }
+        Ok(layout)
     }
 
     /// The columns that are read, each once, in rising order.
@@ -129,48 +122,77 @@ impl Layout {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
-        let columns: BTreeSet<_> = self.bodies.iter().flat_map(of).chain([self.time]).chain(self.id).collect();
+        let columns: BTreeSet<_> = self.bodies.iter().flat_map(of).chain(self.time).chain(self.id).collect();
         columns.into_iter().collect()
     }
+}
 
-    /// What a person should know about the columns.
-    pub(super) fn notes(&self) -> Vec<String> {
-        let flat = self.bodies.iter().any(|body| body.position[2].is_none());
-        let flat = flat.then(|| "there is no column for z: it is taken as 0".to_owned());
-        let unused = (!self.unused.is_empty()).then(|| format!("columns not used: {}", self.unused.join(", ")));
-        flat.into_iter().chain(unused).collect()
+/// The unit that the name of a column of time says, where the user says nothing of it.
+fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
+    if options.time_unit.is_some() || options.times_per_second.is_some() {
+        return Ok(None);
     }
+    if heading::is_frame(name) {
+        return Err(Fault::frames(format!("its times are the numbers of frames in column {}", quoted(name))));
+    }
+    let Some(unit) = heading::said_unit(name) else { return Ok(None) };
+    TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
+        let problem = format!("column {} says a unit of time that is not known, {}", quoted(name), quoted(&unit));
+        let remedy =
+            "say how many seconds it lasts with --time-scale, such as 60 for minutes, or what it is with --time-unit";
+        Fault::content(problem, remedy)
+    })
 }
 
 /// Columns found so far: of a vehicle by its name, or of all vehicles under no name.
 struct Columns<'a> {
     header: &'a [String],
     found: BTreeMap<(String, Role), usize>,
+    /// The unit that the name of a column says.
+    units: BTreeMap<usize, &'a str>,
 }
 
-impl Columns<'_> {
+impl<'a> Columns<'a> {
     fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
         self.found.get(&(vehicle.to_owned(), role)).copied()
     }
 
-    fn claim(&mut self, vehicle: String, role: Role, column: usize) -> Result<(), Fault> {
+    fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
         let of = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
-        let Some(first) = self.found.insert((vehicle, role), column) else { return Ok(()) };
+        self.units.extend(heading.unit.map(|unit| (column, unit)));
+        let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
         let (first, second) = (&self.header[first], &self.header[column]);
-        let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[role]);
+        let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
         Err(Fault::content(problem, "name the one that is meant with --column, or take the other out"))
     }
 
     /// Finds the vehicles of a wide table, and gives their names in order of appearance.
-    fn claim_wide(&mut self, plain: &[String], time: usize) -> Result<Vec<String>, Fault> {
+    fn claim_wide(&mut self, headings: &[(usize, Heading<'a>)]) -> Result<Vec<String>, Fault> {
+        let named: Vec<_> = headings.iter().filter(|(_, heading)| !heading.vehicle.is_empty()).collect();
+        let vehicles: BTreeSet<_> = named.iter().map(|(_, heading)| heading.vehicle).collect();
+        // Where all vehicles are called by letters, `a` is one of them; beside none or numbers `a_x` is an acceleration.
+        let sure = |heading: &Heading<'_>| !heading.ambiguous && !heading.is_numbered();
+        let letters = named.iter().any(|(_, heading)| sure(heading));
+        let words = named.iter().find(|(_, heading)| sure(heading) && heading.vehicle.len() > 1);
+        let odd = named.iter().find(|(_, heading)| heading.ambiguous);
+        if let (Some((odd, _)), Some((word, _))) = (odd, words) {
+            let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
+            let problem = format!("column {odd} may be of a vehicle, as {word} is, or of a quantity of another one");
+            return Err(Fault::content(problem, "give the column a longer name, or take it out"));
+        }
         let mut names: Vec<String> = Vec::new();
-        for (column, (name, plain)) in self.header.iter().zip(plain).enumerate().filter(|&(column, _)| column != time) {
-            let Some((vehicle, role)) = vehicle_and_quantity(name, plain) else { continue };
-            let known = self.found.range((vehicle.clone(), 0)..).next();
-            if known.is_none_or(|((known, _), _)| *known != vehicle) {
-                names.push(vehicle.clone());
+        // `cf1_v_x` is a velocity where there is a `cf1_x`.
+        let of_another = |vehicle: &str| {
+            let split = vehicle.rsplit_once(['.', '/', '_']).filter(|(_, letter)| heading::LETTERS.contains(letter));
+            split.is_some_and(|(other, _)| vehicles.contains(other))
+        };
+        let is_vehicle = |heading: &Heading<'_>| (letters || !heading.ambiguous) && !of_another(heading.vehicle);
+        for (column, heading) in named.into_iter().filter(|(_, heading)| is_vehicle(heading)) {
+            let known = self.found.range((heading.vehicle.to_owned(), 0)..).next();
+            if known.is_none_or(|((known, _), _)| known != heading.vehicle) {
+                names.push(heading.vehicle.to_owned());
             }
-            self.claim(vehicle, role, column)?;
+            self.claim(heading.vehicle, heading, *column)?;
         }
         if names.is_empty() {
             let of = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
@@ -196,54 +218,52 @@ impl Columns<'_> {
         }
         Ok(Body { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
     }
+
+    /// What the numbers of each column are multiplied by, going by the units that names say: all names or none, and
+    /// nothing beside them.
+    fn metres(&self, used: &[usize], scale: f64) -> Result<Vec<f64>, Fault> {
+        let mut metres = vec![1.0; self.header.len()];
+        let (mut other, mut silent) = (None, None);
+        let lengths =
+            self.found.iter().filter(|((_, role), column)| *role >= POSITION && used.binary_search(column).is_ok());
+        for (&(_, role), &column) in lengths {
+            let name = quoted(&self.header[column]);
+            let Some(unit) = self.units.get(&column) else {
+                silent = Some(name);
+                continue;
+            };
+            let what = if is_velocity(role) { "velocity" } else { "length" };
+            metres[column] = units::size_of(unit, is_velocity(role)).ok_or_else(|| {
+                let problem = format!("column {name} says a unit of {what} that is not known, {}", quoted(unit));
+                let remedy =
+                    "write it in m, cm, mm, km, ft or in, or name the column with --column and its unit with --scale";
+                Fault::content(problem, remedy)
+            })?;
+            if metres[column] != 1.0 {
+                other = Some(name);
+            }
+        }
+        let Some(other) = other else { return Ok(metres) };
+        if let Some(silent) = silent {
+            let problem = format!("column {other} says its unit, and column {silent} none");
+            return Err(Fault::content(problem, "write the unit of each column into its name, as in `x [mm]`"));
+        }
+        if scale != 1.0 {
+            let problem = format!("column {other} says its unit, and --scale {scale} another");
+            return Err(Fault::content(problem, "leave --scale away, or take the units out of the header"));
+        }
+        Ok(metres)
+    }
 }
 
-/// The first dozen of some columns.
-fn list(names: &[String]) -> String {
-    const SHOWN: usize = 12;
+/// The first of some names that are not empty.
+fn list(names: &[String], shown: usize) -> String {
     let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
     match names.len() {
         0 => "none".to_owned(),
-        count if count > SHOWN => format!("{} and {} more", names[..SHOWN].join(", "), count - SHOWN),
+        count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
         _ => names.join(", "),
     }
-}
-
-/// Splits `x1`, `vx_2`, `cf1.x`, `leader/vy` or `drone3_z` into vehicle and quantity.
-fn vehicle_and_quantity(name: &str, plain: &str) -> Option<(String, Role)> {
-    let stem = plain.trim_end_matches(|c: char| c.is_ascii_digit());
-    if stem.len() < plain.len() {
-        return Some((plain[stem.len()..].to_owned(), quantity(stem.strip_suffix('_').unwrap_or(stem))?));
-    }
-    // The name of the vehicle keeps its case.
-    let name = name.split(['[', '(']).next()?.trim();
-    name.char_indices().filter(|&(_, c)| matches!(c, '.' | '/' | '_')).find_map(|(at, _)| {
-        let role = quantity(&name[at + 1..].to_lowercase())?;
-        (at > 0).then(|| (name[..at].to_owned(), role))
-    })
-}
-
-/// The name in lower case, without blanks around it and without a unit in brackets.
-fn plain(name: &str) -> String {
-    name.split(['[', '(']).next().unwrap_or_default().trim().to_lowercase()
-}
-
-/// What stands in brackets.
-fn bracketed(name: &str) -> Option<&str> {
-    let (_, rest) = name.split_once(['[', '('])?;
-    rest.split([']', ')']).next().map(str::trim)
-}
-
-fn is_time(name: &str) -> bool {
-    let stem = match name.rsplit_once('_') {
-        Some((stem, unit)) if TimeUnit::from_name(unit).is_some() => stem,
-        _ => name,
-    };
-    matches!(stem, "t" | "time" | "timestamp" | "stamp")
-}
-
-fn is_id(name: &str) -> bool {
-    matches!(name, "id" | "name" | "vehicle" | "vehicle_id" | "drone" | "drone_id" | "uav" | "agent" | "robot")
 }
 
 #[cfg(test)]
@@ -252,7 +272,7 @@ mod tests {
 
     fn layout(header: &str) -> Result<Layout, Fault> {
         let header: Vec<_> = header.split(',').map(str::to_owned).collect();
-        Layout::of(&header, &ColumnNames::default())
+        Layout::of(&header, &ReadOptions::default(), "alone")
     }
 
     fn at(columns: [usize; 3]) -> [Option<usize>; 3] {
@@ -263,9 +283,9 @@ mod tests {
     fn a_long_header_is_read_in_any_order() {
         let layout = layout("z,Y [m],id,x,time_ms,vx,vy,vz,battery").expect("a layout");
         let body = Body { position: at([3, 1, 0]), velocity: Some(at([5, 6, 7])), radius: None };
-        assert_eq!((layout.time, layout.unit), (4, Some(TimeUnit::Milliseconds)));
+        assert_eq!((layout.time, layout.unit), (Some(4), Some(TimeUnit::Milliseconds)));
         assert_eq!((layout.id, layout.bodies), (Some(2), vec![body]));
-        assert_eq!(layout.unused, ["battery"]);
+        assert_eq!(layout.notes, ["columns not used: battery"]);
     }
 
     #[test]
@@ -291,7 +311,7 @@ mod tests {
     fn what_is_missing_or_double_is_named() {
         let fault = |header: &str| layout(header).expect_err("refused").to_string();
         assert!(fault("id,x,y,z").contains("for time"));
-        assert!(fault("t,x,y,z").contains("for the vehicle"));
+        assert!(fault("t,who,x,y,z").contains("for the vehicle"));
         assert!(fault("t,id,x,z").contains("along y"));
         assert!(fault("t,x1,y1,z1,x2,z2").contains("along y of vehicle `2`"));
         assert!(fault("t,id,x,y,z,vx,vy").contains("velocity along z"));

@@ -42,6 +42,11 @@ pub(super) trait Rows {
     /// Puts the names in their final order, once all have been met.
     fn settle_names(&mut self) {}
 
+    /// What a person should know that shows as rows are read.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// The place that a row's number means.
     fn place(&self, number: u64) -> Place;
 
@@ -76,6 +81,8 @@ pub(super) struct About {
     pub(super) path: PathBuf,
     /// The unit of its times, where it is known.
     pub(super) unit: Option<TimeUnit>,
+    /// How many of them the user says to make a second.
+    pub(super) times_per_second: Option<f64>,
     /// What the times are counted from, as the file says it \[ns\].
     pub(super) epoch_ns: i64,
     /// Metres per unit of length.
@@ -95,7 +102,8 @@ impl About {
         none: Fault,
     ) -> Self {
         let unit = options.time_unit.or(said);
-        Self { path: source.path.clone(), unit, epoch_ns: 0, scale: options.scale, notes, none }
+        let (path, times_per_second) = (source.shown(), options.times_per_second);
+        Self { path, unit, times_per_second, epoch_ns: 0, scale: options.scale, notes, none }
     }
 }
 
@@ -122,7 +130,7 @@ pub(super) struct Ordered<R> {
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { path, unit, epoch_ns, scale, mut notes, none } = about;
+        let About { path, unit, times_per_second, epoch_ns, scale, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -139,13 +147,15 @@ impl<R: Rows> Ordered<R> {
             rows.survey()?
         };
         let Some(probe) = probe else { return Err(none.into()) };
-        let (mut timing, note) = Timing::settle(&probe, unit);
+        let settled = || Timing::settle(&probe, unit);
+        let (mut timing, note) = times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
         notes.extend(note);
         if !rows.is_wide() {
             rows.settle_names();
             rows.rewind()?;
         }
+        notes.extend(rows.notes());
         if !probe.in_order {
             while rows.next(&mut first)? {}
             // Stable: rows of one time stay in the order of the file.
@@ -193,7 +203,11 @@ impl<R: Rows> Ordered<R> {
             radius_m: row.radius.map(|radius| radius * self.scale),
         };
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
-        if time_s.is_finite() && finite(&sample.position_m) && sample.velocity_m_s.as_ref().is_none_or(finite) {
+        if time_s.is_finite()
+            && finite(&sample.position_m)
+            && sample.velocity_m_s.as_ref().is_none_or(finite)
+            && sample.radius_m.is_none_or(f64::is_finite)
+        {
             return Ok(sample);
         }
         Err(self.error(row, Fault::out_of_range()))

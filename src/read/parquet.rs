@@ -46,8 +46,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
     let header: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let layout = Layout::of(&header, &options.columns)?;
-    let unit = unit_of(&schema.column(layout.time));
+    let layout = Layout::of(&header, options, &source.stem())?;
+    let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
         if let Some((what, remedy)) = unreadable(&reader, column) {
             return Err(Fault::content(format!("column `{}` {what}", header[column]), remedy).into());

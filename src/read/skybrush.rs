@@ -16,17 +16,30 @@ use super::error::{Fault, Place, ReadError};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
+use super::stranger;
 use crate::track::{Item, Piece, Sample};
 
 /// Highest degree of a Bezier segment that is read.
 const HIGHEST_DEGREE: usize = 15;
 
 /// The entry of an archive that holds the show.
-const SHOW: &str = "show.json";
+pub(super) const SHOW: &str = "show.json";
 
 #[derive(Deserialize)]
 struct Show {
     swarm: Option<Swarm>,
+    settings: Option<ShowSettings>,
+}
+
+#[derive(Deserialize)]
+struct ShowSettings {
+    validation: Option<Validation>,
+}
+
+#[derive(Deserialize)]
+struct Validation {
+    #[serde(rename = "minDistance")]
+    least_distance: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -64,16 +77,16 @@ struct Trajectory {
 #[serde(expecting = "a keyed point [t, [x, y, z], [control points]]")]
 struct Point(f64, [f64; 3], #[serde(default)] Vec<[f64; 3]>, #[serde(default)] IgnoredAny);
 
-/// Opens a show.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+/// The show of a file, and the archive of its parts.
+fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     let mut head = [0; 2];
     let is_archive = source.bytes()?.read(&mut head).is_ok_and(|bytes| bytes == 2 && head == *b"PK");
     let mut archive = is_archive.then(|| Archive::open(&source.path)).transpose()?;
-    let show: Show = match &mut archive {
+    let show = match &mut archive {
         Some(archive) if archive.holds(SHOW) => parse(&archive.whole(SHOW)?, Some(SHOW))?,
         Some(_) => {
-            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays");
-            return Err(Fault::content(problem, "give a .skyc or .npz file").into());
+            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays nor tables");
+            return Err(Fault::content(problem, "give a .skyc or .npz file, or pack a table for each vehicle").into());
         }
         None => {
             let mut bytes = Vec::new();
@@ -81,9 +94,24 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             parse(&bytes, None)?
         }
     };
+    Ok((show, archive))
+}
+
+/// How close drones may come, as the show itself says \[units of length\].
+pub(super) fn least_distance(source: &Source) -> Result<Option<f64>, ReadError> {
+    let settings = show(source)?.0.settings;
+    Ok(settings.and_then(|settings| settings.validation?.least_distance))
+}
+
+/// Opens a show.
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let (show, mut archive) = show(source)?;
+    let Some(swarm) = show.swarm else {
+        return Err(Fault::content("it is JSON, but no Skybrush show: it has no `swarm`", stranger::TABLE).into());
+    };
     let mut names = Vec::new();
     let mut curves = Vec::new();
-    for (index, drone) in show.swarm.map_or_else(Vec::new, |swarm| swarm.drones).into_iter().enumerate() {
+    for (index, drone) in swarm.drones.into_iter().enumerate() {
         let mut settings = drone.settings.unwrap_or_default();
         if let Some(elsewhere) = &settings.elsewhere {
             settings = referenced(archive.as_mut(), elsewhere)?;

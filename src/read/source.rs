@@ -1,11 +1,12 @@
-//! Files as streams of bytes and of lines, with limits on what they may grow to.
+//! Files as streams of bytes and of lines, which may not grow without a limit.
 
 use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, Read};
-use std::path::PathBuf;
+use std::io::{BufRead as _, BufReader, Read};
+use std::path::{Path, PathBuf};
 
 use flate2::read::MultiGzDecoder;
 
+use super::archive::{Archive, Growing};
 use super::error::{Fault, Place, ReadError};
 
 /// Longest line that is read \[bytes\]: an instant of a hundred thousand vehicles.
@@ -14,58 +15,49 @@ pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
 /// Bytes read at a time.
 const BLOCK_BYTES: usize = 256 * 1024;
 
-/// Up to here compressed data may grow without being looked at \[bytes\].
-const FREE_GROWTH_BYTES: u64 = 64 * 1024 * 1024;
-
-/// Beyond [`FREE_GROWTH_BYTES`] data may grow by this factor. Deflate reaches 1032, recordings of real motion 20.
-const GROWTH_LIMIT: u64 = 200;
-
 /// First bytes of a gzip file.
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
-/// A file that can be read from its start as often as needed.
+/// A file, alone or in an archive, that can be read from its start as often as needed.
 #[derive(Clone, Debug)]
 pub(super) struct Source {
     pub(super) path: PathBuf,
+    /// The entry of the archive that `path` then is.
+    pub(super) entry: Option<String>,
     pub(super) gzip: bool,
 }
 
 impl Source {
+    /// A file of its own.
+    pub(super) fn file(path: &Path) -> Self {
+        Self { path: path.to_owned(), entry: None, gzip: false }
+    }
+
+    /// What errors call it.
+    pub(super) fn shown(&self) -> PathBuf {
+        self.entry.as_ref().map_or_else(|| self.path.clone(), |entry| self.path.join(entry))
+    }
+
+    /// What its only vehicle is called: the name of the file without what says the format.
+    pub(super) fn stem(&self) -> String {
+        let path = self.shown().with_extension("");
+        let stem = if self.gzip { path.file_stem() } else { path.file_name() };
+        stem.unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     /// The bytes of the file, unpacked.
-    pub(super) fn bytes(&self) -> io::Result<Box<dyn Read>> {
-        let file = File::open(&self.path)?;
+    pub(super) fn bytes(&self) -> Result<Box<dyn Read>, ReadError> {
+        let (file, packed_bytes): (Box<dyn Read>, _) = if let Some(entry) = &self.entry {
+            (Archive::open(&self.path)?.entry(entry)?, File::open(&self.path)?.metadata()?.len())
+        } else {
+            let file = File::open(&self.path)?;
+            let bytes = file.metadata()?.len();
+            (Box::new(file), bytes)
+        };
         if !self.gzip {
-            return Ok(Box::new(file));
+            return Ok(file);
         }
-        let packed_bytes = file.metadata()?.len();
         Ok(Box::new(Growing::new(MultiGzDecoder::new(BufReader::new(file)), packed_bytes)))
-    }
-}
-
-/// Unpacked data that are refused once they grow beyond all measure.
-pub(super) struct Growing<R> {
-    inner: R,
-    packed_bytes: u64,
-    inflated_bytes: u64,
-}
-
-impl<R: Read> Growing<R> {
-    /// What is packed takes so much of the file \[bytes\].
-    pub(super) fn new(inner: R, packed_bytes: u64) -> Self {
-        Self { inner, packed_bytes, inflated_bytes: 0 }
-    }
-}
-
-impl<R: Read> Read for Growing<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let bytes = self.inner.read(buffer)?;
-        self.inflated_bytes += bytes as u64;
-        let Self { inflated_bytes, packed_bytes, .. } = *self;
-        if inflated_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT)) {
-            let grown = format!("it grows to more than {inflated_bytes} bytes out of {packed_bytes}");
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, grown));
-        }
-        Ok(bytes)
     }
 }
 
@@ -78,7 +70,7 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    pub(super) fn new(source: &Source) -> io::Result<Self> {
+    pub(super) fn new(source: &Source) -> Result<Self, ReadError> {
         Ok(Self { input: BufReader::with_capacity(BLOCK_BYTES, source.bytes()?), buffer: Vec::new(), number: 0 })
     }
 

@@ -85,6 +85,8 @@ struct Table<C> {
     names: Names,
     /// Vehicle of the last row.
     vehicle: usize,
+    /// Rows before the current one.
+    count: i64,
 }
 
 /// Opens a table of these cells; `unit` is that of its times where the format says it.
@@ -96,10 +98,10 @@ pub(super) fn open<C: Cells + 'static>(
     epoch_ns: i64,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
-    let about = About::new(source, options, unit.or(layout.unit), layout.notes(), Fault::header_only());
+    let about = About::new(source, options, unit.or(layout.unit), layout.notes.clone(), Fault::header_only());
     let names = Names::from_list(layout.names.clone());
     cells.restart(&layout.columns(), true)?;
-    let table = Table { cells, layout, names, vehicle: 0 };
+    let table = Table { cells, layout, names, vehicle: 0, count: 0 };
     Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
 }
 
@@ -110,7 +112,9 @@ impl<C: Cells> Table<C> {
 
     #[inline]
     fn stamp(&mut self) -> Result<Stamp, Fault> {
-        let column = self.layout.time;
+        let Some(column) = self.layout.time else {
+            return Ok(Stamp::Whole(self.count));
+        };
         if let Some(stamp) = self.cells.stamp(column).filter(|stamp| stamp.approximately().is_finite()) {
             return Ok(stamp);
         }
@@ -135,18 +139,22 @@ impl<C: Cells> Table<C> {
         let stamp = self.stamp()?;
         let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
         for (place, body) in self.layout.bodies.iter().enumerate() {
-            rows.extend(row(&self.cells, stamp, first + place, body)?);
+            rows.extend(row(&self.cells, stamp, first + place, body, &self.layout.metres)?);
         }
+        self.count += 1;
         Ok(())
     }
 }
 
 /// The row of a vehicle; none where it was not seen.
 #[inline]
-fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body) -> Result<Option<Row>, Fault> {
-    let Some(position) = vector(cells, &body.position)? else { return Ok(None) };
-    let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns)).transpose()?.flatten();
-    let radius = body.radius.map(|column| number(cells, column)).transpose()?.flatten();
+fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[f64]) -> Result<Option<Row>, Fault> {
+    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(None) };
+    let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns, metres)).transpose()?.flatten();
+    let radius = match body.radius {
+        Some(column) => number(cells, column)?.map(|radius| radius * metres[column]),
+        None => None,
+    };
     if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
         return Err(Fault::content(problem, "write 0 or more"));
@@ -156,13 +164,13 @@ fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body) -> Result<
 
 /// Three numbers, none where all cells are empty.
 #[inline]
-fn vector(cells: &impl Cells, columns: &[Option<usize>; 3]) -> Result<Option<Vector3<f64>>, Fault> {
+fn vector(cells: &impl Cells, columns: &[Option<usize>; 3], metres: &[f64]) -> Result<Option<Vector3<f64>>, Fault> {
     let mut vector = Vector3::zeros();
     let (mut filled, mut missing) = (false, None);
     for (axis, column) in columns.iter().enumerate() {
         let Some(column) = *column else { continue };
         match number(cells, column)? {
-            Some(x) => (vector[axis], filled) = (x, true),
+            Some(x) => (vector[axis], filled) = (x * metres[column], true),
             None => missing = missing.or(Some(column)),
         }
     }
@@ -183,6 +191,7 @@ impl<C: Cells> Rows for Table<C> {
     }
 
     fn rewind(&mut self) -> Result<(), ReadError> {
+        self.count = 0;
         self.cells.restart(&self.layout.columns(), true)
     }
 
@@ -205,7 +214,7 @@ impl<C: Cells> Rows for Table<C> {
     /// Only times and names are looked at, which is several times faster than reading everything.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let Some(id) = self.layout.id else { return Ok(None) };
-        let mut columns = [self.layout.time, id];
+        let mut columns: Vec<usize> = self.layout.time.into_iter().chain([id]).collect();
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
         let mut probe: Option<Probe> = None;

@@ -23,6 +23,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         names: Names::default(),
         vehicle: 0,
         messages: 0,
+        fixed: BTreeSet::new(),
         listed: true,
     };
     let none = match &options.frame {
@@ -58,6 +59,8 @@ struct Poses {
     /// Vehicle of the last row.
     vehicle: usize,
     messages: u64,
+    /// Frames that never move, out of `/tf_static`.
+    fixed: BTreeSet<String>,
     /// Whether all topics hold lists of poses.
     listed: bool,
 }
@@ -84,7 +87,14 @@ impl Poses {
         rows: &mut Vec<Row>,
     ) -> Result<(), Fault> {
         let topic = &message.of.topic;
+        let is_static = topic.rsplit('/').next() == Some("tf_static");
         for seen in seen.map_err(Fault::Damaged)? {
+            if let Who::Named(name) = &seen.who
+                && is_static
+            {
+                self.fixed.insert(name.clone());
+                continue;
+            }
             if !self.is_in_frame(&seen.frame, topic)? {
                 continue;
             }
@@ -183,6 +193,12 @@ impl Rows for Foreign {
                 self.shown = names.all().to_vec();
             }
         }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let fixed: Vec<_> = self.poses.fixed.iter().map(String::as_str).collect();
+        let note = || format!("frames of tf_static stand still and are no vehicles: {}", fixed.join(", "));
+        if fixed.is_empty() { Vec::new() } else { vec![note()] }
     }
 
     fn place(&self, number: u64) -> Place {
