@@ -199,7 +199,7 @@ impl AuditArguments {
     }
 
     fn check_outputs(&self) -> Result<(), Failure> {
-        let mut inputs = vec![("the recording", self.reading.recording.as_path())];
+        let mut inputs: Vec<_> = self.reading.paths().map(|path| ("the recording", path)).collect();
         inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--html", &self.html)];
         let outputs: Vec<_> =
@@ -208,12 +208,15 @@ impl AuditArguments {
     }
 
     /// Delta of a recording of ours where nothing else says how close vehicles may come \[m\].
-    fn own_delta_m(&self) -> Option<f64> {
+    fn own_delta_m(&self, options: &ReadOptions) -> Option<f64> {
         let path = &self.reading.recording;
         let silent = self.delta.is_none() && self.radius.is_empty() && self.ellipsoid.is_none();
         let may_be_ours = path.is_file() && self.format.is_none_or(|format| format == Format::Mcap);
-        let ours = if silent && may_be_ours { McapRecording::open(path).ok()? } else { return None };
-        Some(ours.header().delta_m)
+        if !silent {
+            return None;
+        }
+        let ours = may_be_ours.then(|| McapRecording::open(path).ok()).flatten();
+        ours.map(|ours| ours.header().delta_m).or_else(|| read::own_limit_m(path, options))
     }
 
     /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording.
@@ -256,7 +259,7 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let mut settings = arguments.settings()?;
     let options = arguments.reading.options(arguments.format)?;
     let path = &arguments.reading.recording;
-    let own_delta_m = arguments.own_delta_m();
+    let own_delta_m = arguments.own_delta_m(&options);
     settings.delta_m = settings.delta_m.or(own_delta_m);
     let auditor = TrackAuditor::new(settings.clone())?;
     let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
@@ -306,7 +309,7 @@ fn judged(
     console: Console,
 ) -> Result<Judged, Failure> {
     let path = &arguments.reading.recording;
-    let mut recording = read::open(path, options)?;
+    let mut recording = arguments.reading.open(options)?;
     let progress = console.counter(path.display().to_string());
     let mut items = Vec::new();
     let (mut more, mut first, mut read, mut curves) = (true, true, 0, true);
@@ -341,7 +344,7 @@ fn figures(
     let follow = |approach: &Approach| Ok((PairSeries::new(settings, outcome, approach.pair)?, *approach));
     let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();
     let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
-    let mut recording = read::open(&arguments.reading.recording, options)?;
+    let mut recording = arguments.reading.open(options)?;
     let (mut items, mut more) = (Vec::new(), !(pairs.is_empty() && obstacles.is_empty()));
     while more {
         items.clear();

@@ -76,9 +76,7 @@ fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> R
         if !recording.is_dir() {
             return failure;
         }
-        failure.with_help(format!(
-            "the folder was taken for one of Crazyflie polynomials, a file for each vehicle: {help}"
-        ))
+        failure.with_help(format!("the folder was taken for one recording, a file for each vehicle: {help}"))
     };
     let mut tracks = match read::open(recording, reading) {
         Err(_) if has_nothing_yet(recording, reading) => {

@@ -11,8 +11,8 @@ use super::console::Console;
 use super::reading::{self, ReadArguments, one_of};
 use super::run::interruption;
 use super::{Exit, Failure, outputs};
-use crate::export::{self, ExportOptions, Format};
-use crate::read::{self, Fault, ReadError, Recording};
+use crate::export::{self, ExportOptions, WRITTEN};
+use crate::read::{Fault, Format, ReadError, Recording};
 use crate::report::write_atomically_with;
 use crate::track::{Clock, Item, Tracks};
 
@@ -23,7 +23,7 @@ pub(super) struct ExportArguments {
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
     /// Format to write [default: by the extension of the file].
-    #[arg(long, value_name = "FORMAT", value_parser = one_of(Format::ALL.map(|format| (format.name().into(), format)).into()))]
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(WRITTEN.iter().map(|format| (format.name().into(), *format)).collect()))]
     format: Option<Format>,
     /// How often curves are sampled [Hz]; what is between the samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
@@ -39,7 +39,7 @@ pub(super) struct ExportArguments {
     reading: ReadArguments,
     /// Format of the recording [default: recognised by its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
-    input_format: Option<read::Format>,
+    input_format: Option<Format>,
 }
 
 /// A recording that ends with an error once the user has had enough, so that no unfinished file is left behind.
@@ -75,7 +75,10 @@ impl Tracks for Interruptible {
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options(arguments.input_format)?;
     let path = &arguments.output;
-    let by_extension = || Format::from_name(path.extension()?.to_str()?);
+    let by_extension = || {
+        let extension = path.extension()?.to_str()?;
+        WRITTEN.iter().copied().find(|format| format.name().eq_ignore_ascii_case(extension))
+    };
     let format = arguments.format.or_else(by_extension).ok_or_else(|| {
         let message = format!("the name `{}` does not tell a format", path.display());
         Failure::input(message, "name the format with --format csv, parquet, npz or mcap")
@@ -84,12 +87,13 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
         let message = format!("`{}` exists", path.display());
         return Err(Failure::input(message, "overwrite it with --force, or write another file"));
     }
-    outputs::check(&[("the recording", &arguments.reading.recording)], &[("--output", path)])?;
+    let inputs: Vec<_> = arguments.reading.paths().map(|path| ("the recording", path)).collect();
+    outputs::check(&inputs, &[("--output", path)])?;
     let options = ExportOptions { sample_hz: arguments.sample_hz };
     let interrupted = interruption()?;
     let recording = &arguments.reading.recording;
     let open = || -> Result<Recording, ReadError> {
-        let (tracks, path, interrupted) = (read::open(recording, &reading)?, recording.clone(), interrupted.clone());
+        let (tracks, path, interrupted) = (arguments.reading.open(&reading)?, recording.clone(), interrupted.clone());
         Ok(Box::new(Interruptible { tracks, path, interrupted }))
     };
     let exported =

@@ -1,29 +1,47 @@
 //! Arguments that say how a recording is read, the same for all commands that read one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::Failure;
-use crate::read::{AxisOrder, ColumnNames, Format, ReadOptions, TimeUnit};
+use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
 
 /// How a recording is read.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Reading")]
 pub(super) struct ReadArguments {
-    /// The recording: a file, or a folder of Crazyflie polynomials.
+    /// The recording: a file, or a folder or archive with a file for each vehicle.
     #[arg(value_name = "RECORDING")]
     pub(super) recording: PathBuf,
+    /// More files of the recording, with --join.
+    #[arg(value_name = "MORE")]
+    pub(super) more: Vec<PathBuf>,
+    /// Several files are one recording, a vehicle in each.
+    #[arg(long)]
+    join: bool,
     /// Unit of time of the recording [default: what it says, or its numbers suggest].
     #[arg(long, value_name = "UNIT", value_parser = unit())]
     time_unit: Option<TimeUnit>,
+    /// How many units of time of the recording make a second, where they are frames.
+    #[arg(long, value_name = "HZ", conflicts_with_all = ["time_unit", "time_scale"], allow_negative_numbers = true)]
+    fps: Option<f64>,
+    /// How many seconds a unit of time of the recording lasts.
+    #[arg(long, value_name = "SECONDS", conflicts_with = "time_unit", allow_negative_numbers = true)]
+    time_scale: Option<f64>,
+    /// Numbers of a vehicle in a table without a header: x and y, x, y and z, or those and their velocities.
+    #[arg(long, value_name = "NUMBERS", value_parser = dimensions())]
+    dimensions: Option<Dimensions>,
     /// Metres per unit of length of the recording.
     #[arg(long, value_name = "METRES", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
     /// Name of a column: t, id, x, y, z, vx, vy, vz or radius. In NPZ, t and x name the arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
     columns: Vec<(String, String)>,
+    /// Where the curve of a vehicle starts [m], for polynomials that are relative to it; may be given several times.
+    #[arg(long = "start", value_name = "NAME=X,Y,Z", value_parser = start, allow_hyphen_values = true)]
+    starts: Vec<(String, [f64; 3])>,
     /// Which axis of the positions of an NPZ archive comes first, where its shape does not tell.
     #[arg(long, value_name = "ORDER", value_parser = axis_order())]
     axis_order: Option<AxisOrder>,
@@ -36,11 +54,41 @@ pub(super) struct ReadArguments {
 }
 
 impl ReadArguments {
+    /// Opens the recording.
+    pub(super) fn open(&self, options: &ReadOptions) -> Result<Recording, ReadError> {
+        if self.more.is_empty() {
+            return read::open(&self.recording, options);
+        }
+        read::open_joined(&self.paths().collect::<Vec<_>>(), options)
+    }
+
+    /// The only file or folder.
+    pub(super) fn only(&self) -> Result<&Path, Failure> {
+        if self.more.is_empty() {
+            return Ok(&self.recording);
+        }
+        Err(Failure::input("a picture is of one file or folder", "put the files into a folder, and give that"))
+    }
+
+    /// All files.
+    pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.recording).chain(&self.more).map(PathBuf::as_path)
+    }
+
     /// The options of the library, with the format if it is given.
     pub(super) fn options(&self, format: Option<Format>) -> Result<ReadOptions, Failure> {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             let message = format!("--scale is {}", self.scale);
             return Err(Failure::input(message, "give a positive number of metres, such as 0.001 for millimetres"));
+        }
+        if !self.more.is_empty() && !self.join {
+            let help = "give --join if each holds a vehicle of one recording, or give one at a time";
+            return Err(Failure::input("several recordings are given", help));
+        }
+        for (option, value) in [("--fps", self.fps), ("--time-scale", self.time_scale)] {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Failure::input(format!("{option} is {value}"), "give a positive number"));
+            }
         }
         let mut columns = ColumnNames::default();
         for (role, name) in &self.columns {
@@ -49,7 +97,11 @@ impl ReadArguments {
         Ok(ReadOptions {
             format,
             time_unit: self.time_unit,
+            times_per_second: self.fps.or(self.time_scale.map(f64::recip)),
             scale: self.scale,
+            dimensions: self.dimensions,
+            one_vehicle: false,
+            starts: self.starts.iter().cloned().collect(),
             columns,
             axis_order: self.axis_order,
             frame: self.frame.clone(),
@@ -69,6 +121,15 @@ fn column(text: &str) -> Result<(String, String), String> {
     }
 }
 
+fn start(text: &str) -> Result<(String, [f64; 3]), String> {
+    let (name, place) = text.rsplit_once('=').ok_or("write NAME=X,Y,Z, such as cf3=0,1.5,0")?;
+    let numbers: Vec<f64> = place.split(',').filter_map(|number| number.trim().parse().ok()).collect();
+    match <[f64; 3]>::try_from(numbers) {
+        Ok(place) if place.iter().all(|x| x.is_finite()) => Ok((name.to_owned(), place)),
+        _ => Err(format!("`{place}` is not three numbers")),
+    }
+}
+
 /// A parser of these names, each with what it stands for.
 pub(super) fn one_of<T: Clone + Send + Sync + 'static>(
     choices: Vec<(PossibleValue, T)>,
@@ -82,6 +143,10 @@ pub(super) fn one_of<T: Clone + Send + Sync + 'static>(
 
 fn unit() -> impl TypedValueParser<Value = TimeUnit> {
     one_of(TimeUnit::ALL.map(|unit| (unit.name().into(), unit)).into())
+}
+
+fn dimensions() -> impl TypedValueParser<Value = Dimensions> {
+    one_of(Dimensions::ALL.map(|dimensions| (dimensions.name().into(), dimensions)).into())
 }
 
 fn axis_order() -> impl TypedValueParser<Value = AxisOrder> {

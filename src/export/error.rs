@@ -2,7 +2,7 @@
 
 use std::io;
 
-use crate::read::ReadError;
+use crate::read::{Format, ReadError};
 
 /// A recording cannot be exported.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +22,9 @@ pub enum ExportError {
     /// The curves cannot be sampled so often.
     #[error("curves cannot be sampled at {0} Hz")]
     SampleRate(f64),
+    /// Nothing writes the format.
+    #[error("nothing writes {}", .0.title())]
+    NotWritten(Format),
     /// The name of a vehicle cannot be written in the format.
     #[error("the name {0:?} of a vehicle cannot be written in this format")]
     Name(String),
@@ -40,6 +43,7 @@ impl ExportError {
             Self::Curves => "say how often curves are sampled with --sample-hz; between the samples they are lost",
             Self::NoCurves => "leave --sample-hz away",
             Self::SampleRate(_) => "give a positive number of samples per second, such that their count stays sensible",
+            Self::NotWritten(_) => "write csv, parquet, npz or mcap",
             Self::Name(_) => "export to mcap or parquet",
         }
         .to_owned()

@@ -14,6 +14,7 @@ mod parquet;
 mod sampled;
 mod source;
 
+pub use crate::read::Format;
 pub use error::ExportError;
 
 use std::fs::File;
@@ -21,48 +22,14 @@ use std::fs::File;
 use crate::read::{ReadError, Recording};
 use source::Source;
 
-/// The formats that are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// A long table in text.
-    Csv,
-    /// A long table in Parquet.
+/// The formats that are written; files of each have its name as their extension.
+pub const WRITTEN: &[Format] = &[
+    Format::Csv,
     #[cfg(feature = "parquet")]
-    Parquet,
-    /// `NumPy` arrays.
-    Npz,
-    /// MCAP with messages of our own.
-    Mcap,
-}
-
-impl Format {
-    /// All formats.
-    pub const ALL: [Self; 3 + cfg!(feature = "parquet") as usize] = [
-        Self::Csv,
-        #[cfg(feature = "parquet")]
-        Self::Parquet,
-        Self::Npz,
-        Self::Mcap,
-    ];
-
-    /// What `--format` calls it, and the extension of its files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            #[cfg(feature = "parquet")]
-            Self::Parquet => "parquet",
-            Self::Npz => "npz",
-            Self::Mcap => "mcap",
-        }
-    }
-
-    /// The format of this name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|format| format.name().eq_ignore_ascii_case(name))
-    }
-}
+    Format::Parquet,
+    Format::Npz,
+    Format::Mcap,
+];
 
 /// How a recording is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -101,6 +68,7 @@ pub fn export(
         Format::Parquet => parquet::write(&source, &about, file)?,
         Format::Npz => npz::write(&source, &about, file)?,
         Format::Mcap => mcap::write(&source, &about, file)?,
+        other => return Err(ExportError::NotWritten(other)),
     }
     Ok(exported)
 }

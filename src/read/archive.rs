@@ -8,11 +8,16 @@ use flate2::bufread::DeflateDecoder;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::error::{Fault, FaultAt, Place};
-use super::source::Growing;
+use super::error::{Fault, Place, ReadError};
 
 /// Longest end of an archive: its last record with the longest comment \[bytes\].
 const END_LIMIT_BYTES: u64 = 22 + 65_535;
+
+/// Up to here compressed data may grow without being looked at \[bytes\].
+const FREE_GROWTH_BYTES: u64 = 64 * 1024 * 1024;
+
+/// Beyond [`FREE_GROWTH_BYTES`] data may grow by this factor. Deflate reaches 1032, recordings of real motion 20.
+const GROWTH_LIMIT: u64 = 200;
 
 /// An archive opened for reading.
 pub(super) struct Archive {
@@ -24,7 +29,7 @@ impl Archive {
     pub(super) fn open(path: &Path) -> Result<Self, Fault> {
         let zip = ZipArchive::new(BufReader::new(File::open(path)?)).map_err(|error| match error {
             ZipError::InvalidArchive(_) if !has_end(path) => {
-                Fault::Truncated { what: "the end of the archive is missing".to_owned() }
+                Fault::Truncated("the end of the archive is missing".to_owned())
             }
             other => zip_fault(other),
         })?;
@@ -42,7 +47,7 @@ impl Archive {
     }
 
     /// The bytes of an entry, unpacked and compared with their checksum.
-    pub(super) fn entry(&mut self, name: &str) -> Result<Box<dyn Read>, FaultAt> {
+    pub(super) fn entry(&mut self, name: &str) -> Result<Box<dyn Read>, ReadError> {
         self.try_entry(name).map_err(|fault| fault.at(place(name)))
     }
 
@@ -74,7 +79,7 @@ impl Archive {
     }
 
     /// All bytes of an entry, unpacked.
-    pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, FaultAt> {
+    pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, ReadError> {
         let mut bytes = Vec::new();
         self.entry(name)?.read_to_end(&mut bytes).map_err(|error| Fault::from(error).at(place(name)))?;
         Ok(bytes)
@@ -104,6 +109,33 @@ fn zip_fault(error: ZipError) -> Fault {
             "make it with deflate or unpacked",
         ),
         other => Fault::damaged(other),
+    }
+}
+
+/// Unpacked data that are refused once they grow beyond all measure.
+pub(super) struct Growing<R> {
+    inner: R,
+    packed_bytes: u64,
+    inflated_bytes: u64,
+}
+
+impl<R: Read> Growing<R> {
+    /// What is packed takes so much of the file \[bytes\].
+    pub(super) fn new(inner: R, packed_bytes: u64) -> Self {
+        Self { inner, packed_bytes, inflated_bytes: 0 }
+    }
+}
+
+impl<R: Read> Read for Growing<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let bytes = self.inner.read(buffer)?;
+        self.inflated_bytes += bytes as u64;
+        let Self { inflated_bytes, packed_bytes, .. } = *self;
+        if inflated_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT)) {
+            let grown = format!("it grows to more than {inflated_bytes} bytes out of {packed_bytes}");
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, grown));
+        }
+        Ok(bytes)
     }
 }
 

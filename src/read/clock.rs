@@ -15,6 +15,9 @@ const LONGEST_STEP_S: f64 = 1e3;
 /// Why whole numbers are taken as a unit shorter than a second.
 const BY_STEPS: &str = "because they are whole numbers with steps of that size";
 
+/// From here on the whole part of a double is no longer looked at: it may not fit into 64 bits.
+const TOP: f64 = 9.3e18;
+
 /// Decimals that a [`Stamp::Fixed`] keeps.
 const DECIMALS: usize = 18;
 
@@ -35,37 +38,31 @@ impl TimeUnit {
     /// All units, the longest first.
     pub const ALL: [Self; 4] = [Self::Seconds, Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
 
+    /// What it is called, the usual name first, and how many make a second.
+    const fn names(self) -> (&'static [&'static str], i64) {
+        match self {
+            Self::Seconds => (&["s", "sec", "secs", "second", "seconds"], 1),
+            Self::Milliseconds => (&["ms", "msec", "millis", "milliseconds"], 1_000),
+            Self::Microseconds => (&["us", "µs", "μs", "usec", "micros", "microseconds"], 1_000_000),
+            Self::Nanoseconds => (&["ns", "nsec", "nanos", "nanoseconds"], 1_000_000_000),
+        }
+    }
+
     /// `s`, `ms`, `us` or `ns`.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Seconds => "s",
-            Self::Milliseconds => "ms",
-            Self::Microseconds => "us",
-            Self::Nanoseconds => "ns",
-        }
+        self.names().0[0]
     }
 
     /// The unit of this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "s" | "sec" | "secs" | "second" | "seconds" => Some(Self::Seconds),
-            "ms" | "msec" | "millis" | "milliseconds" => Some(Self::Milliseconds),
-            "us" | "µs" | "usec" | "micros" | "microseconds" => Some(Self::Microseconds),
-            "ns" | "nsec" | "nanos" | "nanoseconds" => Some(Self::Nanoseconds),
-            _ => None,
-        }
+        Self::ALL.into_iter().find(|unit| unit.names().0.contains(&name))
     }
 
     /// How many make a second.
     pub(super) fn per_second(self) -> i64 {
-        match self {
-            Self::Seconds => 1,
-            Self::Milliseconds => 1_000,
-            Self::Microseconds => 1_000_000,
-            Self::Nanoseconds => 1_000_000_000,
-        }
+        self.names().1
     }
 }
 
@@ -127,16 +124,6 @@ impl Stamp {
             Self::Fixed { whole, decimals } => (whole, decimals),
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the casts saturate")]
             Self::Real(real) => (real.floor() as i64, ((real - real.floor()) * 1e18) as u64),
-        }
-    }
-
-    /// The largest whole number that is not above it, if there is one.
-    fn floor(self) -> Option<i64> {
-        #[expect(clippy::cast_possible_truncation, reason = "the range is looked at first")]
-        let floor_of = |real: f64| (real.abs() < 9e18).then(|| real.floor() as i64);
-        match self {
-            Self::Whole(whole) | Self::Fixed { whole, .. } => Some(whole),
-            Self::Real(real) => floor_of(real),
         }
     }
 
@@ -217,49 +204,44 @@ impl Probe {
     }
 }
 
-/// How the unit of a clock is known.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum KnownUnit {
-    /// The format, the name of the column or the user says it.
-    Given(TimeUnit),
-    /// Nobody says it.
-    Unsaid,
-}
-
 /// Turns stamps into seconds.
 #[derive(Clone, Debug)]
 pub(super) struct Timing {
     pub(super) clock: Clock,
-    unit: TimeUnit,
+    per_second: f64,
     /// Whole seconds in units.
     epoch: i64,
 }
 
 impl Timing {
-    /// A clock that fits what was seen, and a sentence where something was inferred.
-    pub(super) fn settle(probe: &Probe, known: KnownUnit) -> (Self, Option<String>) {
-        let (unit, why) = match known {
-            KnownUnit::Given(unit) => (unit, None),
-            KnownUnit::Unsaid => {
-                let (unit, why) = probe.likely_unit();
-                (unit, Some(why))
-            }
+    /// A clock that fits what was seen, and a sentence where its unit is not known but inferred.
+    pub(super) fn settle(probe: &Probe, known: Option<TimeUnit>) -> (Self, Option<String>) {
+        let inferred = || {
+            let (unit, why) = probe.likely_unit();
+            (unit, Some(why))
         };
+        let (unit, why) = known.map_or_else(inferred, |unit| (unit, None));
         let name = unit.name();
         let note =
             why.map(|why| format!("times carry no unit and are taken as {name}, {why} (--time-unit {name} says so)"));
         let per_second = unit.per_second();
-        let seconds = probe.first.floor().map(|floor| floor.div_euclid(per_second));
-        let seconds = seconds.filter(|&seconds| (seconds as f64).abs() >= EPOCH_FROM_S);
+        let seconds = probe.first.digits().0.div_euclid(per_second);
+        let fits = probe.first.approximately().abs() < TOP;
+        let seconds = Some(seconds).filter(|&seconds| fits && (seconds as f64).abs() >= EPOCH_FROM_S);
         let epoch = seconds.and_then(|s| Some((s.checked_mul(per_second)?, s.checked_mul(1_000_000_000)?)));
         let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
         let clock = Clock { unit: name, inferred: why.is_some(), by_steps: why == Some(BY_STEPS), epoch_ns };
-        (Self { clock, unit, epoch }, note)
+        (Self { clock, per_second: per_second as f64, epoch }, note)
+    }
+
+    /// A clock of which so many units make a second.
+    pub(super) fn given(per_second: f64) -> Self {
+        Self { clock: Clock { unit: "given", ..Clock::default() }, per_second, epoch: 0 }
     }
 
     /// Seconds since the epoch.
     pub(super) fn seconds(&self, stamp: Stamp) -> f64 {
-        stamp.since(self.epoch) / self.unit.per_second() as f64
+        stamp.since(self.epoch) / self.per_second
     }
 }
 
@@ -267,7 +249,7 @@ impl Timing {
 mod tests {
     use super::*;
 
-    fn timing(texts: &[&str], known: KnownUnit) -> (Timing, Option<String>, Vec<f64>) {
+    fn timing(texts: &[&str], known: Option<TimeUnit>) -> (Timing, Option<String>, Vec<f64>) {
         let stamps: Vec<_> = texts.iter().map(|text| Stamp::parse(text).expect("a number")).collect();
         let mut probe = Probe::new(stamps[0]);
         for &stamp in &stamps {
@@ -280,7 +262,7 @@ mod tests {
 
     #[test]
     fn a_clock_in_nanoseconds_loses_no_digit() {
-        let (timing, note, seconds) = timing(&["1700000000123456789", "1700000000123456790"], KnownUnit::Unsaid);
+        let (timing, note, seconds) = timing(&["1700000000123456789", "1700000000123456790"], None);
         assert_eq!(
             timing.clock,
             Clock { unit: "ns", inferred: true, by_steps: false, epoch_ns: 1_700_000_000_000_000_000 }
@@ -291,14 +273,14 @@ mod tests {
 
     #[test]
     fn decimal_seconds_since_1970_lose_no_digit() {
-        let (timing, _, seconds) = timing(&["1700000000.123456789", "1700000003.000000001"], KnownUnit::Unsaid);
+        let (timing, _, seconds) = timing(&["1700000000.123456789", "1700000003.000000001"], None);
         assert_eq!((timing.clock.unit, timing.clock.epoch_ns), ("s", 1_700_000_000_000_000_000));
         assert_eq!(seconds, [0.123_456_789, 3.000_000_001]);
     }
 
     #[test]
     fn small_times_keep_the_bits_of_their_text() {
-        let (timing, note, seconds) = timing(&["0.1", "0.30000000000000004", "7"], KnownUnit::Given(TimeUnit::Seconds));
+        let (timing, note, seconds) = timing(&["0.1", "0.30000000000000004", "7"], Some(TimeUnit::Seconds));
         assert_eq!((timing.clock.epoch_ns, note), (0, None));
         assert_eq!(seconds, [0.1, 0.300_000_000_000_000_04, 7.0]);
     }
@@ -318,7 +300,7 @@ mod tests {
             (["200000000", "200010000"], "us"),
             (["500000000000", "500010000000"], "ns"),
         ] {
-            let clock = timing(&texts, KnownUnit::Unsaid).0.clock;
+            let clock = timing(&texts, None).0.clock;
             let by_size = texts[0].starts_with("1700000000");
             assert_eq!((clock.unit, clock.by_steps), (unit, unit != "s" && !by_size), "{texts:?}");
         }

@@ -3,16 +3,18 @@
 //! Lines are found and split here: the reader of `csv` takes as much memory as a line is long, without a limit, reads on
 //! over the end of a line where a quote is left open, and knows no fields between any number of blanks.
 
+use std::borrow::Cow;
 use std::str;
 
 use csv_core::ReadRecordResult;
 
 use super::clock::Stamp;
-use super::error::{Fault, FaultAt, Place};
+use super::error::{Fault, Place, ReadError, quoted};
 use super::format::Format;
+use super::headerless;
+use super::heading;
 use super::layout::Layout;
-use super::names::Names;
-use super::options::ReadOptions;
+use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
 use super::source::{Lines, Source};
 use super::table::{self, Cells};
@@ -22,16 +24,27 @@ use super::table::{self, Cells};
 enum Separator {
     /// One of this byte.
     Byte(u8),
-    /// Any number of blanks and tabs.
-    Blanks,
+    /// Any number of these.
+    Any(&'static [u8]),
 }
 
+const BLANKS: Separator = Separator::Any(b" \t");
+
+/// Between the numbers of `t (x,y) (x,y)`.
+const TUPLES: Separator = Separator::Any(b" \t(),");
+
 /// A table in text.
-struct Text {
+pub(super) struct Text {
     source: Source,
     lines: Lines,
     separator: Separator,
     has_header: bool,
+    /// The numbers of the first line below the header, where all are numbers.
+    first: Vec<f64>,
+    /// Whether names say what the numbers are.
+    named: bool,
+    /// Whether a line that begins with `#` is a comment: below a header the first field may be a name that does.
+    comments: bool,
     header: Vec<String>,
     fields: Fields,
     /// Fields that are looked at; all have to be there where no number says how many.
@@ -41,73 +54,123 @@ struct Text {
 }
 
 /// Opens a table.
-pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, FaultAt> {
-    let mut lines = Lines::new(source)?;
-    if !next_line(&mut lines, true)? {
-        return Err(Fault::Empty.into());
-    }
-    let place = Place::Line(lines.number());
-    let at = |fault: Fault| fault.at(place.clone());
-    if let Some(value) = decimal_comma(lines.line()) {
-        return Err(at(Fault::DecimalComma { column: "1".to_owned(), value }));
-    }
-    let separator = separator(lines.line(), format);
-    let mut fields = Fields::default();
-    fields.split(lines.line(), separator, usize::MAX).map_err(at)?;
-    let mut header = Vec::new();
-    for index in 0..fields.count() {
-        header.push(fields.text(lines.line(), index).map_err(at)?.trim().to_owned());
-    }
-    let numeric = header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
-    let has_header = !(numeric && format == Format::Text);
-    let layout = if has_header {
-        if numeric {
-            return Err(at(Fault::NoHeader));
-        }
-        Layout::of(&header, &options.columns).map_err(at)?
-    } else {
-        let count = header.len();
-        header = (1..=count).map(|number| number.to_string()).collect();
-        let fault = || {
-            let problem = format!("it has {count} numbers where time and three for each vehicle are expected");
-            at(Fault::content(problem, "write t x y z x y z ..., a line for each time"))
-        };
-        Layout::without_header(count).ok_or_else(fault)?
+pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let text = Text::open(source, format)?;
+    let (stem, first) = (source.stem(), &text.first);
+    let numbers = || {
+        let dimensions = options.dimensions.or(text.tuples());
+        headerless::layout(first, &ReadOptions { dimensions, ..options.clone() }, &stem)
     };
-    let time = (Vec::new(), Stamp::Whole(0));
-    let text = Text { source: source.clone(), lines, separator, has_header, header, fields, wanted: None, time };
+    let layout = match Layout::of(&text.header, options, &stem) {
+        _ if !text.named => numbers(),
+        _ if options.dimensions.is_some() => {
+            Err(Fault::content("its header says which numbers are a vehicle's", "leave --dimensions away"))
+        }
+        // What stands above numbers may be a remark.
+        Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
+        layout => layout,
+    };
+    let layout = layout.map_err(|fault| fault.at(Text::place(text.row())))?;
     table::open(source, text, layout, None, 0, options)
 }
 
 impl Text {
-    /// The number in a cell that is not a plain finite number.
-    #[cold]
-    fn odd_number(&self, column: usize) -> Result<Option<f64>, Fault> {
-        let text = self.fields.text(self.lines.line(), column)?.trim();
-        if text.is_empty() {
-            return Ok(None);
+    /// Opens a table and reads its header, or the first line where there is none above plain numbers.
+    pub(super) fn open(source: &Source, format: Format) -> Result<Self, ReadError> {
+        let mut lines = Lines::new(source)?;
+        // The last comment above the first line may be its header.
+        let mut comment = Vec::new();
+        while next_line(&mut lines, false)? && lines.line().starts_with(b"#") {
+            let hashes = lines.line().iter().take_while(|&&byte| byte == b'#').count();
+            comment = lines.line()[hashes..].trim_ascii().to_vec();
         }
-        let (value, column) = (text.to_owned(), self.header[column].clone());
-        match text.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(Some(number)),
-            Ok(_) => Err(Fault::NotFinite { column, value }),
-            Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => Err(Fault::DecimalComma { column, value }),
-            Err(_) => Err(Fault::NotANumber { column, value }),
+        if lines.line().is_empty() {
+            return Err(Fault::Empty.into());
+        }
+        let mut text = Self {
+            source: source.clone(),
+            separator: separator(lines.line(), format),
+            lines,
+            has_header: true,
+            first: Vec::new(),
+            named: true,
+            comments: false,
+            header: Vec::new(),
+            fields: Fields::default(),
+            wanted: None,
+            time: (Vec::new(), Stamp::Whole(0)),
+        };
+        text.read_header(format, &comment).map_err(|fault| fault.at(Self::place(text.row())))?;
+        Ok(text)
+    }
+
+    fn read_header(&mut self, format: Format, comment: &[u8]) -> Result<(), Fault> {
+        let line = self.lines.line();
+        if let Some(value) = decimal_comma(line) {
+            let problem = format!("column `1` holds {}, a number with a decimal comma", quoted(&value));
+            return Err(Fault::content(problem, "write numbers with a decimal point"));
+        }
+        self.header = names(line, self.separator)?;
+        let numeric = self.header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
+        self.has_header = !numeric;
+        self.comments = numeric || format == Format::Crazyflie;
+        let named = |names: &[String]| names.iter().any(|name| heading::is_time(name) || heading::is_frame(name));
+        let above = [self.separator, Separator::Byte(b','), BLANKS].map(|separator| names(comment, separator));
+        let above = above.into_iter().filter_map(Result::ok);
+        let above =
+            above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
+        if numeric {
+            self.first = self.header.iter().map(|number| number.parse()).collect::<Result<_, _>>().unwrap_or_default();
+        }
+        if let Some(names) = above {
+            (self.header, self.has_header, self.comments) = (names, false, true);
+        } else if !numeric {
+            self.header.pop_if(|name| name.is_empty());
+        } else if format == Format::Text {
+            self.header = (1..=self.header.len()).map(|number| number.to_string()).collect();
+            self.named = false;
+        } else {
+            let remedy = "put a header above: t,id,x,y,z with a row for each vehicle and time, or t,x1,y1,z1,x2,... with \
+                          a row for each time";
+            return Err(Fault::content("the first line holds numbers and no names of columns", remedy));
+        }
+        Ok(())
+    }
+
+    /// What each vehicle has where its numbers are in brackets.
+    fn tuples(&self) -> Option<Dimensions> {
+        let (_, tuple) =
+            str::from_utf8(self.lines.line()).ok().filter(|_| self.separator == TUPLES)?.split_once('(')?;
+        match tuple.split(')').next()?.split(',').count() {
+            2 => Some(Dimensions::Plane),
+            3 => Some(Dimensions::Space),
+            _ => None,
         }
     }
 
     /// Splits the current line.
     #[inline]
     fn split(&mut self) -> Result<(), Fault> {
-        self.fields.split(self.lines.line(), self.separator, self.wanted.unwrap_or(usize::MAX))?;
-        let (expected, found) = (self.header.len(), self.fields.count());
-        match self.wanted {
-            None if found != expected => {
-                Err(Fault::FieldCount { expected, found, commas: self.separator == Separator::Byte(b',') })
-            }
-            Some(wanted) if found < wanted => Err(Fault::FieldCount { expected, found, commas: false }),
-            _ => Ok(()),
+        let line = self.lines.line();
+        self.fields.split(line, self.separator, self.wanted.unwrap_or(usize::MAX))?;
+        let (expected, found) = (self.wanted.unwrap_or(self.header.len()), self.fields.ends.len());
+        let too_many = self.wanted.is_none() && found > expected;
+        // A separator behind the last field is no field.
+        if found < expected || (too_many && !(found == expected + 1 && self.fields.bytes(line, expected).is_empty())) {
+            return Err(self.field_count(found));
         }
+        Ok(())
+    }
+
+    #[cold]
+    fn field_count(&self, found: usize) -> Fault {
+        let expected = self.header.len();
+        let remedy = if found > expected && self.separator == Separator::Byte(b',') {
+            "every line needs a field for each column; where decimals are written with commas, write them with points"
+        } else {
+            "every line needs a field for each column; leave cells empty where a vehicle was not seen"
+        };
+        Fault::content(format!("it has {found} fields where {expected} are expected"), remedy)
     }
 }
 
@@ -116,7 +179,7 @@ impl Cells for Text {
         &self.header
     }
 
-    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), FaultAt> {
+    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), ReadError> {
         self.wanted = columns.last().filter(|_| !all).map(|last| last + 1);
         self.lines = Lines::new(&self.source)?;
         if self.has_header {
@@ -127,8 +190,8 @@ impl Cells for Text {
     }
 
     #[inline]
-    fn advance(&mut self) -> Result<bool, FaultAt> {
-        if !next_line(&mut self.lines, !self.has_header)? {
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        if !next_line(&mut self.lines, self.comments)? {
             return Ok(false);
         }
         self.split().map(|()| true).map_err(|fault| fault.at(Self::place(self.row())))
@@ -144,48 +207,30 @@ impl Cells for Text {
     }
 
     #[inline]
-    fn number(&self, column: usize) -> Result<Option<f64>, Fault> {
-        let bytes = self.fields.bytes(self.lines.line(), column);
-        match str::from_utf8(bytes).ok().and_then(|text| text.parse::<f64>().ok()) {
-            Some(number) if number.is_finite() => Ok(Some(number)),
-            _ => self.odd_number(column),
-        }
+    fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
+        self.fields.text(self.lines.line(), column).map(Cow::Borrowed)
     }
 
     #[inline]
-    fn stamp(&mut self, column: usize) -> Result<Option<Stamp>, Fault> {
-        let bytes = self.fields.bytes(self.lines.line(), column);
-        if bytes == self.time.0 && !bytes.is_empty() {
-            return Ok(Some(self.time.1));
-        }
-        let stamp = str::from_utf8(bytes).ok().and_then(|text| Stamp::parse(text.trim()));
-        let stamp = match stamp {
-            Some(stamp) if stamp.approximately().is_finite() => stamp,
-            _ => match self.odd_number(column)? {
-                Some(number) => Stamp::Real(number),
-                None => return Ok(None),
-            },
-        };
-        self.time.0.clear();
-        self.time.0.extend_from_slice(bytes);
-        self.time.1 = stamp;
-        Ok(Some(stamp))
+    fn number(&self, column: usize) -> Option<f64> {
+        str::from_utf8(self.fields.bytes(self.lines.line(), column)).ok()?.parse().ok()
     }
 
     #[inline]
-    fn vehicle(&self, column: usize, names: &mut Names, before: usize) -> Result<Option<usize>, Fault> {
-        if let Some(next) = names.next_if(self.fields.bytes(self.lines.line(), column), before) {
-            return Ok(Some(next));
+    fn stamp(&mut self, column: usize) -> Option<Stamp> {
+        let bytes = self.fields.bytes(self.lines.line(), column);
+        if bytes.is_empty() || bytes != self.time.0 {
+            self.time.1 = Stamp::parse(str::from_utf8(bytes).ok()?.trim())?;
+            self.time.0.clear();
+            self.time.0.extend_from_slice(bytes);
         }
-        let name = self.fields.text(self.lines.line(), column)?.trim();
-        Ok((!name.is_empty()).then(|| names.index(name, before)))
+        Some(self.time.1)
     }
 }
 
-/// Goes to the next line that is not blank, nor a comment where there may be `comments`: below a header the first field
-/// may be a name that begins with `#`.
+/// Goes to the next line that is not blank, nor a comment where there may be `comments`.
 #[inline]
-fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, FaultAt> {
+fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     loop {
         if !lines.advance()? {
             return Ok(false);
@@ -198,12 +243,20 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, FaultAt> {
     }
 }
 
+/// The fields of a line of names.
+fn names(line: &[u8], separator: Separator) -> Result<Vec<String>, Fault> {
+    let mut fields = Fields::default();
+    fields.split(line, separator, usize::MAX)?;
+    (0..fields.ends.len()).map(|index| Ok(fields.text(line, index)?.trim().to_owned())).collect()
+}
+
 /// The separator that a line most likely uses.
 fn separator(line: &[u8], format: Format) -> Separator {
     let count = |byte| memchr::memchr_iter(byte, line).count();
     let (comma, semicolon, tab) = (count(b','), count(b';'), count(b'\t'));
     match format {
-        Format::Text if comma == 0 && semicolon == 0 => Separator::Blanks,
+        Format::Text if line.contains(&b'(') => TUPLES,
+        Format::Text if comma == 0 && semicolon == 0 => BLANKS,
         _ if semicolon > 0 && semicolon >= comma => Separator::Byte(b';'),
         _ if tab > comma => Separator::Byte(b'\t'),
         _ => Separator::Byte(b','),
@@ -228,10 +281,6 @@ struct Fields {
 }
 
 impl Fields {
-    fn count(&self) -> usize {
-        self.ends.len()
-    }
-
     #[inline]
     fn bytes<'a>(&'a self, line: &'a [u8], index: usize) -> &'a [u8] {
         let (start, end) = self.ends[index];
@@ -265,9 +314,10 @@ impl Fields {
                 }
                 self.ends.push((start, line.len()));
             }
-            Separator::Blanks => {
+            Separator::Any(bytes) => {
                 let mut start = 0;
-                for end in memchr::memchr2_iter(b' ', b'\t', line).chain([line.len()]) {
+                let ends = (0..line.len()).filter(|&at| bytes.contains(&line[at]));
+                for end in ends.chain([line.len()]) {
                     if start < end {
                         self.ends.push((start, end));
                     }

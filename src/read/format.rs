@@ -24,37 +24,28 @@ impl Format {
     pub const ALL: [Self; 7] =
         [Self::Csv, Self::Text, Self::Parquet, Self::Npz, Self::Mcap, Self::Crazyflie, Self::Skybrush];
 
-    /// What `--format` calls it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    /// What `--format` calls it, and what a sentence does.
+    const fn names(self) -> [&'static str; 2] {
         match self {
-            Self::Csv => "csv",
-            Self::Text => "text",
-            Self::Parquet => "parquet",
-            Self::Npz => "npz",
-            Self::Mcap => "mcap",
-            Self::Crazyflie => "crazyflie",
-            Self::Skybrush => "skybrush",
+            Self::Csv => ["csv", "a table in CSV"],
+            Self::Text => ["text", "a table in plain text"],
+            Self::Parquet => ["parquet", "a Parquet file"],
+            Self::Npz => ["npz", "an NPZ archive"],
+            Self::Mcap => ["mcap", "an MCAP file"],
+            Self::Crazyflie => ["crazyflie", "a folder of Crazyflie polynomials"],
+            Self::Skybrush => ["skybrush", "a Skybrush show"],
         }
     }
 
-    /// The format of this name.
+    /// What `--format` calls it.
     #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|format| format.name() == name)
+    pub fn name(self) -> &'static str {
+        self.names()[0]
     }
 
     /// What a sentence calls it.
     #[must_use]
     pub fn title(self) -> &'static str {
-        match self {
-            Self::Csv => "a table in CSV",
-            Self::Text => "a table in plain text",
-            Self::Parquet => "a Parquet file",
-            Self::Npz => "an NPZ archive",
-            Self::Mcap => "an MCAP file",
-            Self::Crazyflie => "a folder of Crazyflie polynomials",
-            Self::Skybrush => "a Skybrush show",
-        }
+        self.names()[1]
     }
 }

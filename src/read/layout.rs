@@ -1,13 +1,15 @@
 //! What the columns of a table mean, going by their names.
 //!
 //! A *long* table has a row for each vehicle and time, a *wide* one a row for each time. Names are compared without
-//! regard to case, and a unit in brackets is left out.
+//! regard to case. A unit that a name says is honoured, and one that is not known is refused.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
-use super::error::Fault;
-use super::options::ColumnNames;
+use super::error::{Fault, quoted};
+use super::heading::{self, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_velocity};
+use super::options::{ColumnNames, ReadOptions};
+use super::units;
 
 /// The columns of a position, and of what else is known of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,289 +21,248 @@ pub(super) struct Body {
 }
 
 /// The columns of a table.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
-    pub(super) time: usize,
+    /// The column of time; none where the number of the row is the time.
+    pub(super) time: Option<usize>,
     /// The unit in the name of the column of time.
     pub(super) unit: Option<TimeUnit>,
-    pub(super) shape: Shape,
-    /// Names of columns that mean nothing here.
-    pub(super) unused: Vec<String>,
+    /// The column of the vehicle in a long table.
+    pub(super) id: Option<usize>,
+    /// The vehicles of a wide table by name; none of a long one.
+    pub(super) names: Vec<String>,
+    /// The columns of each vehicle of a wide table, or of every row of a long one.
+    pub(super) bodies: Vec<Body>,
+    /// What the numbers of each column are multiplied by: the size of the unit that its name says \[m or m/s\], or 1.
+    pub(super) metres: Vec<f64>,
+    /// What a person should know about the columns.
+    pub(super) notes: Vec<String>,
 }
 
-/// Long or wide.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Shape {
-    Long { id: usize, body: Body },
-    Wide { names: Vec<String>, bodies: Vec<Body> },
-}
+const WORDS: [&str; 9] = [
+    "time",
+    "the vehicle",
+    "the position along x",
+    "the position along y",
+    "the position along z",
+    "the velocity along x",
+    "the velocity along y",
+    "the velocity along z",
+    "the radius",
+];
 
-/// What a column gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Quantity {
-    Position(usize),
-    Velocity(usize),
-    Radius,
-}
-
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-impl Quantity {
-    fn words(self) -> String {
-        match self {
-            Self::Position(axis) => format!("the position along {}", AXES[axis]),
-            Self::Velocity(axis) => format!("the velocity along {}", AXES[axis]),
-            Self::Radius => "the radius".to_owned(),
-        }
-    }
-
-    fn option(self) -> &'static str {
-        match self {
-            Self::Position(axis) => AXES[axis],
-            Self::Velocity(axis) => ["vx", "vy", "vz"][axis],
-            Self::Radius => "radius",
-        }
-    }
-
-    /// The quantity of a plain name like `x`, `pos_x`, `vy` or `radius_m`.
-    fn from_name(name: &str) -> Option<Self> {
-        if matches!(name, "radius" | "radius_m") {
-            return Some(Self::Radius);
-        }
-        AXES.iter().enumerate().find_map(|(axis, letter)| {
-            let (position, velocity) =
-                (["", "p", "pos_", "pos.", "position_", "position."], ["v", "vel_", "velocity_"]);
-            let is = |starts: &[&str], ends: &[&str]| {
-                starts.iter().any(|start| {
-                    name.strip_prefix(start)
-                        .and_then(|rest| rest.strip_prefix(letter))
-                        .is_some_and(|end| ends.contains(&end))
-                })
-            };
-            if is(&position, &["", "_m"]) {
-                Some(Self::Position(axis))
-            } else {
-                is(&velocity, &["", "_m_s"]).then_some(Self::Velocity(axis))
-            }
-        })
-    }
+fn missing(header: &[String], role: Role, of: &str) -> Fault {
+    let problem = format!("there is no column for {}{of}; its columns are {}", WORDS[role], list(header, 12));
+    let option = ColumnNames::ROLES[role];
+    Fault::content(problem, format!("name the column with --column {option}=NAME, or put it into the header"))
 }
 
 impl Layout {
-    /// What the columns of this header mean.
-    pub(super) fn of(header: &[String], given: &ColumnNames) -> Result<Self, Fault> {
-        let plain: Vec<String> = header.iter().map(|name| plain(name)).collect();
-        let missing = |role: &str, option| Fault::MissingColumn {
-            role: role.to_owned(),
-            option,
-            columns: header.iter().filter(|name| !name.is_empty()).cloned().collect(),
-        };
-        let named = |name: &Option<String>, role: &str, option| match name {
-            None => Ok(None),
-            Some(name) => match header.iter().position(|column| column == name) {
-                Some(column) => Ok(Some(column)),
-                None => Err(missing(&format!("{role} with the name `{name}`"), option)),
-            },
-        };
-        let first = |is: fn(&str) -> bool| plain.iter().position(|name| is(name));
-        let time = named(&given.time, "time", "t")?.or_else(|| first(is_time)).ok_or_else(|| missing("time", "t"))?;
-        let unit = plain[time].rsplit_once('_').and_then(|(_, unit)| TimeUnit::from_name(unit));
-        let unit = unit.or_else(|| bracketed(&header[time]).and_then(TimeUnit::from_name));
+    /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
+    pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
+        let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new() };
+        for (role, name) in options.columns.given() {
+            let column = header.iter().position(|column| column == name);
+            let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
+            columns.found.insert((String::new(), role), column);
+            // A unit that is not known is the user's affair where the column is.
+            let unit = units::bracketed(name).1.filter(|unit| units::size_of(unit, is_velocity(role)).is_some());
+            columns.units.extend(unit.map(|unit| (column, unit)));
+        }
+        let first = |is: fn(&str) -> bool| header.iter().position(|name| is(name));
+        let time = columns.get("", TIME).or_else(|| first(heading::is_time)).or_else(|| first(heading::is_frame));
+        let time = time.ok_or_else(|| missing(header, TIME, ""))?;
+        let unit = unit_of_time(&header[time], options)?;
+        let id = columns.get("", ID).or_else(|| first(heading::is_id));
 
-        let mut columns = Columns { header, found: BTreeMap::new() };
-        for (quantity, name) in given.quantities() {
-            if let Some(column) = named(name, &quantity.words(), quantity.option())? {
-                columns.found.insert((String::new(), quantity), column);
+        let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
+        let headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
+        for (column, heading) in headings.iter().filter(|(_, heading)| heading.vehicle.is_empty()) {
+            if options.columns.given().all(|(known, _)| known != heading.role) {
+                columns.claim("", heading, *column)?;
             }
         }
-        let is_given = |quantity| given.quantities().iter().any(|(q, name)| *q == quantity && name.is_some());
-        for (column, name) in plain.iter().enumerate().filter(|&(column, _)| column != time) {
-            if let Some(quantity) = Quantity::from_name(name).filter(|&quantity| !is_given(quantity)) {
-                columns.claim(String::new(), quantity, column)?;
+        let one = columns.get("", POSITION).is_some();
+        // A table that repeats its columns has more vehicles than its rows name.
+        let repeated = headings.iter().filter(|(_, heading)| heading.is_numbered() && (one || id.is_some()));
+        for (column, heading) in repeated {
+            if columns.get("", heading.role).is_some() {
+                columns.claim("", heading, *column)?;
             }
         }
-        let id = named(&given.id, "the vehicle", "id")?.or_else(|| first(is_id));
-        let mut used = vec![time];
-        let shape = if let Some(id) = id {
-            let body = columns.body("").map_err(|quantity| missing(&quantity.words(), quantity.option()))?;
-            used.push(id);
-            Shape::Long { id, body }
-        } else {
-            if columns.found.contains_key(&(String::new(), Quantity::Position(0))) {
-                return Err(missing("the vehicle", "id"));
-            }
-            wide(&mut columns, &plain, time, &missing)?
+        let (vehicles, names) = match id {
+            Some(_) => (vec![String::new()], Vec::new()),
+            None if one => (vec![String::new()], vec![alone.to_owned()]),
+            None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
-        used.extend(columns.found.values());
-        let unused = |&(column, name): &(usize, &String)| !used.contains(&column) && !name.is_empty();
-        let unused = header.iter().enumerate().filter(unused).map(|(_, name)| name.clone()).collect();
-        Ok(Self { time, unit, shape, unused })
-    }
-
-    /// Time and then x, y and z of each vehicle; none where the columns do not come out even.
-    pub(super) fn without_header(columns: usize) -> Option<Self> {
-        if columns < 4 || !(columns - 1).is_multiple_of(3) {
-            return None;
+        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
+        let mut layout = Self { time: Some(time), unit, id, names, bodies, metres: Vec::new(), notes: Vec::new() };
+        let used = layout.columns();
+        layout.metres = columns.metres(&used, options.scale)?;
+        let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
+        let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
+        if id.is_none() && one && !options.one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+            return Err(missing(header, ID, ""));
         }
-        let bodies = (1..columns).step_by(3).map(|x| Body {
-            position: [Some(x), Some(x + 1), Some(x + 2)],
-            velocity: None,
-            radius: None,
-        });
-        let names = (1..=(columns - 1) / 3).map(|number| number.to_string()).collect();
-        let shape = Shape::Wide { names, bodies: bodies.collect() };
-        Some(Self { time: 0, unit: None, shape, unused: Vec::new() })
+        if layout.bodies.iter().any(|body| body.position[2].is_none()) {
+            layout.notes.push("there is no column for z: it is taken as 0".to_owned());
+        }
+        if !unused.is_empty() {
+            layout.notes.push(format!("columns not used: {}", unused.join(", ")));
+        }
+        if !layout.names.is_empty() && !options.one_vehicle {
+            layout.notes.push(format!("vehicles, going by the names of columns: {}", list(&layout.names, 50)));
+        }
+        Ok(layout)
     }
 
     /// The columns that are read, each once, in rising order.
     pub(super) fn columns(&self) -> Vec<usize> {
         let of = |body: &Body| {
             let velocity = body.velocity.unwrap_or_default();
-            body.position.into_iter().chain(velocity).chain([body.radius]).flatten().collect::<Vec<_>>()
+            body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
-        let mut columns = vec![self.time];
-        match &self.shape {
-            Shape::Long { id, body } => {
-                columns.push(*id);
-                columns.extend(of(body));
-            }
-            Shape::Wide { bodies, .. } => columns.extend(bodies.iter().flat_map(of)),
-        }
-        columns.sort_unstable();
-        columns.dedup();
-        columns
+        let columns: BTreeSet<_> = self.bodies.iter().flat_map(of).chain(self.time).chain(self.id).collect();
+        columns.into_iter().collect()
     }
+}
 
-    /// What a person should know about the columns.
-    pub(super) fn notes(&self) -> Vec<String> {
-        let flat = match &self.shape {
-            Shape::Long { body, .. } => body.position[2].is_none(),
-            Shape::Wide { bodies, .. } => bodies.iter().any(|body| body.position[2].is_none()),
-        };
-        let flat = flat.then(|| "there is no column for z: it is taken as 0".to_owned());
-        let unused = (!self.unused.is_empty()).then(|| format!("columns not used: {}", self.unused.join(", ")));
-        flat.into_iter().chain(unused).collect()
+/// The unit that the name of a column of time says, where the user says nothing of it.
+fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
+    if options.time_unit.is_some() || options.times_per_second.is_some() {
+        return Ok(None);
     }
+    if heading::is_frame(name) {
+        return Err(Fault::frames(format!("its times are the numbers of frames in column {}", quoted(name))));
+    }
+    let Some(unit) = heading::said_unit(name) else { return Ok(None) };
+    TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
+        let problem = format!("column {} says a unit of time that is not known, {}", quoted(name), quoted(&unit));
+        let remedy =
+            "say how many seconds it lasts with --time-scale, such as 60 for minutes, or what it is with --time-unit";
+        Fault::content(problem, remedy)
+    })
 }
 
 /// Columns found so far: of a vehicle by its name, or of all vehicles under no name.
 struct Columns<'a> {
     header: &'a [String],
-    found: BTreeMap<(String, Quantity), usize>,
+    found: BTreeMap<(String, Role), usize>,
+    /// The unit that the name of a column says.
+    units: BTreeMap<usize, &'a str>,
 }
 
-impl Columns<'_> {
-    fn claim(&mut self, vehicle: String, quantity: Quantity, column: usize) -> Result<(), Fault> {
+impl<'a> Columns<'a> {
+    fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
+        self.found.get(&(vehicle.to_owned(), role)).copied()
+    }
+
+    fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
         let of = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
-        match self.found.insert((vehicle, quantity), column) {
-            None => Ok(()),
-            Some(first) => Err(Fault::TwoColumns {
-                role: quantity.words() + &of,
-                first: self.header[first].clone(),
-                second: self.header[column].clone(),
-            }),
-        }
+        self.units.extend(heading.unit.map(|unit| (column, unit)));
+        let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
+        let (first, second) = (&self.header[first], &self.header[column]);
+        let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
+        Err(Fault::content(problem, "name the one that is meant with --column, or take the other out"))
     }
 
-    /// The columns of a vehicle, or the quantity that is missing: x and y of its position, and its velocity along each
-    /// axis of its position where it has one along some axis.
-    fn body(&self, vehicle: &str) -> Result<Body, Quantity> {
-        let get = |quantity| self.found.get(&(vehicle.to_owned(), quantity)).copied();
-        let position = [0, 1, 2].map(|axis| get(Quantity::Position(axis)));
-        if let Some(axis) = position[..2].iter().position(Option::is_none) {
-            return Err(Quantity::Position(axis));
+    /// Finds the vehicles of a wide table, and gives their names in order of appearance.
+    fn claim_wide(&mut self, headings: &[(usize, Heading<'a>)]) -> Result<Vec<String>, Fault> {
+        let named: Vec<_> = headings.iter().filter(|(_, heading)| !heading.vehicle.is_empty()).collect();
+        let vehicles: BTreeSet<_> = named.iter().map(|(_, heading)| heading.vehicle).collect();
+        // Where all vehicles are called by letters, `a` is one of them; beside none or numbers `a_x` is an acceleration.
+        let sure = |heading: &Heading<'_>| !heading.ambiguous && !heading.is_numbered();
+        let letters = named.iter().any(|(_, heading)| sure(heading));
+        let words = named.iter().find(|(_, heading)| sure(heading) && heading.vehicle.len() > 1);
+        let odd = named.iter().find(|(_, heading)| heading.ambiguous);
+        if let (Some((odd, _)), Some((word, _))) = (odd, words) {
+            let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
+            let problem = format!("column {odd} may be of a vehicle, as {word} is, or of a quantity of another one");
+            return Err(Fault::content(problem, "give the column a longer name, or take it out"));
         }
-        let velocity = [0, 1, 2].map(|axis| get(Quantity::Velocity(axis)));
+        let mut names: Vec<String> = Vec::new();
+        // `cf1_v_x` is a velocity where there is a `cf1_x`.
+        let of_another = |vehicle: &str| {
+            let split = vehicle.rsplit_once(['.', '/', '_']).filter(|(_, letter)| heading::LETTERS.contains(letter));
+            split.is_some_and(|(other, _)| vehicles.contains(other))
+        };
+        let is_vehicle = |heading: &Heading<'_>| (letters || !heading.ambiguous) && !of_another(heading.vehicle);
+        for (column, heading) in named.into_iter().filter(|(_, heading)| is_vehicle(heading)) {
+            let known = self.found.range((heading.vehicle.to_owned(), 0)..).next();
+            if known.is_none_or(|((known, _), _)| known != heading.vehicle) {
+                names.push(heading.vehicle.to_owned());
+            }
+            self.claim(heading.vehicle, heading, *column)?;
+        }
+        if names.is_empty() {
+            let of = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
+            return Err(missing(self.header, ID, of));
+        }
+        Ok(names)
+    }
+
+    /// The columns of a vehicle: at least x and y of its position, and its velocity along each axis of its position where
+    /// it has one along some axis.
+    fn body(&self, vehicle: &str) -> Result<Body, Fault> {
+        let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
+        let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
+        let (position, velocity) = (axes(POSITION), axes(VELOCITY));
         let moves = velocity.iter().any(Option::is_some);
-        for axis in (0..3).filter(|_| moves) {
-            match (position[axis], velocity[axis]) {
-                (Some(_), None) => return Err(Quantity::Velocity(axis)),
-                (None, Some(_)) => return Err(Quantity::Position(axis)),
-                _ => {}
+        for axis in 0..3 {
+            let lacks = match (position[axis], velocity[axis]) {
+                (None, moving) if axis < 2 || moving.is_some() => POSITION,
+                (Some(_), None) if moves => VELOCITY,
+                _ => continue,
+            };
+            return Err(missing(self.header, lacks + axis, &of));
+        }
+        Ok(Body { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
+    }
+
+    /// What the numbers of each column are multiplied by, going by the units that names say: all names or none, and
+    /// nothing beside them.
+    fn metres(&self, used: &[usize], scale: f64) -> Result<Vec<f64>, Fault> {
+        let mut metres = vec![1.0; self.header.len()];
+        let (mut other, mut silent) = (None, None);
+        let lengths =
+            self.found.iter().filter(|((_, role), column)| *role >= POSITION && used.binary_search(column).is_ok());
+        for (&(_, role), &column) in lengths {
+            let name = quoted(&self.header[column]);
+            let Some(unit) = self.units.get(&column) else {
+                silent = Some(name);
+                continue;
+            };
+            let what = if is_velocity(role) { "velocity" } else { "length" };
+            metres[column] = units::size_of(unit, is_velocity(role)).ok_or_else(|| {
+                let problem = format!("column {name} says a unit of {what} that is not known, {}", quoted(unit));
+                let remedy =
+                    "write it in m, cm, mm, km, ft or in, or name the column with --column and its unit with --scale";
+                Fault::content(problem, remedy)
+            })?;
+            if metres[column] != 1.0 {
+                other = Some(name);
             }
         }
-        Ok(Body { position, velocity: moves.then_some(velocity), radius: get(Quantity::Radius) })
-    }
-}
-
-fn wide(
-    columns: &mut Columns<'_>,
-    plain: &[String],
-    time: usize,
-    missing: &dyn Fn(&str, &'static str) -> Fault,
-) -> Result<Shape, Fault> {
-    let mut names: Vec<String> = Vec::new();
-    for (column, (name, plain)) in columns.header.iter().zip(plain).enumerate().filter(|&(column, _)| column != time) {
-        if let Some((vehicle, quantity)) = vehicle_and_quantity(name, plain) {
-            if !columns.found.keys().any(|(known, _)| *known == vehicle) {
-                names.push(vehicle.clone());
-            }
-            columns.claim(vehicle, quantity, column)?;
+        let Some(other) = other else { return Ok(metres) };
+        if let Some(silent) = silent {
+            let problem = format!("column {other} says its unit, and column {silent} none");
+            return Err(Fault::content(problem, "write the unit of each column into its name, as in `x [mm]`"));
         }
+        if scale != 1.0 {
+            let problem = format!("column {other} says its unit, and --scale {scale} another");
+            return Err(Fault::content(problem, "leave --scale away, or take the units out of the header"));
+        }
+        Ok(metres)
     }
-    if names.is_empty() {
-        return Err(missing("the vehicle and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)", "id"));
-    }
-    let body = |vehicle: &String| {
-        columns
-            .body(vehicle)
-            .map_err(|quantity| missing(&format!("{} of vehicle `{vehicle}`", quantity.words()), quantity.option()))
-    };
-    let bodies = names.iter().map(body).collect::<Result<_, _>>()?;
-    Ok(Shape::Wide { names, bodies })
 }
 
-/// Splits `x1`, `vx_2`, `cf1.x`, `leader/vy` or `drone3_z` into vehicle and quantity.
-fn vehicle_and_quantity(name: &str, plain: &str) -> Option<(String, Quantity)> {
-    let stem = plain.trim_end_matches(|c: char| c.is_ascii_digit());
-    if stem.len() < plain.len() {
-        let quantity = Quantity::from_name(stem.strip_suffix('_').unwrap_or(stem));
-        return quantity.map(|quantity| (plain[stem.len()..].to_owned(), quantity));
-    }
-    // The name of the vehicle keeps its case.
-    let name = name.split(['[', '(']).next()?.trim();
-    name.char_indices().filter(|&(_, c)| matches!(c, '.' | '/' | '_')).find_map(|(at, _)| {
-        let quantity = Quantity::from_name(&name[at + 1..].to_lowercase())?;
-        (at > 0).then(|| (name[..at].to_owned(), quantity))
-    })
-}
-
-/// The name in lower case, without blanks around it and without a unit in brackets.
-fn plain(name: &str) -> String {
-    name.split(['[', '(']).next().unwrap_or_default().trim().to_lowercase()
-}
-
-/// What stands in brackets.
-fn bracketed(name: &str) -> Option<&str> {
-    let (_, rest) = name.split_once(['[', '('])?;
-    rest.split([']', ')']).next().map(str::trim)
-}
-
-fn is_time(name: &str) -> bool {
-    let stem = match name.rsplit_once('_') {
-        Some((stem, unit)) if TimeUnit::from_name(unit).is_some() => stem,
-        _ => name,
-    };
-    matches!(stem, "t" | "time" | "timestamp" | "stamp")
-}
-
-fn is_id(name: &str) -> bool {
-    matches!(name, "id" | "name" | "vehicle" | "vehicle_id" | "drone" | "drone_id" | "uav" | "agent" | "robot")
-}
-
-impl ColumnNames {
-    fn quantities(&self) -> [(Quantity, &Option<String>); 7] {
-        let [x, y, z] = &self.position;
-        let [vx, vy, vz] = &self.velocity;
-        [
-            (Quantity::Position(0), x),
-            (Quantity::Position(1), y),
-            (Quantity::Position(2), z),
-            (Quantity::Velocity(0), vx),
-            (Quantity::Velocity(1), vy),
-            (Quantity::Velocity(2), vz),
-            (Quantity::Radius, &self.radius),
-        ]
+/// The first of some names that are not empty.
+fn list(names: &[String], shown: usize) -> String {
+    let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
+    match names.len() {
+        0 => "none".to_owned(),
+        count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
+        _ => names.join(", "),
     }
 }
 
@@ -311,7 +272,7 @@ mod tests {
 
     fn layout(header: &str) -> Result<Layout, Fault> {
         let header: Vec<_> = header.split(',').map(str::to_owned).collect();
-        Layout::of(&header, &ColumnNames::default())
+        Layout::of(&header, &ReadOptions::default(), "alone")
     }
 
     fn at(columns: [usize; 3]) -> [Option<usize>; 3] {
@@ -322,14 +283,14 @@ mod tests {
     fn a_long_header_is_read_in_any_order() {
         let layout = layout("z,Y [m],id,x,time_ms,vx,vy,vz,battery").expect("a layout");
         let body = Body { position: at([3, 1, 0]), velocity: Some(at([5, 6, 7])), radius: None };
-        assert_eq!((layout.time, layout.unit), (4, Some(TimeUnit::Milliseconds)));
-        assert_eq!(layout.shape, Shape::Long { id: 2, body });
-        assert_eq!(layout.unused, ["battery"]);
+        assert_eq!((layout.time, layout.unit), (Some(4), Some(TimeUnit::Milliseconds)));
+        assert_eq!((layout.id, layout.bodies), (Some(2), vec![body]));
+        assert_eq!(layout.notes, ["columns not used: battery"]);
     }
 
     #[test]
     fn what_moves_in_a_plane_needs_no_velocity_along_z() {
-        let Shape::Long { body, .. } = layout("t,id,x,y,vx,vy").expect("a layout").shape else { panic!("wide") };
+        let body = layout("t,id,x,y,vx,vy").expect("a layout").bodies.remove(0);
         assert_eq!((body.position[2], body.velocity), (None, Some([Some(4), Some(5), None])));
     }
 
@@ -340,7 +301,7 @@ mod tests {
             ("t (s),cf1.x,cf1.y,cf1.z,Leader.x,Leader.y,Leader.z", ["cf1", "Leader"]),
             ("t,a_b_x,a_b_y,a_b_z,c/x,c/y,c/z", ["a_b", "c"]),
         ] {
-            let Shape::Wide { names, bodies } = layout(header).expect("a layout").shape else { panic!("{header}") };
+            let Layout { id: None, names, bodies, .. } = layout(header).expect("a layout") else { panic!("{header}") };
             assert_eq!(names, vehicles, "{header}");
             assert_eq!([bodies[0].position, bodies[1].position], [at([1, 2, 3]), at([4, 5, 6])], "{header}");
         }
@@ -350,7 +311,7 @@ mod tests {
     fn what_is_missing_or_double_is_named() {
         let fault = |header: &str| layout(header).expect_err("refused").to_string();
         assert!(fault("id,x,y,z").contains("for time"));
-        assert!(fault("t,x,y,z").contains("for the vehicle"));
+        assert!(fault("t,who,x,y,z").contains("for the vehicle"));
         assert!(fault("t,id,x,z").contains("along y"));
         assert!(fault("t,x1,y1,z1,x2,z2").contains("along y of vehicle `2`"));
         assert!(fault("t,id,x,y,z,vx,vy").contains("velocity along z"));

@@ -18,7 +18,11 @@ mod crazyflie;
 mod csv;
 mod curves;
 mod error;
+mod folder;
 mod format;
+mod headerless;
+mod heading;
+mod join;
 mod layout;
 pub(crate) mod mcap;
 mod names;
@@ -31,50 +35,129 @@ pub(crate) mod parquet;
 mod recognise;
 mod skybrush;
 mod source;
+mod stranger;
 mod table;
+mod units;
 
 #[cfg(feature = "parquet")]
 pub use self::parquet::is_guarded;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
 pub use format::Format;
-pub use options::{AxisOrder, ColumnNames, ReadOptions};
+pub use options::{AxisOrder, ColumnNames, Dimensions, ReadOptions};
 pub use order::Recording;
 
+use std::fs;
 use std::path::Path;
 
-use error::FaultAt;
-use recognise::{Recognised, recognise};
+use folder::Folder;
+use recognise::recognise;
 use source::Source;
 
-/// Opens a recording.
+/// Opens a recording: a file, or a folder or archive with a file for each vehicle.
 ///
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is of no known format, or is wrong where it was looked at so far.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
-    try_open(path, options).map_err(|fault| fault.of(path))
+    let opened = match look(path) {
+        Ok(Some(folder)) => open_folder(folder, options),
+        Ok(None) => open_one(Source::file(path), options),
+        Err(error) => Err(error),
+    };
+    opened.map_err(|error| error.of(path))
 }
 
-fn try_open(path: &Path, options: &ReadOptions) -> Result<Recording, FaultAt> {
+/// Opens several files as one recording, a vehicle in each, called as the file is.
+///
+/// # Errors
+/// Those of [`open`], and where a file holds several vehicles or clocks cannot be those of one recording.
+pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, ReadError> {
+    let files = paths.iter().map(|path| Source::file(path)).collect();
+    let opened = open_folder(Folder { files, ..Folder::default() }, options);
+    opened.map_err(|error| error.of(paths.first().copied().unwrap_or(Path::new(""))))
+}
+
+/// How close vehicles may come, where the recording says it itself as Skybrush shows do \[m\].
+#[must_use]
+pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
+    let mut source = Source::file(path);
+    let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::Skybrush;
+    let limit = if is_show { skybrush::least_distance(&source).ok()?? } else { return None };
+    Some(limit * options.scale).filter(|limit| limit.is_finite() && *limit > 0.0)
+}
+
+/// The files of a folder, or of an archive that is no recording itself.
+fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
+    let data = fs::metadata(path)?;
+    if data.is_dir() {
+        if let Some(stranger) = stranger::of_folder(path) {
+            return Err(stranger.into());
+        }
+        let folder = Folder::open(path)?;
+        let remedy =
+            "give a folder with a table or a polynomial file (.csv) for each vehicle, or one with a folder for each";
+        return if folder.is_empty() {
+            Err(Fault::content("there is no table in the folder", remedy).into())
+        } else {
+            Ok(Some(folder))
+        };
+    }
+    if !data.is_file() {
+        let problem = "it is a pipe or a device, and a recording is read more than once";
+        return Err(Fault::content(problem, "save it to a file first, and give the file").into());
+    }
+    if !recognise::is_archive(path)? {
+        return Ok(None);
+    }
+    Ok(Some(Folder::of_archive(path)?).filter(|folder| !folder.is_empty()))
+}
+
+/// Opens files of one vehicle each.
+fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let polynomials = match folder.files.first_mut() {
+        Some(first) => {
+            let format = recognise(first, options.format).map_err(|error| error.of(&first.shown()))?;
+            format == Format::Crazyflie
+        }
+        None => true,
+    };
+    if polynomials {
+        options.refuse_needless(Format::Crazyflie)?;
+        let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
+        return crazyflie::open(alone.chain(folder.folders).collect(), options);
+    }
+    let options = ReadOptions { one_vehicle: true, ..options.clone() };
+    let open = |file: Source| {
+        let shown = file.shown();
+        Ok((shown.clone(), open_one(file, &options).map_err(|error| error.of(&shown))?))
+    };
+    join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?)
+}
+
+fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     if !(options.scale.is_finite() && options.scale > 0.0) {
         let problem = format!("its lengths cannot be scaled by {}", options.scale);
         return Err(Fault::content(problem, "give a positive number of metres per unit of length").into());
     }
-    let Recognised { format, gzip } = recognise(path, options.format)?;
-    if let Some((option, why)) = options.needless_for(format) {
-        let problem = format!("{} {why}", format.title());
-        return Err(Fault::content(problem, format!("leave {option} away")).into());
+    if let Some(rate) = options.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+        let problem = format!("its times cannot be counted with {rate} in a second");
+        return Err(Fault::content(problem, "give a positive number with --fps or --time-scale").into());
     }
-    let source = &Source { path: path.to_owned(), gzip };
+    let format = recognise(&mut source, options.format)?;
+    options.refuse_needless(format)?;
+    let source = &source;
     match format {
         Format::Csv | Format::Text => csv::open(source, format, options),
-        Format::Crazyflie => crazyflie::open(path, options),
+        Format::Crazyflie => crazyflie::open(vec![(source.stem(), vec![source.clone()])], options),
         Format::Mcap => mcap::open(source, options),
         Format::Npz => npz::open(source, options),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::open(source, options),
         #[cfg(not(feature = "parquet"))]
-        Format::Parquet => Err(Fault::NotBuilt(format).into()),
+        Format::Parquet => {
+            let problem = "it is a Parquet file, which this build does not read";
+            Err(Fault::content(problem, "build it with the feature of the format's name").into())
+        }
         Format::Skybrush => skybrush::open(source, options),
     }
 }

@@ -24,17 +24,12 @@ impl Names {
         &self.names
     }
 
-    /// The vehicle after this one, or the first after the last, if it is called so: most files go round.
-    #[inline]
-    pub(super) fn next_if(&self, name: &[u8], before: usize) -> Option<usize> {
-        let next = if before + 1 < self.names.len() { before + 1 } else { 0 };
-        self.names.get(next).is_some_and(|known| known.as_bytes() == name).then_some(next)
-    }
-
-    /// The index of a name, which is new if need be. Looked for first right after the vehicle before.
+    /// The index of a name, which is new if need be. Looked for first right after the vehicle before, or at the first
+    /// after the last: most files go round.
     #[inline]
     pub(super) fn index(&mut self, name: &str, before: usize) -> usize {
-        if let Some(next) = self.next_if(name.as_bytes(), before) {
+        let next = if before + 1 < self.names.len() { before + 1 } else { 0 };
+        if self.names.get(next).is_some_and(|known| known == name) {
             return next;
         }
         if let Some(&index) = self.indices.get(name) {

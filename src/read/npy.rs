@@ -17,19 +17,26 @@ const HEADER_LIMIT_BYTES: usize = 64 * 1024;
 /// The `NaT` of `datetime64`.
 const NOT_A_TIME: i64 = i64::MIN;
 
-/// What an array holds.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// How the elements of an array are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Float,
     Signed,
+    /// Whole numbers without a sign, and truth values.
     Unsigned,
-    Bool,
-    /// Times in a unit.
+    /// Times as whole numbers of a unit.
     Time(TimeUnit),
     /// Text of four bytes a character.
     Unicode,
     /// Text of one byte a character.
     Bytes,
+}
+
+/// An element.
+enum Element {
+    Whole(i64),
+    Real(f64),
+    Text(String),
 }
 
 /// An array being read, number by number in the order of the file.
@@ -93,7 +100,7 @@ impl Array {
         if let Kind::Time(unit) = self.kind { Some(unit) } else { None }
     }
 
-    fn next_element(&mut self) -> Result<(), Fault> {
+    fn next(&mut self) -> Result<Element, Fault> {
         read_exactly(&mut self.bytes, &mut self.element)?;
         self.left = self.left.saturating_sub(1);
         // Behind the last element the checksum is compared.
@@ -103,87 +110,65 @@ impl Array {
         if self.big_endian {
             self.element.reverse();
         }
-        Ok(())
-    }
-
-    /// The next whole number; none where the array holds others.
-    fn integer(&self) -> Option<i64> {
         let mut wide = [0; 8];
-        wide[..self.width.min(8)].copy_from_slice(&self.element[..self.width.min(8)]);
-        let unsigned = u64::from_le_bytes(wide);
-        match self.kind {
-            Kind::Unsigned | Kind::Bool => i64::try_from(unsigned).ok(),
+        let width = self.width.min(8);
+        wide[..width].copy_from_slice(&self.element[..width]);
+        let bits = u64::from_le_bytes(wide);
+        Ok(match self.kind {
+            Kind::Float if width == 4 => Element::Real(f32::from_le_bytes([wide[0], wide[1], wide[2], wide[3]]).into()),
+            Kind::Float => Element::Real(f64::from_bits(bits)),
+            Kind::Unsigned => i64::try_from(bits).map_or(Element::Real(bits as f64), Element::Whole),
+            Kind::Time(_) if bits.cast_signed() == NOT_A_TIME => Element::Real(f64::NAN),
             Kind::Signed | Kind::Time(_) => {
-                let shift = 64 - 8 * u32::try_from(self.width).ok()?;
-                Some((unsigned << shift).cast_signed() >> shift)
+                let unused = 8 * (8 - width);
+                Element::Whole((bits << unused).cast_signed() >> unused)
             }
-            _ => None,
-        }
-    }
-
-    fn float(&self) -> Option<f64> {
-        match (&self.kind, self.width) {
-            (Kind::Float, 8) => self.element.first_chunk().copied().map(f64::from_le_bytes),
-            (Kind::Float, 4) => self.element.first_chunk().copied().map(|bytes| f32::from_le_bytes(bytes).into()),
-            _ => self.integer().map(|integer| integer as f64),
-        }
+            Kind::Unicode => {
+                let chars =
+                    self.element.chunks_exact(4).map(|c| char::from_u32(u32::from_le_bytes([c[0], c[1], c[2], c[3]])));
+                // The whole element was turned around, characters and all: turn the order of characters back.
+                let text: Option<String> = if self.big_endian { chars.rev().collect() } else { chars.collect() };
+                Element::Text(text.ok_or_else(|| Fault::damaged("a name is not text"))?)
+            }
+            Kind::Bytes => Element::Text(String::from_utf8(self.element.clone()).map_err(|_| Fault::NotUtf8)?),
+        })
     }
 
     /// The next element as a number.
     pub(super) fn next_number(&mut self) -> Result<f64, Fault> {
-        self.next_element()?;
-        self.float().ok_or_else(|| self.not("numbers"))
+        match self.next()? {
+            Element::Whole(whole) => Ok(whole as f64),
+            Element::Real(real) => Ok(real),
+            Element::Text(_) => Err(not("numbers", "text")),
+        }
     }
 
     /// The next element as a time.
     pub(super) fn next_stamp(&mut self) -> Result<Stamp, Fault> {
-        self.next_element()?;
-        let stamp = self.integer().map(|whole| self.stamp_of(whole)).or_else(|| self.float().map(Stamp::Real));
-        stamp.ok_or_else(|| self.not("times"))
-    }
-
-    fn stamp_of(&self, whole: i64) -> Stamp {
-        match self.kind {
-            Kind::Time(_) if whole == NOT_A_TIME => Stamp::Real(f64::NAN),
-            _ => Stamp::Whole(whole),
+        match self.next()? {
+            Element::Whole(whole) => Ok(Stamp::Whole(whole)),
+            Element::Real(real) => Ok(Stamp::Real(real)),
+            Element::Text(_) => Err(not("times", "text")),
         }
     }
 
     /// The next element as text.
     pub(super) fn next_text(&mut self) -> Result<String, Fault> {
-        self.next_element()?;
-        let text = match self.kind {
-            // The whole element was turned around, characters and all: turn the order of characters back.
-            Kind::Unicode => {
-                let chars = self
-                    .element
-                    .chunks_exact(4)
-                    .map(|bytes| char::from_u32(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])));
-                let text: Option<String> = if self.big_endian { chars.rev().collect() } else { chars.collect() };
-                text.ok_or_else(|| Fault::damaged("a name is not text"))?
-            }
-            Kind::Bytes => String::from_utf8(self.element.clone()).map_err(|_| Fault::NotUtf8)?,
-            _ => return Err(self.not("names")),
-        };
-        Ok(text.trim_end_matches('\0').to_owned())
+        match self.next()? {
+            Element::Text(text) => Ok(text.trim_end_matches('\0').to_owned()),
+            _ => Err(not("names", "numbers")),
+        }
     }
+}
 
-    fn not(&self, what: &str) -> Fault {
-        let found = match self.kind {
-            Kind::Float => "decimal numbers",
-            Kind::Signed | Kind::Unsigned => "whole numbers",
-            Kind::Bool => "truth values",
-            Kind::Time(_) => "times",
-            Kind::Unicode | Kind::Bytes => "text",
-        };
-        Fault::content(format!("its elements are no {what} but {found}"), "save float64, int64 or text")
-    }
+fn not(what: &str, found: &str) -> Fault {
+    Fault::content(format!("its elements are no {what} but {found}"), "save float64, int64 or text")
 }
 
 fn read_exactly(bytes: &mut impl Read, buffer: &mut [u8]) -> Result<(), Fault> {
     match bytes.read_exact(buffer) {
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-            Err(Fault::Truncated { what: "the array is shorter than it says".to_owned() })
+            Err(Fault::Truncated("the array is shorter than it says".to_owned()))
         }
         other => Ok(other?),
     }
@@ -207,8 +192,7 @@ fn kind(descr: &str) -> Option<(Kind, usize, bool)> {
     let (kind, width) = match (letter, width) {
         ('f', 4 | 8) => (Kind::Float, width),
         ('i', 1 | 2 | 4 | 8) => (Kind::Signed, width),
-        ('u', 1 | 2 | 4 | 8) => (Kind::Unsigned, width),
-        ('b', 1) => (Kind::Bool, 1),
+        ('u', 1 | 2 | 4 | 8) | ('b', 1) => (Kind::Unsigned, width),
         ('M' | 'm', 8) => (Kind::Time(TimeUnit::from_name(unit.trim_end_matches(']'))?), 8),
         ('U', 1..=4096) => (Kind::Unicode, 4 * width),
         ('S', 1..=4096) => (Kind::Bytes, width),

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 
 use super::archive::Archive;
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, FaultAt, Place};
+use super::error::{Fault, Place, ReadError};
 use super::names::Names;
 use super::npy::Array;
 use super::options::{AxisOrder, ReadOptions};
@@ -30,11 +30,11 @@ const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
 const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
 
 /// Opens an archive.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut arrays = Arrays { archive: Archive::open(&source.path)? };
-    let time = options.columns.time.clone().or_else(|| arrays.first_of(&TIMES));
+    let time = options.columns.get("t").cloned().or_else(|| arrays.first_of(&TIMES));
     let time = time.filter(|name| arrays.holds(name)).ok_or_else(|| arrays.missing("times", "t"))?;
-    let positions = options.columns.position[0].clone().or_else(|| arrays.first_of(&POSITIONS));
+    let positions = options.columns.get("x").cloned().or_else(|| arrays.first_of(&POSITIONS));
     let positions =
         positions.filter(|name| arrays.holds(name)).ok_or_else(|| arrays.missing("positions", "positions"))?;
 
@@ -83,7 +83,7 @@ struct Arrays {
 }
 
 /// A fault of an array.
-fn in_array(name: &str) -> impl Fn(Fault) -> FaultAt {
+fn in_array(name: &str) -> impl Fn(Fault) -> ReadError {
     move |fault| fault.at(Place::Part(format!("array `{name}`")))
 }
 
@@ -109,20 +109,20 @@ impl Arrays {
         Fault::content(problem, remedy)
     }
 
-    fn array(&mut self, name: &str) -> Result<Array, FaultAt> {
+    fn array(&mut self, name: &str) -> Result<Array, ReadError> {
         Array::open(self.archive.entry(&format!("{name}.npy"))?).map_err(in_array(name))
     }
 
     fn optional<T>(
         &mut self,
         name: &str,
-        read: impl FnOnce(&mut Self) -> Result<T, FaultAt>,
-    ) -> Result<Option<T>, FaultAt> {
+        read: impl FnOnce(&mut Self) -> Result<T, ReadError>,
+    ) -> Result<Option<T>, ReadError> {
         if self.holds(name) { read(self).map(Some) } else { Ok(None) }
     }
 
     /// Radii of all vehicles, instant by instant: the array has them once, or each time.
-    fn radii(&mut self, positions: &Table) -> Result<Numbers, FaultAt> {
+    fn radii(&mut self, positions: &Table) -> Result<Numbers, ReadError> {
         let mut array = self.array("radii")?;
         if array.shape != [positions.vehicles()] {
             return self.like(positions, "radii", 2);
@@ -132,7 +132,7 @@ impl Arrays {
     }
 
     /// The numbers of an array whose axes are the first `axes` of those of the positions.
-    fn like(&mut self, positions: &Table, name: &str, axes: usize) -> Result<Numbers, FaultAt> {
+    fn like(&mut self, positions: &Table, name: &str, axes: usize) -> Result<Numbers, ReadError> {
         let array = self.array(name)?;
         let expected = &positions.shape[..axes];
         if array.shape != expected {
@@ -143,7 +143,7 @@ impl Arrays {
     }
 
     /// Names of as many vehicles.
-    fn names(&mut self, vehicles: usize) -> Result<Vec<String>, FaultAt> {
+    fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
         let names = self.texts("names")?;
         let different: BTreeSet<_> = names.iter().collect();
         let problem = match different.len() {
@@ -154,7 +154,7 @@ impl Arrays {
         Err(in_array("names")(Fault::content(problem, "save a name of its own for each vehicle, or leave `names` out")))
     }
 
-    fn texts(&mut self, name: &str) -> Result<Vec<String>, FaultAt> {
+    fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
         let mut array = self.array(name)?;
         let mut texts = Vec::new();
         for _ in 0..array.count() {
@@ -164,7 +164,7 @@ impl Arrays {
     }
 
     /// An array of vectors with `times` instants.
-    fn table(&mut self, name: &str, times: usize, order: Option<AxisOrder>) -> Result<Table, FaultAt> {
+    fn table(&mut self, name: &str, times: usize, order: Option<AxisOrder>) -> Result<Table, ReadError> {
         let array = self.array(name)?;
         let at = in_array(name);
         let &[first, second, axes @ (2 | 3)] = array.shape.as_slice() else {
@@ -221,20 +221,16 @@ fn numbers(mut array: Array, order: AxisOrder) -> Result<Numbers, Fault> {
         return Ok(Box::new(std::iter::repeat_with(move || array.next_number())));
     }
     let stored = (0..array.count()).map(|_| array.next_number()).collect::<Result<Vec<_>, _>>()?;
-    let (first, second) = (array.shape[0], array.shape[1]);
-    let axes = array.shape[2..].iter().product();
-    let index = |a: usize, b: usize, axis: usize| {
-        if array.fortran_order { a + first * (b + second * axis) } else { (a * second + b) * axes + axis }
-    };
-    let mut sorted = Vec::with_capacity(stored.len());
-    let (times, vehicles) = if order == AxisOrder::TimeFirst { (first, second) } else { (second, first) };
-    for k in 0..times {
-        for i in 0..vehicles {
-            let (a, b) = if order == AxisOrder::TimeFirst { (k, i) } else { (i, k) };
-            sorted.extend((0..axes).map(|axis| stored[index(a, b, axis)]));
-        }
+    let (first, second, axes) = (array.shape[0], array.shape[1], array.shape[2..].iter().product::<usize>());
+    let strides = if array.fortran_order { [1, first, first * second] } else { [second * axes, axes, 1] };
+    let [mut times, mut vehicles] = [(first, strides[0]), (second, strides[1])];
+    if order == AxisOrder::VehicleFirst {
+        std::mem::swap(&mut times, &mut vehicles);
     }
-    Ok(Box::new(sorted.into_iter().map(Ok)))
+    let along = |(length, stride): (usize, usize)| (0..length).map(move |k| k * stride);
+    let places = along(times).flat_map(move |time| along(vehicles).map(move |vehicle| time + vehicle));
+    let places = places.flat_map(move |place| along((axes, strides[2])).map(move |axis| place + axis));
+    Ok(Box::new(places.map(move |place| Ok(stored[place]))))
 }
 
 fn next(numbers: &mut Numbers) -> Result<f64, Fault> {
@@ -301,7 +297,7 @@ impl Instants {
 }
 
 impl Rows for Instants {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             let Some(&stamp) = self.times.get(self.at) else { break };

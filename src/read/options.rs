@@ -1,5 +1,7 @@
 //! What the user says of a recording.
 
+use std::collections::BTreeMap;
+
 use super::clock::TimeUnit;
 use super::error::Fault;
 use super::format::Format;
@@ -13,31 +15,67 @@ pub enum AxisOrder {
     VehicleFirst,
 }
 
-/// Names of columns, where they are not the usual ones.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ColumnNames {
-    /// Time.
-    pub time: Option<String>,
-    /// The vehicle.
-    pub id: Option<String>,
-    /// Position along x, y and z \[m\].
-    pub position: [Option<String>; 3],
-    /// Velocity along x, y and z \[m/s\].
-    pub velocity: [Option<String>; 3],
-    /// Radius of the vehicle \[m\].
-    pub radius: Option<String>,
+/// The numbers of a vehicle at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimensions {
+    /// x, y.
+    Plane,
+    /// x, y, z.
+    Space,
+    /// x, y, vx, vy.
+    PlaneVelocity,
+    /// x, y, z, vx, vy, vz.
+    SpaceVelocity,
 }
 
+impl Dimensions {
+    /// All that are known.
+    pub const ALL: [Self; 4] = [Self::Plane, Self::Space, Self::PlaneVelocity, Self::SpaceVelocity];
+
+    /// What `--dimensions` calls it: `2`, `3`, `2+2` or `3+3`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Plane => "2",
+            Self::Space => "3",
+            Self::PlaneVelocity => "2+2",
+            Self::SpaceVelocity => "3+3",
+        }
+    }
+
+    /// Number of axes, and of numbers.
+    pub(super) fn counts(self) -> (usize, usize) {
+        match self {
+            Self::Plane => (2, 2),
+            Self::Space => (3, 3),
+            Self::PlaneVelocity => (2, 4),
+            Self::SpaceVelocity => (3, 6),
+        }
+    }
+}
+
+/// Names of columns, where they are not the usual ones: one for each of [`ColumnNames::ROLES`].
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ColumnNames([Option<String>; 9]);
+
 impl ColumnNames {
-    /// Roles that a column can have, as [`ColumnNames::set`] calls them.
+    /// Roles that a column can have: time, vehicle, position \[m\], velocity \[m/s\] and radius \[m\] of the vehicle.
     pub const ROLES: [&str; 9] = ["t", "id", "x", "y", "z", "vx", "vy", "vz", "radius"];
 
     /// Gives the column of a role a name; `false` where there is no such role.
     pub fn set(&mut self, role: &str, name: &str) -> bool {
-        let ([x, y, z], [vx, vy, vz]) = (&mut self.position, &mut self.velocity);
-        let slots = [&mut self.time, &mut self.id, x, y, z, vx, vy, vz, &mut self.radius];
-        let slot = slots.into_iter().zip(Self::ROLES).find(|(_, known)| *known == role);
+        let slot = self.0.iter_mut().zip(Self::ROLES).find(|(_, known)| *known == role);
         slot.map(|(slot, _)| *slot = Some(name.to_owned())).is_some()
+    }
+
+    /// The name given for a role.
+    pub(super) fn get(&self, role: &str) -> Option<&String> {
+        self.0.iter().zip(Self::ROLES).find(|(_, known)| *known == role)?.0.as_ref()
+    }
+
+    /// Places of roles, and the names given for them.
+    pub(super) fn given(&self) -> impl Iterator<Item = (usize, &String)> {
+        self.0.iter().enumerate().filter_map(|(role, name)| Some((role, name.as_ref()?)))
     }
 }
 
@@ -48,10 +86,18 @@ pub struct ReadOptions {
     pub format: Option<Format>,
     /// The unit of time, instead of what the file says or its numbers suggest.
     pub time_unit: Option<TimeUnit>,
+    /// How many units of time there are in a second, where they are those of no clock: frames, steps, minutes.
+    pub times_per_second: Option<f64>,
     /// Metres per unit of length of the file; velocities and radii are scaled too.
     pub scale: f64,
+    /// The numbers of a vehicle in a table without a header, where their count does not tell.
+    pub dimensions: Option<Dimensions>,
+    /// Whether a table whose rows name no vehicle is of one, whatever other columns it has.
+    pub one_vehicle: bool,
     /// Names of columns of a table.
     pub columns: ColumnNames,
+    /// Where the curves of vehicles start, if they are relative to that \[m\].
+    pub starts: BTreeMap<String, [f64; 3]>,
     /// Which axis of an array comes first, where its shape does not tell.
     pub axis_order: Option<AxisOrder>,
     /// The frame whose poses are read, where messages have several.
@@ -66,7 +112,11 @@ impl Default for ReadOptions {
         Self {
             format: None,
             time_unit: None,
+            times_per_second: None,
             scale: 1.0,
+            dimensions: None,
+            one_vehicle: false,
+            starts: BTreeMap::new(),
             columns: ColumnNames::default(),
             axis_order: None,
             frame: None,
@@ -76,18 +126,30 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// An option that means nothing for a format, and why.
-    pub(super) fn needless_for(&self, format: Format) -> Option<(&'static str, &'static str)> {
+    /// Refuses an option that means nothing for a format.
+    pub(super) fn refuse_needless(&self, format: Format) -> Result<(), Fault> {
         let is_table = matches!(format, Format::Csv | Format::Text | Format::Parquet | Format::Npz);
         let (is_npz, is_mcap) = (format == Format::Npz, format == Format::Mcap);
         let given = [
             (self.time_unit.is_some() && !is_table, "--time-unit", "has a unit of time of its own"),
+            (self.times_per_second.is_some() && !is_table, "--fps and --time-scale", "has a unit of time of its own"),
+            (self.dimensions.is_some() && format != Format::Text, "--dimensions", "says which numbers are a vehicle's"),
+            (
+                !self.starts.is_empty() && format != Format::Crazyflie,
+                "--start",
+                "does not hold curves that are relative",
+            ),
             (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
             (self.axis_order.is_some() && !is_npz, "--axis-order", "has no arrays"),
             (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
             (self.allow_unfinished && !is_mcap, "--allow-unfinished", "cannot be read before it is closed"),
         ];
-        given.into_iter().find_map(|(needless, option, why)| needless.then_some((option, why)))
+        match given.into_iter().find(|(needless, ..)| *needless) {
+            Some((_, option, why)) => {
+                Err(Fault::content(format!("{} {why}", format.title()), format!("leave {option} away")))
+            }
+            None => Ok(()),
+        }
     }
 
     /// What is to be said of an MCAP file that was not closed, or the fault that it is.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
-use super::clock::{KnownUnit, Probe, Stamp, TimeUnit, Timing};
-use super::error::{Fault, FaultAt, Place, ReadError, quoted};
+use super::clock::{Probe, Stamp, TimeUnit, Timing};
+use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::source::Source;
 use crate::track::{Clock, Item, Sample, Tracks};
@@ -29,10 +29,10 @@ pub(super) struct Row {
 /// A recording that holds samples, row by row.
 pub(super) trait Rows {
     /// Appends some [`BATCH`] rows in the order of the file; `false` when there was none to append.
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt>;
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
 
     /// Starts again with the first row. Nothing to do where time only runs forwards, so that rows are read once.
-    fn rewind(&mut self) -> Result<(), FaultAt> {
+    fn rewind(&mut self) -> Result<(), ReadError> {
         Ok(())
     }
 
@@ -41,6 +41,11 @@ pub(super) trait Rows {
 
     /// Puts the names in their final order, once all have been met.
     fn settle_names(&mut self) {}
+
+    /// What a person should know that shows as rows are read.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// The place that a row's number means.
     fn place(&self, number: u64) -> Place;
@@ -51,13 +56,13 @@ pub(super) trait Rows {
     }
 
     /// Looks at all times and names; none where there are no rows.
-    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
+    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         survey(self)
     }
 }
 
 /// Looks at all times by reading all rows.
-pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, FaultAt> {
+pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
     let mut probe: Option<Probe> = None;
     let mut batch = Vec::new();
     while rows.next(&mut batch)? {
@@ -74,7 +79,10 @@ pub type Recording = Box<dyn Tracks<Error = ReadError>>;
 /// What is known of a recording beside its rows.
 pub(super) struct About {
     pub(super) path: PathBuf,
-    pub(super) unit: KnownUnit,
+    /// The unit of its times, where it is known.
+    pub(super) unit: Option<TimeUnit>,
+    /// How many of them the user says to make a second.
+    pub(super) times_per_second: Option<f64>,
     /// What the times are counted from, as the file says it \[ns\].
     pub(super) epoch_ns: i64,
     /// Metres per unit of length.
@@ -93,8 +101,9 @@ impl About {
         notes: Vec<String>,
         none: Fault,
     ) -> Self {
-        let unit = options.time_unit.or(said).map_or(KnownUnit::Unsaid, KnownUnit::Given);
-        Self { path: source.path.clone(), unit, epoch_ns: 0, scale: options.scale, notes, none }
+        let unit = options.time_unit.or(said);
+        let (path, times_per_second) = (source.shown(), options.times_per_second);
+        Self { path, unit, times_per_second, epoch_ns: 0, scale: options.scale, notes, none }
     }
 }
 
@@ -108,9 +117,8 @@ pub(super) struct Ordered<R> {
     timing: Timing,
     notes: Vec<String>,
     scale: f64,
-    /// Rows read, of which those before `given` have been given out.
-    batch: Vec<Row>,
-    given: usize,
+    /// Rows read that have not been given out.
+    batch: std::vec::IntoIter<Row>,
     /// All rows have been read.
     ended: bool,
     /// Stamp and time of the last row.
@@ -121,8 +129,8 @@ pub(super) struct Ordered<R> {
 
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
-    pub(super) fn open(mut rows: R, about: About) -> Result<Self, FaultAt> {
-        let About { path, unit, epoch_ns, scale, mut notes, none } = about;
+    pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
+        let About { path, unit, times_per_second, epoch_ns, scale, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -139,13 +147,15 @@ impl<R: Rows> Ordered<R> {
             rows.survey()?
         };
         let Some(probe) = probe else { return Err(none.into()) };
-        let (mut timing, note) = Timing::settle(&probe, unit);
+        let settled = || Timing::settle(&probe, unit);
+        let (mut timing, note) = times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
         notes.extend(note);
         if !rows.is_wide() {
             rows.settle_names();
             rows.rewind()?;
         }
+        notes.extend(rows.notes());
         if !probe.in_order {
             while rows.next(&mut first)? {}
             // Stable: rows of one time stay in the order of the file.
@@ -153,14 +163,15 @@ impl<R: Rows> Ordered<R> {
             ended = true;
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
-        Ok(Self { path, rows, timing, notes, scale, batch: first, given: 0, ended, now: None, last: Vec::new() })
+        let batch = first.into_iter();
+        Ok(Self { path, rows, timing, notes, scale, batch, ended, now: None, last: Vec::new() })
     }
 
-    fn error(&self, row: &Row, fault: Fault) -> FaultAt {
+    fn error(&self, row: &Row, fault: Fault) -> ReadError {
         fault.at(self.rows.place(row.place))
     }
 
-    fn time_of(&mut self, row: &Row) -> Result<f64, FaultAt> {
+    fn time_of(&mut self, row: &Row) -> Result<f64, ReadError> {
         let before = match self.now {
             Some((stamp, time_s)) if stamp == row.stamp => return Ok(time_s),
             Some((_, time_s)) => time_s,
@@ -168,31 +179,20 @@ impl<R: Rows> Ordered<R> {
         };
         let time_s = self.timing.seconds(row.stamp);
         if time_s < before {
-            return Err(self.error(row, Fault::TimeBackwards { time_s, before_s: before }));
+            return Err(self.error(row, Fault::time_backwards(time_s, before)));
         }
         self.now = Some((row.stamp, time_s));
         Ok(time_s)
     }
 
-    fn sample(&mut self, row: &Row) -> Result<Sample, FaultAt> {
+    fn sample(&mut self, row: &Row) -> Result<Sample, ReadError> {
         let time_s = self.time_of(row)?;
         if row.vehicle >= self.last.len() {
             self.last.resize(row.vehicle + 1, None);
         }
         if let Some((before_s, before)) = self.last[row.vehicle].replace((time_s, *row)) {
-            let vehicle = || self.rows.vehicles().get(row.vehicle).cloned().unwrap_or_default();
-            let first = self.rows.place(before.place);
-            let fault = if before_s == time_s {
-                Some(Fault::Duplicate { vehicle: vehicle(), time_s, first })
-            } else if before.radius.is_some() != row.radius.is_some() {
-                let which = if row.radius.is_some() { "a radius here and none" } else { "no radius here and one" };
-                let problem = format!("vehicle {} has {which} at {first}", quoted(&vehicle()));
-                Some(Fault::content(problem, "fill the empty cells, or leave all radii of the vehicle empty"))
-            } else {
-                None
-            };
-            if let Some(fault) = fault {
-                return Err(self.error(row, fault));
+            if before_s == time_s || before.radius.is_some() != row.radius.is_some() {
+                return Err(self.error(row, self.contradiction(before_s == time_s, time_s, &before, row)));
             }
         }
         let sample = Sample {
@@ -203,28 +203,43 @@ impl<R: Rows> Ordered<R> {
             radius_m: row.radius.map(|radius| radius * self.scale),
         };
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
-        if time_s.is_finite() && finite(&sample.position_m) && sample.velocity_m_s.as_ref().is_none_or(finite) {
+        if time_s.is_finite()
+            && finite(&sample.position_m)
+            && sample.velocity_m_s.as_ref().is_none_or(finite)
+            && sample.radius_m.is_none_or(f64::is_finite)
+        {
             return Ok(sample);
         }
-        let remedy = "look at --scale and at the numbers themselves";
-        Err(self.error(row, Fault::content("its numbers leave the range of numbers", remedy)))
+        Err(self.error(row, Fault::out_of_range()))
     }
 
-    fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, FaultAt> {
-        if self.given == self.batch.len() && !self.ended {
-            self.batch.clear();
-            self.given = 0;
-            self.ended = !self.rows.next(&mut self.batch)?;
+    /// What a row of a vehicle says against its row before: it is there twice, or has a radius in one of them alone.
+    #[cold]
+    fn contradiction(&self, twice: bool, time_s: f64, before: &Row, row: &Row) -> Fault {
+        let vehicle = quoted(self.rows.vehicles().get(row.vehicle).map_or("", String::as_str));
+        let first = self.rows.place(before.place);
+        if twice {
+            let problem = format!("vehicle {vehicle} is there a second time at {time_s} s; the first is {first}");
+            return Fault::content(problem, "take one of the two out: a vehicle is in one place at a time");
         }
-        let end = self.batch.len().min(self.given + BATCH);
-        let count = end - self.given;
-        items.reserve(count);
-        while self.given < end {
-            let row = self.batch[self.given];
+        let which = if row.radius.is_some() { "a radius here and none" } else { "no radius here and one" };
+        let remedy = "fill the empty cells, or leave all radii of the vehicle empty";
+        Fault::content(format!("vehicle {vehicle} has {which} at {first}"), remedy)
+    }
+
+    fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        if self.batch.len() == 0 && !self.ended {
+            let mut batch = Vec::with_capacity(BATCH);
+            self.ended = !self.rows.next(&mut batch)?;
+            self.batch = batch.into_iter();
+        }
+        let before = items.len();
+        while items.len() < before + BATCH
+            && let Some(row) = self.batch.next()
+        {
             items.push(Item::Sample(self.sample(&row)?));
-            self.given += 1;
         }
-        Ok(count > 0)
+        Ok(items.len() > before)
     }
 }
 

@@ -3,6 +3,7 @@
 //! Columns are flat: numbers, text or whole numbers for the vehicle, and for time numbers or time stamps, whose unit is
 //! then known. What time counts from may stand under `epoch_ns` in the metadata of the file.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,9 +16,8 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, FaultAt, Place};
+use super::error::{Fault, Place, ReadError};
 use super::layout::Layout;
-use super::names::Names;
 use super::options::ReadOptions;
 use super::order::{BATCH, Recording};
 use super::source::Source;
@@ -30,53 +30,32 @@ pub(crate) const EPOCH_KEY: &str = "epoch_ns";
 const BATCH_CELLS: usize = 640_000;
 
 /// Opens a table.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut file = File::open(&source.path)?;
     if file.metadata()?.len() < 12 {
-        return Err(Fault::Truncated { what: "the end of the file is missing".to_owned() }.into());
+        return Err(Fault::Truncated("the end of the file is missing".to_owned()).into());
     }
     let mut end = [0; 4];
     file.seek(SeekFrom::End(-4))?;
     file.read_exact(&mut end)?;
     if end != *b"PAR1" && end != *b"PARE" {
         let what = "the end of the file, where its columns are described, is missing".to_owned();
-        return Err(Fault::Truncated { what }.into());
+        return Err(Fault::Truncated(what).into());
     }
     let reader = guarded(|| SerializedFileReader::new(file))?;
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
     let header: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let layout = Layout::of(&header, &options.columns)?;
-    let unit = unit_of(&schema.column(layout.time));
+    let layout = Layout::of(&header, options, &source.stem())?;
+    let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
-        let descriptor = schema.column(column);
-        if descriptor.max_rep_level() > 0 {
-            let problem = format!("column `{}` holds lists", header[column]);
-            return Err(Fault::content(problem, "save a number in each cell").into());
-        }
-        if let Some(what) = other_than_numbers(&descriptor) {
-            let problem = format!("column `{}` holds {what}", header[column]);
-            let remedy = "save numbers as double, and time as double, int64 or time stamps";
-            return Err(Fault::content(problem, remedy).into());
-        }
-        if let Some(packed) = packed_otherwise(&reader, column) {
-            let problem = format!("column `{}` is packed by {packed}, which is not read", header[column]);
-            return Err(Fault::content(problem, "save it plain, or packed by snappy, gzip, lz4 or zstd").into());
+        if let Some((what, remedy)) = unreadable(&reader, column) {
+            return Err(Fault::content(format!("column `{}` {what}", header[column]), remedy).into());
         }
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
     let epoch_ns = epoch_ns.and_then(|pair| pair.value.as_deref()).and_then(|value| value.parse().ok());
-    let groups = Groups {
-        reader,
-        header,
-        wanted: Vec::new(),
-        group: 0,
-        columns: Vec::new(),
-        rows_left: 0,
-        count: 0,
-        at: 0,
-        rows_before: 0,
-    };
+    let groups = Groups { reader, header, wanted: Vec::new(), columns: Vec::new(), cursor: Cursor::default() };
     table::open(source, groups, layout, unit, epoch_ns.unwrap_or(0), options)
 }
 
@@ -97,7 +76,7 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault
     GUARDED.set(false);
     match outcome {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated { what }),
+        Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated(what)),
         Ok(Err(error)) => Err(Fault::damaged(error)),
         Err(_) => Err(Fault::damaged("its pages contradict each other")),
     }
@@ -117,26 +96,31 @@ fn unit_of(column: &ColumnDescriptor) -> Option<TimeUnit> {
     }
 }
 
-/// What the cells of a column are, where reading them as numbers or text would change their meaning.
-fn other_than_numbers(column: &ColumnDescriptor) -> Option<&'static str> {
-    match (column.logical_type_ref(), column.converted_type()) {
-        (Some(LogicalType::Decimal(_)), _) | (_, ConvertedType::DECIMAL) => Some("decimals"),
-        (Some(LogicalType::Date), _) | (_, ConvertedType::DATE) => Some("dates"),
+/// What keeps a column from being read as numbers or text without a change of meaning, and what helps.
+fn unreadable(reader: &SerializedFileReader<File>, column: usize) -> Option<(&'static str, &'static str)> {
+    let metadata = reader.metadata();
+    let descriptor = metadata.file_metadata().schema_descr().column(column);
+    if descriptor.max_rep_level() > 0 {
+        return Some(("holds lists", "save a number in each cell"));
+    }
+    let other = match (descriptor.logical_type_ref(), descriptor.converted_type()) {
+        (Some(LogicalType::Decimal(_)), _) | (_, ConvertedType::DECIMAL) => Some("holds decimals"),
+        (Some(LogicalType::Date), _) | (_, ConvertedType::DATE) => Some("holds dates"),
         (Some(LogicalType::Time(_)), _) | (_, ConvertedType::TIME_MILLIS | ConvertedType::TIME_MICROS) => {
-            Some("times of day")
+            Some("holds times of day")
         }
         _ => None,
+    };
+    if let Some(what) = other {
+        return Some((what, "save numbers as double, and time as double, int64 or time stamps"));
     }
-}
-
-/// The codec of a column that is packed by one that is not read.
-fn packed_otherwise(reader: &SerializedFileReader<File>, column: usize) -> Option<&'static str> {
-    let mut columns = reader.metadata().row_groups().iter().filter_map(|group| group.columns().get(column));
-    columns.find_map(|column| match column.compression() {
-        Compression::BROTLI(_) => Some("brotli"),
-        Compression::LZO => Some("lzo"),
+    let mut chunks = metadata.row_groups().iter().filter_map(|group| group.columns().get(column));
+    let packed = chunks.find_map(|chunk| match chunk.compression() {
+        Compression::BROTLI(_) => Some("is packed by brotli, which is not read"),
+        Compression::LZO => Some("is packed by lzo, which is not read"),
         _ => None,
-    })
+    });
+    packed.map(|what| (what, "save it plain, or packed by snappy, gzip, lz4 or zstd"))
 }
 
 /// Whether the whole numbers of a column have no sign.
@@ -212,9 +196,15 @@ struct Groups {
     header: Vec<String>,
     /// Columns that are read.
     wanted: Vec<usize>,
+    columns: Vec<Column>,
+    cursor: Cursor,
+}
+
+/// How far a table has been read.
+#[derive(Default)]
+struct Cursor {
     /// Number of the next group of rows.
     group: usize,
-    columns: Vec<Column>,
     /// Rows of the current group that have not been read.
     rows_left: usize,
     /// Rows in the cells that were read, which one of them is the current one, and how many came before them.
@@ -226,11 +216,11 @@ struct Groups {
 impl Groups {
     /// Goes to the next group of rows; `false` behind the last.
     fn open_group(&mut self) -> Result<bool, Fault> {
-        if self.group >= self.reader.num_row_groups() {
+        if self.cursor.group >= self.reader.num_row_groups() {
             return Ok(false);
         }
         let schema = self.reader.metadata().file_metadata().schema_descr_ptr();
-        let (group, reader) = (self.group, &self.reader);
+        let (group, reader) = (self.cursor.group, &self.reader);
         let mut columns = Vec::new();
         for &number in &self.wanted {
             let column = guarded(|| reader.get_row_group(group)?.get_column_reader(number))?;
@@ -238,36 +228,36 @@ impl Groups {
             let (present, unsigned) = (descriptor.max_def_level(), is_unsigned(&descriptor));
             columns.push(Column { number, present, unsigned, reader: column, cells: Vec::new() });
         }
-        let rows = self.reader.metadata().row_group(self.group).num_rows();
-        self.rows_left = usize::try_from(rows).map_err(|_| Fault::damaged("a group has less than no rows"))?;
+        let rows = self.reader.metadata().row_group(self.cursor.group).num_rows();
+        self.cursor.rows_left = usize::try_from(rows).map_err(|_| Fault::damaged("a group has less than no rows"))?;
         self.columns = columns;
-        self.group += 1;
+        self.cursor.group += 1;
         Ok(true)
     }
 
     /// Reads some rows; 0 at the end.
     fn fill(&mut self) -> Result<usize, Fault> {
-        while self.rows_left == 0 {
+        while self.cursor.rows_left == 0 {
             if !self.open_group()? {
                 return Ok(0);
             }
         }
-        let count = self.rows_left.min(BATCH).min((BATCH_CELLS / self.wanted.len()).max(1));
+        let count = self.cursor.rows_left.min(BATCH).min((BATCH_CELLS / self.wanted.len()).max(1));
         for column in &mut self.columns {
             column.cells = read_cells(column, &self.header[column.number], count)?;
             if column.cells.len() != count {
                 let what = format!("column `{}` has fewer cells than its group has rows", self.header[column.number]);
-                return Err(Fault::Truncated { what });
+                return Err(Fault::Truncated(what));
             }
         }
-        self.rows_left -= count;
+        self.cursor.rows_left -= count;
         Ok(count)
     }
 
     /// The cell of the current row in a column that is read.
     fn cell(&self, number: usize) -> &Cell {
         let at = self.columns.binary_search_by_key(&number, |column| column.number);
-        at.ok().and_then(|at| self.columns[at].cells.get(self.at)).unwrap_or(&Cell::Empty)
+        at.ok().and_then(|at| self.columns[at].cells.get(self.cursor.at)).unwrap_or(&Cell::Empty)
     }
 }
 
@@ -276,63 +266,59 @@ impl Cells for Groups {
         &self.header
     }
 
-    fn restart(&mut self, columns: &[usize], _all: bool) -> Result<(), FaultAt> {
+    fn restart(&mut self, columns: &[usize], _all: bool) -> Result<(), ReadError> {
         self.wanted = columns.to_vec();
-        (self.group, self.rows_left, self.count, self.at, self.rows_before) = (0, 0, 0, 0, 0);
+        self.cursor = Cursor::default();
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<bool, FaultAt> {
-        self.at += 1;
-        if self.at >= self.count {
-            self.rows_before += self.count as u64;
-            (self.count, self.at) = (0, 0);
-            self.count = self.fill().map_err(|fault| fault.at(Self::place(self.row())))?;
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        self.cursor.at += 1;
+        if self.cursor.at >= self.cursor.count {
+            self.cursor.rows_before += self.cursor.count as u64;
+            (self.cursor.count, self.cursor.at) = (0, 0);
+            self.cursor.count = self.fill().map_err(|fault| fault.at(Self::place(self.row())))?;
         }
-        Ok(self.count > 0)
+        Ok(self.cursor.count > 0)
     }
 
     fn row(&self) -> u64 {
-        self.rows_before + self.at as u64 + 1
+        self.cursor.rows_before + self.cursor.at as u64 + 1
     }
 
     fn place(row: u64) -> Place {
         Place::Row(row)
     }
 
-    fn number(&self, column: usize) -> Result<Option<f64>, Fault> {
-        let name = || self.header[column].clone();
-        match self.cell(column) {
-            Cell::Empty => Ok(None),
-            Cell::Whole(whole) => Ok(Some(*whole as f64)),
-            Cell::Real(number) if number.is_finite() => Ok(Some(*number)),
-            Cell::Real(number) => Err(Fault::NotFinite { column: name(), value: number.to_string() }),
-            Cell::Text(text) => {
-                let value = String::from_utf8_lossy(text.data()).into_owned();
-                Err(Fault::NotANumber { column: name(), value })
-            }
+    fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
+        Ok(match self.cell(column) {
+            Cell::Empty => "".into(),
+            Cell::Whole(whole) => whole.to_string().into(),
+            Cell::Real(number) => number.to_string().into(),
+            Cell::Text(text) => text.as_utf8().map_err(|_| Fault::NotUtf8)?.into(),
+        })
+    }
+
+    fn number(&self, column: usize) -> Option<f64> {
+        match *self.cell(column) {
+            Cell::Whole(whole) => Some(whole as f64),
+            Cell::Real(number) => Some(number),
+            Cell::Empty | Cell::Text(_) => None,
         }
     }
 
-    fn stamp(&mut self, column: usize) -> Result<Option<Stamp>, Fault> {
-        match self.cell(column) {
-            &Cell::Whole(whole) => Ok(Some(i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole))),
-            _ => Ok(self.number(column)?.map(Stamp::Real)),
+    fn stamp(&mut self, column: usize) -> Option<Stamp> {
+        match *self.cell(column) {
+            Cell::Whole(whole) => Some(i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole)),
+            _ => self.number(column).map(Stamp::Real),
         }
     }
 
-    fn vehicle(&self, column: usize, names: &mut Names, before: usize) -> Result<Option<usize>, Fault> {
-        match self.cell(column) {
-            Cell::Empty => Ok(None),
-            Cell::Whole(number) => Ok(Some(names.index(&number.to_string(), before))),
-            Cell::Text(text) => {
-                let name = text.as_utf8().map_err(|_| Fault::NotUtf8)?;
-                Ok(Some(names.index(name, before)))
-            }
-            Cell::Real(_) => {
-                let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
-                Err(Fault::content(problem, "save vehicles as text or as whole numbers"))
-            }
+    fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
+        if let Cell::Real(_) = self.cell(column) {
+            let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
+            return Err(Fault::content(problem, "save vehicles as text or as whole numbers"));
         }
+        self.text(column)
     }
 }

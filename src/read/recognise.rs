@@ -1,89 +1,83 @@
 //! Which format a file is in, going by its content.
 
-use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-use super::error::Fault;
+use super::archive::Archive;
+use super::error::{Fault, ReadError};
 use super::format::Format;
+use super::skybrush::SHOW;
 use super::source::{GZIP_MAGIC, Source};
+use super::stranger;
 
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;
 
-const PARQUET_MAGIC: &[u8] = b"PAR1";
-const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// How files of a format begin, where all of them do. Other archives begin as NPZ does.
+const MAGICS: [(Format, &[u8]); 4] = [
+    (Format::Parquet, b"PAR1"),
+    (Format::Mcap, b"\x89MCAP0\r\n"),
+    (Format::Npz, b"PK\x03\x04"),
+    (Format::Npz, b"PK\x05\x06"),
+];
 
-/// What a file is.
-pub(super) struct Recognised {
-    pub(super) format: Format,
-    /// Whether it is packed by gzip.
-    pub(super) gzip: bool,
-}
-
-/// Recognises a file or folder.
-pub(super) fn recognise(path: &Path, forced: Option<Format>) -> Result<Recognised, Fault> {
-    let data = fs::metadata(path)?;
-    if data.is_dir() {
-        return Ok(Recognised { format: Format::Crazyflie, gzip: false });
-    }
-    if !data.is_file() {
-        let problem = "it is a pipe or a device, and a recording is read more than once";
-        return Err(Fault::content(problem, "save it to a file first, and give the file"));
-    }
-    let mut source = Source { path: path.to_owned(), gzip: false };
-    let mut head = head_of(&source)?;
+/// Recognises a file, and finds out whether it is packed by gzip.
+pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
+    let mut head = head_of(source)?;
     source.gzip = head.starts_with(&GZIP_MAGIC);
     if source.gzip {
-        head = head_of(&source)?;
+        head = head_of(source)?;
     }
     let format = match forced {
-        Some(format) if first_bytes(format).is_some_and(|bytes| !head.starts_with(bytes)) => {
-            let reason = "it does not begin as one does".to_owned();
-            return Err(Fault::WrongFormat { format, reason });
+        Some(format) if MAGICS.iter().any(|(known, _)| *known == format) && by_magic(&head) != Some(format) => {
+            return Err(Fault::WrongFormat(format).into());
         }
         Some(format) => format,
         None => format_of(&head)?,
     };
-    if source.gzip && !matches!(format, Format::Csv | Format::Text) {
-        let problem = format!("it is {} inside gzip", format.title());
-        return Err(Fault::content(problem, "unpack it first, with gunzip"));
+    let (streamed, packed) = (matches!(format, Format::Csv | Format::Text), source.entry.is_some());
+    if (source.gzip || packed) && !streamed && !(packed && format == Format::Crazyflie) {
+        let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
+        let problem = format!("it is {} inside {within}", format.title());
+        return Err(Fault::content(problem, format!("unpack it first, with {remedy}")).into());
     }
-    Ok(Recognised { format, gzip: source.gzip })
+    Ok(format)
+}
+
+/// Whether a file is a zip archive that holds neither NumPy arrays nor a show.
+pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
+    let head = head_of(&Source::file(path))?;
+    Ok(by_magic(&head) == Some(Format::Npz) && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
+}
+
+fn is_recording(entry: &str) -> bool {
+    entry == SHOW || entry.ends_with(".npy")
 }
 
 /// The first bytes, unpacked.
-fn head_of(source: &Source) -> Result<Vec<u8>, Fault> {
+fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
     let mut head = Vec::new();
     source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
-    if head.is_empty() { Err(Fault::Empty) } else { Ok(head) }
+    if head.is_empty() { Err(Fault::Empty.into()) } else { Ok(head) }
 }
 
-/// How every file of a format begins, if they all begin alike.
-fn first_bytes(format: Format) -> Option<&'static [u8]> {
-    match format {
-        Format::Parquet => Some(PARQUET_MAGIC),
-        Format::Mcap => Some(MCAP_MAGIC),
-        Format::Npz => Some(b"PK"),
-        Format::Csv | Format::Text | Format::Crazyflie | Format::Skybrush => None,
-    }
+fn by_magic(head: &[u8]) -> Option<Format> {
+    MAGICS.iter().find(|(_, magic)| head.starts_with(magic)).map(|(format, _)| *format)
 }
 
 fn format_of(head: &[u8]) -> Result<Format, Fault> {
-    if head.starts_with(PARQUET_MAGIC) {
-        return Ok(Format::Parquet);
-    }
-    if head.starts_with(MCAP_MAGIC) {
-        return Ok(Format::Mcap);
-    }
-    if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") {
+    match by_magic(head) {
         // Entries of NPZ archives end in .npy; a show holds show.json.
-        let arrays = memchr::memmem::find(head, b".npy").is_some();
-        return Ok(if arrays { Format::Npz } else { Format::Skybrush });
+        Some(Format::Npz) if memchr::memmem::find(head, b".npy").is_none() => return Ok(Format::Skybrush),
+        Some(format) => return Ok(format),
+        None => {}
     }
     if head.starts_with(b"\x93NUMPY") {
         let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
         return Err(Fault::content("it is a single NumPy array, which tells no times", remedy));
+    }
+    if let Some(stranger) = stranger::of_bytes(head) {
+        return Err(stranger);
     }
     if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
         return Err(Fault::NotUtf8);
@@ -95,16 +89,21 @@ fn format_of(head: &[u8]) -> Result<Format, Fault> {
     if text.starts_with(b"{") {
         return Ok(Format::Skybrush);
     }
+    if let Some(stranger) = stranger::of_text(text) {
+        return Err(stranger);
+    }
     let lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
     let Some(line) = lines.into_iter().find(|line| !line.is_empty() && !line.starts_with(b"#")) else {
         return Ok(Format::Csv);
     };
-    if line.starts_with(b"duration,") {
+    let polynomials = b"duration,";
+    if line.get(..polynomials.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(polynomials)) {
         return Ok(Format::Crazyflie);
     }
     let has = |byte| memchr::memchr(byte, line).is_some();
     let begins_with_a_number = line.split(u8::is_ascii_whitespace).next().is_some_and(is_number);
-    let csv = has(b',') || has(b';') || (has(b'\t') && !begins_with_a_number);
+    let tuples = begins_with_a_number && has(b'(');
+    let csv = (has(b',') && !tuples) || has(b';') || (has(b'\t') && !begins_with_a_number);
     Ok(if csv { Format::Csv } else { Format::Text })
 }
 

@@ -4,30 +4,42 @@
 //! before which it stands at its first point; a drone with a single point stands there throughout. The control points belong to the segment that ends at the point: with n of
 //! them the segment is a Bezier curve of degree n + 1, so without any it is a straight line.
 
-use std::fmt;
 use std::io::Read;
 
 use nalgebra::Vector3;
-use serde::de::{DeserializeOwned, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, IgnoredAny};
 
 use super::archive::Archive;
 use super::curves::{Curves, distinct, piece};
-use super::error::{Fault, FaultAt, Place};
+use super::error::{Fault, Place, ReadError};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
+use super::stranger;
 use crate::track::{Item, Piece, Sample};
 
 /// Highest degree of a Bezier segment that is read.
 const HIGHEST_DEGREE: usize = 15;
 
 /// The entry of an archive that holds the show.
-const SHOW: &str = "show.json";
+pub(super) const SHOW: &str = "show.json";
 
 #[derive(Deserialize)]
 struct Show {
     swarm: Option<Swarm>,
+    settings: Option<ShowSettings>,
+}
+
+#[derive(Deserialize)]
+struct ShowSettings {
+    validation: Option<Validation>,
+}
+
+#[derive(Deserialize)]
+struct Validation {
+    #[serde(rename = "minDistance")]
+    least_distance: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -60,47 +72,21 @@ struct Trajectory {
     takeoff_s: f64,
 }
 
-/// `[t, [x, y, z], [control points]]`, the last of which may be left out.
-struct Point {
-    time_s: f64,
-    position: Vector3<f64>,
-    controls: Vec<Vector3<f64>>,
-}
+/// Time \[s\], position and control points, the last of which may be left out, and what is not read.
+#[derive(Deserialize)]
+#[serde(expecting = "a keyed point [t, [x, y, z], [control points]]")]
+struct Point(f64, [f64; 3], #[serde(default)] Vec<[f64; 3]>, #[serde(default)] IgnoredAny);
 
-impl<'de> Deserialize<'de> for Point {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Parts;
-        impl<'de> Visitor<'de> for Parts {
-            type Value = Point;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a keyed point [t, [x, y, z], [control points]]")
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut parts: A) -> Result<Point, A::Error> {
-                use serde::de::Error as _;
-                let time_s = parts.next_element()?.ok_or_else(|| A::Error::invalid_length(0, &self))?;
-                let position: [f64; 3] = parts.next_element()?.ok_or_else(|| A::Error::invalid_length(1, &self))?;
-                let controls: Vec<[f64; 3]> = parts.next_element()?.unwrap_or_default();
-                while parts.next_element::<serde::de::IgnoredAny>()?.is_some() {}
-                let controls = controls.into_iter().map(Vector3::from).collect();
-                Ok(Point { time_s, position: position.into(), controls })
-            }
-        }
-        deserializer.deserialize_seq(Parts)
-    }
-}
-
-/// Opens a show.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+/// The show of a file, and the archive of its parts.
+fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     let mut head = [0; 2];
     let is_archive = source.bytes()?.read(&mut head).is_ok_and(|bytes| bytes == 2 && head == *b"PK");
     let mut archive = is_archive.then(|| Archive::open(&source.path)).transpose()?;
-    let show: Show = match &mut archive {
+    let show = match &mut archive {
         Some(archive) if archive.holds(SHOW) => parse(&archive.whole(SHOW)?, Some(SHOW))?,
         Some(_) => {
-            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays");
-            return Err(Fault::content(problem, "give a .skyc or .npz file").into());
+            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays nor tables");
+            return Err(Fault::content(problem, "give a .skyc or .npz file, or pack a table for each vehicle").into());
         }
         None => {
             let mut bytes = Vec::new();
@@ -108,9 +94,24 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             parse(&bytes, None)?
         }
     };
+    Ok((show, archive))
+}
+
+/// How close drones may come, as the show itself says \[units of length\].
+pub(super) fn least_distance(source: &Source) -> Result<Option<f64>, ReadError> {
+    let settings = show(source)?.0.settings;
+    Ok(settings.and_then(|settings| settings.validation?.least_distance))
+}
+
+/// Opens a show.
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let (show, mut archive) = show(source)?;
+    let Some(swarm) = show.swarm else {
+        return Err(Fault::content("it is JSON, but no Skybrush show: it has no `swarm`", stranger::TABLE).into());
+    };
     let mut names = Vec::new();
     let mut curves = Vec::new();
-    for (index, drone) in show.swarm.map_or_else(Vec::new, |swarm| swarm.drones).into_iter().enumerate() {
+    for (index, drone) in swarm.drones.into_iter().enumerate() {
         let mut settings = drone.settings.unwrap_or_default();
         if let Some(elsewhere) = &settings.elsewhere {
             settings = referenced(archive.as_mut(), elsewhere)?;
@@ -150,7 +151,7 @@ fn stand_throughout(curves: &mut [Vec<Item>]) {
 }
 
 /// The document behind `$ref`.
-fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &str) -> Result<T, FaultAt> {
+fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &str) -> Result<T, ReadError> {
     let name = reference.split('#').next().unwrap_or_default();
     let name = name.trim_start_matches("./");
     let Some(archive) = archive.filter(|archive| archive.holds(name)) else {
@@ -160,13 +161,13 @@ fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &st
     parse(&archive.whole(name)?, Some(name))
 }
 
-fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, FaultAt> {
+fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, ReadError> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     serde_json::from_slice(text).map_err(|error| {
         let line = u64::try_from(error.line()).unwrap_or(0);
         let place = entry.map_or(Place::Line(line), |entry| Place::Part(format!("entry `{entry}`, line {line}")));
         let fault = if error.is_eof() {
-            Fault::Truncated { what: "the JSON ends before it is complete".to_owned() }
+            Fault::Truncated("the JSON ends before it is complete".to_owned())
         } else {
             let remedy = "give a show as Skybrush exports it";
             Fault::content(format!("it is not the JSON of a Skybrush show: {error}"), remedy)
@@ -181,41 +182,43 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
         let problem = format!("the trajectory is of version {version}");
         return Err((None, Fault::content(problem, "export the show with trajectories of version 1")));
     }
-    let Some(first) = trajectory.points.first() else { return Ok(Vec::new()) };
-    let begin_s = trajectory.takeoff_s + first.time_s;
-    let range =
-        |at| (at, Fault::content("its numbers leave the range of numbers", "look at --scale and at the numbers"));
+    let Some(Point(first_s, first, ..)) = &trajectory.points.first() else { return Ok(Vec::new()) };
+    let (begin_s, first) = (trajectory.takeoff_s + first_s, Vector3::from(*first));
     if trajectory.points.len() == 1 {
-        let (time_s, position_m) = (begin_s.min(0.0), first.position * scale);
+        let (time_s, position_m) = (begin_s.min(0.0), first * scale);
         return Ok(vec![Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })]);
     }
     let mut items = Vec::new();
     if begin_s > 0.0 {
-        let standing = piece(vehicle, 0.0, begin_s, [first.position], scale).ok_or_else(|| range(Some(0)))?;
-        items.push(Item::Piece(standing));
+        let standing = piece(vehicle, 0.0, begin_s, [first], scale);
+        items.push(Item::Piece(standing.ok_or_else(|| (Some(0), Fault::out_of_range()))?));
     }
     for (index, pair) in trajectory.points.windows(2).enumerate() {
-        let [before, point] = pair else { continue };
-        let (from_s, to_s) = (trajectory.takeoff_s + before.time_s, trajectory.takeoff_s + point.time_s);
-        if to_s == from_s {
-            let problem = format!("two points are at the same time, {to_s} s");
-            return Err((Some(index + 1), Fault::content(problem, "a drone is in one place at a time: take one out")));
-        }
-        if to_s < from_s {
-            return Err((Some(index + 1), Fault::TimeBackwards { time_s: to_s, before_s: from_s }));
-        }
-        let degree = point.controls.len() + 1;
-        if degree > HIGHEST_DEGREE {
-            let problem = format!("the segment is of degree {degree}");
-            return Err((Some(index + 1), Fault::content(problem, format!("degrees up to {HIGHEST_DEGREE} are read"))));
-        }
-        let mut points = vec![before.position];
-        points.extend(&point.controls);
-        points.push(point.position);
-        let piece = piece(vehicle, from_s, to_s, powers(&points, to_s - from_s), scale);
-        items.push(Item::Piece(piece.ok_or_else(|| range(Some(index + 1)))?));
+        let span = [&pair[0], &pair[1]].map(|point| trajectory.takeoff_s + point.0);
+        let segment = segment(&pair[0], &pair[1], span).and_then(|coefficients| {
+            piece(vehicle, span[0], span[1], coefficients, scale).ok_or_else(Fault::out_of_range)
+        });
+        items.push(Item::Piece(segment.map_err(|fault| (Some(index + 1), fault))?));
     }
     Ok(items)
+}
+
+/// The coefficients of a segment between two points at these times.
+fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Vec<Vector3<f64>>, Fault> {
+    if to_s == from_s {
+        let problem = format!("two points are at the same time, {to_s} s");
+        return Err(Fault::content(problem, "a drone is in one place at a time: take one out"));
+    }
+    if to_s < from_s {
+        return Err(Fault::time_backwards(to_s, from_s));
+    }
+    let degree = point.2.len() + 1;
+    if degree > HIGHEST_DEGREE {
+        let problem = format!("the segment is of degree {degree}");
+        return Err(Fault::content(problem, format!("degrees up to {HIGHEST_DEGREE} are read")));
+    }
+    let points = std::iter::once(&before.1).chain(&point.2).chain([&point.1]);
+    Ok(powers(&points.map(|&point| point.into()).collect::<Vec<_>>(), to_s - from_s))
 }
 
 /// The Bezier curve of these points over a duration as coefficients of the powers of time.

@@ -1,10 +1,12 @@
 //! Tables row by row, whatever their cells are written as.
 
+use std::borrow::Cow;
+
 use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit};
-use super::error::{Fault, FaultAt, Place};
-use super::layout::{Body, Layout, Shape};
+use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::layout::{Body, Layout};
 use super::names::Names;
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
@@ -17,10 +19,10 @@ pub(super) trait Cells {
 
     /// Goes before the first row. Of each row these columns are asked, in rising order; where not `all` that a table
     /// needs are among them, no more is looked at.
-    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), FaultAt>;
+    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), ReadError>;
 
     /// Goes to the next row; `false` behind the last one.
-    fn advance(&mut self) -> Result<bool, FaultAt>;
+    fn advance(&mut self) -> Result<bool, ReadError>;
 
     /// Number of the current row.
     fn row(&self) -> u64;
@@ -28,18 +30,52 @@ pub(super) trait Cells {
     /// Where a row of this number is.
     fn place(row: u64) -> Place;
 
-    /// A finite number; none where the cell is empty.
-    fn number(&self, column: usize) -> Result<Option<f64>, Fault>;
+    /// A cell as it is written; nothing where it is empty.
+    fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault>;
 
-    /// A finite time; none where the cell is empty.
-    fn stamp(&mut self, column: usize) -> Result<Option<Stamp>, Fault>;
+    /// The number in a cell that plainly holds one.
+    fn number(&self, column: usize) -> Option<f64>;
 
-    /// The vehicle of this name, looked for first after the one `before`; none where the cell is empty.
-    fn vehicle(&self, column: usize, names: &mut Names, before: usize) -> Result<Option<usize>, Fault>;
+    /// The time in a cell that plainly holds one.
+    fn stamp(&mut self, column: usize) -> Option<Stamp>;
+
+    /// A cell as the name of a vehicle; nothing where it is empty.
+    fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
+        self.text(column)
+    }
 }
 
 fn empty(cells: &impl Cells, column: usize) -> Fault {
-    Fault::EmptyCell { column: cells.header()[column].clone() }
+    Fault::empty_cell(&cells.header()[column])
+}
+
+/// The finite number in a cell; none where it is empty.
+#[inline]
+pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, Fault> {
+    match cells.number(column) {
+        Some(number) if number.is_finite() => Ok(Some(number)),
+        _ => odd_number(cells, column, UNSEEN),
+    }
+}
+
+/// The number in a cell that does not plainly hold a finite one; `unseen` helps where it is not finite.
+#[cold]
+fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Result<Option<f64>, Fault> {
+    let (text, column) = (cells.text(column)?, &cells.header()[column]);
+    let text = text.trim();
+    let holds = |what: &str, remedy| {
+        let problem = format!("column `{column}` holds {}, {what}", quoted(text));
+        Err(Fault::content(problem, remedy))
+    };
+    match text.parse::<f64>() {
+        _ if text.is_empty() => Ok(None),
+        Ok(number) if number.is_finite() => Ok(Some(number)),
+        Ok(_) => Err(Fault::not_finite(column, text, unseen)),
+        Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+            holds("a number with a decimal comma", "write numbers with a decimal point")
+        }
+        Err(_) => holds("which is not a number", "write a number with a decimal point"),
+    }
 }
 
 /// A table, long or wide.
@@ -49,6 +85,8 @@ struct Table<C> {
     names: Names,
     /// Vehicle of the last row.
     vehicle: usize,
+    /// Rows before the current one.
+    count: i64,
 }
 
 /// Opens a table of these cells; `unit` is that of its times where the format says it.
@@ -59,32 +97,39 @@ pub(super) fn open<C: Cells + 'static>(
     unit: Option<TimeUnit>,
     epoch_ns: i64,
     options: &ReadOptions,
-) -> Result<Recording, FaultAt> {
-    let about = About::new(source, options, unit.or(layout.unit), layout.notes(), Fault::HeaderOnly);
-    let names = match &layout.shape {
-        Shape::Long { .. } => Names::default(),
-        Shape::Wide { names, .. } => Names::from_list(names.clone()),
-    };
+) -> Result<Recording, ReadError> {
+    let about = About::new(source, options, unit.or(layout.unit), layout.notes.clone(), Fault::header_only());
+    let names = Names::from_list(layout.names.clone());
     cells.restart(&layout.columns(), true)?;
-    let table = Table { cells, layout, names, vehicle: 0 };
+    let table = Table { cells, layout, names, vehicle: 0, count: 0 };
     Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
 }
 
 impl<C: Cells> Table<C> {
-    fn at_row(&self, fault: Fault) -> FaultAt {
+    fn at_row(&self, fault: Fault) -> ReadError {
         fault.at(C::place(self.cells.row()))
     }
 
     #[inline]
     fn stamp(&mut self) -> Result<Stamp, Fault> {
-        let stamp = self.cells.stamp(self.layout.time).map_err(Fault::of_time)?;
-        stamp.ok_or_else(|| empty(&self.cells, self.layout.time))
+        let Some(column) = self.layout.time else {
+            return Ok(Stamp::Whole(self.count));
+        };
+        if let Some(stamp) = self.cells.stamp(column).filter(|stamp| stamp.approximately().is_finite()) {
+            return Ok(stamp);
+        }
+        let number = odd_number(&self.cells, column, "take the row out: each needs a time")?;
+        number.map(Stamp::Real).ok_or_else(|| empty(&self.cells, column))
     }
 
     #[inline]
     fn vehicle(&mut self, id: usize) -> Result<usize, Fault> {
-        let vehicle = self.cells.vehicle(id, &mut self.names, self.vehicle)?;
-        self.vehicle = vehicle.ok_or_else(|| empty(&self.cells, id))?;
+        let name = self.cells.name(id)?;
+        let name = name.trim();
+        if name.is_empty() {
+            return Err(empty(&self.cells, id));
+        }
+        self.vehicle = self.names.index(name, self.vehicle);
         Ok(self.vehicle)
     }
 
@@ -92,27 +137,24 @@ impl<C: Cells> Table<C> {
     #[inline]
     fn append(&mut self, rows: &mut Vec<Row>) -> Result<(), Fault> {
         let stamp = self.stamp()?;
-        if let Shape::Long { id, .. } = self.layout.shape {
-            self.vehicle(id)?;
+        let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
+        for (place, body) in self.layout.bodies.iter().enumerate() {
+            rows.extend(row(&self.cells, stamp, first + place, body, &self.layout.metres)?);
         }
-        match &self.layout.shape {
-            Shape::Long { body, .. } => rows.extend(row(&self.cells, stamp, self.vehicle, body)?),
-            Shape::Wide { bodies, .. } => {
-                for (vehicle, body) in bodies.iter().enumerate() {
-                    rows.extend(row(&self.cells, stamp, vehicle, body)?);
-                }
-            }
-        }
+        self.count += 1;
         Ok(())
     }
 }
 
 /// The row of a vehicle; none where it was not seen.
 #[inline]
-fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body) -> Result<Option<Row>, Fault> {
-    let Some(position) = vector(cells, &body.position)? else { return Ok(None) };
-    let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns)).transpose()?.flatten();
-    let radius = body.radius.map(|column| cells.number(column)).transpose()?.flatten();
+fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[f64]) -> Result<Option<Row>, Fault> {
+    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(None) };
+    let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns, metres)).transpose()?.flatten();
+    let radius = match body.radius {
+        Some(column) => number(cells, column)?.map(|radius| radius * metres[column]),
+        None => None,
+    };
     if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
         return Err(Fault::content(problem, "write 0 or more"));
@@ -122,13 +164,13 @@ fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body) -> Result<
 
 /// Three numbers, none where all cells are empty.
 #[inline]
-fn vector(cells: &impl Cells, columns: &[Option<usize>; 3]) -> Result<Option<Vector3<f64>>, Fault> {
+fn vector(cells: &impl Cells, columns: &[Option<usize>; 3], metres: &[f64]) -> Result<Option<Vector3<f64>>, Fault> {
     let mut vector = Vector3::zeros();
     let (mut filled, mut missing) = (false, None);
     for (axis, column) in columns.iter().enumerate() {
         let Some(column) = *column else { continue };
-        match cells.number(column)? {
-            Some(number) => (vector[axis], filled) = (number, true),
+        match number(cells, column)? {
+            Some(x) => (vector[axis], filled) = (x * metres[column], true),
             None => missing = missing.or(Some(column)),
         }
     }
@@ -140,7 +182,7 @@ fn vector(cells: &impl Cells, columns: &[Option<usize>; 3]) -> Result<Option<Vec
 }
 
 impl<C: Cells> Rows for Table<C> {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
         while rows.len() < before + BATCH && self.cells.advance()? {
             self.append(rows).map_err(|fault| self.at_row(fault))?;
@@ -148,7 +190,8 @@ impl<C: Cells> Rows for Table<C> {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), FaultAt> {
+    fn rewind(&mut self) -> Result<(), ReadError> {
+        self.count = 0;
         self.cells.restart(&self.layout.columns(), true)
     }
 
@@ -165,13 +208,13 @@ impl<C: Cells> Rows for Table<C> {
     }
 
     fn is_wide(&self) -> bool {
-        matches!(self.layout.shape, Shape::Wide { .. })
+        self.layout.id.is_none()
     }
 
     /// Only times and names are looked at, which is several times faster than reading everything.
-    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
-        let Shape::Long { id, .. } = self.layout.shape else { return Ok(None) };
-        let mut columns = [self.layout.time, id];
+    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+        let Some(id) = self.layout.id else { return Ok(None) };
+        let mut columns: Vec<usize> = self.layout.time.into_iter().chain([id]).collect();
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
         let mut probe: Option<Probe> = None;

@@ -65,7 +65,7 @@ impl Item {
 /// How a recording counts time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Clock {
-    /// The unit that the recording writes: `s`, `ms`, `us` or `ns`.
+    /// The unit that the recording writes: `s`, `ms`, `us` or `ns`; `given` where the user says how long one lasts.
     pub unit: &'static str,
     /// Whether the unit was inferred from the numbers and not given by the format or by the user.
     pub inferred: bool,

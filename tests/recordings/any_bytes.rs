@@ -31,7 +31,8 @@ fn cases() -> u32 {
 const CSV: &str =
     "t,id,x,y,z,vx,vy,vz,radius\n0,1,1,2,3,0,0,0,0.1\n0,\"2\",-1.5,0.25,1e-3,,,,\n0.5,1,1.5,2,3,1,1,1,0.1\n";
 const WIDE: &str = "t,x1,y1,z1,x2,y2,z2\n0,1,2,3,-1.5,.25,1e-3\n.5,1.5,2,3,,,\n";
-const TEXT: &str = "# text\n0 1 2 3 -1.5 .25 1e-3\n.5   1.5\t2 3 -1 .25 2e-3\n";
+const TEXT: &str = "# t x1 y1 z1 x2 y2 z2\n0 1 2 3 -1.5 .25 1e-3\n.5   1.5\t2 3 -1 .25 2e-3\n";
+const TUPLES: &str = "0 (1,2) (-1.5,.25)\n.5 (1.5, 2) (-1,.25)\n";
 const POLYNOMIAL: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1,\n1,0,1,0,0,1,0,\n0.5,1,1,0,0,1,0,\n";
 const SHOW: &str = r#"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
     "takeoffTime": 2, "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], [[0, 0, 0]]]]}}},
@@ -60,6 +61,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("long", CSV.into()),
         ("wide", WIDE.into()),
         ("text", TEXT.into()),
+        ("tuples", TUPLES.into()),
         ("polynomial", POLYNOMIAL.into()),
         ("show", SHOW.into()),
         ("gzip", gzip.finish().expect("finished")),

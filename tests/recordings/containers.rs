@@ -90,6 +90,22 @@ fn poses_with_a_topic_each_and_transforms_are_called_by_topic_and_frame() {
     assert_eq!(found.samples(), [(5e-9, "cf1", [1.0, 2.0, 3.0]), (5e-9, "cf2", [1.0, 2.0, 3.0])]);
 }
 
+#[test]
+fn frames_that_stand_still_are_no_vehicles() {
+    let kind = "tf2_msgs/msg/TFMessage";
+    let transform = |parent: &'static str, child: &'static str, x: f64| {
+        cdr(&(vec![(((SEC, 5), parent), child, ([x, 2.0, 3.0], NO_TURN))],), true)
+    };
+    let fixed = ("/tf_static", kind, "cdr", 1, transform("cf1", "camera", 0.1));
+    let found = whole("tf.mcap", &mcap_of(&[fixed.clone(), ("/tf", kind, "cdr", 2, transform("map", "cf1", 1.0))]));
+    assert_eq!(found.samples(), [(5e-9, "cf1", [1.0, 2.0, 3.0])]);
+    assert!(found.notes.iter().any(|note| note.ends_with("no vehicles: camera")), "{:?}", found.notes);
+    // On a topic of another name the same message is a vehicle in another frame.
+    let moving = ("/other", kind, "cdr", 1, fixed.4);
+    let both = mcap_of(&[moving, ("/tf", kind, "cdr", 2, transform("map", "cf1", 1.0))]);
+    assert!(read_bytes("tf.mcap", &both, &ReadOptions::default()).is_err());
+}
+
 /// The parts of Foxglove's messages that the reader does not need are written too.
 mod foxglove {
     #[derive(Clone, PartialEq, prost::Message)]

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use tautline::read::{ReadOptions, TimeUnit};
+use tautline::read::{Dimensions, ReadOptions, TimeUnit};
 use tautline::track::Item;
 use tempfile::TempDir;
 
@@ -61,7 +61,8 @@ fn tables_of_every_shape_say_the_same() {
         ("quoted.csv", LONG.replace(",1,", ",\"1\",").replace("t,id", "\"t\",\"id\"")),
         ("header.txt", "t x1 y1 z1 x2 y2 z2\n0 1 2 3 -1.5 .25 1e-3\n.5 1.5 2 3 -1 .25 2e-3\n".to_owned()),
     ] {
-        let whole = read(name, content);
+        let dimensions = (name == "text.txt").then_some(Dimensions::Space);
+        let whole = read_with(name, content, &ReadOptions { dimensions, ..ReadOptions::default() });
         assert_eq!(whole.samples(), TRUTH, "{name}");
         assert_eq!(whole.vehicles, ["1", "2"], "{name}");
     }

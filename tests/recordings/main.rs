@@ -4,9 +4,11 @@
 mod recording;
 
 mod any_bytes;
+mod columns;
 mod containers;
 mod exports;
 mod formats;
 mod own;
 mod parquet;
 mod refusals;
+mod vehicles;

@@ -5,7 +5,7 @@ use std::io::{Cursor, Write as _};
 use std::path::PathBuf;
 
 use tautline::export::{self, ExportOptions};
-use tautline::read::{self, AxisOrder, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
+use tautline::read::{self, AxisOrder, Dimensions, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -78,7 +78,8 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         ("t,x1,y1,z1\r\n\r\n".into(), None, "a header and no rows", "record again"),
         ("\n\n".into(), None, "it is empty", "record again"),
         ("0 1 2 3\n0.5 1 2\n".into(), line(2), "3 fields where 4", "a field for each column"),
-        ("0 1 2 3 4\n".into(), line(1), "5 numbers where time and three", "t x y z x y z"),
+        ("0 1 2 3 4\n".into(), line(1), "5 numbers, and nothing says how many", "--dimensions 2 or 2+2"),
+        ("0 1 2 3 4 5 6 7\n".into(), line(1), "8 numbers where time and three", "t x y z x y z"),
         ("0 1 2 3\n1 1 2 3\n0.5 1 2 3\n".into(), line(3), "time runs backwards", "sort the lines"),
         ("t,id,x,y,z,radius\n0,1,1,2,3,-1\n".into(), line(2), "a negative radius", "0 or more"),
         (
@@ -130,7 +131,8 @@ fn a_line_of_ten_megabytes_is_refused_and_one_below_the_limit_is_not() {
     let vehicles = 30_000;
     let wide: String = std::iter::once("0".to_owned()).chain((0..vehicles).map(|k| format!(" {k} 2 3"))).collect();
     let (_folder, path) = written("wide.txt", wide.as_bytes());
-    assert_eq!(Whole::read(&path, &ReadOptions::default()).expect("read").items.len(), vehicles);
+    let options = ReadOptions { dimensions: Some(Dimensions::Space), ..ReadOptions::default() };
+    assert_eq!(Whole::read(&path, &options).expect("read").items.len(), vehicles);
 }
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {

@@ -269,7 +269,7 @@ fn a_folder_is_said_to_have_been_taken_for_polynomials() {
         let Ran { exit, err, .. } = ran(folder.path(), &[command, "some"]);
         assert_eq!(exit, WRONG_INPUT, "{err}");
         let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-        assert!(text.contains("the folder was taken for one of Crazyflie polynomials"), "{text}");
+        assert!(text.contains("the folder was taken for one recording"), "{text}");
     }
 }
 

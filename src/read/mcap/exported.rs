@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::super::clock::{Stamp, TimeUnit};
-use super::super::error::{Fault, FaultAt, Place};
+use super::super::error::{Fault, Place, ReadError};
 use super::super::names::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
@@ -45,7 +45,7 @@ pub(crate) struct Instant {
     pub(crate) radii_m: Vec<f64>,
 }
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let topics = TopicReader::open(&source.path)?;
     let notes = options.accept_unfinished(topics.is_complete())?;
     let instants = Instants { names: Names::default(), epoch_ns: 0, count: 0 };
@@ -116,12 +116,12 @@ fn take(instant: &Instant, vehicles: usize, number: u64, rows: &mut Vec<Row>) ->
 }
 
 impl Rows for Exported {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             match self.topics.next()? {
                 Some(Part::Message(message)) => {
-                    let damaged = |reason| Fault::Damaged { reason }.at(Place::Byte(message.offset));
+                    let damaged = |reason| Fault::Damaged(reason).at(Place::Byte(message.offset));
                     self.instants.take(&message, rows).map_err(damaged)?;
                 }
                 Some(_) => {}
@@ -131,7 +131,7 @@ impl Rows for Exported {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), FaultAt> {
+    fn rewind(&mut self) -> Result<(), ReadError> {
         self.topics = TopicReader::open(&self.path)?;
         (self.instants.names, self.instants.count) = (Names::default(), 0);
         Ok(())

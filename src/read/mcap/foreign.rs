@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::super::clock::{Probe, Stamp, TimeUnit};
-use super::super::error::{Fault, FaultAt, Place, quoted};
+use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted};
 use super::super::names::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows, survey};
@@ -12,7 +12,7 @@ use super::super::source::Source;
 use super::messages::{self, Seen, Who};
 use crate::record::mcap::topic::{CDR, Declared, Message, Part, TopicReader};
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let topics = TopicReader::open(&source.path)?;
     let notes = options.accept_unfinished(topics.is_complete())?;
     let poses = Poses {
@@ -23,6 +23,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         names: Names::default(),
         vehicle: 0,
         messages: 0,
+        fixed: BTreeSet::new(),
         listed: true,
     };
     let none = match &options.frame {
@@ -58,6 +59,8 @@ struct Poses {
     /// Vehicle of the last row.
     vehicle: usize,
     messages: u64,
+    /// Frames that never move, out of `/tf_static`.
+    fixed: BTreeSet<String>,
     /// Whether all topics hold lists of poses.
     listed: bool,
 }
@@ -69,7 +72,7 @@ fn reader_of(topic: &Declared) -> Option<messages::Reader> {
 
 impl Poses {
     /// Appends the rows of a message.
-    fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), FaultAt> {
+    fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), ReadError> {
         let Declared { topic, encoding, .. } = message.of;
         let Some(reader) = reader_of(message.of) else { return Ok(()) };
         self.messages += 1;
@@ -84,12 +87,19 @@ impl Poses {
         rows: &mut Vec<Row>,
     ) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        for seen in seen.map_err(|reason| Fault::Damaged { reason })? {
+        let is_static = topic.rsplit('/').next() == Some("tf_static");
+        for seen in seen.map_err(Fault::Damaged)? {
+            if let Who::Named(name) = &seen.who
+                && is_static
+            {
+                self.fixed.insert(name.clone());
+                continue;
+            }
             if !self.is_in_frame(&seen.frame, topic)? {
                 continue;
             }
             if let Some(odd) = seen.position.iter().find(|x| !x.is_finite()) {
-                return Err(Fault::NotFinite { column: "position".to_owned(), value: odd.to_string() });
+                return Err(Fault::not_finite("position", &odd.to_string(), UNSEEN));
             }
             let name = match seen.who {
                 Who::Topic => topic.clone(),
@@ -140,7 +150,7 @@ impl Poses {
 }
 
 impl Rows for Foreign {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             match self.topics.next()? {
@@ -156,7 +166,7 @@ impl Rows for Foreign {
         Ok(rows.len() > before)
     }
 
-    fn rewind(&mut self) -> Result<(), FaultAt> {
+    fn rewind(&mut self) -> Result<(), ReadError> {
         self.topics = TopicReader::open(&self.path)?;
         self.poses.messages = 0;
         Ok(())
@@ -185,6 +195,12 @@ impl Rows for Foreign {
         }
     }
 
+    fn notes(&self) -> Vec<String> {
+        let fixed: Vec<_> = self.poses.fixed.iter().map(String::as_str).collect();
+        let note = || format!("frames of tf_static stand still and are no vehicles: {}", fixed.join(", "));
+        if fixed.is_empty() { Vec::new() } else { vec![note()] }
+    }
+
     fn place(&self, number: u64) -> Place {
         Place::Part(format!("message {number} with positions"))
     }
@@ -194,7 +210,7 @@ impl Rows for Foreign {
     }
 
     /// Whether a channel says its times is known when all of it has been read.
-    fn survey(&mut self) -> Result<Option<Probe>, FaultAt> {
+    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let probe = survey(self)?;
         if self.poses.stamped.is_disjoint(&self.poses.logged) {
             return Ok(probe);

@@ -1,6 +1,6 @@
 //! Messages of others that hold positions: Foxglove in protobuf and JSON, ROS 2 in CDR.
 
-use nalgebra::{Vector3, vector};
+use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -11,17 +11,38 @@ pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, S
 
 /// What reads the messages of a schema, where they hold positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {
-    Some(match schema {
-        "foxglove.PoseInFrame" => foxglove::<PoseInFrame>,
-        "foxglove.PosesInFrame" => foxglove::<PosesInFrame>,
-        "foxglove.FrameTransform" => foxglove::<FrameTransform>,
-        "foxglove.FrameTransforms" => foxglove::<FrameTransforms>,
-        "geometry_msgs/msg/PoseStamped" => ros::<PoseStamped>,
-        "geometry_msgs/msg/PoseArray" => ros::<PoseArray>,
-        "geometry_msgs/msg/TransformStamped" => ros::<TransformStamped>,
-        "tf2_msgs/msg/TFMessage" => ros::<TfMessage>,
+    let reader: Reader = match schema {
+        "foxglove.PoseInFrame" => {
+            |encoding, bytes| foxglove(encoding, bytes).map(|pose: PoseInFrame| vec![pose.seen()])
+        }
+        "foxglove.PosesInFrame" => |encoding, bytes| foxglove(encoding, bytes).map(PosesInFrame::seen),
+        "foxglove.FrameTransform" => {
+            |encoding, bytes| foxglove(encoding, bytes).map(|transform: FrameTransform| vec![transform.seen()])
+        }
+        "foxglove.FrameTransforms" => |encoding, bytes| {
+            let transforms = foxglove(encoding, bytes).map(|message: FrameTransforms| message.transforms);
+            Ok(transforms?.into_iter().map(FrameTransform::seen).collect())
+        },
+        "geometry_msgs/msg/PoseStamped" => |encoding, bytes| {
+            let (header, pose): (RosHeader, RosPose) = ros(encoding, bytes)?;
+            Ok(vec![ros_seen(Who::Topic, &header, &pose)])
+        },
+        "geometry_msgs/msg/PoseArray" => |encoding, bytes| {
+            let (header, poses): (RosHeader, Vec<RosPose>) = ros(encoding, bytes)?;
+            Ok((1..).zip(&poses).map(|(number, pose)| ros_seen(Who::Listed(number), &header, pose)).collect())
+        },
+        "geometry_msgs/msg/TransformStamped" => |encoding, bytes| {
+            let (header, child, transform): RosTransform = ros(encoding, bytes)?;
+            Ok(vec![ros_seen(Who::Named(child), &header, &transform)])
+        },
+        "tf2_msgs/msg/TFMessage" => |encoding, bytes| {
+            let (transforms,): (Vec<RosTransform>,) = ros(encoding, bytes)?;
+            let seen = |(header, child, transform)| ros_seen(Who::Named(child), &header, &transform);
+            Ok(transforms.into_iter().map(seen).collect())
+        },
         _ => return None,
-    })
+    };
+    Some(reader)
 }
 
 /// A position as a message says it.
@@ -44,28 +65,23 @@ pub(super) enum Who {
     Named(String),
 }
 
-/// A message with positions.
-trait Positions {
-    fn seen(self) -> Vec<Seen>;
-}
-
-fn foxglove<T: prost::Message + Default + DeserializeOwned + Positions>(
-    encoding: &str,
-    bytes: &[u8],
-) -> Result<Vec<Seen>, String> {
-    let message = match encoding {
+fn foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
+    match encoding {
         "protobuf" => T::decode(bytes).map_err(|error| error.to_string()),
         "json" => serde_json::from_slice(bytes).map_err(|error| error.to_string()),
         _ => Err("Foxglove messages are read in protobuf and JSON, not in CDR".to_owned()),
-    };
-    message.map(T::seen)
+    }
 }
 
-fn ros<T: DeserializeOwned + Positions>(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String> {
-    if encoding == CDR { decode(bytes).map(T::seen) } else { Err("ROS 2 messages are read in CDR alone".to_owned()) }
+fn ros<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
+    if encoding == CDR { decode(bytes) } else { Err("ROS 2 messages are read in CDR alone".to_owned()) }
 }
 
-#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
+    seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds)
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message, Deserialize)]
 #[serde(default)]
 struct Timestamp {
     #[prost(int64, tag = "1")]
@@ -76,17 +92,7 @@ struct Timestamp {
     nanos: i32,
 }
 
-impl Timestamp {
-    fn ns(stamp: Option<&Self>) -> i64 {
-        stamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()))
-    }
-}
-
-fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
-    seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds)
-}
-
-#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[derive(Clone, Copy, PartialEq, prost::Message, Deserialize)]
 #[serde(default)]
 struct Vec3 {
     #[prost(double, tag = "1")]
@@ -97,15 +103,18 @@ struct Vec3 {
     z: f64,
 }
 
-#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[derive(Clone, Copy, PartialEq, prost::Message, Deserialize)]
 #[serde(default)]
 struct Pose {
     #[prost(message, optional, tag = "1")]
     position: Option<Vec3>,
 }
 
-fn point(point: Option<&Vec3>) -> Vector3<f64> {
-    point.map_or_else(Vector3::zeros, |point| vector![point.x, point.y, point.z])
+/// What a Foxglove message does not say is 0.
+fn foxglove_seen(who: Who, frame: String, timestamp: Option<Timestamp>, position: Option<Vec3>) -> Seen {
+    let stamp_ns = timestamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()));
+    let position = position.map_or_else(Vector3::zeros, |point| Vector3::new(point.x, point.y, point.z));
+    Seen { who, frame, stamp_ns, position }
 }
 
 #[derive(Clone, PartialEq, prost::Message, Deserialize)]
@@ -119,11 +128,9 @@ struct PoseInFrame {
     pose: Option<Pose>,
 }
 
-impl Positions for PoseInFrame {
-    fn seen(self) -> Vec<Seen> {
-        let position = point(self.pose.as_ref().and_then(|pose| pose.position.as_ref()));
-        let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
-        vec![Seen { who: Who::Topic, frame: self.frame_id, stamp_ns, position }]
+impl PoseInFrame {
+    fn seen(self) -> Seen {
+        foxglove_seen(Who::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
     }
 }
 
@@ -138,16 +145,12 @@ struct PosesInFrame {
     poses: Vec<Pose>,
 }
 
-impl Positions for PosesInFrame {
+impl PosesInFrame {
     fn seen(self) -> Vec<Seen> {
-        let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
-        let seen = |(k, pose): (usize, &Pose)| Seen {
-            who: Who::Listed(k + 1),
-            frame: self.frame_id.clone(),
-            stamp_ns,
-            position: point(pose.position.as_ref()),
+        let seen = |(number, pose): (usize, &Pose)| {
+            foxglove_seen(Who::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
         };
-        self.poses.iter().enumerate().map(seen).collect()
+        (1..).zip(&self.poses).map(seen).collect()
     }
 }
 
@@ -164,11 +167,9 @@ struct FrameTransform {
     translation: Option<Vec3>,
 }
 
-impl Positions for FrameTransform {
-    fn seen(self) -> Vec<Seen> {
-        let stamp_ns = Timestamp::ns(self.timestamp.as_ref());
-        let position = point(self.translation.as_ref());
-        vec![Seen { who: Who::Named(self.child_frame_id), frame: self.parent_frame_id, stamp_ns, position }]
+impl FrameTransform {
+    fn seen(self) -> Seen {
+        foxglove_seen(Who::Named(self.child_frame_id), self.parent_frame_id, self.timestamp, self.translation)
     }
 }
 
@@ -179,83 +180,16 @@ struct FrameTransforms {
     transforms: Vec<FrameTransform>,
 }
 
-impl Positions for FrameTransforms {
-    fn seen(self) -> Vec<Seen> {
-        self.transforms.into_iter().flat_map(FrameTransform::seen).collect()
-    }
-}
-
-#[derive(Deserialize)]
-struct RosTime {
-    sec: i32,
-    nanosec: u32,
-}
-
-#[derive(Deserialize)]
-struct RosHeader {
-    stamp: RosTime,
-    frame_id: String,
-}
-
-impl RosHeader {
-    fn seen(&self, who: Who, position: &[f64; 3]) -> Seen {
-        let stamp_ns = nanoseconds(self.stamp.sec.into(), self.stamp.nanosec.into());
-        Seen { who, frame: self.frame_id.clone(), stamp_ns, position: (*position).into() }
-    }
-}
+/// Seconds and nanoseconds, and the frame.
+type RosHeader = ((i32, u32), String);
 
 /// `Pose` and `Transform` alike: a position and a quaternion.
-#[derive(Deserialize)]
-struct RosPose {
-    position: [f64; 3],
-    _orientation: [f64; 4],
-}
+type RosPose = ([f64; 3], [f64; 4]);
 
-#[derive(Deserialize)]
-struct PoseStamped {
-    header: RosHeader,
-    pose: RosPose,
-}
+/// `TransformStamped`: the name is that of the child frame.
+type RosTransform = (RosHeader, String, RosPose);
 
-impl Positions for PoseStamped {
-    fn seen(self) -> Vec<Seen> {
-        vec![self.header.seen(Who::Topic, &self.pose.position)]
-    }
-}
-
-#[derive(Deserialize)]
-struct PoseArray {
-    header: RosHeader,
-    poses: Vec<RosPose>,
-}
-
-impl Positions for PoseArray {
-    fn seen(self) -> Vec<Seen> {
-        let seen = |(k, pose): (usize, &RosPose)| self.header.seen(Who::Listed(k + 1), &pose.position);
-        self.poses.iter().enumerate().map(seen).collect()
-    }
-}
-
-#[derive(Deserialize)]
-struct TransformStamped {
-    header: RosHeader,
-    child_frame_id: String,
-    transform: RosPose,
-}
-
-impl Positions for TransformStamped {
-    fn seen(self) -> Vec<Seen> {
-        vec![self.header.seen(Who::Named(self.child_frame_id), &self.transform.position)]
-    }
-}
-
-#[derive(Deserialize)]
-struct TfMessage {
-    transforms: Vec<TransformStamped>,
-}
-
-impl Positions for TfMessage {
-    fn seen(self) -> Vec<Seen> {
-        self.transforms.into_iter().flat_map(TransformStamped::seen).collect()
-    }
+fn ros_seen(who: Who, ((sec, nanosec), frame): &RosHeader, (position, _): &RosPose) -> Seen {
+    let stamp_ns = nanoseconds((*sec).into(), (*nanosec).into());
+    Seen { who, frame: frame.clone(), stamp_ns, position: (*position).into() }
 }

@@ -16,7 +16,7 @@ mod foreign;
 mod messages;
 mod run;
 
-use super::error::{Fault, FaultAt, Place};
+use super::error::{Fault, Place, ReadError};
 use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -25,7 +25,7 @@ use crate::record::mcap::topic::{Part, TopicReader};
 use crate::record::{ReadFault, RecordError};
 
 /// Opens a recording, going by the first schema that is known.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut topics = TopicReader::open(&source.path)?;
     while let Some(part) = topics.next()? {
         match part {
@@ -41,7 +41,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     Err(Fault::content("it has no topic with positions", remedy).into())
 }
 
-impl From<RecordError> for FaultAt {
+impl From<RecordError> for ReadError {
     fn from(error: RecordError) -> Self {
         let fault = match error {
             RecordError::Write { source, .. } | RecordError::Open { source, .. } => {
@@ -51,18 +51,13 @@ impl From<RecordError> for FaultAt {
         };
         match fault {
             ReadFault::Empty => Fault::Empty.into(),
-            ReadFault::NotMcap => {
-                let reason = "it does not begin as MCAP files do".to_owned();
-                Fault::WrongFormat { format: Format::Mcap, reason }.into()
-            }
+            ReadFault::NotMcap => Fault::WrongFormat(Format::Mcap).into(),
             ReadFault::TooLong { offset, bytes, limit } => {
                 let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
-                Fault::Damaged { reason }.at(Place::Byte(offset))
+                Fault::Damaged(reason).at(Place::Byte(offset))
             }
-            ReadFault::Damaged { offset, reason } => Fault::Damaged { reason }.at(Place::Byte(offset)),
-            ReadFault::Message { topic, reason } => {
-                Fault::Damaged { reason }.at(Place::Part(format!("topic `{topic}`")))
-            }
+            ReadFault::Damaged { offset, reason } => Fault::Damaged(reason).at(Place::Byte(offset)),
+            ReadFault::Message { topic, reason } => Fault::Damaged(reason).at(Place::Part(format!("topic `{topic}`"))),
             other => Fault::damaged(other).into(),
         }
     }

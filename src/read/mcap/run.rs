@@ -1,14 +1,14 @@
 //! `run.mcap`.
 
 use super::super::clock::{Stamp, TimeUnit};
-use super::super::error::{Fault, FaultAt, Place};
+use super::super::error::{Fault, Place, ReadError};
 use super::super::names::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use crate::record::mcap::{Entry, McapRecording};
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, FaultAt> {
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let recording = McapRecording::open(&source.path)?;
     let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
@@ -28,7 +28,7 @@ struct Run {
 }
 
 impl Rows for Run {
-    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, FaultAt> {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             let Some(entry) = self.recording.next() else { break };

@@ -22,34 +22,6 @@ const HEAD_BYTES: usize = 9;
 /// Bytes of a footer's content.
 const FOOTER_BYTES: u64 = 20;
 
-/// The system's error or the file's fault.
-pub(super) enum Trouble {
-    System(io::Error),
-    Fault(ReadFault),
-}
-
-impl Trouble {
-    pub(super) fn of(self, path: &Path) -> RecordError {
-        let path = path.display().to_string();
-        match self {
-            Self::System(source) => RecordError::Open { path, source },
-            Self::Fault(fault) => RecordError::Read { path, fault },
-        }
-    }
-}
-
-impl From<io::Error> for Trouble {
-    fn from(error: io::Error) -> Self {
-        Self::System(error)
-    }
-}
-
-impl From<ReadFault> for Trouble {
-    fn from(fault: ReadFault) -> Self {
-        Self::Fault(fault)
-    }
-}
-
 /// One record: what it is and what it holds.
 pub(super) struct Record<'a> {
     /// Where in the file it, or the chunk around it, begins \[bytes\].
@@ -74,15 +46,15 @@ pub(super) struct RecordReader {
 }
 
 impl RecordReader {
-    pub(super) fn open(path: &Path) -> Result<Self, Trouble> {
+    pub(super) fn open(path: &Path) -> io::Result<Self> {
         let mut file = File::open(path)?;
         let mut magic = Vec::new();
         (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic)?;
         if magic.is_empty() {
-            return Err(ReadFault::Empty.into());
+            return Err(invalid(ReadFault::Empty));
         }
         if magic != MAGIC {
-            return Err(ReadFault::NotMcap.into());
+            return Err(invalid(ReadFault::NotMcap));
         }
         let complete = ends_with_footer(&mut file)?;
         let offset = file.seek(SeekFrom::Start(MAGIC.len() as u64))?;
@@ -103,7 +75,7 @@ impl RecordReader {
 
     /// The next record, chunks taken apart; `None` at the end of the data section or where a file that was not closed
     /// breaks off.
-    pub(super) fn next(&mut self) -> Result<Option<Record<'_>>, Trouble> {
+    pub(super) fn next(&mut self) -> io::Result<Option<Record<'_>>> {
         while self.chunk.is_empty() {
             let Some(opcode) = self.read_record()? else { return Ok(None) };
             match opcode {
@@ -112,14 +84,8 @@ impl RecordReader {
                     return Ok(None);
                 }
                 op::CHUNK => {
-                    let records = chunk_records(&self.body).map_err(|reason| damaged(self.body_offset, reason))?;
-                    self.chunk = match records {
-                        Records::Plain(range) => range,
-                        Records::Unpacked(bytes) => {
-                            self.body = bytes;
-                            0..self.body.len()
-                        }
-                    };
+                    self.body = chunk_records(&self.body).map_err(|reason| damaged(self.body_offset, reason))?;
+                    self.chunk = 0..self.body.len();
                 }
                 _ => return Ok(Some(Record { offset: self.body_offset, opcode, body: &self.body })),
             }
@@ -132,12 +98,12 @@ impl RecordReader {
                 let body = &rest[HEAD_BYTES..HEAD_BYTES + bytes];
                 Ok(Some(Record { offset: self.body_offset, opcode, body }))
             }
-            _ => Err(damaged(self.body_offset, "a record inside the chunk is longer than the chunk").into()),
+            _ => Err(damaged(self.body_offset, "a record inside the chunk is longer than the chunk")),
         }
     }
 
     /// Reads the next record of the file into `body`, or only its opcode where nobody wants the content.
-    fn read_record(&mut self) -> Result<Option<u8>, Trouble> {
+    fn read_record(&mut self) -> io::Result<Option<u8>> {
         if self.ended {
             return Ok(None);
         }
@@ -148,12 +114,12 @@ impl RecordReader {
         let Some((opcode, bytes)) = Fields(&self.body).head() else { return self.broken_off() };
         let wanted = matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK);
         if opcode == 0 {
-            return Err(damaged(self.body_offset, "it has no type").into());
+            return Err(damaged(self.body_offset, "it has no type"));
         }
         let read = if wanted {
             if bytes > RECORD_LIMIT_BYTES {
                 let (offset, limit) = (self.body_offset, RECORD_LIMIT_BYTES);
-                return Err(ReadFault::TooLong { offset, bytes, limit }.into());
+                return Err(invalid(ReadFault::TooLong { offset, bytes, limit }));
             }
             self.fill(bytes)?
         } else {
@@ -171,10 +137,10 @@ impl RecordReader {
     }
 
     /// The end of a file that was not closed; a file that was closed cannot end here.
-    fn broken_off<T>(&mut self) -> Result<Option<T>, Trouble> {
+    fn broken_off<T>(&mut self) -> io::Result<Option<T>> {
         self.ended = true;
         if self.complete {
-            return Err(damaged(self.body_offset, "it goes beyond the end of the file").into());
+            return Err(damaged(self.body_offset, "it goes beyond the end of the file"));
         }
         Ok(None)
     }
@@ -194,16 +160,8 @@ fn ends_with_footer(file: &mut File) -> io::Result<bool> {
     Ok(bytes.starts_with(&expected) && bytes.ends_with(MAGIC))
 }
 
-/// The records of a chunk.
-enum Records {
-    /// They stand here in its content.
-    Plain(std::ops::Range<usize>),
-    /// They were packed.
-    Unpacked(Vec<u8>),
-}
-
-/// The records in a chunk's content, once its checksum is found right.
-fn chunk_records(body: &[u8]) -> Result<Records, &'static str> {
+/// The records in a chunk's content, unpacked to no more than it says, once its checksum is found right.
+fn chunk_records(body: &[u8]) -> Result<Vec<u8>, &'static str> {
     let mut fields = Fields(body);
     let header = (|| {
         let _message_times = (fields.u64()?, fields.u64()?);
@@ -211,39 +169,40 @@ fn chunk_records(body: &[u8]) -> Result<Records, &'static str> {
     })();
     let (unpacked_bytes, crc, compression, bytes) = header.ok_or("the chunk has no header")?;
     let packed = usize::try_from(bytes).ok().and_then(|bytes| fields.0.get(..bytes));
-    let packed = packed.ok_or("the chunk is shorter than it says")?;
-    let checked = |records: &[u8]| {
-        if records.len() as u64 != unpacked_bytes {
-            return Err("the chunk is shorter than it says");
-        }
-        if crc != 0 && crc32fast::hash(records) != crc { Err("the checksum of the chunk is wrong") } else { Ok(()) }
-    };
-    if compression.is_empty() {
-        checked(packed)?;
-        let start = body.len() - fields.0.len();
-        return Ok(Records::Plain(start..start + packed.len()));
-    }
-    let records = unpack(compression, packed, unpacked_bytes)?;
-    checked(&records)?;
-    Ok(Records::Unpacked(records))
-}
-
-/// Unpacks a chunk, to no more than it says.
-fn unpack(compression: &str, packed: &[u8], unpacked_bytes: u64) -> Result<Vec<u8>, &'static str> {
+    let mut packed = packed.ok_or("the chunk is shorter than it says")?;
     if unpacked_bytes > RECORD_LIMIT_BYTES {
         return Err("the chunk claims to unpack to more than any recording needs");
     }
     let mut records = Vec::new();
     let read = match compression {
+        "" => packed.read_to_end(&mut records),
         "lz4" => lz4_flex::frame::FrameDecoder::new(packed).take(unpacked_bytes).read_to_end(&mut records),
         "zstd" => zstd::Decoder::new(packed).and_then(|zstd| zstd.take(unpacked_bytes).read_to_end(&mut records)),
         _ => return Err("the chunk is packed by something else than lz4 and zstd (`mcap compress` changes that)"),
     };
-    read.map(|_| records).map_err(|_| "the packed content of the chunk is wrong")
+    read.map_err(|_| "the packed content of the chunk is wrong")?;
+    if records.len() as u64 != unpacked_bytes {
+        return Err("the chunk is shorter than it says");
+    }
+    if crc != 0 && crc32fast::hash(&records) != crc { Err("the checksum of the chunk is wrong") } else { Ok(records) }
 }
 
-pub(super) fn damaged(offset: u64, reason: &str) -> ReadFault {
-    ReadFault::Damaged { offset, reason: reason.to_owned() }
+/// A fault of the content on its way through calls that fail as the system does.
+fn invalid(fault: ReadFault) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, fault)
+}
+
+pub(super) fn damaged(offset: u64, reason: &str) -> io::Error {
+    invalid(ReadFault::Damaged { offset, reason: reason.to_owned() })
+}
+
+/// The system's error or the file's fault.
+pub(super) fn error(path: &Path, error: io::Error) -> RecordError {
+    let path = path.display().to_string();
+    match error.downcast() {
+        Ok(fault) => RecordError::Read { path, fault },
+        Err(source) => RecordError::Open { path, source },
+    }
 }
 
 /// Takes the fields of a record off its front; `None` where it is too short.

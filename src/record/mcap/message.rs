@@ -5,7 +5,6 @@ use std::sync::Arc;
 use serde::ser::SerializeSeq;
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::Header;
 use super::topic::Topic;
 use crate::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
@@ -57,40 +56,6 @@ pub(super) fn channel_topic(channel: &str) -> String {
 /// The topic of a channel.
 pub(super) fn topic_of_channel(name: &str) -> Topic<'_> {
     Topic::cdr(name, CHANNEL_SCHEMA, include_str!("channel.msg"))
-}
-
-/// The fields of `scenario.msg`, in order.
-#[derive(Serialize, Deserialize)]
-pub(super) struct ScenarioMessage<S> {
-    name: S,
-    sha256: S,
-    vehicles: u64,
-    delta_m: f64,
-    toml: S,
-}
-
-impl<'a> From<&'a Header> for ScenarioMessage<&'a str> {
-    fn from(header: &'a Header) -> Self {
-        Self {
-            name: &header.scenario_name,
-            sha256: &header.scenario_sha256,
-            vehicles: header.vehicles as u64,
-            delta_m: header.delta_m,
-            toml: &header.scenario_toml,
-        }
-    }
-}
-
-impl ScenarioMessage<String> {
-    pub(super) fn into_header(self) -> Result<Header, ReadFault> {
-        Ok(Header {
-            scenario_name: self.name,
-            scenario_toml: self.toml,
-            scenario_sha256: self.sha256,
-            vehicles: usize::try_from(self.vehicles).map_err(|_| Own::Scenario.fault("too many vehicles"))?,
-            delta_m: self.delta_m,
-        })
-    }
 }
 
 /// The fields of `swarm.msg`, in order.
@@ -208,21 +173,18 @@ pub(super) struct SummaryMessage {
     step: u64,
     separation_m: f64,
     separation_time_s: f64,
-    first_vehicle: u64,
-    second_vehicle: u64,
+    pair: [u64; 2],
     energy_m2_s2: f64,
 }
 
 impl From<&Sample<'_>> for SummaryMessage {
     fn from(sample: &Sample<'_>) -> Self {
-        let [first_vehicle, second_vehicle] = numbers_of(sample.separation.map(|closest| closest.pair));
         Self {
             time_s: sample.time_s,
             step: sample.step,
             separation_m: sample.separation.map_or(f64::NAN, |closest| closest.separation_m),
             separation_time_s: sample.separation.map_or(f64::NAN, |closest| closest.time_s),
-            first_vehicle,
-            second_vehicle,
+            pair: numbers_of(sample.separation.map(|closest| closest.pair)),
             energy_m2_s2: sample.energy.unwrap_or(f64::NAN),
         }
     }
@@ -230,10 +192,10 @@ impl From<&Sample<'_>> for SummaryMessage {
 
 impl SummaryMessage {
     fn separation(&self) -> Result<Option<ClosestApproach>, ReadFault> {
-        if self.first_vehicle == 0 {
+        if self.pair[0] == 0 {
             return Ok(None);
         }
-        let pair = pair_of(Own::Summary, [self.first_vehicle, self.second_vehicle])?;
+        let pair = pair_of(Own::Summary, self.pair)?;
         Ok(Some(ClosestApproach { pair, separation_m: self.separation_m, time_s: self.separation_time_s }))
     }
 }
@@ -243,8 +205,7 @@ impl SummaryMessage {
 pub(super) struct EventMessage<S> {
     kind: S,
     time_s: f64,
-    first_vehicle: u64,
-    second_vehicle: u64,
+    pair: [u64; 2],
     value: f64,
     text: String,
 }
@@ -278,15 +239,14 @@ impl From<&Event> for EventMessage<&'static str> {
             }
             Event::EndedEarly { reason, .. } => ("ended-early", None, f64::NAN, reason.clone()),
         };
-        let [first_vehicle, second_vehicle] = numbers_of(pair);
-        Self { kind, time_s: event.time_s(), first_vehicle, second_vehicle, value, text }
+        Self { kind, time_s: event.time_s(), pair: numbers_of(pair), value, text }
     }
 }
 
 impl EventMessage<String> {
     pub(super) fn into_event(self) -> Result<Event, ReadFault> {
         let time_s = self.time_s;
-        let pair = || pair_of(Own::Events, [self.first_vehicle, self.second_vehicle]);
+        let pair = || pair_of(Own::Events, self.pair);
         Ok(match self.kind.as_str() {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
@@ -297,9 +257,7 @@ impl EventMessage<String> {
             unknown => return Err(Own::Events.fault(format!("unknown kind {unknown:?}"))),
         })
     }
-}
 
-impl EventMessage<String> {
     fn leg(&self) -> Result<usize, ReadFault> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
         let number = self.value as usize;

@@ -54,21 +54,23 @@ pub use reader::{Entry, McapRecording};
 pub use topic::Topic;
 pub use writer::{ExtraTopic, FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
 
+use serde::{Deserialize, Serialize};
+
 use super::sha256_hex;
 
-/// What a recording says about the run as a whole.
-#[derive(Clone, Debug, PartialEq)]
+/// What a recording says about the run as a whole: the fields of `scenario.msg`, in order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Name of the scenario.
     pub scenario_name: String,
-    /// The resolved scenario as TOML.
-    pub scenario_toml: String,
     /// SHA-256 of `scenario_toml`, 64 hexadecimal digits.
     pub scenario_sha256: String,
     /// Number of vehicles N.
     pub vehicles: usize,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
+    /// The resolved scenario as TOML.
+    pub scenario_toml: String,
 }
 
 impl Header {

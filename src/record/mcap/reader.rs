@@ -6,9 +6,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::Header;
-use super::message::{
-    CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, ScenarioMessage, SummaryMessage, SwarmMessage, fault,
-};
+use super::message::{CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, fault};
 use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
 use crate::record::{Event, OwnedSample, ReadFault, RecordError};
 
@@ -146,7 +144,7 @@ impl Contents {
         let Declared { topic, schema, encoding, .. } = message.of;
         match Own::of(topic) {
             Some(Own::Scenario) => {
-                let header = content::<ScenarioMessage<String>>(message)?.into_header()?;
+                let header = content(message)?;
                 self.header.get_or_insert(header);
             }
             Some(Own::Summary) => self.summary = Some(content(message)?),

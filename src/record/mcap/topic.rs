@@ -10,7 +10,7 @@ use mcap::{McapError, WriteOptions, Writer};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::framing::{Fields, Record, RecordReader, Trouble, damaged};
+use super::framing::{self, Fields, Record, RecordReader, damaged};
 use crate::record::{ReadFault, RecordError};
 
 /// Who wrote the file, for MCAP tools.
@@ -161,13 +161,13 @@ pub(crate) struct TopicReader {
 
 impl TopicReader {
     pub(crate) fn open(path: &Path) -> Result<Self, RecordError> {
-        let records = RecordReader::open(path).map_err(|trouble| trouble.of(path))?;
+        let records = RecordReader::open(path).map_err(|error| framing::error(path, error))?;
         Ok(Self { path: path.to_owned(), records, schemas: BTreeMap::new(), topics: BTreeMap::new() })
     }
 
     /// A fault of the file's content.
     pub(crate) fn fault(&self, fault: ReadFault) -> RecordError {
-        Trouble::from(fault).of(&self.path)
+        RecordError::Read { path: self.path.display().to_string(), fault }
     }
 
     /// Whether the file was closed.
@@ -178,7 +178,7 @@ impl TopicReader {
     /// The next part; `None` at the end, or where a file that was not closed breaks off.
     pub(crate) fn next(&mut self) -> Result<Option<Part<'_>>, RecordError> {
         let path = &self.path;
-        let record = self.records.next().map_err(|trouble| trouble.of(path))?;
+        let record = self.records.next().map_err(|error| framing::error(path, error))?;
         let Some(Record { offset, opcode, body }) = record else { return Ok(None) };
         let mut fields = Fields(body);
         let part = match opcode {
@@ -196,7 +196,7 @@ impl TopicReader {
             }),
             _ => Some(Part::Other),
         };
-        let short = || Trouble::from(damaged(offset, "a record is shorter than its fields")).of(path);
+        let short = || framing::error(path, damaged(offset, "a record is shorter than its fields"));
         part.map(Some).ok_or_else(short)
     }
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::Header;
 use super::message::{
-    ChannelMessage, EventMessage, Own, ScenarioMessage, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
+    ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
 };
 use super::topic::{Topic, TopicWriter, encode, log_time_ns};
 use crate::record::{Channel, Event, RecordError, Sample, Sink};
@@ -75,7 +75,7 @@ impl McapRecorder {
             waiting_bytes: 0,
             flushed_at_s: f64::NEG_INFINITY,
         };
-        recorder.write(Own::Scenario as usize, 0.0, &ScenarioMessage::from(header))?;
+        recorder.write(Own::Scenario as usize, 0.0, header)?;
         Ok(recorder)
     }
 

@@ -1,0 +1,209 @@
+//! What the name of a column says: a quantity, perhaps of a vehicle, perhaps in a unit.
+
+use super::clock::TimeUnit;
+use super::units;
+
+/// What a column gives: its place among [`ColumnNames::ROLES`](super::options::ColumnNames::ROLES). Axes follow each
+/// other.
+pub(super) type Role = usize;
+pub(super) const TIME: Role = 0;
+pub(super) const ID: Role = 1;
+pub(super) const POSITION: Role = 2;
+pub(super) const VELOCITY: Role = 5;
+pub(super) const RADIUS: Role = 8;
+
+pub(super) fn is_velocity(role: Role) -> bool {
+    (VELOCITY..RADIUS).contains(&role)
+}
+
+/// Words that name a quantity with axes, and no vehicle.
+const QUANTITIES: [&str; 55] = [
+    "vel",
+    "velocity",
+    "speed",
+    "acc",
+    "accel",
+    "acceleration",
+    "gyro",
+    "gyr",
+    "gyroscope",
+    "imu",
+    "mag",
+    "magnetometer",
+    "magnetic",
+    "omega",
+    "angular",
+    "linear",
+    "rate",
+    "rates",
+    "angvel",
+    "angle",
+    "angles",
+    "attitude",
+    "orientation",
+    "quat",
+    "quaternion",
+    "rot",
+    "rotation",
+    "euler",
+    "rpy",
+    "twist",
+    "wrench",
+    "force",
+    "torque",
+    "moment",
+    "thrust",
+    "wind",
+    "gravity",
+    "bias",
+    "noise",
+    "std",
+    "sigma",
+    "var",
+    "cov",
+    "covariance",
+    "err",
+    "error",
+    "sp",
+    "setpoint",
+    "ref",
+    "reference",
+    "des",
+    "desired",
+    "cmd",
+    "command",
+    "jerk",
+];
+
+/// Letters of quantities with axes, which may be vehicles too.
+pub(super) const LETTERS: [&str; 8] = ["a", "f", "g", "j", "q", "u", "v", "w"];
+
+/// What the name of a column says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Heading<'a> {
+    /// The vehicle; empty where the name is that of a quantity alone.
+    pub(super) vehicle: &'a str,
+    pub(super) role: Role,
+    pub(super) unit: Option<&'a str>,
+    /// Whether it may as well be a quantity, as `a_x` is an acceleration or the place of `a`.
+    pub(super) ambiguous: bool,
+}
+
+impl<'a> Heading<'a> {
+    /// What a name says, where it is that of a quantity.
+    pub(super) fn of(name: &'a str) -> Option<Self> {
+        let (stem, unit) = units::bracketed(name);
+        match unit {
+            // Some number vehicles as arrays do: x[0].
+            Some(number) if is_number(number) => {
+                Some(Self { vehicle: number, ..Self::new("", quantity(&stem.to_lowercase())?) })
+            }
+            Some(_) => Self::without_unit(stem).map(|heading| Self { unit, ..heading }),
+            None => Self::without_unit(stem).or_else(|| {
+                units::endings(stem).find_map(|(stem, unit, velocity)| {
+                    let heading = Self::without_unit(stem).filter(|heading| is_velocity(heading.role) == velocity)?;
+                    Some(Self { unit: Some(unit), ..heading })
+                })
+            }),
+        }
+    }
+
+    fn new(vehicle: &'a str, role: Role) -> Self {
+        Self { vehicle, role, unit: None, ambiguous: false }
+    }
+
+    /// Splits `x1`, `vx_2`, `px.1`, `cf1.x`, `leader/vy` or `drone3_z` into vehicle and quantity.
+    fn without_unit(name: &'a str) -> Option<Self> {
+        if let Some(role) = quantity(&name.to_lowercase()) {
+            return Some(Self::new("", role));
+        }
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        if stem.len() < name.len() {
+            let role = quantity(&stem.strip_suffix(['_', '.']).unwrap_or(stem).to_lowercase())?;
+            return Some(Self::new(&name[stem.len()..], role));
+        }
+        let mut splits = name.char_indices().filter(|&(at, c)| at > 0 && matches!(c, '.' | '/' | '_'));
+        let (separator, heading) = splits.find_map(|(at, separator)| {
+            Some((separator, Self::new(&name[..at], quantity(&name[at + 1..].to_lowercase())?)))
+        })?;
+        let ambiguous = LETTERS.contains(&heading.vehicle) && separator == '_';
+        (ambiguous || !says_a_quantity(heading.vehicle)).then_some(Self { ambiguous, ..heading })
+    }
+
+    /// Whether the vehicle is a number.
+    pub(super) fn is_numbered(&self) -> bool {
+        is_number(self.vehicle)
+    }
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// The quantity of a plain name in lower case like `x`, `pos_x`, `vy` or `radius`.
+fn quantity(name: &str) -> Option<Role> {
+    if name == "radius" {
+        return Some(RADIUS);
+    }
+    let name = name.replace(['.', '/'], "_");
+    let axis_after = |start: &&str| ["x", "y", "z"].iter().position(|axis| name.strip_prefix(start) == Some(axis));
+    let axis = |role, starts: &[&str]| starts.iter().find_map(axis_after).map(|axis| role + axis);
+    axis(POSITION, &["", "p", "p_", "pos_", "position_"]).or_else(|| axis(VELOCITY, &["v", "vel_", "velocity_"]))
+}
+
+/// Whether the last word of a name is that of a quantity with axes, as in `cf1_gyro` and `../orientation`.
+fn says_a_quantity(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let words = name.split(|c: char| !c.is_alphanumeric());
+    let mut words = words.map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));
+    words.rfind(|word| !word.is_empty()).is_some_and(|word| QUANTITIES.contains(&word))
+}
+
+/// Whether a column that is not read cannot be what tells the vehicles of the rows apart: attitudes, rates, sensors.
+pub(super) fn tells_no_vehicle(name: &str) -> bool {
+    let stem = units::bracketed(name).0.to_lowercase();
+    let is = |start: &str, ends: &[&str]| stem.strip_prefix(start).is_some_and(|end| ends.contains(&end));
+    let known = ["", "roll", "pitch", "yaw", "heading", "speed", "battery", "voltage", "thrust", "frame"];
+    known.contains(&stem.as_str())
+        || is("q", &["x", "y", "z", "w", "0", "1", "2", "3"])
+        || ["a", "w", "yaw^"].iter().any(|start| is(start, &["x", "y", "z"]))
+        || stem.rsplit_once(['.', '/', '_']).is_some_and(|(start, _)| start.len() == 1 || says_a_quantity(start))
+}
+
+/// The name of a column of time in lower case without its unit, and the unit.
+fn time_and_unit(name: &str) -> (String, Option<String>) {
+    let name = name.to_lowercase();
+    let (stem, unit) = units::bracketed(&name);
+    let longer = ["min", "mins", "minute", "minutes", "h", "hr", "hrs", "hour", "hours", "day", "days"];
+    let ending = stem.rsplit_once('_').filter(|(_, end)| TimeUnit::from_name(end).is_some() || longer.contains(end));
+    let (stem, unit) = match (unit, ending) {
+        (None, Some((stem, end))) => (stem, Some(end)),
+        _ => (stem, unit),
+    };
+    (stem.to_owned(), unit.map(str::to_owned))
+}
+
+pub(super) fn is_time(name: &str) -> bool {
+    matches!(time_and_unit(name).0.as_str(), "t" | "time" | "timestamp" | "stamp")
+}
+
+/// Whether a column counts pictures or steps.
+pub(super) fn is_frame(name: &str) -> bool {
+    let name = time_and_unit(name).0.replace(['_', ' ', '-', '.'], "");
+    let counted = name.trim_end_matches('s');
+    let counted = ["number", "no", "nr", "num", "index", "idx", "count"]
+        .iter()
+        .find_map(|end| name.strip_suffix(end))
+        .unwrap_or(counted);
+    matches!(counted, "frame" | "step" | "timestep" | "tick" | "iteration" | "picture")
+}
+
+/// The unit that the name of a column of time says.
+pub(super) fn said_unit(name: &str) -> Option<String> {
+    time_and_unit(name).1
+}
+
+pub(super) fn is_id(name: &str) -> bool {
+    let name = units::bracketed(name).0.to_lowercase();
+    matches!(name.as_str(), "id" | "name" | "vehicle" | "vehicle_id" | "drone" | "drone_id" | "uav" | "agent" | "robot")
+}

@@ -1,0 +1,143 @@
+//! Files of one vehicle each as one recording.
+
+use std::path::PathBuf;
+
+use super::error::{Fault, ReadError, quoted};
+use super::order::Recording;
+use super::source::Source;
+use crate::track::{Clock, Item, Tracks};
+
+/// Clocks that begin further apart than this are not the same \[ns\]: 30 days.
+const APART_NS: i64 = 30 * 86_400 * 1_000_000_000;
+
+/// A file of a vehicle.
+struct Part {
+    path: PathBuf,
+    tracks: Recording,
+    /// Where its clock begins after that of the recording \[s\].
+    shift_s: f64,
+    /// Items that were read and not given out.
+    waiting: std::iter::Peekable<std::vec::IntoIter<Item>>,
+    /// When the last of them begins \[s\]; infinite behind the end of the file.
+    until_s: f64,
+}
+
+/// Vehicles from several files, in order of time. A block of each file is in memory.
+struct Joined {
+    vehicles: Vec<String>,
+    parts: Vec<Part>,
+    clock: Clock,
+    notes: Vec<String>,
+}
+
+/// One recording out of several with a vehicle each, which is called as its file.
+pub(super) fn join(parts: Vec<(PathBuf, Recording)>) -> Result<Recording, ReadError> {
+    let stem = |path: &PathBuf| Source::file(path).stem();
+    let (vehicles, parts): (Vec<_>, Vec<_>) =
+        parts.into_iter().map(|(path, tracks)| (stem(&path), (path, tracks))).unzip();
+    let (paths, recordings): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    let mut sorted: Vec<_> = vehicles.iter().collect();
+    sorted.sort();
+    if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        let problem = format!("two of its files are called {}", quoted(pair[0]));
+        return Err(Fault::content(problem, "vehicles are called as their files: give each file another name").into());
+    }
+    let clocks: Vec<Clock> = recordings.iter().map(|tracks| tracks.clock().clone()).collect();
+    let Some(first) = clocks.iter().min_by_key(|clock| clock.epoch_ns) else { return Err(Fault::Empty.into()) };
+    for (name, clock) in vehicles.iter().zip(&clocks) {
+        let guessed = clock.inferred || clocks[0].inferred;
+        let problem = if clock.unit != clocks[0].unit && guessed {
+            let (unit, other) = (clock.unit, clocks[0].unit);
+            format!(
+                "times of {} would be taken as {unit} and those of {} as {other}",
+                quoted(name),
+                quoted(&vehicles[0])
+            )
+        } else if clock.epoch_ns.saturating_sub(first.epoch_ns) > APART_NS {
+            format!("the clock of {} begins more than a month after that of another file", quoted(name))
+        } else {
+            continue;
+        };
+        return Err(Fault::content(problem, "say the unit with --time-unit, and write all times by one clock").into());
+    }
+    let clock = Clock {
+        inferred: clocks.iter().any(|clock| clock.inferred),
+        by_steps: clocks.iter().any(|clock| clock.by_steps),
+        epoch_ns: first.epoch_ns,
+        unit: clocks[0].unit,
+    };
+    let mut notes = vec![format!("a file is a vehicle: {}", vehicles.join(", "))];
+    let mut joined = Vec::new();
+    for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
+        for note in tracks.notes() {
+            if !notes.contains(note) {
+                notes.push(note.clone());
+            }
+        }
+        let shift_s = own.epoch_ns.saturating_sub(clock.epoch_ns) as f64 / 1e9;
+        let waiting = Vec::new().into_iter().peekable();
+        joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
+    }
+    Ok(Box::new(Joined { vehicles, parts: joined, clock, notes }))
+}
+
+impl Part {
+    /// Reads the next items where none are waiting.
+    fn fill(&mut self, vehicle: usize) -> Result<(), ReadError> {
+        if self.until_s == f64::INFINITY || self.waiting.peek().is_some() {
+            return Ok(());
+        }
+        let mut items = Vec::new();
+        if !self.tracks.read(&mut items)? {
+            self.until_s = f64::INFINITY;
+            return Ok(());
+        }
+        for item in &mut items {
+            if item.vehicle() > 0 {
+                let fault = Fault::content("it holds several vehicles", "files that are joined hold one vehicle each");
+                return Err(ReadError::new(&self.path, fault));
+            }
+            match item {
+                Item::Sample(sample) => (sample.vehicle, sample.time_s) = (vehicle, sample.time_s + self.shift_s),
+                Item::Piece(piece) => {
+                    piece.vehicle = vehicle;
+                    piece.from_s += self.shift_s;
+                    piece.to_s += self.shift_s;
+                }
+            }
+        }
+        self.until_s = items.last().map_or(self.until_s, Item::time_s);
+        self.waiting = items.into_iter().peekable();
+        Ok(())
+    }
+}
+
+impl Tracks for Joined {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        &self.vehicles
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        let before = items.len();
+        for (vehicle, part) in self.parts.iter_mut().enumerate() {
+            part.fill(vehicle)?;
+        }
+        // Up to here nothing can come between what is known.
+        let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);
+        for part in &mut self.parts {
+            items.extend(std::iter::from_fn(|| part.waiting.next_if(|item| item.time_s() <= until_s)));
+        }
+        items[before..].sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        Ok(items.len() > before)
+    }
+
+    fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}

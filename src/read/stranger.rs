@@ -1,0 +1,81 @@
+//! Files that are known and not read: what they are, and the way in.
+
+use std::path::Path;
+
+use super::error::Fault;
+
+/// Beginnings of files, what they are, and what helps.
+const STRANGERS: [(&[u8], &str, &str); 15] = [
+    (b"#ROSBAG V", "a ROS 1 bag", "convert it with `rosbags-convert` to a ROS 2 bag in MCAP, and give its .mcap file"),
+    (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
+    (
+        b"ULog\x01\x12\x35",
+        "a ULog of PX4",
+        "write its vehicle_local_position with `ulog2csv`, and give a file for each vehicle",
+    ),
+    (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
+    (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
+    (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
+    (b"FMT ", "a DataFlash log of ArduPilot", DATAFLASH),
+    (
+        b"\x89HDF\r\n\x1a\n",
+        "an HDF5 file",
+        "save its arrays with numpy.savez(\"flight.npz\", t=t, positions=positions)",
+    ),
+    (b"MATLAB 5.0", "a file of MATLAB", "write it with `writetable` as t,id,x,y,z"),
+    (b"RRF2", "a recording of Rerun", "write its positions as a table t,id,x,y,z"),
+    (b"\xff\xd8\xff", "a picture", TABLE),
+    (b"\x89PNG", "a picture", TABLE),
+    (b"%PDF", "a document in PDF", TABLE),
+    (b"\xd0\xcf\x11\xe0", "an old Office document", "save the sheet as CSV"),
+    (b"\x28\xb5\x2f\xfd", "packed by zstd", "unpack it first, with unzstd"),
+];
+
+const BAG: &str = "convert it with `ros2 bag convert` to MCAP, and give the .mcap file";
+const DATAFLASH: &str =
+    "write the messages of position with `mavlogdump.py --format csv`, a file for each vehicle in metres";
+pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z";
+const EARTH: &str = "convert degrees to metres in a plane first, and give a table t,id,x,y,z";
+
+/// What a file is and what helps, where it is known and not read.
+pub(super) fn of_bytes(head: &[u8]) -> Option<Fault> {
+    // Each message of telemetry has the microseconds since 1970 in front.
+    if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
+        let remedy = "write its LOCAL_POSITION_NED with `mavlogdump.py --format csv`, a file for each vehicle";
+        return Some(Fault::content("it is a MAVLink telemetry log, which is not read", remedy));
+    }
+    let stranger = STRANGERS.iter().find(|(begin, ..)| head.starts_with(begin));
+    stranger.map(|(_, what, remedy)| Fault::content(format!("it is {what}, which is not read"), *remedy))
+}
+
+/// The same of text, which has no blanks in front.
+pub(super) fn of_text(text: &[u8]) -> Option<Fault> {
+    let holds = |word: &str| memchr::memmem::find(text, word.as_bytes()).is_some();
+    let (what, remedy) = match text.first()? {
+        b'<' if holds("<gpx") => ("a GPX track", EARTH),
+        b'<' if holds("<kml") => ("a KML file", EARTH),
+        b'<' if holds("<html") || holds("<HTML") => ("a page of HTML", TABLE),
+        b'<' => ("an XML file", TABLE),
+        b'[' => ("JSON, but no Skybrush show", TABLE),
+        _ => return None,
+    };
+    Some(Fault::content(format!("it is {what}, which is not read"), remedy))
+}
+
+/// The same of a folder.
+pub(super) fn of_folder(path: &Path) -> Option<Fault> {
+    if !path.join("metadata.yaml").is_file() {
+        return None;
+    }
+    let files = std::fs::read_dir(path).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut bags: Vec<_> =
+        files.filter(|file| file.extension().is_some_and(|end| end == "mcap" || end == "db3")).collect();
+    bags.sort();
+    let bag = bags.first()?;
+    let remedy = if bag.extension().is_some_and(|end| end == "mcap") {
+        format!("give {}, which lies in it", bag.file_name()?.to_string_lossy())
+    } else {
+        BAG.to_owned()
+    };
+    Some(Fault::content("it is the folder of a ROS 2 bag, which is not read", remedy))
+}
