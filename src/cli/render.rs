@@ -120,7 +120,8 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let renderer = Renderer::open(&arguments.adapter.as_str().into())?;
     renderer.check_size(view.size_px)?;
     let extent = Extent::of(&timeline);
-    extent.camera(&timeline, &timeline.at(f64::NEG_INFINITY).ok_or(RenderError::NoSamples)?, &view)?;
+    let start = timeline.at(f64::NEG_INFINITY).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
+    extent.camera(&timeline, &start, &view)?;
     // Targets are tried before the work.
     if !stills.is_empty() || sheet.is_some() {
         writable(&folder)?;
@@ -202,7 +203,7 @@ impl Batch<'_> {
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
-        let frame = self.timeline.at(time_s).ok_or(RenderError::NoSamples)?;
+        let frame = self.timeline.at(time_s).ok_or_else(|| RenderError::Empty(self.timeline.name.clone()))?;
         let camera = self.extent.camera(self.timeline, &frame, &self.view)?;
         let picture = self.renderer.paint(&Scene::compose(self.timeline, &self.extent, &frame, &self.view, camera))?;
         self.progress.inc(1);

@@ -151,11 +151,8 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
 fn nice_step(span: f64, most: f64) -> f64 {
     let least = span / most;
     let power = 10.0_f64.powf(least.log10().floor());
-    [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|digit| digit * power)
-        .find(|step| *step >= least * (1.0 - 1e-9))
-        .unwrap_or(10.0 * power)
+    let steps = [1.0, 2.0, 5.0].map(|digit| digit * power);
+    steps.into_iter().find(|step| *step >= least * (1.0 - 1e-9)).unwrap_or(10.0 * power)
 }
 
 /// A number with as many decimals as the step between ticks needs, and a true minus sign.
@@ -172,13 +169,8 @@ fn number_label(number: f64, step: f64) -> String {
 /// A power of ten by its exponent.
 fn power_label(exponent: f64) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    match exponent {
-        -2.0 => return "0.01".to_owned(),
-        -1.0 => return "0.1".to_owned(),
-        0.0 => return "1".to_owned(),
-        1.0 => return "10".to_owned(),
-        2.0 => return "100".to_owned(),
-        _ => {}
+    if exponent.abs() <= 2.0 {
+        return 10.0_f64.powf(exponent).to_string();
     }
     let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
     format!("10{}", format!("{exponent:.0}").chars().map(raised).collect::<String>())
