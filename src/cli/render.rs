@@ -68,6 +68,9 @@ pub(super) struct RenderArguments {
     /// metres.
     #[arg(long, default_value = "iso", allow_hyphen_values = true)]
     camera: String,
+    /// Trails of the last so many seconds alone [default: from the start].
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    trail: Option<f64>,
     /// Colours: dark, light, or paper (white, for print).
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
@@ -113,7 +116,8 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         .chain(film.map(|(path, _)| ("--film", path)))
         .collect();
     outputs::check(&[("the recording", recording)], &outputs)?;
-    let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
+    let trail_s = arguments.trail.map(|trail_s| positive(trail_s, "--trail")).transpose()?;
+    let view = View { camera, theme: arguments.theme, size_px: arguments.size, trail_s, ..View::default() };
     if let Some((_, format)) = film {
         format.check(view.size_px, fps)?;
     }

@@ -1,5 +1,6 @@
 //! Axes: what range they show, and where their ticks are.
 
+use super::svg::text_px;
 use crate::text::decimals_of;
 
 /// Numbers beyond this have no place on an axis: differences of larger ones might overflow.
@@ -120,6 +121,11 @@ impl Axis {
         }
     }
 
+    /// Width of what is written at the ticks, that of the widest \[px\].
+    pub(super) fn labels_px(&self) -> f64 {
+        self.ticks.iter().map(|&tick| text_px(&self.tick_label(tick))).fold(0.0, f64::max)
+    }
+
     /// What is written at the tick at `place`.
     pub(super) fn tick_label(&self, place: f64) -> String {
         match self.scale {
@@ -157,8 +163,11 @@ fn nice_step(span: f64, most: f64) -> f64 {
 
 /// A number with as many decimals as the step between ticks needs, and a true minus sign.
 fn number_label(number: f64, step: f64) -> String {
-    let text = if number != 0.0 && (number.abs() >= 1e5 || step < 1e-4) {
-        format!("{number:.3e}").replace("000e", "e").replace(".e", "e")
+    /// Most digits behind the point that powers of ten are written with: with more, the number itself is shorter.
+    const MOST_DIGITS: usize = 3;
+    let digits = decimals_of(step / 10.0_f64.powf(number.abs().log10().floor()), 17);
+    let text = if number != 0.0 && (number.abs() >= 1e5 && digits <= MOST_DIGITS || step < 1e-4) {
+        format!("{number:.digits$e}")
     } else {
         let decimals = decimals_of(step, 4);
         format!("{number:.decimals$}")

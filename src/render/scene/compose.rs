@@ -8,6 +8,9 @@ use super::labels::LabelLayout;
 use super::view::View;
 use crate::render::timeline::{Frame, Timeline};
 
+/// Whether a part of a picture is shown, and what adds it.
+type Part<'a, T> = (bool, fn(&SceneBuilder<'a>, &mut T));
+
 impl Scene {
     /// The draw list of a frame of a flight, seen by a camera whose size of picture is that of the view.
     ///
@@ -22,14 +25,14 @@ impl Scene {
         builder.vehicles(&mut scene);
         let layers = view.layers;
         // In the order in which they cover each other, and in which they take room from each other.
-        let lines: [(bool, fn(&_, &mut Vec<Line>)); 5] = [
+        let lines: [Part<'_, Vec<Line>>; 5] = [
             (layers.ground, SceneBuilder::ground),
             (layers.trails, SceneBuilder::trails),
             (layers.marks, SceneBuilder::starts_and_goals),
             (layers.edges, SceneBuilder::edges),
             (layers.closest, SceneBuilder::pairs),
         ];
-        let words: [(bool, fn(&_, &mut LabelLayout)); 6] = [
+        let words: [Part<'_, LabelLayout>; 6] = [
             (layers.caption, SceneBuilder::caption),
             (layers.caption, SceneBuilder::legend),
             (layers.labels, SceneBuilder::keep_off_vehicles),
