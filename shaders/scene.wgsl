@@ -67,14 +67,20 @@ const LIGHT = vec3(-0.408, 0.577, 0.707);
 const AMBIENT = 0.38;
 const GLOSS = 0.16;
 
+// Whether a ball is outside of one of the four planes through the eye that bound what a camera in perspective sees.
+fn is_aside(centre: vec3<f32>, radius: f32) -> bool {
+    let outside = abs(centre.xy) + camera.lens.xy * centre.z;
+    return any(outside > radius * sqrt(1.0 + camera.lens.xy * camera.lens.xy));
+}
+
 @vertex
 fn ball_corner(@builtin(vertex_index) index: u32, ball: Ball) -> BallCorner {
     let side = vec2(f32(index & 1u), f32(index >> 1u)) * 2.0 - 1.0;
     let centre = seen(ball.centre);
     let distance = length(centre);
     var position: vec4<f32>;
-    if is_perspective() && centre.z >= ball.radius {
-        // All of it is behind the camera: outside the picture.
+    if is_perspective() && (centre.z >= ball.radius || is_aside(centre, 1.001 * ball.radius + 1e-5 * distance)) {
+        // All of it is behind the camera or beside what it sees: outside the picture.
         position = vec4(2.0, 2.0, 2.0, 1.0);
     } else if is_perspective() && (distance < 1.001 * ball.radius || -centre.z < ball.radius) {
         // The camera is within the ball or beside it.

@@ -261,7 +261,10 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let path = &arguments.reading.recording;
     let own_delta_m = arguments.own_delta_m(&options);
     settings.delta_m = settings.delta_m.or(own_delta_m);
-    let auditor = TrackAuditor::new(settings.clone())?;
+    let mut auditor = TrackAuditor::new(settings.clone())?;
+    if arguments.html.is_some() {
+        auditor = auditor.with_smallest();
+    }
     let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
     for note in &notes {
@@ -361,6 +364,8 @@ fn figures(
     if let Some(nearest) = pairs.first() {
         drawn.push(figures::encounters(&pairs, "encounters", "Distances of the closest pairs"));
         drawn.push(figures::closest_approach(nearest, "Closest approach from above"));
+        let smallest = outcome.smallest.iter().map(|found| found.map(|found| (found.time_s, found.certain_m())));
+        drawn.push(figures::smallest(&smallest.collect::<Vec<_>>(), nearest, "Smallest distance of all"));
     }
     if !obstacles.is_empty() {
         drawn.push(figures::encounters(&obstacles, "obstacles", "Distances from the closest obstacles"));

@@ -10,6 +10,8 @@ mod console;
 mod diagnostic;
 #[cfg(feature = "viewer")]
 mod drawing;
+#[cfg(all(feature = "viewer", target_os = "linux"))]
+mod driver;
 mod events;
 mod export;
 mod folder;
@@ -101,6 +103,11 @@ pub fn main() -> ExitCode {
         }
     };
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
+    #[cfg(all(feature = "viewer", target_os = "linux"))]
+    if matches!(&command, Command::Run(run) if run.draws()) || matches!(command, Command::Render(_) | Command::View(_))
+    {
+        driver::silence();
+    }
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Audit(arguments) => audit::audit(&arguments),

@@ -68,6 +68,9 @@ pub(super) struct RenderArguments {
     /// metres.
     #[arg(long, default_value = "iso", allow_hyphen_values = true)]
     camera: String,
+    /// Trails of the last so many seconds alone [default: from the start].
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    trail: Option<f64>,
     /// Colours: dark, light, or paper (white, for print).
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
@@ -113,14 +116,16 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         .chain(film.map(|(path, _)| ("--film", path)))
         .collect();
     outputs::check(&[("the recording", recording)], &outputs)?;
-    let view = View { camera, theme: arguments.theme, size_px: arguments.size, ..View::default() };
+    let trail_s = arguments.trail.map(|trail_s| positive(trail_s, "--trail")).transpose()?;
+    let view = View { camera, theme: arguments.theme, size_px: arguments.size, trail_s, ..View::default() };
     if let Some((_, format)) = film {
         format.check(view.size_px, fps)?;
     }
     let renderer = Renderer::open(&arguments.adapter.as_str().into())?;
     renderer.check_size(view.size_px)?;
     let extent = Extent::of(&timeline);
-    extent.camera(&timeline, &timeline.at(f64::NEG_INFINITY).ok_or(RenderError::NoSamples)?, &view)?;
+    let start = timeline.at(f64::NEG_INFINITY).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
+    extent.camera(&timeline, &start, &view)?;
     // Targets are tried before the work.
     if !stills.is_empty() || sheet.is_some() {
         writable(&folder)?;
@@ -202,7 +207,7 @@ impl Batch<'_> {
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
-        let frame = self.timeline.at(time_s).ok_or(RenderError::NoSamples)?;
+        let frame = self.timeline.at(time_s).ok_or_else(|| RenderError::Empty(self.timeline.name.clone()))?;
         let camera = self.extent.camera(self.timeline, &frame, &self.view)?;
         let picture = self.renderer.paint(&Scene::compose(self.timeline, &self.extent, &frame, &self.view, camera))?;
         self.progress.inc(1);

@@ -92,6 +92,12 @@ impl Default for RunArguments {
 }
 
 impl RunArguments {
+    /// Whether pictures are taken.
+    #[cfg(all(feature = "viewer", target_os = "linux"))]
+    pub(super) fn draws(&self) -> bool {
+        !self.no_snapshots
+    }
+
     /// The command that flies the same again, for a shell.
     fn command(&self) -> String {
         let mut words = vec!["tautline", "run", &self.scenario];

@@ -121,7 +121,7 @@ mod viewer {
     fn taken(camera: &Camera) -> Result<Vec<Snapshot>, Failure> {
         let view = View { theme: Theme::Light, ..View::default() };
         if camera.timeline.keyframes().is_empty() {
-            return Err(RenderError::NoSamples.into());
+            return Err(RenderError::Empty(camera.timeline.name.clone()).into());
         }
         let mut renderer = Renderer::open(&camera.adapter.as_str().into())?;
         Ok(snapshots_of_run(&mut renderer, &camera.timeline, &view)?)

@@ -2,15 +2,15 @@
 
 use std::io;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use clap::Args;
 
 use super::console::Console;
 use super::drawing;
+use super::reading::{self, ReadArguments};
 use super::{Exit, Failure};
-use crate::read::ReadOptions;
+use crate::read::{Format, ReadOptions};
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::render::{LiveUpdate, Theme, Timeline, show};
 use crate::scenario::{Override, Scenario, Source};
@@ -21,10 +21,11 @@ const WAITING: usize = 256;
 
 /// Arguments of `tautline view`.
 #[derive(Debug, Args)]
+#[command(mut_arg("recording", |what| {
+    let help = "A recording, a scenario file, or the name of a built-in scenario";
+    what.required(false).default_value("pentagon").value_name("RECORDING|SCENARIO").help(help)
+}))]
 pub(super) struct ViewArguments {
-    /// A recording, a scenario file, or the name of a built-in scenario.
-    #[arg(default_value = "pentagon")]
-    what: String,
     /// Set any key of the scenario; may be given several times.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
@@ -37,10 +38,17 @@ pub(super) struct ViewArguments {
     /// What draws: best, hardware, software, or a part of an adapter's name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
+    // Last, because its heading holds for all that follows.
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Format of the recording [default: recognised by its content].
+    #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
+    input_format: Option<Format>,
 }
 
 pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
-    let path = Path::new(&arguments.what);
+    let path = &arguments.reading.recording;
+    let reading = arguments.reading.options(arguments.input_format)?;
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
     let (timeline, live) = if is_recording {
@@ -48,7 +56,7 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
             let help = "leave --set out, or give a scenario";
             return Err(Failure::input("a recording has been flown: --set has no effect on it", help));
         }
-        (drawing::timeline(path, &ReadOptions::default(), arguments.delta, console)?, None)
+        (drawing::timeline(path, &reading, arguments.delta, console)?, None)
     } else {
         if arguments.delta.is_some() {
             let help = "leave --delta out, or give --set with the scenario's own key";
@@ -57,8 +65,12 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
                 help,
             ));
         }
+        if reading != ReadOptions::default() {
+            let help = "leave the options of reading out, or give a recording";
+            return Err(Failure::input("a scenario is flown: how a recording is read has no effect on it", help));
+        }
         let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let scenario = Scenario::read(&Source::resolve(&arguments.what)?, &overrides)?;
+        let scenario = Scenario::read(&Source::resolve(&path.to_string_lossy())?, &overrides)?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
     };
     show(timeline, live, arguments.theme, arguments.adapter.as_str().into())?;

@@ -1,5 +1,6 @@
 //! Axes: what range they show, and where their ticks are.
 
+use super::svg::text_px;
 use crate::text::decimals_of;
 
 /// Numbers beyond this have no place on an axis: differences of larger ones might overflow.
@@ -120,6 +121,11 @@ impl Axis {
         }
     }
 
+    /// Width of what is written at the ticks, that of the widest \[px\].
+    pub(super) fn labels_px(&self) -> f64 {
+        self.ticks.iter().map(|&tick| text_px(&self.tick_label(tick))).fold(0.0, f64::max)
+    }
+
     /// What is written at the tick at `place`.
     pub(super) fn tick_label(&self, place: f64) -> String {
         match self.scale {
@@ -151,17 +157,17 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
 fn nice_step(span: f64, most: f64) -> f64 {
     let least = span / most;
     let power = 10.0_f64.powf(least.log10().floor());
-    [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|digit| digit * power)
-        .find(|step| *step >= least * (1.0 - 1e-9))
-        .unwrap_or(10.0 * power)
+    let steps = [1.0, 2.0, 5.0].map(|digit| digit * power);
+    steps.into_iter().find(|step| *step >= least * (1.0 - 1e-9)).unwrap_or(10.0 * power)
 }
 
 /// A number with as many decimals as the step between ticks needs, and a true minus sign.
 fn number_label(number: f64, step: f64) -> String {
-    let text = if number != 0.0 && (number.abs() >= 1e5 || step < 1e-4) {
-        format!("{number:.3e}").replace("000e", "e").replace(".e", "e")
+    /// Most digits behind the point that powers of ten are written with: with more, the number itself is shorter.
+    const MOST_DIGITS: usize = 3;
+    let digits = decimals_of(step / 10.0_f64.powf(number.abs().log10().floor()), 17);
+    let text = if number != 0.0 && (number.abs() >= 1e5 && digits <= MOST_DIGITS || step < 1e-4) {
+        format!("{number:.digits$e}")
     } else {
         let decimals = decimals_of(step, 4);
         format!("{number:.decimals$}")
@@ -172,13 +178,8 @@ fn number_label(number: f64, step: f64) -> String {
 /// A power of ten by its exponent.
 fn power_label(exponent: f64) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    match exponent {
-        -2.0 => return "0.01".to_owned(),
-        -1.0 => return "0.1".to_owned(),
-        0.0 => return "1".to_owned(),
-        1.0 => return "10".to_owned(),
-        2.0 => return "100".to_owned(),
-        _ => {}
+    if exponent.abs() <= 2.0 {
+        return 10.0_f64.powf(exponent).to_string();
     }
     let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
     format!("10{}", format!("{exponent:.0}").chars().map(raised).collect::<String>())

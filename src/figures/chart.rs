@@ -9,7 +9,8 @@ use super::thin::thinned;
 pub(super) const WIDTH: f64 = 460.0;
 /// Space for the title \[px\].
 pub(super) const TITLE: f64 = 32.0;
-/// Left and right ends of the plotting area \[px\]; left of it are the numbers and the label of the vertical axis.
+/// Left end of the plotting area, or more where its numbers are wide, and right end \[px\]; left of it are the numbers and
+/// the label of the vertical axis.
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = WIDTH - 16.0;
 /// Middle of the label of the vertical axis \[px\].
@@ -21,6 +22,11 @@ const HEIGHT: f64 = 240.0;
 const LEAST_HEIGHT: f64 = 130.0;
 const MOST_HEIGHT: f64 = 380.0;
 const HAIRLINE: f64 = 0.8;
+/// Side of an inset, and how far it is from the edges of the plotting area \[px\].
+const INSET: f64 = 130.0;
+const INSET_GAP: f64 = 6.0;
+/// Largest part of the chart's width that half of an inset may show: beyond, it would show nothing from nearer.
+const INSET_FROM: f64 = 0.1;
 const TICK: f64 = 4.0;
 /// Space between a tick and its number \[px\].
 const BESIDE_TICK: f64 = 3.0;
@@ -70,6 +76,17 @@ pub(super) struct Chart {
     pub(super) bands: Vec<Band>,
     pub(super) lines: Vec<Line>,
     pub(super) marks: Vec<Mark>,
+    pub(super) inset: Option<Inset>,
+    /// Left end of the plotting area \[px\].
+    left: f64,
+}
+
+/// A square part of a chart with equal axes, drawn a second time from near in a corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inset {
+    pub(super) middle: (f64, f64),
+    /// Half of its side in the units of the axes.
+    pub(super) half: f64,
 }
 
 /// How a line or an area is painted.
@@ -81,7 +98,7 @@ enum Paint {
 
 impl Chart {
     pub(super) fn new(x: Axis, y: Axis) -> Self {
-        Self { x, y, equal: false, bands: Vec::new(), lines: Vec::new(), marks: Vec::new() }
+        Self { x, y, equal: false, bands: Vec::new(), lines: Vec::new(), marks: Vec::new(), inset: None, left: LEFT }
     }
 
     /// Adds a line that the legend explains.
@@ -96,12 +113,17 @@ impl Chart {
 
     /// Draws the chart under a title.
     pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Figure {
-        let height = if self.equal { self.make_axes_equal() } else { HEIGHT };
-        let bottom = TITLE + height;
+        let mut height = if self.equal { self.make_axes_equal() } else { HEIGHT };
+        // Wide numbers have their room, so that they do not run into the label of their axis.
+        self.left = LEFT.max(LABEL + TEXT / 2.0 + 2.0 * BESIDE_TICK + TICK + self.y.labels_px());
+        if self.equal && self.left > LEFT {
+            height = self.make_axes_equal();
+        }
+        let (left, bottom) = (self.left, TITLE + height);
         let legend = self.legend();
         let mut canvas =
-            Canvas::new((WIDTH, bottom + BELOW + legend_height(&legend)), title, f64::midpoint(LEFT, RIGHT));
-        let on_paper = |(x, y)| (LEFT + (RIGHT - LEFT) * self.x.share(x), bottom - height * self.y.share(y));
+            Canvas::new((WIDTH, bottom + BELOW + legend_height(&legend)), title, f64::midpoint(left, RIGHT));
+        let on_paper = |(x, y)| (left + (RIGHT - left) * self.x.share(x), bottom - height * self.y.share(y));
         self.draw_axes(&mut canvas, on_paper);
 
         let bands = self.bands.iter().map(|band| (Paint::Area(band.colour, band.opacity), self.outline(band)));
@@ -122,13 +144,54 @@ impl Chart {
                 canvas.text_beside(mark.marker, at, words);
             }
         }
+        if let Some(inset) =
+            self.inset.filter(|inset| inset.half > 0.0 && inset.half < INSET_FROM * (self.x.to - self.x.from))
+        {
+            self.draw_inset(&mut canvas, inset, on_paper(inset.middle), bottom);
+        }
         draw_legend(&mut canvas, &legend, bottom + BELOW);
         canvas.figure(name, description)
     }
 
+    /// Draws lines and marks around the middle of an inset from near, in the upper corner that is farther from it.
+    fn draw_inset(&self, canvas: &mut Canvas, inset: Inset, middle: Point, bottom: f64) {
+        let side = INSET.min(0.5 * (bottom - TITLE));
+        let is_right = middle.0 > f64::midpoint(self.left, RIGHT);
+        let left = if is_right { self.left + INSET_GAP } else { RIGHT - INSET_GAP - side };
+        let corner = (left, TITLE + INSET_GAP);
+        let unit = side / (2.0 * inset.half);
+        let on_inset = |(x, y): (f64, f64)| {
+            (corner.0 + side / 2.0 + unit * (x - inset.middle.0), corner.1 + side / 2.0 - unit * (y - inset.middle.1))
+        };
+        // The corners within, and one more on each side: the rest is outside.
+        let near = |&(x, y): &(f64, f64)| (x - inset.middle.0).abs().max((y - inset.middle.1).abs()) <= inset.half;
+        let stretches = self.lines.iter().flat_map(|line| {
+            let is_near: Vec<bool> = line.points.iter().map(near).collect();
+            let from = is_near.iter().position(|near| *near).unwrap_or(line.points.len()).saturating_sub(1);
+            let to = is_near.iter().rposition(|near| *near).map_or(from, |last| line.points.len().min(last + 2));
+            let known = line.points[from..to].split(|(x, y)| !(x + y).is_finite());
+            known.map(|points| (line.stroke, points.iter().copied().map(on_inset).collect()))
+        });
+        canvas.window(corner, side, |canvas| {
+            for (stroke, points) in thinned(stretches.collect()) {
+                canvas.line(&points, stroke);
+            }
+            for mark in &self.marks {
+                canvas.marker(mark.marker, on_inset(mark.at), mark.radius, mark.colour);
+            }
+        });
+        let far = (corner.0 + side, corner.1 + side);
+        let frame = [corner, (far.0, corner.1), far, (corner.0, far.1), corner];
+        canvas.line(&frame, Stroke::solid(SOFT_INK, HAIRLINE));
+        let part = inset.half * (RIGHT - self.left) / (self.x.to - self.x.from);
+        let here = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]
+            .map(|(right, down)| (middle.0 + right * part, middle.1 + down * part));
+        canvas.line(&here, Stroke::solid(SOFT_INK, HAIRLINE));
+    }
+
     /// Widens one range until a unit is as long on both axes; returns the height of the plotting area \[px\].
     fn make_axes_equal(&mut self) -> f64 {
-        let width = RIGHT - LEFT;
+        let width = RIGHT - self.left;
         let (across, up) = (self.x.to - self.x.from, self.y.to - self.y.from);
         let height = (width * up / across).clamp(LEAST_HEIGHT, MOST_HEIGHT).round();
         let unit = (across / width).max(up / height);
@@ -145,11 +208,16 @@ impl Chart {
         let [Axis { from: left, to: right, .. }, Axis { from: low, to: high, .. }] = [&self.x, &self.y];
         let (grid, frame) = (Stroke::solid(GRID, HAIRLINE), Stroke::solid(SOFT_INK, HAIRLINE));
         let mut ticks = Vec::new();
-        for &tick in &self.x.ticks {
+        let apart_px = (RIGHT - self.left) / self.x.ticks.len().max(1) as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
+        let every = ((self.x.labels_px() + 2.0 * BESIDE_TICK) / apart_px).ceil().max(1.0) as usize;
+        for (k, &tick) in self.x.ticks.iter().enumerate() {
             let (at, top) = (on_paper((tick, *low)), on_paper((tick, *high)));
             canvas.line(&[at, top], grid);
             ticks.push([at, (at.0, at.1 + TICK)]);
-            canvas.text((at.0, at.1 + TICK + BESIDE_TICK), Align::CENTRE_ABOVE, &self.x.tick_label(tick));
+            if k.is_multiple_of(every) {
+                canvas.text((at.0, at.1 + TICK + BESIDE_TICK), Align::CENTRE_ABOVE, &self.x.tick_label(tick));
+            }
         }
         for &tick in &self.y.ticks {
             let (at, end) = (on_paper((*left, tick)), on_paper((*right, tick)));

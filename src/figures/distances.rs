@@ -3,7 +3,7 @@
 use super::axis::{Axis, Scale};
 use super::chart::{Band, Chart, Line, Mark};
 use super::figure::Figure;
-use super::history::{FEW_VEHICLES, RunHistory, evenly, pairs};
+use super::history::{FEW_VEHICLES, RunHistory, Span, evenly, pairs};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
 use crate::swarm::{ClosestApproach, Pair, Rows, separation};
 use crate::text::at_least;
@@ -24,15 +24,19 @@ const TOLD_APART: usize = 15;
 /// The closest approach is marked with what the recording says of the time between samples too.
 #[must_use]
 pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, title: &str) -> Figure {
-    let curves = if history.vehicles() <= FEW_VEHICLES { of_all_pairs(history) } else { of_many_pairs(history) };
     let closest = history.closest();
-    let drawn = curves.lines.iter().flat_map(|line| line.points.iter().map(|&(_, y)| y));
-    let bands = curves.bands.iter().flat_map(|band| band.points.iter().map(|&(_, _, high)| high));
+    let mut chart = Chart::new(history.time_axis(), Axis::distances("m", &[], delta_m));
+    let note = if history.vehicles() <= FEW_VEHICLES {
+        chart.lines = of_all_pairs(history);
+        String::new()
+    } else {
+        of_many_pairs(history, &mut chart)
+    };
+    let drawn = chart.lines.iter().flat_map(|line| line.points.iter().map(|&(_, y)| y));
+    let bands = chart.bands.iter().flat_map(|band| band.points.iter().map(|&(_, _, high)| high));
     let marked = closest.map(|closest| closest.separation_m);
     let numbers: Vec<f64> = drawn.chain(bands).chain(marked).chain([delta_m]).chain(certified_m).collect();
-
-    let mut chart = Chart::new(history.time_axis(), Axis::distances("m", &numbers, delta_m));
-    (chart.bands, chart.lines) = (curves.bands, curves.lines);
+    chart.y = Axis::distances("m", &numbers, delta_m);
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
     if let Some(certified_m) = certified_m {
         chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", at_least(certified_m, 3)));
@@ -49,17 +53,10 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
         let at = (closest.time_s, closest.separation_m);
         chart.marks.push(Mark::ring(at, INK, Some(format!("closest {words}"))));
     }
-    chart.figure("distances", title, &(description + &curves.note))
+    chart.figure("distances", title, &(description + &note))
 }
 
-struct Curves {
-    bands: Vec<Band>,
-    lines: Vec<Line>,
-    /// What is drawn of all that could be, as a sentence behind a space.
-    note: String,
-}
-
-fn of_all_pairs(history: &RunHistory) -> Curves {
+fn of_all_pairs(history: &RunHistory) -> Vec<Line> {
     let count = pairs(history.vehicles()).count();
     let lines = pairs(history.vehicles()).enumerate().map(|(k, (i, j))| {
         let points = history.spans().map(|span| (span.time_s, span.pair_min_m[k])).collect();
@@ -70,10 +67,11 @@ fn of_all_pairs(history: &RunHistory) -> Curves {
         };
         Line { points, stroke, label }
     });
-    Curves { bands: Vec::new(), lines: lines.collect(), note: String::new() }
+    lines.collect()
 }
 
-fn of_many_pairs(history: &RunHistory) -> Curves {
+/// Draws the pairs of a large swarm; says what is drawn of all that could be, as a sentence behind a space.
+fn of_many_pairs(history: &RunHistory, chart: &mut Chart) -> String {
     let (ranked_pairs, all) = ranked_pairs(history.vehicles());
     let instants = history.spread(RANKED_INSTANTS);
     let mut scratch = Vec::new();
@@ -86,9 +84,9 @@ fn of_many_pairs(history: &RunHistory) -> Curves {
         opacity,
         label: Some(label.to_owned()),
     };
-    let line = |points, stroke, label: String| Line { points, stroke, label: Some(label) };
+    chart.bands = vec![band(0, 4, 0.16, "5 to 95 %"), band(1, 3, 0.28, "25 to 75 %")];
     let median = times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[2])).collect();
-    let mut lines = vec![line(median, Stroke::solid(PALETTE[0], 1.6), "median".to_owned())];
+    chart.line(median, Stroke::solid(PALETTE[0], 1.6), "median");
 
     // Between samples too, where the recording knows.
     let swept: Vec<_> = history.spans().filter_map(|span| Some((span.time_s, span.closest?))).collect();
@@ -98,24 +96,18 @@ fn of_many_pairs(history: &RunHistory) -> Curves {
         swept
     };
     for (k, pair) in closest_pairs(&closest, history.vehicles()).into_iter().enumerate() {
-        let apart = history
-            .spans()
-            .map(|span| (span.time_s, separation(&span.positions_m, pair.first(), pair.second())))
-            .collect();
-        lines.push(line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair.to_string()));
+        let apart_m = |span: &Span| separation(&span.positions_m, pair.first(), pair.second());
+        let apart = history.spans().map(|span| (span.time_s, apart_m(span))).collect();
+        chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair.to_string());
     }
     let smallest = closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
-    lines.push(line(smallest, Stroke::dashed(SOFT_INK, 1.4), "smallest".to_owned()));
-    let note = match ranked_pairs.len() {
-        ranked if ranked < all => {
-            format!(
-                " Median and bands are those of {ranked} of the {all} pairs, evenly chosen at {} instants.",
-                ranks.len()
-            )
+    chart.line(smallest, Stroke::dashed(SOFT_INK, 1.4), "smallest");
+    match (ranked_pairs.len(), ranks.len()) {
+        (ranked, instants) if ranked < all => {
+            format!(" Median and bands are those of {ranked} of the {all} pairs, evenly chosen at {instants} instants.")
         }
         _ => String::new(),
-    };
-    Curves { bands: vec![band(0, 4, 0.16, "5 to 95 %"), band(1, 3, 0.28, "25 to 75 %")], lines, note }
+    }
 }
 
 /// The pairs whose distances are ranked, and how many there are in all.

@@ -10,7 +10,8 @@
 //! | [`shape_error`] | largest error of a desired distance |
 //! | [`disagreement`] | largest speed relative to the swarm's mean |
 //! | [`encounters`] | distances of pairs of a recording, with bands where they are not known exactly |
-//! | [`closest_approach`] | two paths of a recording from above, where they are closest |
+//! | [`closest_approach`] | two paths of a recording from above, and from near where they are closest |
+//! | [`smallest`] | the smallest distance of all of a recording |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
 //! | [`convergence`] | an integrator's error over its step |
 //!
@@ -41,7 +42,7 @@ pub use distances::distances;
 pub use figure::Figure;
 pub use history::RunHistory;
 pub use paths::{paths, paths_in_space};
-pub use recorded::{Encounter, closest_approach, encounters};
+pub use recorded::{Encounter, closest_approach, encounters, smallest};
 pub use run::{Criteria, NAMES_OF_RUN, of_run};
 pub use scalars::{control, disagreement, energy, shape_error};
 pub use tension::tension_curve;

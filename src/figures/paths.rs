@@ -92,8 +92,9 @@ const PITCH: f64 = 0.42;
 const HEIGHT: f64 = 330.0;
 /// Most that the box of the axes may take, across and up \[px\]; the rest is for the numbers.
 const BOX: Point = (340.0, 270.0);
-/// Least space between the numbers of an axis \[px\].
+/// Least space between the ticks of an axis, and across between their numbers \[px\].
 const TICK_PX: f64 = 32.0;
+const BESIDE_PX: f64 = 4.0;
 
 /// Where the vehicles went in space: x, y and z \[m\] in a parallel projection, a unit as long on all axes. Which
 /// vehicles, marks and colours as in [`paths`].
@@ -137,9 +138,13 @@ impl View {
         let seen_across = across * YAW.cos() + deep * YAW.sin();
         let seen_up = (across * YAW.sin() + deep * YAW.cos()) * PITCH.sin() + up * PITCH.cos();
         let unit = (BOX.0 / seen_across).min(BOX.1 / seen_up);
-        let axes = spans.map(|axis| {
-            let room = unit * (axis.to - axis.from);
-            Axis::spanning(&axis.label, axis.from, axis.to, (room / TICK_PX).max(1.0))
+        // How much of a length along each axis is seen across: numbers beside each other must not meet.
+        let axes = [(0, YAW.cos()), (1, YAW.sin()), (2, 0.0)].map(|(k, across)| {
+            let Axis { label, from, to, .. } = &spans[k];
+            let spanning = |tick_px: f64| Axis::spanning(label, *from, *to, (unit * (to - from) / tick_px).max(1.0));
+            let axis = spanning(TICK_PX);
+            let wide_px = if across > 0.0 { (axis.labels_px() + BESIDE_PX) / across } else { 0.0 };
+            if wide_px > TICK_PX { spanning(wide_px) } else { axis }
         });
         Self { axes, unit }
     }
@@ -176,7 +181,7 @@ impl View {
         numbered(z, &on_z, (-7.0, 0.0), Align::RIGHT);
         for (axis, [beside, ..], (right, down), align) in [
             (x, on_x(x.middle()), (-8.0, 28.0), Align::RIGHT_ABOVE),
-            (y, on_y(y.middle()), (38.0, 26.0), Align::LEFT),
+            (y, on_y(y.middle()), ((15.0 + y.labels_px()).max(38.0), 26.0), Align::LEFT),
             (z, on_z(z.to), (0.0, -12.0), Align::CENTRE_BELOW),
         ] {
             canvas.text((beside.0 + right, beside.1 + down), align, &axis.label);

@@ -1,9 +1,12 @@
 //! Two of a recording: their distance over time, and their closest approach from above.
 
 use super::axis::{Axis, Scale, extent};
-use super::chart::{Band, Chart, Mark};
+use super::chart::{Band, Chart, Inset, Mark};
 use super::figure::Figure;
 use super::svg::{INK, PALETTE, Stroke};
+
+/// Width of the inset of a closest approach, over the distance from above.
+const NEAR: f64 = 4.0;
 
 /// Two over time.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,13 +80,33 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     chart.figure(name, title, &description)
 }
 
-/// The paths of two vehicles from above \[m\], and where both are when they are closest.
+/// The smallest distance of all over time \[s\], and the limit and the closest approach of those who came closest. The
+/// line breaks where no distance is known.
+#[must_use]
+pub fn smallest(distances: &[Option<(f64, f64)>], closest: &Encounter, title: &str) -> Figure {
+    let Encounter { limit_m: limit, unit, .. } = *closest;
+    let points: Vec<_> = distances.iter().map(|known| known.unwrap_or((f64::NAN, f64::NAN))).collect();
+    let (from_s, to_s) = extent(points.iter().map(|point| point.0)).unwrap_or((0.0, 0.0));
+    let numbers: Vec<_> = points.iter().map(|point| point.1).chain([limit]).collect();
+    let mut chart = Chart::new(Axis::time(from_s, to_s), Axis::distances(unit, &numbers, limit));
+    let least = points.iter().copied().filter(|point| point.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
+    chart.line(points, Stroke::solid(PALETTE[0], 1.5), "smallest distance of any two");
+    chart.level(limit, Stroke::solid(INK, 2.0), format!("limit {limit:?} {unit}"));
+    let words = closest.closest();
+    chart.marks.extend(least.map(|at| Mark::ring(at, INK, Some(format!("closest {words}")))));
+    let description = format!("The smallest distance of any two over time; closest {words}, limit {limit:?} {unit}.");
+    chart.figure("smallest", title, &description)
+}
+
+/// The paths of two vehicles from above \[m\], and where both are when they are closest; an inset shows that from near,
+/// [`NEAR`] times their distance wide.
 #[must_use]
 pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     let points = || encounter.paths_m.iter().flatten();
     let x = Axis::linear("x [m]", points().map(|point| point.0), false);
     let y = Axis::linear("y [m]", points().map(|point| point.1), false);
-    let mut chart = Chart { equal: true, ..Chart::new(x, y) };
+    let mut chart = Chart::new(x, y);
+    chart.equal = true;
     let nearest = encounter.nearest();
     let places = encounter.paths_m.each_ref().map(|path| nearest.and_then(|k| path.get(k).copied()));
     for (k, (path, name)) in encounter.paths_m.iter().zip(&encounter.names).enumerate() {
@@ -93,6 +116,9 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     let closest = encounter.closest();
     if let [Some(one), Some(other)] = places {
         chart.line(vec![one, other], Stroke::dashed(INK, 1.4), format!("closest {closest}"));
+        let middle = (f64::midpoint(one.0, other.0), f64::midpoint(one.1, other.1));
+        let apart = (one.0 - other.0).hypot(one.1 - other.1);
+        chart.inset = Some(Inset { middle, half: 0.5 * NEAR * apart });
     }
     let [first, second] = &encounter.names;
     let description = format!("Paths of {first} and {second} from above; rings where they are closest, {closest}.");

@@ -165,6 +165,21 @@ impl Canvas {
         }
     }
 
+    /// A square with its upper left corner here, beyond which nothing that is drawn in it shows.
+    pub(super) fn window(&mut self, (x, y): Point, side: f64, draw: impl FnOnce(&mut Self)) {
+        let around = std::mem::take(&mut self.shapes);
+        draw(self);
+        let within = std::mem::replace(&mut self.shapes, around);
+        let window = html! {
+            svg x=(px(x)) y=(px(y)) width=(px(side)) height=(px(side))
+                viewBox=(format!("{} {} {} {}", px(x), px(y), px(side), px(side))) {
+                rect x=(px(x)) y=(px(y)) width="100%" height="100%" fill=(PAPER.light) {}
+                (PreEscaped(within))
+            }
+        };
+        self.shapes += &window.into_string();
+    }
+
     /// A text beside a marker: to the lower left of a cross and to the upper right of a ring, so that the numbers of one
     /// that ends where it started stay apart.
     pub(super) fn text_beside(&mut self, marker: Marker, (x, y): Point, words: &str) {
@@ -209,6 +224,12 @@ impl Canvas {
 /// The same text without control characters, which XML does not allow.
 fn printable(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).collect()
+}
+
+/// Width of words by an estimate of the font, rather that of a wide one \[px\].
+pub(super) fn text_px(words: &str) -> f64 {
+    let narrow = words.chars().filter(|c| matches!(c, '.' | ' ' | '[' | ']')).count();
+    TEXT * (0.6 * words.chars().count() as f64 - 0.3 * narrow as f64)
 }
 
 /// A length to a tenth of a pixel.

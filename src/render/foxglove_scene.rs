@@ -1,5 +1,6 @@
 //! A run as a 3-D scene that Foxglove shows without a plug-in.
 
+use std::collections::BTreeSet;
 use std::io;
 
 use foxglove::messages::line_primitive::Type as LineType;
@@ -11,10 +12,9 @@ use foxglove::{Encode as _, Schema};
 use super::scene::{Colour, Theme};
 use super::timeline::Plan;
 use crate::graph::Graph;
-use crate::record::Sample;
 use crate::record::mcap::{ExtraTopic, Topic};
+use crate::record::{Event, Sample};
 use crate::scenario::Scenario;
-use crate::space::NearPairs;
 use crate::swarm::{Pair, Rows, row, separation};
 
 /// Scenes a second \[Hz\].
@@ -38,7 +38,8 @@ pub struct FoxgloveScene {
     delta_m: f64,
     next_s: f64,
     schema: Option<Schema>,
-    near: NearPairs,
+    /// Pairs that are closer than delta, by the judge of the flight.
+    violated: BTreeSet<Pair>,
 }
 
 impl FoxgloveScene {
@@ -51,19 +52,16 @@ impl FoxgloveScene {
             delta_m: scenario.delta_m,
             next_s: f64::NEG_INFINITY,
             schema: SceneUpdate::get_schema(),
-            near: NearPairs::default(),
+            violated: BTreeSet::new(),
         }
     }
 
-    fn scene(&mut self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
+    fn scene(&self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
         let theme = Theme::Dark;
         let count = positions_m.nrows();
         let mut alarm = vec![false; count];
-        self.near.update(positions_m, self.delta_m);
-        for &(i, j) in self.near.pairs() {
-            if separation(positions_m, i, j) < self.delta_m {
-                (alarm[i], alarm[j]) = (true, true);
-            }
+        for pair in self.violated.iter().filter(|pair| pair.second() < count) {
+            (alarm[pair.first()], alarm[pair.second()]) = (true, true);
         }
         let hulls = (0..count).map(|k| {
             let colour = if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
@@ -120,6 +118,14 @@ impl ExtraTopic for FoxgloveScene {
         let scene = self.scene(sample.time_s, &sample.swarm.positions_m);
         scene.encode(message).map_err(io::Error::other)?;
         Ok(true)
+    }
+
+    fn note(&mut self, event: &Event) {
+        match *event {
+            Event::ViolationBegan { pair, .. } => _ = self.violated.insert(pair),
+            Event::ViolationEnded { pair, .. } => _ = self.violated.remove(&pair),
+            _ => {}
+        }
     }
 }
 
@@ -197,17 +203,25 @@ mod tests {
     }
 
     #[test]
-    fn two_without_an_edge_between_them_are_red_too_where_they_are_too_close() {
+    fn two_without_an_edge_between_them_are_red_too_while_the_judge_finds_them_too_close() {
         let mut scenario = pentagon();
         scenario.graph = crate::graph::Graph::ring(5);
         let mut swarm = scenario.start.clone();
         let place = row(&swarm.positions_m, 0) + nalgebra::Vector3::new(0.0, 0.0, 1.9);
         crate::swarm::set_row(&mut swarm.positions_m, 2, place);
-        let bytes = message(&mut FoxgloveScene::of(&scenario), 0.0, &swarm).expect("a message");
-        let entity = SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities.remove(0);
-        let red = |k: usize| entity.spheres[k].color == Some(colour(Theme::Dark.alarm()));
-        assert!(red(0) && red(2) && !red(4));
-        assert!(entity.lines[0].pose.is_some());
+        let mut scene = FoxgloveScene::of(&scenario);
+        let red = |scene: &mut FoxgloveScene, time_s: f64| {
+            let bytes = message(scene, time_s, &swarm).expect("a message");
+            let entity = SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities.remove(0);
+            assert!(entity.lines[0].pose.is_some());
+            [0, 2, 4].map(|k| entity.spheres[k].color == Some(colour(Theme::Dark.alarm())))
+        };
+        assert_eq!(red(&mut scene, 0.0), [false; 3], "the judge has said nothing");
+        let (pair, time_s, min_m) = (Pair::new(0, 2), 0.5, 1.9);
+        scene.note(&Event::ViolationBegan { pair, time_s });
+        assert_eq!(red(&mut scene, 1.0), [true, true, false]);
+        scene.note(&Event::ViolationEnded { pair, time_s, min_m });
+        assert_eq!(red(&mut scene, 2.0), [false; 3]);
     }
 
     #[test]

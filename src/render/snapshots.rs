@@ -4,11 +4,8 @@ use super::error::RenderError;
 use super::gpu::Renderer;
 use super::picture::Picture;
 use super::scene::{CameraSpec, Extent, Scene, View, metres};
-use super::timeline::Timeline;
+use super::timeline::{PICTURED, Timeline};
 use crate::swarm::Pair;
-
-/// Most violations that are pictured.
-const MOST_VIOLATIONS: usize = 10;
 
 /// A picture with its name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,7 +21,7 @@ pub struct Snapshot {
 /// Names of all pictures that [`snapshots_of_run`] can take.
 #[must_use]
 pub fn snapshot_names() -> Vec<String> {
-    let violations = (1..=MOST_VIOLATIONS).map(|k| format!("violation-{k}"));
+    let violations = (1..=PICTURED).map(|k| format!("violation-{k}"));
     ["start", "closest", "end"].map(str::to_owned).into_iter().chain(violations).collect()
 }
 
@@ -60,10 +57,10 @@ pub fn snapshots_of_run(
         shoot("closest", what, time_s, None)?;
     }
     shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
-    for (k, span) in timeline.violations().iter().take(MOST_VIOLATIONS).enumerate() {
+    for (k, span) in timeline.violations().iter().take(PICTURED).enumerate() {
         let (pair, from_s, to_s) = (span.pair, span.from_s, span.to_s.min(end_s));
         let what = format!("Vehicles {pair} were closer than delta from {from_s:.2} s to {to_s:.2} s.");
-        shoot(&format!("violation-{}", k + 1), what, timeline.worst_s(span), Some(pair))?;
+        shoot(&format!("violation-{}", k + 1), what, span.min_at_s, Some(pair))?;
     }
     Ok(snapshots)
 }

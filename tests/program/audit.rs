@@ -237,7 +237,7 @@ fn the_page_says_what_the_verdict_says() {
     let lines = |page: &str| page.matches("<polyline").count();
     assert_eq!(
         lines(&page(&["gap.csv", "--delta", "1"])),
-        lines(&page(&["gap.csv", "--delta", "1", "--max-gap", "9"])) + 3
+        lines(&page(&["gap.csv", "--delta", "1", "--max-gap", "9"])) + 4
     );
     let scaled = page(&["pass.csv", "--ellipsoid", "0.5,0.5,0.5"]);
     assert!(scaled.contains("distance [ellipsoids]") && scaled.contains("closest 2.000000 ellipsoids"), "{scaled}");

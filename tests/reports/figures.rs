@@ -242,6 +242,51 @@ fn every_axis_names_its_unit() {
     }
 }
 
+/// Width of a number as it is written, by what most fonts need \[px\].
+fn width(words: &str) -> f64 {
+    words.chars().map(|c| if c == '.' { 4.0 } else { 7.3 }).sum()
+}
+
+#[test]
+fn numbers_of_the_axes_run_neither_into_each_other_nor_into_the_label() {
+    let mut most = 0.0_f64;
+    for (offset, scale) in [(0.0, 1.0), (0.0, 1e3), (123_456.0, 1.0), (-1e6, 10.0), (0.0, 1e-3), (0.0, 1e7)] {
+        let mut history = RunHistory::new();
+        samples(3, 0.0, 2.75, &mut |sample| {
+            let mut swarm = sample.swarm.clone();
+            swarm.positions_m = swarm.positions_m.map(|x| offset + scale * x);
+            swarm.velocities_m_s *= scale;
+            let (control, time_s) = (sample.control * scale, sample.time_s * scale);
+            let energy = sample.energy.map(|energy| energy * scale);
+            history.observe(&Sample { swarm: &swarm, control: &control, time_s, energy, separation: None, ..*sample });
+        });
+        for figure in all_of(&history, DELTA_M * scale) {
+            let drawing = Drawing::of(&figure);
+            let of = |anchor: &str, dy: &str| -> Vec<(f64, f64, String)> {
+                let texts = drawing.all("text").into_iter();
+                let texts =
+                    texts.filter(|t| t.attribute("text-anchor") == Some(anchor) && t.attribute("dy") == Some(dy));
+                texts.map(|t| (number_of(&t, "x"), number_of(&t, "y"), t.text().unwrap_or("").to_owned())).collect()
+            };
+            let ticks = of("end", "0.35em");
+            assert!(ticks.len() > 1, "{}", figure.name);
+            for (at, (x, _, words)) in ticks.iter().enumerate() {
+                // The label of the axis is read upwards: its letters are 13 px to the left of 24 px.
+                assert!(x - width(words) >= 23.0, "{}, {offset}, {scale}: {words} ends at {x} px", figure.name);
+                assert!(ticks[..at].iter().all(|other| other.2 != *words), "{}: {words} twice", figure.name);
+                most = most.max(width(words));
+            }
+            let mut ticks = of("middle", "0.76em");
+            ticks.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for two in ticks.windows(2) {
+                let apart = two[1].0 - two[0].0 - 0.5 * (width(&two[0].2) + width(&two[1].2));
+                assert!(apart > 2.0, "{}, {offset}, {scale}: {two:?}", figure.name);
+            }
+        }
+    }
+    assert!(most > 45.0, "some numbers are wider than the room that most need: {most} px");
+}
+
 #[test]
 fn a_run_has_the_figures_that_it_has_data_for() {
     let level = ["paths", "distances", "control", "energy", "shape-error", "disagreement"];

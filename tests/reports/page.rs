@@ -126,3 +126,38 @@ fn figures_that_are_not_wanted_are_not_left_over() {
     let html = fly(folder.path(), &[&flown[..], &["--no-figures"]].concat());
     assert!(!figure.exists() && !html.contains("<svg"));
 }
+
+#[test]
+fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_approach_from_near() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Alpha and bravo pass each other on ways of 100 m; charlie and delta are nearest before and after.
+    let page = |miss_m: f64| {
+        let mut table = "t,id,x,y,z\n".to_owned();
+        for t in 0..=100 {
+            let x = f64::from(t);
+            table += &format!("{t},alpha,{x},0,0\n{t},bravo,{},{miss_m},0\n", 100.0 - x);
+            table += &format!("{t},charlie,{x},50,0\n{t},delta,{x},58,0\n");
+        }
+        fs::write(folder.path().join("pass.csv"), table).expect("written");
+        let audit = ["audit", "pass.csv", "--delta", "1", "--html", "a.html"];
+        let done = Command::new(env!("CARGO_BIN_EXE_tautline")).args(audit).current_dir(folder.path()).output();
+        assert_eq!(done.expect("the program runs").status.code(), Some(0));
+        fs::read_to_string(folder.path().join("a.html")).expect("a page")
+    };
+    let near = page(1.5);
+    let figure = near.split("<svg xmlns").find(|figure| figure.contains("Smallest distance of all")).expect("a figure");
+    assert!(figure.contains("closest 1.500000 m at 50.000 s, limit 1.0 m"), "{figure}");
+    // It is that of all, and not of one pair: 8 m but around the pass.
+    let line = figure.split("<polyline ").filter(|line| line.contains("#0072B2")).max_by_key(|line| line.len());
+    let corners: Vec<(f64, f64)> = line
+        .and_then(|line| line.split('"').find(|text| text.contains(',')))
+        .expect("a line")
+        .split(' ')
+        .filter_map(|corner| corner.split_once(',').and_then(|(x, y)| Some((x.parse().ok()?, y.parse().ok()?))))
+        .collect();
+    let lowest = corners.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");
+    let [first, last] = [corners[0], corners[corners.len() - 1]];
+    assert!((lowest.0 - f64::midpoint(first.0, last.0)).abs() < 3.0 && first.1 == last.1, "{corners:?}");
+    let insets = |page: &str| page.matches("<svg x=").count();
+    assert_eq!((insets(&near), insets(&page(30.0))), (1, 0), "what is seen anyway has no inset");
+}

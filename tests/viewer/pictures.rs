@@ -225,7 +225,7 @@ fn a_size_that_cannot_be_drawn_is_refused() {
         assert_eq!(picture.rgba.len(), size_px[0] as usize * size_px[1] as usize * 4);
     }
     let none = Renderer::open(&AdapterChoice::Named("no such adapter".to_owned())).err();
-    assert!(matches!(none, Some(RenderError::NoSuchAdapter { .. })), "{none:?}");
+    assert!(matches!(none, Some(RenderError::NoSuchAdapter(_))), "{none:?}");
 }
 
 /// Three vehicles pass each other; two of them come too close from 2 s to 3 s.

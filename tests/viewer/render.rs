@@ -238,6 +238,138 @@ fn vehicles_that_meet_between_two_samples_are_pictured_as_they_meet() {
     assert!(closest == halfway, "they are closest halfway");
 }
 
+/// The pixels of a picture, red, green and blue.
+fn pixels(path: &Path) -> Vec<[u8; 3]> {
+    let file = fs::File::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG");
+    let mut rgb = vec![0; reader.output_buffer_size().expect("a size")];
+    reader.next_frame(&mut rgb).expect("a picture");
+    rgb.as_chunks().0.to_vec()
+}
+
+/// What a violation is drawn in on dark ground; the bar across the top begins with it.
+const ALARM: [u8; 3] = [0xFF, 0x2F, 0x3C];
+
+#[test]
+fn a_picture_is_red_where_audit_finds_a_violation_and_nowhere_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // 1.1 m apart, and 0.66^2 + 0.88^2 is below 1.1^2 by rounding.
+    let still = |t: u32| format!("{t},a,0,0,0\n{t},b,0.66,0.88,0\n");
+    let table = format!("t,id,x,y,z\n{}{}{}", still(0), still(1), still(2));
+    fs::write(folder.path().join("still.csv"), table).expect("written");
+    for (delta, is_violation) in [("1.1", false), ("1.1000001", true)] {
+        let audit = ran(folder.path(), &["audit", "still.csv", "--delta", delta]);
+        assert_eq!(audit.exit, Some(i32::from(is_violation)), "{}", audit.out);
+        let render = ["render", "still.csv", "--delta", delta, "--at", "1", "--size", "320x180", "--out", delta];
+        let Ran { exit, err, .. } = ran(folder.path(), &render);
+        assert_eq!(exit, GOOD, "{err}");
+        let pixels = pixels(&folder.path().join(delta).join("at-1.000s.png"));
+        assert_eq!(pixels[0] == ALARM, is_violation, "delta {delta}: {:?}", pixels[0]);
+        assert_eq!(pixels.contains(&ALARM), is_violation, "delta {delta}");
+    }
+}
+
+#[test]
+fn what_the_judge_refuses_is_drawn_and_said_to_be_not_judged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // The radius of a vehicle must not change in the middle of a flight.
+    let table = "t,id,x,y,z,radius\n0,a,0,0,0,0.1\n0,b,1,0,0,0.1\n1,a,0,0,0,0.2\n1,b,1,0,0,0.1\n";
+    fs::write(folder.path().join("grows.csv"), table).expect("written");
+    assert_eq!(ran(folder.path(), &["audit", "grows.csv", "--delta", "2"]).exit, WRONG_INPUT);
+    let Ran { exit, err, .. } = ran(folder.path(), &["render", "grows.csv", "--delta", "2", "--size", "320x180"]);
+    let text = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(exit, GOOD, "{err}");
+    assert!(text.contains("it was not judged"), "{text}");
+    assert!(!pixels(&folder.path().join("snapshots/start.png")).contains(&ALARM));
+}
+
+#[test]
+fn trails_are_as_long_as_they_are_asked_to_be() {
+    let folder = flown("pentagon", &["--no-snapshots"]);
+    let picture = |name: &str, more: &[&str]| {
+        let render = [&["render", "out/run.mcap", "--at", "end", "--size", "320x180", "--out", name], more].concat();
+        let Ran { exit, err, .. } = ran(folder.path(), &render);
+        assert_eq!(exit, GOOD, "{err}");
+        pixels(&folder.path().join(name).join("end.png"))
+    };
+    let none = picture("none", &["--trail", "1e-6"]);
+    let painted = |more: &[&str]| picture("some", more).iter().zip(&none).filter(|(with, none)| with != none).count();
+    let [whole, long, short] = [&[][..], &["--trail", "2"], &["--trail", "0.5"]].map(painted);
+    assert!(whole > long && long > short && short > 0, "{whole}, {long} and {short} pixels");
+    for trail in ["0", "-1", "nan"] {
+        let Ran { exit, err, .. } = ran(folder.path(), &["render", "out/run.mcap", "--trail", trail]);
+        assert_eq!(exit, WRONG_INPUT, "{err}");
+        assert!(err.contains("is not a positive number"), "{err}");
+    }
+}
+
+#[test]
+fn a_window_reads_a_recording_as_it_is_told_to() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("own.csv"), "t,id,east,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,-2,1,0\n").expect("written");
+    // Arguments after `view`, exit code, part of the message. There is no display: what gets that far was read.
+    let cases: [(&[&str], Option<i32>, &str); 5] = [
+        (&["own.csv"], WRONG_INPUT, "own.csv"),
+        (&["own.csv", "--column", "x=east"], MACHINE_FAILED, "no display"),
+        (&["own.csv", "--column", "x=east", "--input-format", "npz"], WRONG_INPUT, "own.csv"),
+        (&["own.csv", "--column", "x=east", "--scale", "0"], WRONG_INPUT, "--scale is 0"),
+        (&["pentagon", "--scale", "0.001"], WRONG_INPUT, "a scenario is flown"),
+    ];
+    for (arguments, exit, message) in cases {
+        let done = std::process::Command::new(TAUTLINE)
+            .arg("view")
+            .args(arguments)
+            .current_dir(folder.path())
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .output()
+            .expect("the program runs");
+        let err = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), exit, "{arguments:?}: {err}");
+        assert!(err.contains(message), "{arguments:?}: {err}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn where_there_is_no_desktop_the_driver_is_silent_and_the_program_stays_one_process() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("two.csv"), "t,id,x,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,-2,1,0\n").expect("written");
+    let command = |arguments: &[&str]| {
+        let mut command = std::process::Command::new(TAUTLINE);
+        command.args(arguments).current_dir(folder.path()).env_remove("XDG_RUNTIME_DIR");
+        command.env_remove("NODEVICE_SELECT").env_remove("MESA_VK_DEVICE_SELECT");
+        command
+    };
+    let complains = |command: &mut std::process::Command, exit: Option<i32>| {
+        let done = command.output().expect("the program runs");
+        let err = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), exit, "{err}");
+        err.contains("XDG_RUNTIME_DIR")
+    };
+    let render = ["render", "two.csv", "--size", "64x36", "--at", "start"];
+    let run = ["run", "pentagon", "--out", "out", "--set", "time.duration_s=1"];
+    assert!(!complains(&mut command(&render), GOOD));
+    assert!(!complains(&mut command(&run), Some(1)), "the formation is not reached: the exit code passes through");
+    // Who chooses a device by that layer keeps it, and its complaints: without the layer's absence there are some.
+    assert!(complains(command(&render).env("MESA_VK_DEVICE_SELECT", "0:0"), GOOD));
+
+    // A signal reaches the one process that there is.
+    let long = ["run", "pentagon", "--out", "long", "--set", "time.duration_s=100000"];
+    let mut flight = command(&long).stderr(std::process::Stdio::piped()).spawn().expect("the program runs");
+    let recording = folder.path().join("long/run.mcap");
+    let began = std::time::Instant::now();
+    while fs::metadata(&recording).map_or(0, |file| file.len()) == 0 {
+        assert!(began.elapsed() < std::time::Duration::from_mins(1), "nothing is recorded");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    let told = std::process::Command::new("kill").args(["-INT", &flight.id().to_string()]).status().expect("kill");
+    assert!(told.success());
+    assert_eq!(flight.wait().expect("it ends").code(), Some(1), "an interrupted run ends cleanly and is no pass");
+    assert!(folder.path().join("long/report.json").exists());
+}
+
 #[test]
 fn a_recording_that_was_not_closed_is_drawn_and_said_to_be_unfinished() {
     let folder = flown("pentagon", &["--no-snapshots"]);

@@ -8,8 +8,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use tautline::render::Timeline;
 use tautline::render::scene::{Camera, Extent};
-use tautline::render::{CameraSpec, Timeline};
 
 /// Longest wait for anything on a slow machine.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -272,7 +272,7 @@ fn every_layer_theme_and_turn_changes_the_picture_and_back_again() {
 fn first_vehicle(recording: &Path, size_px: [u32; 2]) -> [u32; 2] {
     let timeline = Timeline::read_mcap(recording).expect("a recording");
     let extent = Extent::of(&timeline);
-    let (orbit, target_m) = extent.orbit(&CameraSpec::Iso, size_px);
+    let (orbit, target_m) = extent.orbit(size_px);
     let frame = timeline.at(f64::INFINITY).expect("a frame");
     let place = frame.positions_m.row(0).transpose().fixed_rows::<3>(0) - extent.origin_m();
     let at = Camera::orbiting(orbit, target_m, size_px).project(place).expect("before the camera");

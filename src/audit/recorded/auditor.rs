@@ -4,6 +4,7 @@ use super::error::RecordedError;
 use super::outcome::{Gap, Outcome};
 use super::rates::Rates;
 use super::settings::{LARGEST, Settings};
+use super::smallest::Smallest;
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::audit::outcome::Status;
@@ -30,6 +31,7 @@ pub struct TrackAuditor {
     windows: Windows,
     results: Results,
     gaps: Vec<Gap>,
+    smallest: Option<Smallest>,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
     /// Time of the last item, and of the last one before that time \[s\].
@@ -66,12 +68,20 @@ impl TrackAuditor {
             rates: None,
             results: Results::default(),
             gaps: Vec::new(),
+            smallest: None,
             now_s: f64::NEG_INFINITY,
             before_s: f64::NEG_INFINITY,
             done_s: f64::NEG_INFINITY,
             pending: 0,
             segments: 0,
         })
+    }
+
+    /// Follows the smallest distance over time too: see [`Outcome::smallest`]. It is asked for before anything is judged.
+    #[must_use]
+    pub fn with_smallest(mut self) -> Self {
+        self.smallest = Some(Smallest::new(&self.settings));
+        self
     }
 
     /// Judges what comes next. `names` are those of all vehicles known so far.
@@ -164,7 +174,11 @@ impl TrackAuditor {
     }
 
     fn judge_until(&mut self, to_s: f64) {
-        self.windows.judge(&self.vehicles, Interval { from_s: self.done_s, to_s }, &mut self.results);
+        let window = Interval { from_s: self.done_s, to_s };
+        self.windows.judge(&self.vehicles, window, &mut self.results);
+        if let Some(smallest) = &mut self.smallest {
+            smallest.follow(&self.vehicles, window);
+        }
         for vehicle in &mut self.vehicles {
             self.segments += vehicle.forget(to_s) as u64;
         }
@@ -210,6 +224,7 @@ impl TrackAuditor {
             span_s,
             closest: closest.kept,
             obstacles: obstacles.kept,
+            smallest: self.smallest.map(|smallest| smallest.approaches).unwrap_or_default(),
             violations,
             undecided,
             gaps: self.gaps,

@@ -44,6 +44,7 @@ mod outcome;
 mod rates;
 mod series;
 mod settings;
+mod smallest;
 mod vehicle;
 mod window;
 

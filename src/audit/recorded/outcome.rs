@@ -59,6 +59,9 @@ pub struct Outcome {
     pub closest: Vec<Approach>,
     /// The ten closest approaches to obstacles, likewise.
     pub obstacles: Vec<Approach>,
+    /// The closest approach of all pairs of vehicles in one slice of time after the other, about a sample long, and `None`
+    /// where no two are there; of a long recording that of several. Empty unless it was asked for.
+    pub smallest: Vec<Option<Approach>>,
     /// Every violation, in order of time.
     pub violations: Vec<Violation<ObjectPair>>,
     /// Every time that could not be decided, in order of time.

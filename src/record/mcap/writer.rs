@@ -35,6 +35,9 @@ pub trait ExtraTopic: Send {
     /// # Errors
     /// When the message cannot be encoded.
     fn message(&mut self, sample: &Sample<'_>, message: &mut Vec<u8>) -> io::Result<bool>;
+
+    /// Hears of an event, in order with the samples.
+    fn note(&mut self, _event: &Event) {}
 }
 
 /// Topics without seeking: a chunk is built in memory and written whole.
@@ -172,6 +175,9 @@ impl Sink for McapRecorder {
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        if let Some((extra, _)) = &mut self.extra {
+            extra.note(event);
+        }
         self.write(Own::Events as usize, event.time_s(), &EventMessage::from(event))?;
         self.flush_if_due(event.time_s())
     }

@@ -2,18 +2,16 @@
 
 use std::io::Write;
 
-use super::encoder::FilmEncoder;
+use super::encoder::{self, FilmEncoder};
 use crate::render::error::RenderError;
 use crate::render::picture::{Picture, png_encoder};
-
-pub(super) const NAME: &str = "PNG";
 
 pub(super) struct Apng<W: Write>(png::Writer<W>);
 
 fn failed(error: png::EncodingError) -> RenderError {
     match error {
         png::EncodingError::IoError(error) => error.into(),
-        error => RenderError::Encoder { format: NAME, reason: error.to_string() },
+        error => encoder::failed("PNG", error),
     }
 }
 

@@ -3,6 +3,11 @@
 use crate::render::error::RenderError;
 use crate::render::picture::Picture;
 
+/// That the encoder of a format failed.
+pub(super) fn failed(format: &str, error: impl std::fmt::Display) -> RenderError {
+    RenderError::Film(format!("the {format} encoder failed: {error}"))
+}
+
 /// Writes pictures of one size as a film.
 pub(super) trait FilmEncoder: Send {
     /// Adds pictures in order. What can be done to each by itself is done side by side.

@@ -4,11 +4,10 @@ use std::io::Write;
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use super::encoder::FilmEncoder;
+use super::encoder::{self, FilmEncoder};
 use crate::render::error::RenderError;
 use crate::render::picture::Picture;
 
-pub(super) const NAME: &str = "GIF";
 /// Shortest that browsers show a picture: two hundredths of a second.
 pub(super) const MOST_FPS: u32 = 50;
 /// How coarsely the colours of a picture are looked at: 1 every pixel, 30 the fastest. At 3 less than half as many pixels
@@ -22,24 +21,16 @@ pub(super) struct Gif<W: Write> {
     pictures: u32,
 }
 
-pub(super) fn sides(size_px: [u32; 2]) -> Result<[u16; 2], RenderError> {
-    let [width, height] = size_px;
-    match (u16::try_from(width), u16::try_from(height)) {
-        (Ok(width @ 1..), Ok(height @ 1..)) => Ok([width, height]),
-        _ => Err(RenderError::FilmSize { format: NAME, width, height, why: "a side has from 1 to 65535" }),
-    }
-}
-
 fn failed(error: gif::EncodingError) -> RenderError {
     match error {
         gif::EncodingError::Io(error) => error.into(),
-        error => RenderError::Encoder { format: NAME, reason: error.to_string() },
+        error => encoder::failed("GIF", error),
     }
 }
 
 impl<W: Write> Gif<W> {
     pub(super) fn new(out: W, size_px: [u32; 2], fps: u32) -> Result<Self, RenderError> {
-        let sides = sides(size_px)?;
+        let sides = size_px.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         let mut encoder = gif::Encoder::new(out, sides[0], sides[1], &[]).map_err(failed)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
         Ok(Self { encoder, sides, fps, pictures: 0 })

@@ -41,28 +41,30 @@ impl FilmFormat {
         }
     }
 
-    fn name(self) -> &'static str {
-        match self {
-            Self::Mp4 => mp4::NAME,
-            Self::Gif => gif::NAME,
-            Self::Png => apng::NAME,
-        }
-    }
-
     /// Whether a film can have pictures of this size, so many a second.
     ///
     /// # Errors
     /// [`RenderError::FilmSize`] or [`RenderError::FilmRate`] when it cannot.
     pub fn check(self, size_px: [u32; 2], fps: u32) -> Result<(), RenderError> {
-        let most = if self == Self::Gif { gif::MOST_FPS } else { MOST_FPS };
+        let (name, most) = match self {
+            Self::Mp4 => ("MP4", MOST_FPS),
+            Self::Gif => ("GIF", gif::MOST_FPS),
+            Self::Png => ("PNG", MOST_FPS),
+        };
         if !(1..=most).contains(&fps) {
-            return Err(RenderError::FilmRate { format: self.name(), fps, most });
+            let what = format!("{name} films have from 1 to {most} pictures a second, not {fps}");
+            return Err(RenderError::FilmRate(what));
         }
-        match self {
-            Self::Mp4 => mp4::check(size_px),
-            Self::Gif => gif::sides(size_px).map(|_| ()),
-            Self::Png => Ok(()),
-        }
+        let [width, height] = size_px;
+        let (shorter, longer) = (width.min(height), width.max(height));
+        let why = match self {
+            Self::Mp4 if width % 2 == 1 || height % 2 == 1 => "H.264 needs even sides",
+            Self::Mp4 if shorter < 16 || longer > 3840 || shorter > 2160 => "from 16 x 16 to 3840 x 2160",
+            Self::Gif if shorter == 0 || longer > u32::from(u16::MAX) => "a side has from 1 to 65535",
+            _ => return Ok(()),
+        };
+        let what = format!("a {name} film cannot have pictures of {width} x {height} pixels: {why}");
+        Err(RenderError::FilmSize(what))
     }
 }
 
@@ -91,7 +93,7 @@ impl<'a> Film<'a> {
     ) -> Result<Self, RenderError> {
         format.check(size_px, fps)?;
         if pictures == 0 {
-            return Err(RenderError::Encoder { format: format.name(), reason: "the film has no pictures".to_owned() });
+            return Err(RenderError::Film("a film needs at least one picture".to_owned()));
         }
         let encoder: Box<dyn FilmEncoder + 'a> = match format {
             FilmFormat::Mp4 => Box::new(mp4::Mp4::new(out, size_px, fps)?),
@@ -107,7 +109,7 @@ impl<'a> Film<'a> {
     /// [`RenderError`] when one has another size, when the encoder fails, or when it cannot be written.
     pub fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError> {
         if pictures.iter().any(|picture| picture.size_px != self.size_px) {
-            return Err(RenderError::MixedSizes);
+            return Err(RenderError::Film("a picture of the film has another size than the film".to_owned()));
         }
         self.given = u32::try_from(pictures.len()).map_or(u32::MAX, |more| self.given.saturating_add(more));
         self.encoder.add(pictures)
@@ -121,7 +123,7 @@ impl<'a> Film<'a> {
     pub fn finish(self) -> Result<(), RenderError> {
         let Self { wanted, given, .. } = self;
         if wanted != given {
-            return Err(RenderError::PictureCount { wanted, given });
+            return Err(RenderError::Film(format!("the film was to have {wanted} pictures, not {given}")));
         }
         self.encoder.finish()
     }

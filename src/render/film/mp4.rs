@@ -9,13 +9,10 @@ use openh264::formats::{RgbaSliceU8, YUVBuffer};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use super::encoder::FilmEncoder;
+use super::encoder::{self, FilmEncoder};
 use crate::render::error::RenderError;
 use crate::render::picture::Picture;
 
-pub(super) const NAME: &str = "MP4";
-/// Largest pictures that the encoder takes.
-const LARGEST: [u32; 2] = [3840, 2160];
 /// Pictures from one that stands by itself to the next, in seconds of film.
 const KEY_EVERY_S: u32 = 4;
 
@@ -28,26 +25,14 @@ pub(super) struct Mp4<W> {
     alone: Option<YUVBuffer>,
 }
 
-fn failed(error: &dyn std::fmt::Display) -> RenderError {
-    RenderError::Encoder { format: NAME, reason: error.to_string() }
+fn failed(error: impl std::fmt::Display) -> RenderError {
+    encoder::failed("MP4", error)
 }
 
 /// Brightness and colour of a picture.
 pub(super) fn yuv(picture: &Picture) -> YUVBuffer {
     let size = picture.size_px.map(|side| side as usize);
     YUVBuffer::from_rgba8_source(RgbaSliceU8::new(&picture.rgba, (size[0], size[1])))
-}
-
-/// Whether the encoder takes pictures of this size.
-pub(super) fn check([width, height]: [u32; 2]) -> Result<(), RenderError> {
-    let size = |why| Err(RenderError::FilmSize { format: NAME, width, height, why });
-    if width % 2 == 1 || height % 2 == 1 {
-        return size("H.264 needs even sides");
-    }
-    if width.min(height) < 16 || width.max(height) > LARGEST[0] || width.min(height) > LARGEST[1] {
-        return size("from 16 x 16 to 3840 x 2160");
-    }
-    Ok(())
 }
 
 impl<W: Write> Mp4<W> {
@@ -60,23 +45,21 @@ impl<W: Write> Mp4<W> {
             .skip_frames(false)
             // What the library makes of red, green and blue.
             .vui(VuiConfig::bt601());
-        let encoder = Encoder::with_api_config(OpenH264API::from_source(), config).map_err(|error| failed(&error))?;
-        let muxer = MuxerBuilder::new(out)
-            .video(VideoCodec::H264, width, height, f64::from(fps))
-            .build()
-            .map_err(|error| failed(&error))?;
+        let encoder = Encoder::with_api_config(OpenH264API::from_source(), config).map_err(failed)?;
+        let muxer = MuxerBuilder::new(out).video(VideoCodec::H264, width, height, f64::from(fps));
+        let muxer = muxer.build().map_err(failed)?;
         Ok(Self { encoder, muxer, fps, pictures: 0, alone: None })
     }
 
     fn encode(&mut self, picture: &YUVBuffer, time_s: f64) -> Result<(), RenderError> {
-        let stream = self.encoder.encode(picture).map_err(|error| failed(&error))?;
+        let stream = self.encoder.encode(picture).map_err(failed)?;
         let is_key = matches!(stream.frame_type(), FrameType::IDR | FrameType::I);
-        self.muxer.write_video(time_s, &stream.to_vec(), is_key).map_err(|error| failed(&error))
+        self.muxer.write_video(time_s, &stream.to_vec(), is_key).map_err(failed)
     }
 
     #[cfg(test)]
     pub(super) fn encoded(&mut self, picture: &YUVBuffer) -> Result<Vec<u8>, RenderError> {
-        Ok(self.encoder.encode(picture).map_err(|error| failed(&error))?.to_vec())
+        Ok(self.encoder.encode(picture).map_err(failed)?.to_vec())
     }
 }
 
@@ -97,7 +80,7 @@ impl<W: Write + Send> FilmEncoder for Mp4<W> {
         }
         self.muxer.finish().map_err(|error| match error {
             MuxerError::Io(error) => error.into(),
-            error => failed(&error),
+            error => failed(error),
         })
     }
 }

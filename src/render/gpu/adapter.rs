@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use wgpu::DeviceType;
+
 use crate::render::error::RenderError;
 
 /// Which adapter draws.
@@ -31,6 +33,9 @@ impl From<&str> for AdapterChoice {
 
 /// Ways to speak to adapters. OpenGL is none of them: it cannot say which samples of a pixel a ball covers.
 const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
+/// Kinds of adapters, the best first.
+const BEST_FIRST: [DeviceType; 5] =
+    [DeviceType::DiscreteGpu, DeviceType::IntegratedGpu, DeviceType::VirtualGpu, DeviceType::Other, DeviceType::Cpu];
 
 /// What finds adapters, for pictures alone or for windows on a display.
 pub(crate) fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>) -> wgpu::Instance {
@@ -38,7 +43,18 @@ pub(crate) fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>
     wgpu::Instance::new(wgpu::InstanceDescriptor { backends: BACKENDS, display, ..headless })
 }
 
+/// That an adapter is gone.
+pub(crate) fn lost() -> RenderError {
+    RenderError::Driver("the graphics adapter was lost".to_owned())
+}
+
+/// That a driver failed, and said this.
+pub(super) fn failed(said: impl std::fmt::Display) -> RenderError {
+    RenderError::Driver(format!("the graphics driver failed: {said}"))
+}
+
 /// An adapter at work.
+#[derive(Clone)]
 pub(crate) struct Gpu {
     pub(crate) name: String,
     pub(crate) largest_px: u32,
@@ -67,13 +83,10 @@ impl Gpu {
             ..wgpu::Limits::downlevel_defaults().using_resolution(limits)
         };
         let largest_px = required_limits.max_texture_dimension_2d;
-        let descriptor = wgpu::DeviceDescriptor {
-            required_limits,
-            memory_hints: wgpu::MemoryHints::MemoryUsage,
-            ..wgpu::DeviceDescriptor::default()
-        };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|error| RenderError::UnusableAdapter { adapter: name.clone(), reason: error.to_string() })?;
+        let memory_hints = wgpu::MemoryHints::MemoryUsage;
+        let descriptor = wgpu::DeviceDescriptor { required_limits, memory_hints, ..wgpu::DeviceDescriptor::default() };
+        let started = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) = started.map_err(|error| unusable(&name, error))?;
         let trouble = Arc::new(Mutex::new(None));
         let kept = Arc::clone(&trouble);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
@@ -91,18 +104,24 @@ impl Gpu {
     }
 
     pub(crate) fn check_size(&self, [width, height]: [u32; 2]) -> Result<(), RenderError> {
-        let largest = self.largest_px;
+        let (largest, adapter) = (self.largest_px, &self.name);
         if (1..=largest).contains(&width) && (1..=largest).contains(&height) {
             return Ok(());
         }
-        Err(RenderError::PictureSize { width, height, largest, adapter: self.name.clone() })
+        let cannot = format!("a picture of {width} x {height} pixels cannot be drawn");
+        Err(RenderError::PictureSize(format!("{cannot}: {adapter} draws from 1 to {largest} pixels a side")))
     }
 
     /// Whether the driver has failed since the last call.
     pub(crate) fn check(&self) -> Result<(), RenderError> {
         let trouble = self.trouble.lock().unwrap_or_else(PoisonError::into_inner).take();
-        trouble.map_or(Ok(()), |reason| Err(RenderError::Driver(reason)))
+        trouble.map_or(Ok(()), |said| Err(failed(said)))
     }
+}
+
+/// That the adapter of this name cannot be started.
+pub(crate) fn unusable(adapter: &str, reason: impl std::fmt::Display) -> RenderError {
+    RenderError::Driver(format!("the adapter {adapter} cannot be used: {reason}"))
 }
 
 fn name(adapter: &wgpu::Adapter) -> String {
@@ -116,37 +135,25 @@ fn pick(
     choice: &AdapterChoice,
     surface: Option<&wgpu::Surface<'_>>,
 ) -> Result<wgpu::Adapter, RenderError> {
+    let kind = |adapter: &wgpu::Adapter| adapter.get_info().device_type;
     let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
     adapters.retain(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)));
-    adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
+    adapters.sort_by_key(|adapter| BEST_FIRST.iter().position(|known| *known == kind(adapter)));
     let found: Vec<String> = adapters.iter().map(name).collect();
-    let chosen = adapters.into_iter().find(|adapter| {
-        let is_software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
-        match choice {
-            AdapterChoice::Best => true,
-            AdapterChoice::Hardware => !is_software,
-            AdapterChoice::Software => is_software,
-            AdapterChoice::Named(wanted) => name(adapter).to_lowercase().contains(&wanted.to_lowercase()),
-        }
+    let chosen = adapters.into_iter().find(|adapter| match choice {
+        AdapterChoice::Best => true,
+        AdapterChoice::Hardware => kind(adapter) != DeviceType::Cpu,
+        AdapterChoice::Software => kind(adapter) == DeviceType::Cpu,
+        AdapterChoice::Named(wanted) => name(adapter).to_lowercase().contains(&wanted.to_lowercase()),
     });
     chosen.ok_or_else(|| {
         let wanted = match choice {
             _ if found.is_empty() => return RenderError::NoAdapter,
-            AdapterChoice::Best => "usable".to_owned(),
-            AdapterChoice::Hardware => "hardware".to_owned(),
-            AdapterChoice::Software => "software".to_owned(),
-            AdapterChoice::Named(name) => format!("`{name}`"),
+            AdapterChoice::Best => "usable",
+            AdapterChoice::Hardware => "hardware",
+            AdapterChoice::Software => "software",
+            AdapterChoice::Named(name) => &format!("`{name}`"),
         };
-        RenderError::NoSuchAdapter { wanted, found: found.join(", ") }
+        RenderError::NoSuchAdapter(format!("there is no {wanted} adapter; there are: {}", found.join(", ")))
     })
-}
-
-fn rank(device_type: wgpu::DeviceType) -> u8 {
-    match device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    }
 }

@@ -15,6 +15,8 @@ pub use adapter::AdapterChoice;
 
 pub(crate) use adapter::{Gpu, instance};
 #[cfg(feature = "window")]
+pub(crate) use adapter::{lost, unusable};
+#[cfg(feature = "window")]
 pub(crate) use overlay::paint;
 
 use super::error::RenderError;
@@ -66,10 +68,9 @@ impl Renderer {
     /// # Errors
     /// [`RenderError`] when the adapter cannot draw a picture of this size, or fails.
     pub fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
-        self.draw(scene, true)?;
-        let target = self.target.as_ref().ok_or(RenderError::AdapterLost)?;
-        let picture = target.read(&self.gpu)?;
-        self.gpu.check()?;
+        let gpu = self.gpu.clone();
+        let picture = self.draw(scene, true)?.read(&gpu)?;
+        gpu.check()?;
         Ok(picture)
     }
 
@@ -78,22 +79,22 @@ impl Renderer {
     /// # Errors
     /// [`RenderError`] when there is nothing to draw, the camera cannot be used or the adapter fails.
     pub fn shoot(&mut self, timeline: &Timeline, time_s: f64, view: &View) -> Result<Picture, RenderError> {
-        let frame = timeline.at(time_s).ok_or(RenderError::NoSamples)?;
+        let frame = timeline.at(time_s).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
         let extent = Extent::of(timeline);
         let camera = extent.camera(timeline, &frame, view)?;
         self.paint(&Scene::compose(timeline, &extent, &frame, view, camera))
     }
 
     /// Draws a scene into a texture, with or without its annotations.
-    pub(crate) fn draw(&mut self, scene: &Scene, with_annotations: bool) -> Result<&wgpu::TextureView, RenderError> {
+    pub(crate) fn draw(&mut self, scene: &Scene, with_annotations: bool) -> Result<&Target, RenderError> {
         let size_px = scene.camera.size_px;
         self.gpu.check_size(size_px)?;
-        let fits = self.target.as_ref().is_some_and(|target| target.size_px == size_px);
-        if !fits {
-            self.target = None;
-            self.target = Some(Target::new(&self.gpu, size_px)?);
-        }
-        let target = self.target.as_ref().ok_or(RenderError::AdapterLost)?;
+        // One of another size makes room first.
+        self.target.take_if(|target| target.size_px != size_px);
+        let target = match &mut self.target {
+            Some(target) => target,
+            none => none.insert(Target::new(&self.gpu, size_px)?),
+        };
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.pipelines.draw(&self.gpu, &mut encoder, target, scene);
         if with_annotations {
@@ -101,6 +102,6 @@ impl Renderer {
         }
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.check()?;
-        Ok(&target.words_view)
+        Ok(target)
     }
 }

@@ -1,74 +1,49 @@
 //! Balls, shells and lines as instances.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Pod;
 use nalgebra::Vector3;
+use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use super::adapter::Gpu;
 use super::target::{DEPTH_FORMAT, LIGHT_FORMAT, SAMPLES, Target};
 use crate::render::scene::{Ball, Lens, Line, Scene};
 
-/// Instances that a buffer holds at first.
-const FIRST_INSTANCES: usize = 256;
+/// `Camera` in shaders/scene.wgsl: right, up, back, eye, lens and range.
+type CameraUniform = [[f32; 4]; 6];
 
-/// `Camera` in shaders/scene.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct CameraUniform {
-    right: [f32; 4],
-    up: [f32; 4],
-    back: [f32; 4],
-    eye: [f32; 4],
-    lens: [f32; 4],
-    range: [f32; 4],
+fn camera_uniform(scene: &Scene) -> CameraUniform {
+    #[expect(clippy::cast_possible_truncation, reason = "the adapter works in single precision")]
+    let single = |x: f64| x as f32;
+    let wide = |v: Vector3<f64>| [single(v.x), single(v.y), single(v.z), 0.0];
+    let camera = &scene.camera;
+    let (half, perspective) = match camera.lens {
+        Lens::Perspective(half) => (half, 1.0),
+        Lens::Parallel(half) => (half, 0.0),
+    };
+    let [width, height] = camera.size_px.map(|size| size as f32);
+    let lens = [single(half[0]), single(half[1]), perspective, 0.0];
+    let range = [single(scene.depth_m[0]), single(scene.depth_m[1]), width, height];
+    [wide(camera.right), wide(camera.up), wide(camera.back), wide(camera.eye_m), lens, range]
 }
 
-impl CameraUniform {
-    fn of(scene: &Scene) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "the adapter works in single precision")]
-        let single = |x: f64| x as f32;
-        let wide = |v: Vector3<f64>| [single(v.x), single(v.y), single(v.z), 0.0];
-        let camera = &scene.camera;
-        let (half, perspective) = match camera.lens {
-            Lens::Perspective(half) => (half, 1.0),
-            Lens::Parallel(half) => (half, 0.0),
-        };
-        let [width, height] = camera.size_px.map(|size| size as f32);
-        Self {
-            right: wide(camera.right),
-            up: wide(camera.up),
-            back: wide(camera.back),
-            eye: wide(camera.eye_m),
-            lens: [single(half[0]), single(half[1]), perspective, 0.0],
-            range: [single(scene.depth_m[0]), single(scene.depth_m[1]), width, height],
-        }
-    }
-}
-
-/// A pipeline and what it draws, a copy for each instance.
+/// A pipeline, and the camera as it knows it.
 struct DrawCall {
     pipeline: wgpu::RenderPipeline,
     camera: wgpu::BindGroup,
-    instances: wgpu::Buffer,
-    count: u32,
-}
-
-fn instance_buffer(device: &wgpu::Device, bytes: usize) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("instances"),
-        size: bytes as u64,
-        usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
 }
 
 impl DrawCall {
-    fn upload<T: Pod>(&mut self, gpu: &Gpu, instances: &[T]) {
-        let bytes: &[u8] = bytemuck::cast_slice(instances);
-        if bytes.len() as u64 > self.instances.size() {
-            self.instances = instance_buffer(&gpu.device, bytes.len().next_power_of_two());
+    /// Draws a copy of a strip of four corners for each instance.
+    fn draw<T: Pod>(&self, gpu: &Gpu, pass: &mut wgpu::RenderPass<'_>, instances: &[T]) {
+        if instances.is_empty() {
+            return;
         }
-        gpu.queue.write_buffer(&self.instances, 0, bytes);
-        self.count = u32::try_from(instances.len()).unwrap_or(u32::MAX);
+        let (contents, usage) = (bytemuck::cast_slice(instances), wgpu::BufferUsages::VERTEX);
+        let buffer = gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some("instances"), contents, usage });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.camera, &[]);
+        pass.set_vertex_buffer(0, buffer.slice(..));
+        pass.draw(0..4, 0..u32::try_from(instances.len()).unwrap_or(u32::MAX));
     }
 }
 
@@ -121,7 +96,7 @@ impl Pipelines {
                     compilation_options: wgpu::PipelineCompilationOptions::default(),
                     targets: &[Some(wgpu::ColorTargetState {
                         format: LIGHT_FORMAT,
-                        blend: Some(OVER),
+                        blend: Some(wgpu::BlendState::ALPHA_BLENDING),
                         write_mask: wgpu::ColorWrites::ALL,
                     })],
                 }),
@@ -133,7 +108,7 @@ impl Pipelines {
                 layout: &pipeline.get_bind_group_layout(0),
                 entries: &[wgpu::BindGroupEntry { binding: 0, resource: camera.as_entire_binding() }],
             });
-            DrawCall { pipeline, camera, instances: instance_buffer(device, FIRST_INSTANCES * bytes), count: 0 }
+            DrawCall { pipeline, camera }
         };
         let ball = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Unorm8x4];
         let line = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Unorm8x4, 4 => Float32];
@@ -148,11 +123,8 @@ impl Pipelines {
     /// Draws solid things first, then what lets light through. Lines hide nothing: of two on one another, the later one
     /// is seen.
     pub(super) fn draw(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, target: &Target, scene: &Scene) {
-        gpu.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&CameraUniform::of(scene)));
-        self.balls.upload(gpu, &scene.balls);
-        self.shells.upload(gpu, &scene.shells);
-        self.lines.upload(gpu, &scene.lines);
-        let [red, green, blue, _] = scene.background.linear().map(f64::from);
+        gpu.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&camera_uniform(scene)));
+        let [r, g, b, _] = scene.background.linear().map(f64::from);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("scene"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -160,7 +132,7 @@ impl Pipelines {
                 depth_slice: None,
                 resolve_target: Some(&target.light_view),
                 ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r: red, g: green, b: blue, a: 1.0 }),
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
                     store: wgpu::StoreOp::Discard,
                 },
             })],
@@ -171,21 +143,8 @@ impl Pipelines {
             }),
             ..wgpu::RenderPassDescriptor::default()
         });
-        for call in [&self.balls, &self.lines, &self.shells] {
-            pass.set_pipeline(&call.pipeline);
-            pass.set_bind_group(0, &call.camera, &[]);
-            pass.set_vertex_buffer(0, call.instances.slice(..));
-            pass.draw(0..4, 0..call.count);
-        }
+        self.balls.draw(gpu, &mut pass, &scene.balls);
+        self.lines.draw(gpu, &mut pass, &scene.lines);
+        self.shells.draw(gpu, &mut pass, &scene.shells);
     }
 }
-
-/// Light through what is in front, and the picture itself opaque.
-const OVER: wgpu::BlendState = wgpu::BlendState {
-    color: wgpu::BlendState::ALPHA_BLENDING.color,
-    alpha: wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::One,
-        dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
-        operation: wgpu::BlendOperation::Add,
-    },
-};

@@ -1,6 +1,6 @@
 //! What is drawn into, and how it is read back.
 
-use super::adapter::Gpu;
+use super::adapter::{Gpu, failed, lost};
 use crate::render::error::RenderError;
 use crate::render::picture::Picture;
 
@@ -13,13 +13,13 @@ pub(super) const WORDS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8U
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Textures for pictures of one size.
-pub(super) struct Target {
+pub(crate) struct Target {
     pub(super) size_px: [u32; 2],
     texture: wgpu::Texture,
     /// The picture as light.
     pub(super) light_view: wgpu::TextureView,
     /// The picture as bytes.
-    pub(super) words_view: wgpu::TextureView,
+    pub(crate) words_view: wgpu::TextureView,
     pub(super) samples_view: wgpu::TextureView,
     pub(super) depth_view: wgpu::TextureView,
 }
@@ -56,7 +56,7 @@ impl Target {
             texture,
         };
         match pollster::block_on(scope.pop()) {
-            Some(error) => Err(RenderError::Driver(error.to_string())),
+            Some(error) => Err(failed(error)),
             None => Ok(target),
         }
     }
@@ -86,16 +86,15 @@ impl Target {
             wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         );
         gpu.queue.submit([encoder.finish()]);
-        let driver = |error: &dyn std::fmt::Display| RenderError::Driver(error.to_string());
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
             // Whoever asked may have given up.
             let _ = sender.send(mapped);
         });
-        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| driver(&error))?;
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(failed)?;
         gpu.check()?;
-        receiver.recv().map_err(|_| RenderError::AdapterLost)?.map_err(|error| driver(&error))?;
-        let mapped = buffer.get_mapped_range(..).map_err(|error| driver(&error))?;
+        receiver.recv().map_err(|_| lost())?.map_err(failed)?;
+        let mapped = buffer.get_mapped_range(..).map_err(failed)?;
         let mut rgba = Vec::with_capacity(row_bytes as usize * height as usize);
         for row in mapped.chunks_exact(padded_bytes as usize) {
             rgba.extend_from_slice(&row[..row_bytes as usize]);

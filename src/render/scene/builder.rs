@@ -6,6 +6,7 @@ use super::camera::{Camera, Projected};
 use super::colour::Colour;
 use super::extent::Extent;
 use super::view::View;
+use crate::audit::Violation;
 use crate::render::timeline::{Frame, Timeline};
 use crate::swarm::Pair;
 
@@ -16,8 +17,8 @@ pub(super) struct SceneBuilder<'a> {
     pub(super) frame: &'a Frame,
     pub(super) view: &'a View,
     pub(super) camera: Camera,
-    /// Pairs that are closer than delta at this time and their distances \[m\], the nearest first.
-    pub(super) violated: Vec<(Pair, f64)>,
+    /// Violations that last at this time, one of a pair, and the distances of the pairs as drawn \[m\], the nearest first.
+    pub(super) violated: Vec<(&'a Violation, f64)>,
     /// Whether a vehicle is closer than delta to another one.
     pub(super) alarmed: Vec<bool>,
 }
@@ -30,15 +31,14 @@ impl<'a> SceneBuilder<'a> {
         view: &'a View,
         camera: Camera,
     ) -> Self {
-        let lasts = timeline.violations().iter().filter(|span| (span.from_s..=span.to_s).contains(&frame.time_s));
-        let mut pairs: Vec<Pair> = lasts.map(|span| span.pair).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut violated: Vec<_> = pairs.into_iter().map(|pair| (pair, frame.distance_m(pair))).collect();
+        let lasts = timeline.begun(frame.time_s).filter(|violation| violation.to_s >= frame.time_s);
+        let mut violated: Vec<_> = lasts.map(|violation| (violation, frame.distance_m(violation.pair))).collect();
         violated.retain(|(_, distance_m)| distance_m.is_finite());
+        violated.sort_by_key(|(violation, _)| violation.pair);
+        violated.dedup_by_key(|(violation, _)| violation.pair);
         violated.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut alarmed = vec![false; timeline.count()];
-        for (pair, _) in &violated {
+        for (Violation { pair, .. }, _) in &violated {
             (alarmed[pair.first()], alarmed[pair.second()]) = (true, true);
         }
         Self { timeline, extent, frame, view, camera, violated, alarmed }
@@ -66,6 +66,6 @@ impl<'a> SceneBuilder<'a> {
 
     /// The closest pair, where it is not closer than delta, and its distance \[m\].
     pub(super) fn clear_nearest(&self) -> Option<(Pair, f64)> {
-        self.frame.nearest.filter(|(nearest, _)| self.violated.iter().all(|(pair, _)| pair != nearest))
+        self.frame.nearest.filter(|(nearest, _)| self.violated.iter().all(|(violation, _)| violation.pair != *nearest))
     }
 }

@@ -13,7 +13,7 @@ const MARGINS: [f64; 4] = [0.02, 0.02, 0.15, 0.21];
 /// Nearest that a camera is put to what it looks at \[m\].
 const MIN_DISTANCE_M: f64 = 1e-3;
 /// Where `iso` looks from: azimuth and elevation \[degrees\].
-const ISO_DEG: [f64; 2] = [-62.0, 32.0];
+pub(in crate::render) const ISO_DEG: [f64; 2] = [-62.0, 32.0];
 
 /// Which camera to use.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,9 +63,9 @@ impl FromStr for CameraSpec {
         }
         let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
         let Ok([azimuth_deg, elevation_deg, distance_m]) = numbers.as_deref() else {
-            return Err(RenderError::UnknownCamera(text.to_owned()));
+            return Err(RenderError::Camera(format!("`{text}` is not a camera")));
         };
-        let range = |what| Err(RenderError::CameraRange { text: text.to_owned(), what });
+        let range = |what| Err(RenderError::Camera(format!("the camera `{text}` has {what}")));
         if !azimuth_deg.is_finite() {
             return range("an azimuth that is not a finite number");
         }
@@ -118,8 +118,7 @@ pub struct Projected {
 
 impl Camera {
     /// A camera that sees all balls (centre and radius \[m\]) and is as near as that allows.
-    #[must_use]
-    pub fn framing(spec: &CameraSpec, balls: &[(Vector3<f64>, f64)], size_px: [u32; 2]) -> Self {
+    pub(super) fn framing(spec: &CameraSpec, balls: &[(Vector3<f64>, f64)], size_px: [u32; 2]) -> Self {
         let ([azimuth_deg, elevation_deg], parallel) = match spec {
             CameraSpec::Top => ([-90.0, 90.0], true),
             CameraSpec::Front => ([-90.0, 0.0], true),
@@ -132,7 +131,7 @@ impl Camera {
         let across = half * aspect(size_px);
         let room = [across, across, half, half];
         let slopes = [0, 1, 2, 3].map(|side| room[side] * (1.0 - MARGINS[side]));
-        // How far each side of the view must reach: see `reach`.
+        // How far each side of the view must reach.
         let mut reaches = [f64::NEG_INFINITY; 4];
         for (centre, radius) in balls {
             let (x, y, ahead) = (right.dot(centre), up.dot(centre), -back.dot(centre));
@@ -176,8 +175,7 @@ impl Camera {
     }
 
     /// A camera at the angle of `iso` from which a ball of this radius \[m\] fills the height of the picture.
-    #[must_use]
-    pub fn close_up(target_m: Vector3<f64>, radius_m: f64, size_px: [u32; 2]) -> Self {
+    pub(super) fn close_up(target_m: Vector3<f64>, radius_m: f64, size_px: [u32; 2]) -> Self {
         let narrow = TAN_HALF_VIEW * aspect(size_px).min(1.0);
         let distance_m = (radius_m * narrow.hypot(1.0) / narrow).max(MIN_DISTANCE_M);
         let orbit = Orbit { azimuth_deg: ISO_DEG[0], elevation_deg: ISO_DEG[1], distance_m };
@@ -185,8 +183,7 @@ impl Camera {
     }
 
     /// The point in coordinates of the camera: right, up, towards it \[m\].
-    #[must_use]
-    pub fn seen(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn seen(&self, point_m: Vector3<f64>) -> Vector3<f64> {
         let from_eye = point_m - self.eye_m;
         Vector3::new(self.right.dot(&from_eye), self.up.dot(&from_eye), self.back.dot(&from_eye))
     }
@@ -208,8 +205,8 @@ impl Camera {
     }
 
     /// The ray through a point of the picture \[pixels from the top left corner\]: origin \[m\] and unit direction.
-    #[must_use]
-    pub fn ray(&self, at_px: [f64; 2]) -> [Vector3<f64>; 2] {
+    #[cfg(test)]
+    pub(super) fn ray(&self, at_px: [f64; 2]) -> [Vector3<f64>; 2] {
         let [width, height] = self.size_px.map(f64::from);
         let (x, y) = (at_px[0] / width * 2.0 - 1.0, 1.0 - at_px[1] / height * 2.0);
         match self.lens {
@@ -322,10 +319,12 @@ mod tests {
     fn what_is_not_a_camera_is_refused() {
         for text in ["", "isometric", "follow:", "1,2", "1,2,3,4", "a,b,c"] {
             let refused = CameraSpec::from_str(text);
-            assert!(matches!(&refused, Err(RenderError::UnknownCamera(said)) if said == text), "{refused:?}");
+            let said = refused.expect_err(text).to_string();
+            assert_eq!(said, format!("`{text}` is not a camera"));
         }
         for text in ["nan,0,1", "0,91,1", "0,0,0", "0,0,-1", "0,0,nan", "0,0,1e10"] {
-            assert!(matches!(CameraSpec::from_str(text), Err(RenderError::CameraRange { .. })), "{text}");
+            let said = CameraSpec::from_str(text).expect_err(text).to_string();
+            assert!(said.starts_with(&format!("the camera `{text}` has a")), "{said}");
         }
         assert_eq!(CameraSpec::from_str("follow:cf 7").ok(), Some(CameraSpec::Follow("cf 7".to_owned())));
     }

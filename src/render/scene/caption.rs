@@ -6,6 +6,7 @@ use super::colour::Colour;
 use super::draw_list::{Annotation, pixels};
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
+use crate::audit::Violation;
 use crate::swarm::Pair;
 use crate::text::at_least;
 
@@ -61,18 +62,24 @@ impl SceneBuilder<'_> {
     /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
         let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
-        let (Some(&(pair, distance_m)), Some(delta_m)) = (self.violated.first(), self.timeline.delta_m) else {
-            return self.margin();
-        };
+        let Some(&(violation, drawn_m)) = self.violated.first() else { return self.margin() };
         let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
-        let (pair, distance) = (self.pair(pair), metres(distance_m));
+        let Violation { min_m, min_at_s, limit_m, .. } = *violation;
+        let (pair, limit) = (self.pair(violation.pair), metres(limit_m));
+        let apart = if drawn_m < limit_m {
+            format!("{} apart", metres(drawn_m))
+        } else if min_m < limit_m {
+            format!("{} apart at {min_at_s:.2} s", metres(min_m))
+        } else {
+            "too close".to_owned()
+        };
         let more = match self.violated.len() - 1 {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
         let texts = [
-            format!("VIOLATION  vehicles {pair} {distance} apart, delta {}{more}", metres(delta_m)),
-            format!("VIOLATION {pair} {distance} apart"),
+            format!("VIOLATION  vehicles {pair} {apart}, delta {limit}{more}"),
+            format!("VIOLATION {pair} {apart}"),
             "VIOLATION".to_owned(),
         ];
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
@@ -88,14 +95,19 @@ impl SceneBuilder<'_> {
 
     /// What can be said up to now, in a few words and in fewer.
     fn verdict(&self) -> (Vec<String>, Colour) {
-        let theme = self.view.theme;
-        if self.timeline.delta_m.is_none() {
-            return (vec!["not judged: no delta".to_owned(), "not judged".to_owned()], theme.soft_ink());
+        let (theme, now_s) = (self.view.theme, self.frame.time_s);
+        if let Some(why) = self.timeline.unjudged() {
+            return (vec![format!("not judged: {why}"), "not judged".to_owned()], theme.soft_ink());
         }
-        let began: Vec<_> = self.timeline.violations().iter().filter(|span| span.from_s <= self.frame.time_s).collect();
-        match began.first() {
-            None => (vec!["clear so far".to_owned()], theme.good()),
-            Some(span) => {
+        let began: Vec<_> = self.timeline.begun(now_s).collect();
+        let undecided_s = self.timeline.undecided_s.filter(|from_s| *from_s <= now_s);
+        match (began.first(), undecided_s) {
+            (None, None) => (vec!["clear so far".to_owned()], theme.good()),
+            (None, Some(from_s)) => {
+                let since = format!("undecided from {:.2} s on", from_s.max(self.timeline.range_s()[0]));
+                (vec![since, "undecided".to_owned()], theme.soft_ink())
+            }
+            (Some(span), _) => {
                 let at = match began.len() {
                     1 => format!("violated at {:.2} s", span.from_s),
                     many => format!("{many} violations, the first at {:.2} s", span.from_s),
@@ -184,7 +196,7 @@ impl SceneBuilder<'_> {
     pub(super) fn distances(&self, labels: &mut LabelLayout) {
         let theme = self.view.theme;
         let size_px = self.view.text_px(1.0);
-        let alarmed = self.violated.iter().take(LABELLED).map(|&(pair, distance_m)| (pair, distance_m, true));
+        let alarmed = self.violated.iter().take(LABELLED).map(|&(violation, drawn_m)| (violation.pair, drawn_m, true));
         let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
         for (pair, distance_m, alarm) in alarmed.chain(nearest) {
             let middle = self.ends(pair).and_then(|[first, second]| self.camera.project((first + second) / 2.0));
@@ -208,7 +220,7 @@ impl SceneBuilder<'_> {
         if self.timeline.count() <= NAMED {
             named.extend(0..self.timeline.count());
         } else {
-            for k in self.violated.iter().flat_map(|(pair, _)| [pair.first(), pair.second()]) {
+            for k in self.violated.iter().flat_map(|(Violation { pair, .. }, _)| [pair.first(), pair.second()]) {
                 if named.len() < NAMED && !named.contains(&k) {
                     named.push(k);
                 }

@@ -26,8 +26,7 @@ impl Colour {
     }
 
     /// The colour at part `t`, from 0 to 1, of the way to another, opacity included.
-    #[must_use]
-    pub fn towards(self, other: Self, t: f32) -> Self {
+    fn towards(self, other: Self, t: f32) -> Self {
         let mix = |k: usize| {
             let (a, b) = (f32::from(self.rgba[k]), f32::from(other.rgba[k]));
             byte(a + (b - a) * t.clamp(0.0, 1.0))
@@ -36,14 +35,12 @@ impl Colour {
     }
 
     /// Opacity from 0 to 1.
-    #[must_use]
-    pub fn opacity(self) -> f32 {
+    fn opacity(self) -> f32 {
         f32::from(self.rgba[3]) / 255.0
     }
 
     /// Red, green, blue as light, from 0 to 1, and opacity (IEC 61966-2-1).
-    #[must_use]
-    pub fn linear(self) -> [f32; 4] {
+    pub(in crate::render) fn linear(self) -> [f32; 4] {
         let light = |k: usize| {
             let c = f32::from(self.rgba[k]) / 255.0;
             if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
@@ -73,22 +70,8 @@ pub enum Theme {
 /// From this many vehicles on all have one colour.
 const ONE_COLOUR: usize = 200;
 /// Vehicles in order, as in the charts: told apart by colour-blind people too.
-const VEHICLES_ON_LIGHT: [Colour; 6] = [
-    Colour::hex(0x00_72_B2),
-    Colour::hex(0xD5_5E_00),
-    Colour::hex(0x00_93_6C),
-    Colour::hex(0xB8_5F_95),
-    Colour::hex(0x9A_76_00),
-    Colour::hex(0x7D_85_8E),
-];
-const VEHICLES_ON_DARK: [Colour; 6] = [
-    Colour::hex(0x56_A8_E0),
-    Colour::hex(0xF0_7F_2E),
-    Colour::hex(0x2F_BF_94),
-    Colour::hex(0xDB_8D_BB),
-    Colour::hex(0xCB_A4_2B),
-    Colour::hex(0xA5_AD_B6),
-];
+const ON_LIGHT: [u32; 6] = [0x00_72_B2, 0xD5_5E_00, 0x00_93_6C, 0xB8_5F_95, 0x9A_76_00, 0x7D_85_8E];
+const ON_DARK: [u32; 6] = [0x56_A8_E0, 0xF0_7F_2E, 0x2F_BF_94, 0xDB_8D_BB, 0xCB_A4_2B, 0xA5_AD_B6];
 
 impl Theme {
     /// Every theme with its name.
@@ -103,70 +86,59 @@ impl Theme {
     }
 
     /// What nothing is drawn on.
-    #[must_use]
-    pub fn background(self) -> Colour {
+    pub(in crate::render) fn background(self) -> Colour {
         self.pick(0x14_19_1F, 0xEC_EF_F3, 0xFF_FF_FF)
     }
 
     /// Text.
-    #[must_use]
-    pub fn ink(self) -> Colour {
+    pub(in crate::render) fn ink(self) -> Colour {
         self.pick(0xE6_EA_EF, 0x1B_22_2B, 0x00_00_00)
     }
 
     /// Text of less weight.
-    #[must_use]
-    pub fn soft_ink(self) -> Colour {
+    pub(in crate::render) fn soft_ink(self) -> Colour {
         self.pick(0x9A_A4_AF, 0x55_60_6C, 0x4A_4A_4A)
     }
 
     /// Lines on the ground.
-    #[must_use]
-    pub fn grid(self) -> Colour {
+    pub(in crate::render) fn grid(self) -> Colour {
         self.pick(0x2E_37_42, 0xCB_D2_DA, 0xDA_DA_DA)
     }
 
     /// Vehicle `k`; the colours repeat.
-    #[must_use]
-    pub fn vehicle(self, k: usize) -> Colour {
-        let palette = if self == Self::Dark { VEHICLES_ON_DARK } else { VEHICLES_ON_LIGHT };
-        palette[k % palette.len()]
+    pub(in crate::render) fn vehicle(self, k: usize) -> Colour {
+        let palette = if self == Self::Dark { ON_DARK } else { ON_LIGHT };
+        Colour::hex(palette[k % palette.len()])
     }
 
     /// Vehicle `k` of so many: from 200 on all have one colour.
-    #[must_use]
-    pub fn vehicle_among(self, k: usize, count: usize) -> Colour {
+    pub(in crate::render) fn vehicle_among(self, k: usize, count: usize) -> Colour {
         self.vehicle(if count < ONE_COLOUR { k } else { 0 })
     }
 
     /// Keep-out shells.
-    #[must_use]
-    pub fn shell(self) -> Colour {
+    pub(in crate::render) fn shell(self) -> Colour {
         self.pick(0x8F_B4_D9, 0x5C_7F_A3, 0x6E_8A_A8)
     }
 
     /// What must not be overlooked: a violation.
-    #[must_use]
-    pub fn alarm(self) -> Colour {
+    pub(in crate::render) fn alarm(self) -> Colour {
         self.pick(0xFF_2F_3C, 0xD4_00_14, 0xD4_00_14)
     }
 
     /// Text on a violation's colour.
-    #[must_use]
-    pub fn on_alarm(self) -> Colour {
+    pub(in crate::render) fn on_alarm(self) -> Colour {
         self.pick(0x14_00_02, 0xFF_FF_FF, 0xFF_FF_FF)
     }
 
     /// What is as it should be.
-    #[must_use]
-    pub fn good(self) -> Colour {
+    pub(in crate::render) fn good(self) -> Colour {
         self.pick(0x35_C0_8A, 0x00_7A_56, 0x00_6B_4B)
     }
 
     /// The colour of an edge that pushes (below 0, to -1), is at rest (0) or pulls (above 0, to 1): orange over grey to
     /// blue, which people of every colour vision tell apart.
-    #[must_use]
-    pub fn tension(self, tension: f32) -> Colour {
+    pub(in crate::render) fn tension(self, tension: f32) -> Colour {
         let push = self.pick(0xFF_9E_2C, 0xD9_6B_00, 0xC8_5A_00);
         let rest = self.pick(0x6B_75_80, 0xA6_AE_B7, 0xB4_B4_B4);
         let pull = self.pick(0x4F_A3_FF, 0x12_5F_C4, 0x0A_4F_B0);

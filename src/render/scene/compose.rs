@@ -2,11 +2,14 @@
 
 use super::builder::SceneBuilder;
 use super::camera::Camera;
-use super::draw_list::Scene;
+use super::draw_list::{Line, Scene};
 use super::extent::Extent;
 use super::labels::LabelLayout;
 use super::view::View;
 use crate::render::timeline::{Frame, Timeline};
+
+/// Whether a part of a picture is shown, and what adds it.
+type Part<'a, T> = (bool, fn(&SceneBuilder<'a>, &mut T));
 
 impl Scene {
     /// The draw list of a frame of a flight, seen by a camera whose size of picture is that of the view.
@@ -19,41 +22,27 @@ impl Scene {
     pub fn compose(timeline: &Timeline, extent: &Extent, frame: &Frame, view: &View, camera: Camera) -> Self {
         let builder = SceneBuilder::new(timeline, extent, frame, view, camera);
         let mut scene = Self::empty(camera, extent.depth_m(&camera), view.theme.background());
-        let layers = view.layers;
         builder.vehicles(&mut scene);
-        if layers.ground {
-            builder.ground(&mut scene.lines);
-        }
-        if layers.trails {
-            builder.trails(&mut scene.lines);
-        }
-        if layers.marks {
-            builder.starts_and_goals(&mut scene.lines);
-        }
-        if layers.edges {
-            builder.edges(&mut scene.lines);
-        }
-        if layers.closest {
-            builder.pairs(&mut scene.lines);
-        }
+        let layers = view.layers;
+        // In the order in which they cover each other, and in which they take room from each other.
+        let lines: [Part<'_, Vec<Line>>; 5] = [
+            (layers.ground, SceneBuilder::ground),
+            (layers.trails, SceneBuilder::trails),
+            (layers.marks, SceneBuilder::starts_and_goals),
+            (layers.edges, SceneBuilder::edges),
+            (layers.closest, SceneBuilder::pairs),
+        ];
+        let words: [Part<'_, LabelLayout>; 6] = [
+            (layers.caption, SceneBuilder::caption),
+            (layers.caption, SceneBuilder::legend),
+            (layers.labels, SceneBuilder::keep_off_vehicles),
+            (layers.closest, SceneBuilder::distances),
+            (layers.ground, SceneBuilder::scale),
+            (layers.labels, SceneBuilder::names),
+        ];
+        lines.iter().filter(|(shown, _)| *shown).for_each(|(_, draw)| draw(&builder, &mut scene.lines));
         let mut labels = LabelLayout::new(view.size_px);
-        if layers.caption {
-            builder.caption(&mut labels);
-            builder.legend(&mut labels);
-        }
-        if layers.labels {
-            builder.keep_off_vehicles(&mut labels);
-        }
-        if layers.closest {
-            builder.distances(&mut labels);
-        }
-        if layers.ground {
-            builder.scale(&mut labels);
-        }
-        if layers.labels {
-            builder.names(&mut labels);
-        }
-        scene.annotations = labels.annotations;
-        scene
+        words.iter().filter(|(shown, _)| *shown).for_each(|(_, write)| write(&builder, &mut labels));
+        Self { annotations: labels.annotations, ..scene }
     }
 }

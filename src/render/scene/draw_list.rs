@@ -121,15 +121,13 @@ pub struct Scene {
 
 impl Scene {
     /// Nothing, seen by this camera.
-    #[must_use]
-    pub fn empty(camera: Camera, depth_m: [f64; 2], background: Colour) -> Self {
+    pub(super) fn empty(camera: Camera, depth_m: [f64; 2], background: Colour) -> Self {
         let (balls, shells, lines, annotations) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self { camera, depth_m, background, balls, shells, lines, annotations }
     }
 
     /// A picture of nothing.
-    #[must_use]
-    pub fn blank(size_px: [u32; 2]) -> Self {
+    pub(in crate::render) fn blank(size_px: [u32; 2]) -> Self {
         Self::empty(Camera::framing(&CameraSpec::Iso, &[], size_px), [0.1, 1.0], Theme::Dark.background())
     }
 }

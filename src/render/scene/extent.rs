@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Vector3;
 
-use super::camera::{Camera, CameraSpec, Lens, Orbit, TAN_HALF_VIEW};
+use super::camera::{Camera, CameraSpec, ISO_DEG, Orbit};
 use super::view::View;
 use crate::render::error::RenderError;
 use crate::render::timeline::{Frame, Timeline};
@@ -125,8 +125,13 @@ impl Extent {
     }
 
     /// A camera near a pair; one that frames the flight where one of the two is not there.
-    #[must_use]
-    pub fn close_up(&self, timeline: &Timeline, frame: &Frame, pair: Pair, size_px: [u32; 2]) -> Camera {
+    pub(in crate::render) fn close_up(
+        &self,
+        timeline: &Timeline,
+        frame: &Frame,
+        pair: Pair,
+        size_px: [u32; 2],
+    ) -> Camera {
         let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&frame.positions_m, k));
         let (Some(first), Some(second)) = (first, second) else { return self.framing(&CameraSpec::Iso, size_px) };
         let distance_m = (second - first).norm();
@@ -147,20 +152,13 @@ impl Extent {
         }
     }
 
-    /// The orbit and the target \[m\] of a camera that frames the flight: where a person begins to look around.
+    /// The orbit and the target \[m\] of a camera that frames the flight as [`CameraSpec::Iso`] does: where a person begins
+    /// to look around.
     #[must_use]
-    pub fn orbit(&self, spec: &CameraSpec, size_px: [u32; 2]) -> (Orbit, Vector3<f64>) {
-        let camera = self.framing(spec, size_px);
-        let back = camera.back;
-        let distance_m = match camera.lens {
-            Lens::Perspective(_) => back.dot(&camera.eye_m).max(self.grid_m),
-            Lens::Parallel(half) => half[1] / TAN_HALF_VIEW,
-        };
-        let elevation_deg = back.z.clamp(-1.0, 1.0).asin().to_degrees();
-        // Seen straight from above, the azimuth is that of the picture's lower edge.
-        let azimuth_deg = (-camera.right.x).atan2(camera.right.y).to_degrees();
-        let target_m = camera.eye_m - back * back.dot(&camera.eye_m);
-        (Orbit { azimuth_deg, elevation_deg, distance_m }, target_m)
+    pub fn orbit(&self, size_px: [u32; 2]) -> (Orbit, Vector3<f64>) {
+        let Camera { eye_m, back, .. } = self.framing(&CameraSpec::Iso, size_px);
+        let ([azimuth_deg, elevation_deg], ahead_m) = (ISO_DEG, back.dot(&eye_m));
+        (Orbit { azimuth_deg, elevation_deg, distance_m: ahead_m.max(self.grid_m) }, eye_m - back * ahead_m)
     }
 
     /// Nearest and farthest that anything is from a camera \[m\].
@@ -179,7 +177,7 @@ fn find(timeline: &Timeline, name: &str) -> Result<usize, RenderError> {
         if timeline.count() > NAMED {
             vehicles = format!("{vehicles} and {} more", timeline.count() - NAMED);
         }
-        RenderError::NoVehicle { name: name.to_owned(), vehicles }
+        RenderError::NoVehicle(format!("there is no vehicle `{name}` to follow; the flight has {vehicles}"))
     })
 }
 

@@ -100,7 +100,7 @@ impl SceneBuilder<'_> {
     pub(super) fn pairs(&self, lines: &mut Vec<Line>) {
         let theme = self.view.theme;
         // The worst one last, which is over the others.
-        let alarmed = self.violated.iter().rev().map(|(pair, _)| (*pair, theme.alarm(), 5.0));
+        let alarmed = self.violated.iter().rev().map(|(violation, _)| (violation.pair, theme.alarm(), 5.0));
         let nearest = self.clear_nearest().map(|(pair, _)| (pair, theme.ink(), 2.6));
         for (pair, colour, width) in nearest.into_iter().chain(alarmed) {
             let ends = self.ends(pair);
@@ -108,24 +108,28 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Where every vehicle came from, fading with age. The corners are samples whose number is a multiple of a power of
+    /// Where every vehicle came from, as long ago as is asked for, fading with age. The corners are samples whose number is a multiple of a power of
     /// two, so that a trail does not shimmer as time goes on.
     pub(super) fn trails(&self, lines: &mut Vec<Line>) {
-        let (count, last) = (self.timeline.count(), self.frame.keyframe);
+        let (count, last, keyframes) = (self.timeline.count(), self.frame.keyframe, self.timeline.keyframes());
+        let ([first_s, last_s], now_s) = (self.timeline.range_s(), self.frame.time_s);
+        let fading_s = self.view.trail_s.unwrap_or(FADED_AFTER * (last_s - first_s)).max(1e-9);
+        let since_s = self.view.trail_s.map_or(first_s, |trail_s| now_s - trail_s);
+        let first = keyframes.partition_point(|keyframe| keyframe.time_s < since_s);
         let most = (TRAIL_PIECES / count.max(1)).clamp(2, LONGEST_TRAIL);
         let mut stride = 1;
-        while last / stride > most {
+        while last.saturating_sub(first) / stride > most {
             stride *= 2;
         }
-        let [first_s, last_s] = self.timeline.range_s();
-        let fading_s = (FADED_AFTER * (last_s - first_s)).max(1e-9);
-        let now_s = self.frame.time_s;
         #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
         let opacity = |time_s: f64| FADED + (FRESH - FADED) * (1.0 - (now_s - time_s) / fading_s).max(0.0) as f32;
         let width_px = if count < 50 { 2.0 } else { 1.3 } * self.view.unit_px();
-        let recorded = self.timeline.keyframes()[..=last].iter().step_by(stride);
-        let corners: Vec<_> = recorded.map(|corner| (&corner.positions_m, opacity(corner.time_s))).collect();
-        let corners: Vec<_> = corners.into_iter().chain([(&self.frame.positions_m, FRESH)]).collect();
+        let begins = self.timeline.positions_m(since_s).filter(|_| since_s > first_s);
+        let recorded = (first..=last).filter(|k| k.is_multiple_of(stride)).map(|k| &keyframes[k]);
+        let corners: Vec<_> = (begins.iter().map(|positions_m| (positions_m, opacity(since_s))))
+            .chain(recorded.map(|corner| (&corner.positions_m, opacity(corner.time_s))))
+            .chain([(&self.frame.positions_m, FRESH)])
+            .collect();
         lines.reserve(count * corners.len());
         for k in 0..count {
             let colour = self.colour(k);

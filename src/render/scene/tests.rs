@@ -125,6 +125,43 @@ fn a_violation_shows_while_it_lasts_and_is_remembered() {
 }
 
 #[test]
+fn a_violation_that_no_sample_shows_is_told_by_its_judge_and_drawn_as_it_is_known() {
+    let mut timeline = timeline();
+    let pair = Pair::new(2, 3);
+    timeline.note(&Event::ViolationBegan { pair, time_s: 8.2 });
+    timeline.note(&Event::ViolationEnded { pair, time_s: 8.4, min_m: 1.25 });
+    let violation = timeline.violations()[1];
+    assert_eq!((violation.min_m, violation.min_at_s), (1.25, 0.5 * (8.2 + 8.4)));
+    let scene = scene(&timeline, violation.min_at_s, &View::default());
+    let (banner, label) = ("VIOLATION  vehicles 3-4 1.250 m apart at 8.30 s, delta 2.000 m", "3.000 m");
+    assert!(words(&scene).contains(&banner) && words(&scene).contains(&label), "{:?}", words(&scene));
+    assert!(!words(&scene).contains(&"1.250 m"), "they are drawn 3 m apart");
+}
+
+#[test]
+fn what_the_judge_finds_after_the_last_sample_is_in_the_last_picture() {
+    let mut timeline = timeline();
+    timeline.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 10.01 });
+    let says = |time_s: f64| {
+        let scene = scene(&timeline, time_s, &View::default());
+        words(&scene).iter().any(|text| text.starts_with("VIOLATION  vehicles 3-4"))
+    };
+    assert_eq!([9.9, 10.0, 10.5].map(says), [false, true, true]);
+}
+
+#[test]
+fn what_the_judge_cannot_tell_is_not_called_clear() {
+    let mut timeline = timeline();
+    timeline.undecided_s = Some(2.0);
+    let verdict = |time_s: f64| {
+        let scene = scene(&timeline, time_s, &View::default());
+        words(&scene).into_iter().find(|text| text.starts_with("clear") || text.starts_with("und")).map(str::to_owned)
+    };
+    let said = [1.9, 2.0, 4.5].map(verdict);
+    assert_eq!(said, [Some("clear so far".to_owned()), Some("undecided from 2.00 s on".to_owned()), None]);
+}
+
+#[test]
 fn the_caption_says_the_smallest_separation_so_far() {
     let timeline = timeline();
     let scene = scene(&timeline, 3.0, &View::default());
@@ -215,7 +252,7 @@ fn the_worst_pair_is_named_first_and_few_are_labelled() {
         timeline.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
     }
     let scene = scene(&timeline, 5.0, &View::default());
-    let banner = "VIOLATION  vehicles 1-2 2.500 m apart, delta 2.000 m and 5 more";
+    let banner = "VIOLATION  vehicles 1-2 1.500 m apart at 5.00 s, delta 2.000 m and 5 more";
     assert!(words(&scene).contains(&banner), "{:?}", words(&scene));
     let labels = words(&scene).iter().filter(|text| text.ends_with(".000 m") || text.ends_with(".500 m")).count();
     assert!((1..=3).contains(&labels), "{:?}", words(&scene));

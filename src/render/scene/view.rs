@@ -47,11 +47,14 @@ pub struct View {
     pub size_px: [u32; 2],
     /// What to show.
     pub layers: Layers,
+    /// How long trails are \[s\]; none for the whole way.
+    pub trail_s: Option<f64>,
 }
 
 impl Default for View {
     fn default() -> Self {
-        Self { camera: CameraSpec::Iso, theme: Theme::Dark, size_px: [1280, 720], layers: Layers::ALL }
+        let (camera, theme, layers) = (CameraSpec::Iso, Theme::Dark, Layers::ALL);
+        Self { camera, theme, size_px: [1280, 720], layers, trail_s: None }
     }
 }
 

@@ -1,6 +1,10 @@
 //! A flight at a time of it, as it was recorded and as it is drawn.
 
-use crate::swarm::{ClosestApproach, Pair, Rows, separation};
+use crate::space::closest_pair;
+use crate::swarm::{ClosestApproach, Pair, Rows, row, separation};
+
+/// Most that a closest approach may be drawn too far apart: what is written between two vehicles is what is seen.
+const AS_DRAWN: f64 = 1.01;
 
 /// A time at which every position is known.
 #[derive(Clone, Debug)]
@@ -15,6 +19,8 @@ pub struct Keyframe {
     pub closest: Option<ClosestApproach>,
     /// Closest approach since the start.
     pub so_far: Option<ClosestApproach>,
+    /// Number of the sample, from 0.
+    pub(super) number: usize,
 }
 
 /// A flight at any time of it.
@@ -37,17 +43,27 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Distance of a pair \[m\]; NaN where one of the two is not there.
+    /// Distance of a pair \[m\] as it is drawn; NaN where one of the two is not there.
     ///
-    /// It is the recorded one where the closest approach was, and is nowhere below it: curves that are drawn as straight
-    /// lines come nearer than they were flown.
+    /// It is nowhere below the recorded closest approach, since curves that are drawn as straight lines come nearer than
+    /// they were flown, and the recorded one where that was, unless samples are too far apart to draw it.
     #[must_use]
     pub fn distance_m(&self, pair: Pair) -> f64 {
         let drawn_m = separation(&self.positions_m, pair.first(), pair.second());
-        match self.around {
-            Some(around) if around.pair == pair && around.time_s == self.time_s => around.separation_m,
-            Some(around) if drawn_m < around.separation_m => around.separation_m,
-            _ => drawn_m,
+        let Some(around) = self.around else { return drawn_m };
+        let is_it = around.pair == pair && around.time_s == self.time_s;
+        if drawn_m < around.separation_m || is_it && drawn_m < AS_DRAWN * around.separation_m {
+            around.separation_m
+        } else {
+            drawn_m
         }
     }
+}
+
+/// The nearest two of the vehicles that are there.
+pub(super) fn nearest_present(positions_m: &Rows) -> Option<Pair> {
+    let is_there = |i: &usize| row(positions_m, *i).iter().all(|x| x.is_finite());
+    let there: Vec<usize> = (0..positions_m.nrows()).filter(is_there).collect();
+    let (pair, _) = closest_pair(&positions_m.select_rows(&there))?;
+    Some(Pair::new(there[pair.first()], there[pair.second()]))
 }

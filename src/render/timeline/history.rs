@@ -3,15 +3,17 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::frame::{Frame, Keyframe};
-use super::interval::{Interval, nearest_present};
+use super::frame::{Frame, Keyframe, nearest_present};
 use super::plan::Plan;
+use crate::audit::Violation;
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::render::error::{RenderError, check_lengths};
 use crate::scenario::{Scenario, Source};
-use crate::swarm::{ClosestApproach, Pair};
+use crate::swarm::{ClosestApproach, Pair, Rows, separation};
 
+/// Violations that have a picture of their own, at most: their worst moments are never thinned out.
+pub(in crate::render) const PICTURED: usize = 10;
 /// Most memory that the keyframes of a flight take \[bytes\]; beyond it every second one is dropped.
 pub(super) const BUDGET_BYTES: usize = 256 << 20;
 /// Most vehicles whose closest pair is sought anew for each frame.
@@ -19,10 +21,11 @@ const SEARCHED_VEHICLES: usize = 2000;
 /// Radius of a vehicle of which nothing is known \[m\].
 pub(super) const UNKNOWN_RADIUS_M: f64 = 0.1;
 
-/// A flight in memory: keyframes in order of time, and what is known about it.
+/// A flight in memory: keyframes in order of time, and what its judge says of it.
 ///
-/// It is a [`Sink`] and can watch a flight as it is flown. What goes beyond 256 MiB is thinned: pictures are
-/// then drawn from every second, fourth, ... sample and the last one; the closest approach stays that of all.
+/// It is a [`Sink`] and can watch a flight as it is flown. What goes beyond 256 MiB is thinned: pictures are then drawn
+/// from every second, fourth, ... sample, the last one, and those around the closest approach and the worst moments of
+/// the first ten violations; the closest approach stays that of all.
 #[derive(Clone, Debug)]
 pub struct Timeline {
     /// What was flown.
@@ -38,25 +41,20 @@ pub struct Timeline {
     /// What a person should know about how it was read, a sentence each.
     pub notes: Vec<String>,
     pub(super) keyframes: Vec<Keyframe>,
-    pub(super) violations: Vec<ViolationSpan>,
-    /// Index of the last violation of every pair that had one.
-    pub(super) latest: BTreeMap<Pair, usize>,
+    pub(super) violations: Vec<Violation>,
+    /// Index of the violation of every pair that is in one.
+    open: BTreeMap<Pair, usize>,
+    /// From when on the judge cannot tell whether two were too close \[s\].
+    pub(in crate::render) undecided_s: Option<f64>,
+    /// The judge refused the motion.
+    pub(super) refused: bool,
+    /// Times of the samples around the closest approach (0), and around the worst moment of the k-th violation (k).
+    moments_s: BTreeMap<usize, [f64; 2]>,
     /// One in so many samples is kept.
     every: usize,
-    /// Samples since the last one that stays.
-    since_kept: usize,
+    /// Samples taken.
+    taken: usize,
     pub(super) budget_bytes: usize,
-}
-
-/// A time during which a pair was closer than delta.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ViolationSpan {
-    /// The pair.
-    pub pair: Pair,
-    /// When it began \[s\].
-    pub from_s: f64,
-    /// When it ended \[s\]; infinite while it lasts.
-    pub to_s: f64,
 }
 
 impl Timeline {
@@ -72,9 +70,12 @@ impl Timeline {
             notes: Vec::new(),
             keyframes: Vec::new(),
             violations: Vec::new(),
-            latest: BTreeMap::new(),
+            open: BTreeMap::new(),
+            undecided_s: None,
+            refused: false,
+            moments_s: BTreeMap::new(),
             every: 1,
-            since_kept: 0,
+            taken: 0,
             budget_bytes: BUDGET_BYTES,
         }
     }
@@ -152,24 +153,26 @@ impl Timeline {
         self.keyframes.last().and_then(|last| last.so_far)
     }
 
-    /// Every time that a pair was closer than delta, in order of its beginning.
+    /// Every time that a pair was closer than it may come, by the judge, in order of its beginning. One that lasts still
+    /// has no end (infinity).
     #[must_use]
-    pub fn violations(&self) -> &[ViolationSpan] {
+    pub fn violations(&self) -> &[Violation] {
         &self.violations
     }
 
-    /// When a pair came closest while it was closer than delta \[s\], as far as the samples tell.
-    #[must_use]
-    pub fn worst_s(&self, span: &ViolationSpan) -> f64 {
-        let recorded = self.keyframes.iter().filter_map(|keyframe| keyframe.closest.filter(|at| at.pair == span.pair));
-        let drawn = self.keyframes.windows(2).filter_map(|ends| {
-            let approach = Interval::between(&ends[0], &ends[1]).approach(span.pair)?;
-            let least_m = ends[1].closest.map_or(0.0, |closest| closest.separation_m);
-            Some(ClosestApproach { separation_m: approach.separation_m.max(least_m), ..approach })
-        });
-        let within = recorded.chain(drawn).filter(|approach| (span.from_s..=span.to_s).contains(&approach.time_s));
-        let worst = within.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m));
-        worst.map_or(span.from_s, |worst| worst.time_s)
+    /// The violations that have begun by a time \[s\]; at the end of the flight all of them.
+    pub(in crate::render) fn begun(&self, time_s: f64) -> impl Iterator<Item = &Violation> {
+        let until_s = if time_s < self.range_s()[1] { time_s } else { f64::INFINITY };
+        self.violations.iter().filter(move |violation| violation.from_s <= until_s)
+    }
+
+    /// Why nothing is judged, where that is so.
+    pub(in crate::render) fn unjudged(&self) -> Option<&'static str> {
+        match self.delta_m {
+            None => Some("no delta"),
+            Some(_) if self.refused => Some("refused"),
+            Some(_) => None,
+        }
     }
 
     /// The flight at a time \[s\], which is brought into its range; between two keyframes every vehicle moves on a straight
@@ -178,13 +181,11 @@ impl Timeline {
     pub fn at(&self, time_s: f64) -> Option<Frame> {
         let [first_s, last_s] = self.range_s();
         let time_s = if time_s.is_nan() { first_s } else { time_s.clamp(first_s, last_s) };
+        let positions_m = self.positions_m(time_s)?;
         let keyframe = self.keyframes.partition_point(|keyframe| keyframe.time_s <= time_s).checked_sub(1)?;
         let before = &self.keyframes[keyframe];
-        let mut positions_m = before.positions_m.clone();
         let (mut so_far, mut around) = (before.so_far, before.closest);
         if let Some(after) = self.keyframes.get(keyframe + 1).filter(|_| time_s > before.time_s) {
-            let part = (time_s - before.time_s) / (after.time_s - before.time_s);
-            positions_m.zip_apply(&after.positions_m, |here, there| *here += (there - *here) * part);
             so_far = nearer(so_far, after.closest.filter(|approach| approach.time_s <= time_s));
             around = after.closest;
         }
@@ -192,7 +193,7 @@ impl Timeline {
         let pair = match (around, before.closest) {
             (Some(around), _) if around.time_s == time_s => Some(around.pair),
             (_, Some(before)) if self.count() > SEARCHED_VEHICLES => Some(before.pair),
-            _ => nearest_present(&positions_m).map(|(pair, _)| pair),
+            _ => nearest_present(&positions_m),
         };
         let control_m_s2 = before.control_m_s2.clone();
         let mut frame = Frame { time_s, positions_m, control_m_s2, nearest: None, so_far, around, keyframe };
@@ -200,6 +201,18 @@ impl Timeline {
         let now = frame.nearest.filter(|(_, distance_m)| distance_m.is_finite());
         frame.so_far = nearer(so_far, now.map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s }));
         Some(frame)
+    }
+
+    /// Where the vehicles are at a time \[s\] that is not before the first keyframe: N x 3 \[m\].
+    pub(in crate::render) fn positions_m(&self, time_s: f64) -> Option<Rows> {
+        let next = self.keyframes.partition_point(|keyframe| keyframe.time_s <= time_s);
+        let before = &self.keyframes[next.checked_sub(1)?];
+        let mut positions_m = before.positions_m.clone();
+        if let Some(after) = self.keyframes.get(next).filter(|_| time_s > before.time_s) {
+            let part = (time_s - before.time_s) / (after.time_s - before.time_s);
+            positions_m.zip_apply(&after.positions_m, |here, there| *here += (there - *here) * part);
+        }
+        Some(positions_m)
     }
 
     /// Takes one sample, which must be later than the one before.
@@ -210,6 +223,7 @@ impl Timeline {
             control_m_s2: Some(sample.control.clone()),
             closest: sample.separation.filter(|approach| self.has(approach.pair)),
             so_far: None,
+            number: 0,
         });
     }
 
@@ -223,23 +237,27 @@ impl Timeline {
         Ok(())
     }
 
-    /// Takes one event.
+    /// Takes one event of the judge of the flight.
     pub fn note(&mut self, event: &Event) {
         match *event {
-            Event::ViolationBegan { pair, time_s } if self.has(pair) => self.violated(pair, [time_s, f64::INFINITY]),
-            Event::ViolationEnded { pair, time_s, .. } => {
-                if let Some(&k) = self.latest.get(&pair) {
-                    self.violations[k].to_s = time_s;
+            Event::ViolationBegan { pair, time_s } if self.has(pair) => {
+                self.open.insert(pair, self.violations.len());
+                let (limit_m, min_m) = (self.delta_m.unwrap_or(f64::NAN), f64::INFINITY);
+                let (from_s, to_s, min_at_s) = (time_s, f64::INFINITY, time_s);
+                self.violations.push(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m });
+            }
+            Event::ViolationEnded { pair, time_s, min_m } => {
+                if let Some(k) = self.open.remove(&pair) {
+                    let violation = &mut self.violations[k];
+                    if violation.min_m.is_infinite() {
+                        // It was between two samples, and another pair was nearer.
+                        violation.min_at_s = f64::midpoint(violation.from_s, time_s);
+                    }
+                    (violation.to_s, violation.min_m) = (time_s, min_m);
                 }
             }
             _ => {}
         }
-    }
-
-    /// Takes a new violation.
-    pub(super) fn violated(&mut self, pair: Pair, [from_s, to_s]: [f64; 2]) {
-        self.latest.insert(pair, self.violations.len());
-        self.violations.push(ViolationSpan { pair, from_s, to_s });
     }
 
     /// Whether both of a pair are vehicles of the flight: a file may say anything.
@@ -248,37 +266,52 @@ impl Timeline {
     }
 
     pub(super) fn push(&mut self, mut keyframe: Keyframe) {
-        keyframe.so_far = nearer(self.closest(), keyframe.closest);
-        // The last keyframe is always there; it makes room for the next one unless its turn has come.
-        if self.since_kept > 0
-            && let Some(last) = self.keyframes.pop()
-        {
-            keyframe.closest = nearer(last.closest, keyframe.closest);
+        let (time_s, closest) = (keyframe.time_s, self.closest());
+        (keyframe.number, keyframe.so_far) = (self.taken, nearer(closest, keyframe.closest));
+        self.taken += 1;
+        let around_s = [self.keyframes.last().map_or(time_s, |last| last.time_s), time_s];
+        if keyframe.so_far != closest {
+            self.moments_s.insert(0, around_s);
         }
-        self.since_kept = (self.since_kept + 1) % self.every;
+        for (&pair, &k) in &self.open {
+            let violation = &mut self.violations[k];
+            let separation_m = separation(&keyframe.positions_m, pair.first(), pair.second());
+            let recorded = keyframe.closest.filter(|at| at.pair == pair && at.time_s >= violation.from_s);
+            let nearest = nearer(recorded, Some(ClosestApproach { pair, separation_m, time_s }));
+            if let Some(nearest) = nearest.filter(|nearest| nearest.separation_m < violation.min_m) {
+                (violation.min_m, violation.min_at_s) = (nearest.separation_m, nearest.time_s);
+                if k < PICTURED {
+                    self.moments_s.insert(k + 1, around_s);
+                }
+            }
+        }
         self.keyframes.push(keyframe);
+        // What was around a moment so far may be so no longer.
+        self.sift(self.keyframes.len().saturating_sub(3));
         let bytes_each = self.count() * 6 * size_of::<f64>() + size_of::<Keyframe>();
         if self.keyframes.len() >= 16 && self.keyframes.len() * bytes_each > self.budget_bytes {
-            self.thin();
+            self.every *= 2;
+            self.sift(0);
         }
     }
 
-    /// Drops every second keyframe, but neither the first nor the last.
-    fn thin(&mut self) {
-        let last = self.keyframes.len() - 1;
+    /// Whether a keyframe is one in [`Timeline::every`], or needed for a moment that is looked at.
+    fn stays(&self, keyframe: &Keyframe) -> bool {
+        let of_moment = || self.moments_s.values().any(|around_s| around_s.contains(&keyframe.time_s));
+        keyframe.number.is_multiple_of(self.every) || of_moment()
+    }
+
+    /// Drops what need not stay of the keyframes from this one on; the last one is always there.
+    fn sift(&mut self, from: usize) {
         let mut dropped = None;
-        let mut k = 0;
-        self.keyframes.retain_mut(|keyframe| {
-            let keep = k % 2 == 0 || k == last;
+        for mut keyframe in self.keyframes.split_off(from) {
             keyframe.closest = nearer(dropped.take(), keyframe.closest);
-            if !keep {
+            if keyframe.number + 1 == self.taken || self.stays(&keyframe) {
+                self.keyframes.push(keyframe);
+            } else {
                 dropped = keyframe.closest;
             }
-            k += 1;
-            keep
-        });
-        self.every *= 2;
-        self.since_kept = if last.is_multiple_of(2) { 0 } else { self.every / 2 };
+        }
     }
 }
 

@@ -2,12 +2,13 @@
 
 mod frame;
 mod history;
-mod interval;
+mod judge;
 mod plan;
 mod tracks;
 
 pub use frame::{Frame, Keyframe};
-pub use history::{Timeline, ViolationSpan};
+pub(super) use history::PICTURED;
+pub use history::Timeline;
 pub use plan::Plan;
 pub use tracks::TracksError;
 

@@ -19,8 +19,7 @@ pub struct Plan {
 
 impl Plan {
     /// Formation, graph and law of a scenario.
-    #[must_use]
-    pub fn of(scenario: &Scenario) -> Self {
+    pub(in crate::render) fn of(scenario: &Scenario) -> Self {
         Self {
             formation: scenario.formation().clone(),
             graph: scenario.graph.clone(),
@@ -33,9 +32,8 @@ impl Plan {
     ///
     /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
     /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: its elongation over the desired distance.
-    #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "the share of a colour")]
-    pub fn tension(&self, pair: Pair, distance_m: f64) -> f32 {
+    pub(in crate::render) fn tension(&self, pair: Pair, distance_m: f64) -> f32 {
         let tension = match self.edge_tension(pair) {
             Some((alpha, edge)) => edge.derivative(distance_m) * edge.k_m() / alpha,
             None => self.elongation(pair, distance_m),
@@ -45,15 +43,13 @@ impl Plan {
 
     /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
     /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
-    #[must_use]
-    pub fn pull_m_s2(&self, pair: Pair, distance_m: f64) -> Option<f64> {
+    pub(in crate::render) fn pull_m_s2(&self, pair: Pair, distance_m: f64) -> Option<f64> {
         let vehicles = self.formation.slots_m.nrows() as f64;
         self.edge_tension(pair).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
     }
 
     /// How much longer a distance \[m\] is than the desired one, over that one.
-    #[must_use]
-    pub fn elongation(&self, pair: Pair, distance_m: f64) -> f64 {
+    pub(in crate::render) fn elongation(&self, pair: Pair, distance_m: f64) -> f64 {
         let rest_m = self.formation.desired_distance(pair.first(), pair.second());
         (distance_m - rest_m) / rest_m
     }

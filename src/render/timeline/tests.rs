@@ -3,6 +3,7 @@ use std::convert::Infallible;
 use nalgebra::Vector3;
 
 use super::*;
+use crate::audit::Violation;
 use crate::record::{Event, Sample};
 use crate::render::error::FARTHEST_M;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
@@ -67,6 +68,50 @@ fn a_long_flight_is_thinned_and_keeps_its_ends_and_its_closest_approach() {
     assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
     // Straight motion is the same from fewer instants.
     assert_eq!(timeline.at(4321.0).map(|frame| frame.positions_m[(1, 0)]), Some(4321.0));
+}
+
+#[test]
+fn the_moments_that_are_looked_at_are_never_thinned_out() {
+    let mut timeline = Timeline::new("three", 3);
+    (timeline.budget_bytes, timeline.delta_m) = (20_000, Some(1.0));
+    let others = Pair::new(1, 2);
+    for k in 0..10_000_u32 {
+        let time_s = f64::from(k);
+        // For a sample, 0 and 1 are nearly at one place; some time later 1 and 2 are near each other.
+        let (first, third) = (if k == 7777 { 9.9 } else { 0.0 }, if (8100..8103).contains(&k) { 10.5 } else { 30.0 });
+        let swarm = Swarm::at_rest(Rows::from_row_slice(&[first, 0.0, 0.0, 10.0, 0.0, 0.0, third, 0.0, 0.0]));
+        if k == 8100 {
+            timeline.note(&Event::ViolationBegan { pair: others, time_s: time_s - 0.1 });
+        }
+        if k == 8103 {
+            timeline.note(&Event::ViolationEnded { pair: others, time_s: time_s - 0.1, min_m: 0.5 });
+        }
+        let separation_m = 10.0 - first;
+        let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s });
+        let control = Rows::zeros(3);
+        let (energy, channels) = (None, &[][..]);
+        timeline.take(&Sample { time_s, step: 0, swarm: &swarm, control: &control, separation, energy, channels });
+    }
+    assert!(timeline.keyframes().len() < 100 && timeline.every() >= 64, "{}", timeline.keyframes().len());
+    let closest = timeline.at(7777.0).expect("a frame");
+    assert_eq!((closest.positions_m[(0, 0)], closest.nearest.map(|(pair, _)| pair)), (9.9, Some(Pair::new(0, 1))));
+    let violation = timeline.violations()[0];
+    assert_eq!((violation.min_m, violation.min_at_s), (0.5, 8100.0));
+    let worst = timeline.at(violation.min_at_s).expect("a frame");
+    assert_eq!(worst.distance_m(others), 0.5, "as it is drawn");
+    // Where nothing is looked at, samples are gone.
+    assert!(timeline.keyframes().iter().all(|keyframe| keyframe.time_s != 7779.0));
+}
+
+#[test]
+fn what_is_written_between_two_is_what_is_drawn() {
+    let mut timeline = Timeline::new("pair", 2);
+    sample(&mut timeline, 0.0, 4.0, 4.0);
+    // The two met halfway between samples; nobody can draw that.
+    sample(&mut timeline, 1.0, 4.0, 0.5);
+    let frame = timeline.at(0.5).expect("a frame");
+    assert_eq!(frame.nearest, Some((Pair::new(0, 1), 4.0)));
+    assert_eq!(frame.so_far.map(|so_far| (so_far.separation_m, so_far.time_s)), Some((0.5, 0.5)));
 }
 
 #[test]
@@ -143,9 +188,26 @@ fn two_that_meet_between_their_samples_have_met() {
     let timeline = seen(&[(0, 0.0, -2.0, 0.0), (1, 0.0, 2.0, 0.0), (0, 1.0, 2.0, 0.0), (1, 1.0, -2.0, 0.0)], 1.0);
     let pair = Pair::new(0, 1);
     assert_eq!(timeline.closest(), Some(ClosestApproach { pair, separation_m: 0.0, time_s: 0.5 }));
-    assert_eq!(timeline.violations(), [ViolationSpan { pair, from_s: 0.375, to_s: 0.625 }]);
-    assert_eq!(timeline.worst_s(&timeline.violations()[0]), 0.5);
+    let violation = Violation { pair, from_s: 0.375, to_s: 0.625, min_m: 0.0, min_at_s: 0.5, limit_m: 1.0 };
+    assert_eq!(timeline.violations(), [violation]);
     assert_eq!(timeline.at(0.4).and_then(|frame| frame.so_far).map(|so_far| so_far.time_s), Some(0.4));
+}
+
+#[test]
+fn the_closest_approach_of_vehicles_seen_at_times_of_their_own_is_drawn_as_it_was() {
+    // Seen by turns, so that no time is common; they pass each other 0.5 m apart between two times that are drawn.
+    let by_turns = |k: u32| {
+        let (one, other) = (f64::from(k), f64::from(k) + 0.37);
+        [(0, one, one - 20.3, 0.0), (1, other, 20.3 - other, 0.5)]
+    };
+    let samples: Vec<_> = (0..=40).flat_map(by_turns).collect();
+    let timeline = seen(&samples, 1.0);
+    let closest = timeline.closest().expect("an approach");
+    assert!((closest.separation_m - 0.5).abs() < 1e-9 && (closest.time_s - 20.3).abs() < 1e-9, "{closest:?}");
+    let frame = timeline.at(closest.time_s).expect("a frame");
+    let drawn_m = crate::swarm::separation(&frame.positions_m, 0, 1);
+    assert!((drawn_m - 0.5).abs() < 1e-9, "{drawn_m} m");
+    assert!(timeline.at(closest.time_s - 0.2).expect("a frame").so_far.is_some_and(|at| at.separation_m > 0.6));
 }
 
 #[test]
@@ -154,8 +216,9 @@ fn every_pair_that_is_too_close_is_kept_and_not_the_nearest_alone() {
     let samples: Vec<_> =
         [0.0, 1.0, 2.0].iter().flat_map(|&time_s| still.map(|(vehicle, x, y)| (vehicle, time_s, x, y))).collect();
     let timeline = seen(&samples, 1.0);
-    let whole = |i, j| ViolationSpan { pair: Pair::new(i, j), from_s: 0.0, to_s: 2.0 };
-    assert_eq!(timeline.violations(), [whole(0, 1), whole(2, 3)]);
+    let whole = |violation: &Violation| (violation.pair, violation.from_s, violation.to_s);
+    let found: Vec<_> = timeline.violations().iter().map(whole).collect();
+    assert_eq!(found, [(Pair::new(0, 1), 0.0, 2.0), (Pair::new(2, 3), 0.0, 2.0)]);
     assert_eq!(seen(&samples, 0.5).violations(), [], "at delta is not below it");
 }
 
@@ -173,7 +236,7 @@ fn the_worst_of_a_violation_is_that_of_its_own_pair() {
         .collect();
     let timeline = seen(&samples, 2.0);
     let other = timeline.violations().iter().find(|span| span.pair == Pair::new(2, 3)).expect("a violation");
-    assert_eq!(timeline.worst_s(other), 2.0);
+    assert_eq!(other.min_at_s, 2.0);
 }
 
 #[test]

@@ -3,14 +3,16 @@
 use nalgebra::Vector3;
 
 use super::frame::Keyframe;
-use super::history::{BUDGET_BYTES, Timeline, UNKNOWN_RADIUS_M, nearer};
-use super::interval::{Interval, nearest_present};
+use super::history::{BUDGET_BYTES, Timeline, UNKNOWN_RADIUS_M};
+use super::judge::{Judge, moments_s};
 use crate::render::error::{RenderError, check_lengths};
 use crate::swarm::{Rows, set_row};
 use crate::track::{Item, Piece, Tracks};
 
 /// Keyframes a second at which known curves are drawn \[Hz\].
 const CURVE_HZ: f64 = 30.0;
+/// Items that are read before the first is judged: usual intervals are learnt from them.
+const OPENING: usize = 65_536;
 /// Keyframes of vehicles that were seen at times of their own, over those of the one that was seen most often.
 const SHARED: usize = 2;
 
@@ -35,8 +37,9 @@ struct VehicleTrack {
 
 impl Timeline {
     /// Reads recorded motion. Vehicles that were seen at times of their own are put on common ones, with straight lines
-    /// between; one that has not been seen yet, or no longer, is not there. Separations, and violations of `delta_m`
-    /// \[m\], are those of the straight lines.
+    /// between; one that has not been seen yet, or no longer, is not there. The closest approaches, and the violations of
+    /// `delta_m` \[m\], are those that [`TrackAuditor`](crate::audit::recorded::TrackAuditor) finds in the recording; what
+    /// it refuses is drawn and not judged.
     ///
     /// The result may be without keyframes.
     ///
@@ -48,7 +51,8 @@ impl Timeline {
         recording: &mut T,
         delta_m: Option<f64>,
     ) -> Result<Self, TracksError<T::Error>> {
-        let tracks = read(recording)?;
+        let mut judge = Judge::new(delta_m);
+        let tracks = read(recording, &mut judge)?;
         let mut timeline = Self::new(name, tracks.len());
         timeline.delta_m = delta_m;
         timeline.vehicles = (0..tracks.len()).map(|k| vehicle(recording, k)).collect();
@@ -57,7 +61,8 @@ impl Timeline {
             timeline.notes.push(format!("vehicles of unknown radius are drawn with {UNKNOWN_RADIUS_M} m"));
         }
         let mut places = vec![0; tracks.len()];
-        for time_s in common_times(&tracks) {
+        let judged = judge.finish();
+        for time_s in common_times(&tracks, &moments_s(&judged)) {
             let mut positions_m = Rows::zeros(tracks.len());
             for (k, track) in tracks.iter().enumerate() {
                 let position_m = track.at(time_s, &mut places[k]);
@@ -65,44 +70,25 @@ impl Timeline {
                 check_lengths(position_m.iter(), "coordinate", time_s, || timeline.vehicles[k].clone())?;
                 set_row(&mut positions_m, k, position_m);
             }
-            timeline.see(time_s, positions_m);
+            let (control_m_s2, closest, so_far) = (None, None, None);
+            timeline.push(Keyframe { time_s, positions_m, control_m_s2, closest, so_far, number: 0 });
         }
-        timeline.violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
-        timeline.latest.clear();
+        timeline.take_outcome(judged);
         timeline.notes.extend_from_slice(recording.notes());
         Ok(timeline)
-    }
-
-    /// Takes the next positions, with who came how near on the straight lines to them.
-    fn see(&mut self, time_s: f64, positions_m: Rows) {
-        // Nothing came nearer than the nearest now, unless it did on the way.
-        let now_m = nearest_present(&positions_m).map_or(0.0, |(_, distance_m)| distance_m);
-        let reach_m = now_m.max(self.delta_m.unwrap_or(0.0));
-        let mut keyframe = Keyframe { time_s, positions_m, control_m_s2: None, closest: None, so_far: None };
-        let interval = Interval::between(self.keyframes.last().unwrap_or(&keyframe), &keyframe);
-        // A little more, for rounding.
-        let near = interval.near(reach_m * (1.0 + 4.0 * f64::EPSILON));
-        let closest = near.iter().map(|&pair| interval.approach(pair)).fold(None, nearer);
-        let inside = self.delta_m.map_or_else(Vec::new, |delta_m| {
-            near.iter().filter_map(|&pair| Some((pair, interval.inside_s(pair, delta_m)?))).collect()
-        });
-        for (pair, [from_s, to_s]) in inside {
-            match self.latest.get(&pair).map(|&k| &mut self.violations[k]) {
-                Some(span) if span.to_s >= from_s => span.to_s = to_s,
-                _ => self.violated(pair, [from_s, to_s]),
-            }
-        }
-        keyframe.closest = closest;
-        self.push(keyframe);
     }
 }
 
 /// Everything that is recorded, by vehicle.
-fn read<T: Tracks + ?Sized>(recording: &mut T) -> Result<Vec<VehicleTrack>, TracksError<T::Error>> {
+fn read<T: Tracks + ?Sized>(recording: &mut T, judge: &mut Judge) -> Result<Vec<VehicleTrack>, TracksError<T::Error>> {
     let (mut tracks, mut items): (Vec<VehicleTrack>, _) = (Vec::new(), Vec::new());
-    let mut more = true;
+    let (mut more, mut first) = (true, true);
     while more {
-        more = recording.read(&mut items).map_err(TracksError::Read)?;
+        while more && (items.is_empty() || first && items.len() < OPENING) {
+            more = recording.read(&mut items).map_err(TracksError::Read)?;
+        }
+        first = false;
+        judge.push(recording.vehicles(), &items);
         for item in items.drain(..) {
             let k = item.vehicle();
             if tracks.len() <= k {
@@ -154,8 +140,8 @@ impl VehicleTrack {
     }
 }
 
-/// The times of all samples where they are few, else evenly spaced ones.
-fn common_times(tracks: &[VehicleTrack]) -> Vec<f64> {
+/// The times of all samples where they are few, else evenly spaced ones and the moments that are looked at \[s\].
+fn common_times(tracks: &[VehicleTrack], moments_s: &[f64]) -> Vec<f64> {
     let mut times: Vec<f64> = Vec::new();
     for track in tracks {
         times.extend(track.samples.iter().map(|sample| sample.0));
@@ -174,5 +160,9 @@ fn common_times(tracks: &[VehicleTrack]) -> Vec<f64> {
     let wanted = if has_curves { (last - first) * CURVE_HZ } else { longest as f64 };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded by both")]
     let steps = wanted.ceil().clamp(1.0, most.max(2) as f64) as usize;
-    (0..=steps).map(|k| first + (last - first) * (k as f64 / steps as f64)).collect()
+    let even = (0..=steps).map(|k| first + (last - first) * (k as f64 / steps as f64));
+    let mut times: Vec<f64> = even.chain(moments_s.iter().copied().filter(|at| (first..=last).contains(at))).collect();
+    times.sort_unstable_by(f64::total_cmp);
+    times.dedup();
+    times
 }

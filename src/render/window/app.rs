@@ -13,7 +13,7 @@ use super::guard::{in_library, out_of_library};
 use super::open_window::OpenWindow;
 use super::panels::{self, Viewport};
 use super::player::{LiveUpdate, Player};
-use super::state::{Requests, WindowState};
+use super::state::WindowState;
 use crate::render::error::RenderError;
 use crate::render::gpu::AdapterChoice;
 use crate::render::scene::{Scene, Theme};
@@ -82,10 +82,10 @@ impl ApplicationHandler for App {
             WindowEvent::CloseRequested => return events.exit(),
             WindowEvent::Resized(size) => open.resize(size.into()),
             WindowEvent::RedrawRequested => {
-                match self.draw() {
-                    Ok(requests) if requests.quit => events.exit(),
-                    Ok(_) => {}
-                    Err(error) => self.fail(events, error),
+                if let Err(error) = self.draw() {
+                    self.fail(events, error);
+                } else if self.state.quits {
+                    events.exit();
                 }
                 return;
             }
@@ -117,15 +117,13 @@ impl App {
     }
 
     /// Draws the picture, then the panels around it, in the order that what the person does is seen at once.
-    fn draw(&mut self) -> Result<Requests, RenderError> {
-        let (Some(open), player, state) = (&mut self.open, &mut self.player, &mut self.state) else {
-            return Ok(Requests::default());
-        };
+    fn draw(&mut self) -> Result<(), RenderError> {
+        let (Some(open), player, state) = (&mut self.open, &mut self.player, &mut self.state) else { return Ok(()) };
         let now = Instant::now();
         let passed_s = (now - self.drawn).as_secs_f64().min(LONGEST_PAUSE_S);
         self.drawn = now;
         let input = open.input.take_egui_input(&open.window);
-        let (output, requests, area_px) = out_of_library(|| {
+        let (output, area_px) = out_of_library(|| {
             player.receive();
             player.advance(passed_s);
             open.update_extent(&player.timeline);
@@ -148,8 +146,7 @@ impl App {
                 state.keys(ui.ctx(), player);
                 area = panels::show(ui, state, player, &viewport);
             });
-            let requests = std::mem::take(&mut state.requests);
-            if requests.picture
+            if std::mem::take(&mut state.wants_picture)
                 && let Some((_, scene)) = &drawn
             {
                 state.message = Some(open.write_picture(scene, &player.timeline.name, player.time_s));
@@ -157,11 +154,10 @@ impl App {
             let points = context.pixels_per_point();
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
             let area_px = [area.width(), area.height()].map(|side| (side * points).round() as u32);
-            Ok::<_, RenderError>((output, requests, area_px))
+            Ok::<_, RenderError>((output, area_px))
         })?;
         // What the panels leave is known now: the next picture fits.
         open.fit_picture(area_px);
-        open.present(output)?;
-        Ok(requests)
+        open.present(output)
     }
 }

@@ -12,7 +12,7 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
 use crate::render::error::RenderError;
-use crate::render::gpu::{AdapterChoice, Gpu, Renderer, instance};
+use crate::render::gpu::{AdapterChoice, Gpu, Renderer, instance, lost, unusable};
 use crate::render::scene::{Extent, Scene};
 use crate::render::timeline::Timeline;
 
@@ -57,14 +57,14 @@ impl OpenWindow {
             }
         });
         let (gpu, painter) = start(events, adapter, &window, &context)?;
-        let panels = painter.render_state().ok_or(RenderError::AdapterLost)?;
+        let panels = painter.render_state().ok_or_else(lost)?;
         #[expect(clippy::cast_possible_truncation, reason = "a factor of a few")]
         let scale = window.scale_factor() as f32;
         let side = Some(gpu.largest_px as usize);
         let input = egui_winit::State::new(context, ViewportId::ROOT, &window, Some(scale), None, side);
         let mut renderer = Renderer::on(gpu);
         let picture_px = fitting(window.inner_size().into(), &renderer);
-        let view = renderer.draw(&Scene::blank(picture_px), false)?;
+        let view = &renderer.draw(&Scene::blank(picture_px), false)?.words_view;
         let nearest = wgpu::FilterMode::Nearest;
         let texture = panels.renderer.write().register_native_texture(&panels.device, view, nearest);
         let (extent, known) = (Extent::of(timeline), timeline.keyframes().len());
@@ -99,7 +99,7 @@ impl OpenWindow {
 
     /// Draws what is between the panels.
     pub(super) fn show_picture(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        let view = self.renderer.draw(scene, false)?;
+        let view = &self.renderer.draw(scene, false)?.words_view;
         let mut panels = self.panels.renderer.write();
         let nearest = wgpu::FilterMode::Nearest;
         panels.update_egui_texture_from_wgpu_texture(&self.panels.device, view, nearest, self.texture);
@@ -156,7 +156,7 @@ fn start(
     let options = RendererOptions::default();
     let mut painter = pollster::block_on(Painter::new(context.clone(), configuration, false, options));
     pollster::block_on(painter.set_window(ViewportId::ROOT, Some(Arc::clone(window))))
-        .map_err(|error| RenderError::UnusableAdapter { adapter: gpu.name.clone(), reason: error.to_string() })?;
+        .map_err(|error| unusable(&gpu.name, error))?;
     Ok((gpu, painter))
 }
 

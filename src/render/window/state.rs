@@ -4,12 +4,13 @@ use egui::{Key, Vec2};
 use nalgebra::Vector3;
 
 use super::player::Player;
-use crate::render::scene::{Camera, CameraSpec, Extent, Layers, Orbit, TAN_HALF_VIEW, Theme, View};
+use crate::render::scene::{Camera, Extent, Layers, Orbit, TAN_HALF_VIEW, Theme, View};
 
 /// Degrees that the camera turns for a key.
 const KEY_TURN_DEG: f64 = 5.0;
 
 /// What the person has chosen.
+#[expect(clippy::struct_excessive_bools, reason = "each is on or off by itself")]
 pub(super) struct WindowState {
     orbit: Orbit,
     target_m: Vector3<f64>,
@@ -20,20 +21,16 @@ pub(super) struct WindowState {
     /// The camera follows the extent of the flight until somebody moves it.
     pub(super) framed: bool,
     pub(super) message: Option<String>,
-    pub(super) requests: Requests,
-}
-
-/// What is asked of the window.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Requests {
-    pub(super) picture: bool,
-    pub(super) quit: bool,
+    /// A picture is to be written.
+    pub(super) wants_picture: bool,
+    /// The window is to be closed.
+    pub(super) quits: bool,
 }
 
 impl WindowState {
     pub(super) fn new(theme: Theme) -> Self {
         Self {
-            orbit: Orbit { azimuth_deg: -62.0, elevation_deg: 32.0, distance_m: 20.0 },
+            orbit: Orbit { azimuth_deg: 0.0, elevation_deg: 0.0, distance_m: 20.0 },
             target_m: Vector3::zeros(),
             layers: Layers::ALL,
             theme,
@@ -41,7 +38,8 @@ impl WindowState {
             help: false,
             framed: true,
             message: None,
-            requests: Requests::default(),
+            wants_picture: false,
+            quits: false,
         }
     }
 
@@ -55,7 +53,7 @@ impl WindowState {
 
     /// Frames the whole flight.
     pub(super) fn frame(&mut self, extent: &Extent, size_px: [u32; 2]) {
-        (self.orbit, self.target_m) = extent.orbit(&CameraSpec::Iso, size_px);
+        (self.orbit, self.target_m) = extent.orbit(size_px);
     }
 
     pub(super) fn turn(&mut self, azimuth_deg: f64, elevation_deg: f64) {
@@ -145,10 +143,10 @@ impl WindowState {
                 let at = Theme::ALL.iter().position(|(_, theme)| *theme == self.theme).unwrap_or(0);
                 self.theme = Theme::ALL[(at + 1) % Theme::ALL.len()].1;
             }
-            Key::P => self.requests.picture = true,
+            Key::P => self.wants_picture = true,
             Key::H | Key::F1 | Key::Questionmark => self.help = !self.help,
             Key::Escape if self.help => self.help = false,
-            Key::Q | Key::Escape => self.requests.quit = true,
+            Key::Q | Key::Escape => self.quits = true,
             digit => {
                 if let Ok(number @ 1..=8) = digit.name().parse::<usize>() {
                     let (_, shown) = &mut self.layers()[number - 1];
