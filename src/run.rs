@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash};
-use crate::report::{EndedEarly, Findings, Performance, Report, Run};
+use crate::report::{Findings, Performance, Report, Run};
 use crate::scenario::{PlantSpec, Scenario};
 use crate::sim::{self, Ending, Flight, Parts, SimError};
 
@@ -70,13 +70,13 @@ fn report(
             state_hash,
         },
         performance: Performance {
-            wall_s: Some(wall_s),
-            real_time_factor: Some(flight.duration_s / wall_s),
-            law_s: Some(flight.performance.law.as_secs_f64()),
-            physics_s: Some(flight.performance.physics.as_secs_f64()),
-            audit_s: Some(flight.performance.audit.as_secs_f64()),
-            record_s: Some(flight.performance.record.as_secs_f64()),
+            wall_s,
+            real_time_factor: Some(flight.duration_s / wall_s).filter(|factor| factor.is_finite()),
+            law_s: flight.performance.law.as_secs_f64(),
+            physics_s: flight.performance.physics.as_secs_f64(),
+            audit_s: flight.performance.audit.as_secs_f64(),
+            record_s: flight.performance.record.as_secs_f64(),
         },
-        ended_early: reason.as_deref().map(|reason| EndedEarly { time_s: flight.duration_s, reason }),
+        ended_early: reason.as_deref(),
     })
 }

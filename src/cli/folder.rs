@@ -65,9 +65,8 @@ impl OutFolder {
     }
 }
 
-/// Makes a file in the folder and takes it away again.
-fn try_to_write_in(folder: &Path) -> io::Result<()> {
+/// Makes a folder and a file in it, and takes the file away again.
+pub(super) fn try_to_write_in(folder: &Path) -> io::Result<()> {
     let probe = folder.join(format!(".tautline-{}", std::process::id()));
-    File::create(&probe)?;
-    fs::remove_file(&probe)
+    fs::create_dir_all(folder).and_then(|()| File::create(&probe)).and_then(|_| fs::remove_file(&probe))
 }

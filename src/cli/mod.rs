@@ -21,7 +21,9 @@ mod reading;
 #[cfg(feature = "viewer")]
 mod render;
 mod run;
+mod scenario;
 mod schema;
+#[cfg(feature = "viewer")]
 mod snapshots;
 mod validate;
 #[cfg(feature = "viewer")]
@@ -100,7 +102,7 @@ pub fn main() -> ExitCode {
             return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good }.into();
         }
     };
-    let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
+    let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::parse_from(["run"])));
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Audit(arguments) => audit::audit(&arguments),
@@ -115,7 +117,7 @@ pub fn main() -> ExitCode {
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments, &mut Arguments::command()),
     };
-    done.unwrap_or_else(|failure| failure.show()).into()
+    done.unwrap_or_else(Failure::show).into()
 }
 
 #[cfg(test)]

@@ -9,11 +9,12 @@ use clap::Args;
 
 use super::console::Console;
 use super::drawing;
+use super::scenario;
 use super::{Exit, Failure};
 use crate::read::ReadOptions;
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::render::{LiveUpdate, Theme, Timeline, show};
-use crate::scenario::{Override, Scenario, Source};
+use crate::scenario::Scenario;
 use crate::sim::{self, Parts};
 
 /// Samples of a flight in the air that wait for the window.
@@ -57,8 +58,7 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
                 help,
             ));
         }
-        let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let scenario = Scenario::read(&Source::resolve(&arguments.what)?, &overrides)?;
+        let scenario = scenario::read(&arguments.what, &arguments.overrides)?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
     };
     show(timeline, live, arguments.theme, arguments.adapter.as_str().into())?;

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::formation::affine_dimension;
 use crate::graph::Graph;
 use crate::law::{Controls, Law, ParameterError, Void};
-use crate::scenario::{PlantSpec, Precision, Scenario, Space};
+use crate::scenario::{PlantSpec, Precision, Scenario};
 use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
 
@@ -139,7 +139,7 @@ impl Preflight {
         let mut found = Self {
             scenario: scenario.name.clone(),
             vehicles: scenario.count(),
-            dimensions: dimensions(scenario.space),
+            dimensions: scenario.space.dimensions(),
             delta_m: scenario.delta_m,
             algebraic_connectivity: connectivity,
             velocity_margin_per_s: connectivity
@@ -156,20 +156,22 @@ impl Preflight {
             start_margin_m: margin(&scenario.start.positions_m),
             formation_dimension,
             formation_margin_m: margin(&scenario.formation().slots_m),
-            rigidity: Rigidity::of(scenario.formation(), &scenario.graph, dimensions(scenario.space)),
+            rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
             controls_distances: law.controls() == Controls::Distances,
         };
+        let trap = if found.trap_dimension() == Some(2) { Code::StartInPlane } else { Code::StartOnLine };
         let warnings = [
-            found.relative_velocity_unstable(law.as_ref(), scenario),
-            found.start_too_flat(),
-            found.no_certificate(),
-            found.not_rigid(scenario),
-            found.flat_formation_in_space(),
-            found.common_mode_unstable(scenario),
-            found.dt_too_large(scenario),
+            (Code::RelativeVelocityUnstable, found.relative_velocity_unstable(law.as_ref(), scenario)),
+            (trap, found.start_too_flat()),
+            (Code::NoCertificate, found.no_certificate()),
+            (Code::NotRigid, found.not_rigid(scenario)),
+            (Code::FlatFormationInSpace, found.flat_formation_in_space()),
+            (Code::CommonModeUnstable, found.common_mode_unstable(scenario)),
+            (Code::DtTooLarge, found.dt_too_large(scenario)),
         ];
-        found.warnings = warnings.into_iter().flatten().collect();
+        let said = |(code, message): (Code, Option<String>)| Some(Warning { code, message: message? });
+        found.warnings = warnings.into_iter().filter_map(said).collect();
         Ok(found)
     }
 
@@ -179,19 +181,18 @@ impl Preflight {
         self.warnings.iter().any(|warning| warning.code.refuses())
     }
 
-    fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<Warning> {
+    fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<String> {
         // Fiedler: lambda2 is at most N/(N - 1) times the smallest degree.
         let count = self.vehicles as f64;
         let most = || smallest_degree(&scenario.graph) as f64 * count / (count - 1.0).max(1.0);
         let connectivity = self.algebraic_connectivity.unwrap_or_else(most);
         let margin = law.velocity_margin(connectivity, scenario.a22_per_s)?;
-        (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| Warning {
-            code: Code::RelativeVelocityUnstable,
-            message: format!(
-                "Relative velocities are not damped: their margin is {} 1/s and must be positive. {}",
-                numbers::rate(margin.per_s),
+        (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
+            let rate = numbers::rate(margin.per_s);
+            format!(
+                "Relative velocities are not damped: their margin is {rate} 1/s and must be positive. {}",
                 margin.remedy
-            ),
+            )
         })
     }
 
@@ -201,26 +202,23 @@ impl Preflight {
         (self.controls_distances && self.start_dimension < self.formation_dimension).then_some(self.start_dimension)
     }
 
-    fn start_too_flat(&self) -> Option<Warning> {
-        let (code, flat) = match self.trap_dimension()? {
-            0 | 1 => (Code::StartOnLine, "line"),
-            _ => (Code::StartInPlane, "plane"),
+    fn start_too_flat(&self) -> Option<String> {
+        let (place, flat) = match self.trap_dimension()? {
+            0 | 1 => ("on a line", "line"),
+            _ => ("in a plane", "plane"),
         };
-        let message = format!(
-            "The start lies on a {flat}, the law pushes and pulls along the lines between vehicles, and so they never leave \
+        Some(format!(
+            "The start lies {place}, the law pushes and pulls along the lines between vehicles, and so they never leave \
              that {flat}: the formation cannot be reached. Offset a start, or add start.jitter_m."
-        );
-        Some(Warning { code, message: message.replace("on a plane", "in a plane") })
+        ))
     }
 
-    fn no_certificate(&self) -> Option<Warning> {
-        self.certified_m.is_none().then(|| Warning {
-            code: Code::NoCertificate,
-            message: format!("No separation is certified. {}", self.certificate_void.join(" ")).trim_end().to_owned(),
-        })
+    fn no_certificate(&self) -> Option<String> {
+        let said = || format!("No separation is certified. {}", self.certificate_void.join(" ")).trim_end().to_owned();
+        self.certified_m.is_none().then(said)
     }
 
-    fn not_rigid(&self, scenario: &Scenario) -> Option<Warning> {
+    fn not_rigid(&self, scenario: &Scenario) -> Option<String> {
         // Out of its own flat a flat formation is never rigid in space, which has a warning of its own.
         let rigidity = if self.is_flat_in_space() {
             self.rigidity.within(self.formation_dimension, self.vehicles)
@@ -229,29 +227,24 @@ impl Preflight {
         };
         let remedy =
             if scenario.graph.is_complete() { "Bend the formation a little." } else { "Add edges to the graph." };
-        (self.controls_distances && rigidity.rigid == Some(false)).then(|| Warning {
-            code: Code::NotRigid,
-            message: format!(
+        (self.controls_distances && rigidity.rigid == Some(false)).then(|| {
+            format!(
                 "The formation is not rigid on its graph: {} of {} independent constraints hold it, so other shapes have \
                  the same edges or are approached only slowly. {remedy}",
                 rigidity.rank.map_or("too few".to_owned(), |rank| rank.to_string()),
                 rigidity.needed
-            ),
+            )
         })
     }
 
-    fn flat_formation_in_space(&self) -> Option<Warning> {
-        (self.controls_distances && self.is_flat_in_space()).then(|| Warning {
-            code: Code::FlatFormationInSpace,
-            message:
-                "The formation is flat and the swarm lives in space: at the goal nothing resists motion out of the \
-                      flat to first order, so that part of the error falls as t^(-1/2), not exponentially. Set \
-                      swarm.dimensions to 2 if the swarm may stay in the plane."
-                    .to_owned(),
-        })
+    fn flat_formation_in_space(&self) -> Option<String> {
+        let said = "The formation is flat and the swarm lives in space: at the goal nothing resists motion out of the \
+                    flat to first order, so that part of the error falls as t^(-1/2), not exponentially. Set \
+                    swarm.dimensions to 2 if the swarm may stay in the plane.";
+        (self.controls_distances && self.is_flat_in_space()).then(|| said.to_owned())
     }
 
-    fn common_mode_unstable(&self, scenario: &Scenario) -> Option<Warning> {
+    fn common_mode_unstable(&self, scenario: &Scenario) -> Option<String> {
         let rate_per_s = self.common_mode_rate_per_s;
         let rounding = match scenario.plant {
             PlantSpec::Rapier(Precision::Single) => f64::from(f32::EPSILON),
@@ -260,44 +253,35 @@ impl Preflight {
             #[cfg(feature = "ideal")]
             PlantSpec::Ideal => f64::EPSILON,
         };
-        (rate_per_s > 0.0).then(|| Warning {
-            code: Code::CommonModeUnstable,
-            message: format!(
-                "The mean velocity grows as exp({rate_per_s} t), since {}: rounding of {rounding:.0e} m/s grows to 1 m/s in \
-                 {:.0} s.",
-                if rate_per_s < scenario.a22_per_s {
-                    "the law brakes it too little"
-                } else {
-                    "the law cannot move the centre of mass"
-                },
+        let why = if rate_per_s < scenario.a22_per_s {
+            "the law brakes it too little"
+        } else {
+            "the law cannot move the centre of mass"
+        };
+        (rate_per_s > 0.0).then(|| {
+            format!(
+                "The mean velocity grows as exp({rate_per_s} t), since {why}: rounding of {rounding:.0e} m/s grows to 1 m/s \
+                 in {:.0} s.",
                 -rounding.ln() / rate_per_s
-            ),
+            )
         })
     }
 
-    fn dt_too_large(&self, scenario: &Scenario) -> Option<Warning> {
+    fn dt_too_large(&self, scenario: &Scenario) -> Option<String> {
         let dt_max_s = self.dt_max_s.filter(|_| matches!(scenario.plant, PlantSpec::Rapier(_)))?;
-        (self.dt_s > dt_max_s).then(|| Warning {
-            code: Code::DtTooLarge,
-            message: format!(
+        (self.dt_s > dt_max_s).then(|| {
+            format!(
                 "The step of {} s is longer than {} s, {STEP_PER_MODE} of the time of the fastest possible mode: a flight \
                  that comes so near may gain energy. The audit judges what is flown; reduce time.dt_s to be sure.",
                 numbers::significant(self.dt_s),
                 numbers::significant(dt_max_s)
-            ),
+            )
         })
     }
 
     /// Whether the formation spans less of space than so many vehicles can.
     fn is_flat_in_space(&self) -> bool {
         self.dimensions == 3 && self.formation_dimension < 3.min(self.vehicles.saturating_sub(1))
-    }
-}
-
-fn dimensions(space: Space) -> usize {
-    match space {
-        Space::Plane => 2,
-        Space::Volume => 3,
     }
 }
 

@@ -1,10 +1,8 @@
 //! A pre-flight check in words: one line, and a table.
 
-use std::fmt::Write as _;
-
 use super::numbers::{rate, significant};
 use super::{Code, Preflight, Warning};
-use crate::text::{at_least, counted};
+use crate::text::{at_least, counted, table};
 
 impl Code {
     /// The stable name, such as `start-on-line`.
@@ -59,19 +57,14 @@ impl Preflight {
     /// The numbers as a short table, a line each, with a line end.
     #[must_use]
     pub fn text(&self) -> String {
-        let mut text = String::new();
-        for (name, content) in [
+        table([
             ("stability", self.stability_line()),
             ("certificate", self.certificate_line()),
             ("step", self.step_line()),
             ("start", self.start_line()),
             ("formation", self.formation_line()),
             ("rigidity", self.rigidity_line()),
-        ] {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{name:<12} {content}");
-        }
-        text
+        ])
     }
 
     fn stability_line(&self) -> String {

@@ -16,7 +16,7 @@ mod words;
 
 pub use crate::audit::Status;
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
-pub use findings::{EndedEarly, Findings, Performance, Run};
+pub use findings::{Findings, Performance, Run};
 pub use flight::{
     Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,
     Separation, Tool, Velocity, Violation,

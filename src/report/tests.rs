@@ -42,7 +42,7 @@ struct Case {
     audit: AuditOutcome,
     summary: Summary,
     trap_dimension: Option<usize>,
-    ended_early: Option<EndedEarly<'static>>,
+    ended_early: Option<&'static str>,
     certificate: Certificate,
 }
 
@@ -72,12 +72,12 @@ impl Case {
                 state_hash: "0123456789abcdef".to_owned(),
             },
             performance: Performance {
-                wall_s: Some(0.5),
+                wall_s: 0.5,
                 real_time_factor: Some(240.0),
-                law_s: Some(0.1),
-                physics_s: Some(0.2),
-                audit_s: Some(0.1),
-                record_s: Some(0.05),
+                law_s: 0.1,
+                physics_s: 0.2,
+                audit_s: 0.1,
+                record_s: 0.05,
             },
             ended_early: self.ended_early,
         })
@@ -179,7 +179,8 @@ fn a_report_read_back_from_its_json_is_the_same_to_the_last_bit() {
     let back: Report = serde_json::from_str(&report.to_json().expect("JSON")).expect("reads back");
     assert_eq!(back, report);
     let extended = report.to_json().expect("JSON").replacen("{\n", "{\n  \"extra\": 1,\n", 1);
-    assert!(serde_json::from_str::<Report>(&extended).is_err(), "an unknown key goes unnoticed");
+    let back: Report = serde_json::from_str(&extended).expect("keys of a later program of this version are no error");
+    assert_eq!(back, report);
 }
 
 #[test]
@@ -299,8 +300,8 @@ fn what_was_not_judged_whole_never_passes() {
 
 #[test]
 fn a_run_that_ended_early_never_passes_and_says_why() {
-    let ended_early = Some(EndedEarly { time_s: 3.627, reason: "interrupted" });
-    assert_eq!(Case { ended_early, ..Case::good() }.reason(), "The run ended early, at 3.63 s: interrupted.");
+    let ended_early = Some("interrupted");
+    assert_eq!(Case { ended_early, ..Case::good() }.reason(), "The run ended early, at 120.00 s: interrupted.");
 }
 
 #[test]

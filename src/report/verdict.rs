@@ -8,7 +8,6 @@ use crate::text::{metres, metres_below, seconds};
 
 /// The judgement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Verdict {
     /// Clear, reached, and flown to its end.
     pub pass: bool,
@@ -74,8 +73,8 @@ fn undecided(findings: &Findings<'_>) -> Option<String> {
 }
 
 fn ended_early(findings: &Findings<'_>) -> Option<String> {
-    let ended = findings.ended_early?;
-    Some(format!("The run ended early, at {}: {}.", seconds(ended.time_s), ended.reason.trim_end_matches('.')))
+    let why = findings.ended_early?.trim_end_matches('.');
+    Some(format!("The run ended early, at {}: {why}.", seconds(findings.run.duration_s)))
 }
 
 /// How far below the certified separation rounding explains, relative to it: the engine's 24 bits at coordinates of some

@@ -1,11 +1,10 @@
 //! A report in words: one line, and a table.
 
-use std::fmt::Write as _;
-
+use super::findings::Performance;
 use super::flight::Report;
 use super::verdict::breaks_certificate;
 use crate::audit::Status;
-use crate::text::{at_least, counted, metres, metres_below, seconds};
+use crate::text::{at_least, counted, metres, metres_below, seconds, table};
 
 impl Report {
     /// The verdict in one line.
@@ -65,31 +64,19 @@ impl Report {
     /// The numbers as a short table, a line each, with a line end.
     #[must_use]
     pub fn text(&self) -> String {
-        let mut text = String::new();
-        for (name, content) in [
+        let (control, velocity) = (&self.control, &self.velocity);
+        let [peak, last] = [control.peak_m_s2, control.final_m_s2].map(or_dash);
+        let [disagreement, common] = [velocity.disagreement_m_s, velocity.common_m_s].map(or_dash);
+        table([
             ("separation", self.separation_line()),
             ("audit", self.audit_line()),
             ("formation", self.formation_line()),
             ("energy", self.energy_line()),
-            (
-                "control",
-                format!("peak {}, final {} m/s^2", or_dash(self.control.peak_m_s2), or_dash(self.control.final_m_s2)),
-            ),
-            (
-                "velocity",
-                format!(
-                    "disagreement {}, common {} m/s",
-                    or_dash(self.velocity.disagreement_m_s),
-                    or_dash(self.velocity.common_m_s)
-                ),
-            ),
+            ("control", format!("peak {peak}, final {last} m/s^2")),
+            ("velocity", format!("disagreement {disagreement}, common {common} m/s")),
             ("run", self.run_line()),
             ("performance", self.performance_line()),
-        ] {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{name:<12} {content}");
-        }
-        text
+        ])
     }
 
     fn separation_line(&self) -> String {
@@ -167,16 +154,11 @@ impl Report {
     }
 
     fn performance_line(&self) -> String {
-        let performance = &self.performance;
-        let time = |time_s: Option<f64>| time_s.map_or("-".to_owned(), |time_s| format!("{time_s:.3}"));
-        let factor = performance.real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
+        let Performance { wall_s, real_time_factor, law_s, physics_s, audit_s, record_s } = self.performance;
+        let factor = real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
         format!(
-            "{} s wall, {factor} x real time (law {}, physics {}, audit {}, record {} s)",
-            time(performance.wall_s),
-            time(performance.law_s),
-            time(performance.physics_s),
-            time(performance.audit_s),
-            time(performance.record_s)
+            "{wall_s:.3} s wall, {factor} x real time (law {law_s:.3}, physics {physics_s:.3}, audit {audit_s:.3}, record \
+             {record_s:.3} s)"
         )
     }
 }

@@ -178,7 +178,6 @@ pub(super) struct LawTable {
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) kind: LawSpec,
     /// Safety distance delta in m: every flight is judged by it, whatever the law.
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub(super) delta_m: f64,
 }
 

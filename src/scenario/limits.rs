@@ -50,6 +50,20 @@ pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
         .at("swarm.count"))
 }
 
+/// Refuses the first list, by its key and what it holds, that is there and not as long as there are vehicles.
+pub(super) fn check_lengths<const N: usize>(
+    count: usize,
+    lists: [(&'static str, &str, Option<usize>); N],
+) -> Result<(), ScenarioError> {
+    match lists.into_iter().find(|&(.., length)| length.is_some_and(|length| length != count)) {
+        Some((key, what, Some(length))) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
+            .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
+            .at(key)
+            .at("swarm.count")),
+        _ => Ok(()),
+    }
+}
+
 /// Refuses a swarm that would take more memory than [`MAX_MEMORY_BYTES`].
 pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioError> {
     let bytes = (count as u128 * BYTES_PER_VEHICLE).saturating_add(edges.saturating_mul(BYTES_PER_EDGE));
@@ -79,16 +93,12 @@ pub(super) fn positive(key: &'static str, what: &str, number: f64) -> Result<f64
     require_positive(what, number).map_err(|error| error.at(key))
 }
 
-pub(super) fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<(), ScenarioError> {
-    require_finite(what, number)
-        .and_then(|number| {
-            if number >= 0.0 {
-                Ok(())
-            } else {
-                Err(ScenarioError::new(format!("{what} is {number}")).with_help("it must be at least 0"))
-            }
-        })
-        .map_err(|error| error.at(key))
+pub(super) fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
+    let required = require_finite(what, number).and_then(|number| match number {
+        0.0.. => Ok(number),
+        _ => Err(ScenarioError::new(format!("{what} is {number}")).with_help("it must be at least 0")),
+    });
+    required.map_err(|error| error.at(key))
 }
 
 pub(super) fn require_positive(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
@@ -105,11 +115,7 @@ pub(super) fn require_more_than_zero(what: impl Display, number: f64) -> Result<
     if number > 0.0 && number.is_finite() {
         return Ok(number);
     }
-    let shown = match number {
-        _ if number.is_nan() => "not a number".to_owned(),
-        f64::INFINITY => "infinite".to_owned(),
-        _ => number.to_string(),
-    };
+    let shown = not_finite(number).map_or_else(|| number.to_string(), str::to_owned);
     Err(ScenarioError::new(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
 }
 
@@ -117,12 +123,13 @@ pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, Sce
     if number.abs() <= LARGEST {
         return Ok(number);
     }
-    let (shown, help) = if number.is_nan() {
-        ("not a number".to_owned(), "give a number".to_owned())
-    } else if number.is_infinite() {
-        ("infinite".to_owned(), "give a finite number".to_owned())
-    } else {
-        (format!("{number:e}, too large to compute with"), format!("the most is {LARGEST:e} in either direction"))
-    };
-    Err(ScenarioError::new(format!("{what} is {shown}")).with_help(help))
+    Err(match not_finite(number) {
+        Some(shown) => ScenarioError::new(format!("{what} is {shown}")).with_help("give a finite number"),
+        None => ScenarioError::new(format!("{what} is {number:e}, too large to compute with"))
+            .with_help(format!("the most is {LARGEST:e} in either direction")),
+    })
+}
+
+fn not_finite(number: f64) -> Option<&'static str> {
+    (!number.is_finite()).then_some(if number.is_nan() { "not a number" } else { "infinite" })
 }

@@ -87,23 +87,16 @@ fn read_file(path: &Path) -> Result<String, ScenarioError> {
         ScenarioError::new(format!("cannot read {shown}: {error}"))
             .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
     };
-    let too_large = || {
-        ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
-            .with_help("no scenario is that long: is it the right file?")
-    };
-    let metadata = std::fs::metadata(path).map_err(cannot)?;
-    if metadata.is_dir() {
+    if path.is_dir() {
         return Err(ScenarioError::new(format!("{shown} is a directory"))
             .with_help("give the path of a scenario file within it"));
-    }
-    if metadata.len() > MAX_FILE_BYTES {
-        return Err(too_large());
     }
     let mut bytes = Vec::new();
     // A device or a pipe does not say how long it is.
     File::open(path).map_err(cannot)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(cannot)?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(too_large());
+        return Err(ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
+            .with_help("no scenario is that long: is it the right file?"));
     }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();

@@ -10,15 +10,12 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct TimeSpec {
     /// Length of the flight in s.
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub duration_s: f64,
     /// Control and physics step in s.
     #[serde(default = "TimeSpec::default_dt_s")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub dt_s: f64,
     /// Samples recorded per second of flight in Hz, at most one a step.
     #[serde(default = "TimeSpec::default_record_hz")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub record_hz: f64,
     /// How often a step that takes more than half of a clearance may be halved; 0 takes every step as it is.
     #[serde(default = "TimeSpec::default_max_halvings")]

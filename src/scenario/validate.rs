@@ -2,8 +2,8 @@
 
 use super::error::ScenarioError;
 use super::limits::{
-    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, at_least_zero, check_count, check_memory, positive,
-    require_finite, require_more_than_zero, require_positive,
+    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, at_least_zero, check_count, check_lengths,
+    check_memory, positive, require_finite, require_more_than_zero, require_positive,
 };
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::time::TimeSpec;
@@ -137,38 +137,40 @@ impl Scenario {
     }
 
     fn check_lengths(&self) -> Result<(), ScenarioError> {
-        let count = self.count();
-        let lengths = [
-            ("start.velocities_m_s", "start velocities", self.start.velocities_m_s.nrows()),
-            ("formation.points_m", "slots in the formation", self.slots_of_a_wrong_leg().unwrap_or(count)),
-            ("swarm.mass_kg", "masses", self.mass_kg.len()),
-            ("swarm.hull_radius_m", "hull radii", self.hull_radius_m.len()),
-            ("graph.edges", "vehicles in the graph", self.graph.count()),
-        ];
-        match lengths.into_iter().find(|&(.., length)| length != count) {
-            Some((key, what, length)) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
-                .with_help("there must be one for each start position")
-                .at(key)),
-            None => Ok(()),
-        }
+        check_lengths(
+            self.count(),
+            [
+                ("start.velocities_m_s", "start velocities", Some(self.start.velocities_m_s.nrows())),
+                ("formation.points_m", "slots in the formation", self.slots_of_a_wrong_leg()),
+                ("swarm.mass_kg", "masses", Some(self.mass_kg.len())),
+                ("swarm.hull_radius_m", "hull radii", Some(self.hull_radius_m.len())),
+                ("graph.edges", "vehicles in the graph", Some(self.graph.count())),
+            ],
+        )
     }
 
     fn check_law(&self) -> Result<(), ScenarioError> {
         positive("law.delta_m", "the safety distance delta", self.delta_m)?;
         for Gain { key, name, value, may_be_zero } in self.law.gains() {
-            if may_be_zero { at_least_zero(key, name, value)? } else { positive(key, name, value).map(drop)? }
+            if may_be_zero {
+                at_least_zero(key, name, value)?
+            } else {
+                positive(key, name, value)?
+            };
         }
         Ok(())
     }
 
     fn check_vehicles(&self) -> Result<(), ScenarioError> {
-        for (i, &mass_kg) in self.mass_kg.iter().enumerate() {
-            require_positive(format_args!("the mass of vehicle {}", i + 1), mass_kg)
-                .map_err(|error| error.at_entry("swarm.mass_kg", i))?;
-        }
-        for (i, &radius_m) in self.hull_radius_m.iter().enumerate() {
-            require_positive(format_args!("the hull radius of vehicle {}", i + 1), radius_m)
-                .map_err(|error| error.at_entry("swarm.hull_radius_m", i))?;
+        let numbers = [
+            ("swarm.mass_kg", "the mass", &self.mass_kg),
+            ("swarm.hull_radius_m", "the hull radius", &self.hull_radius_m),
+        ];
+        for (key, what, numbers) in numbers {
+            for (i, &number) in numbers.iter().enumerate() {
+                require_positive(format_args!("{what} of vehicle {}", i + 1), number)
+                    .map_err(|error| error.at_entry(key, i))?;
+            }
         }
         Ok(())
     }
@@ -204,17 +206,21 @@ impl Scenario {
 
     fn check_separations(&self) -> Result<(), ScenarioError> {
         let delta_m = self.delta_m;
+        let refuse = |said: String, help: &str, key: &'static str, pair: Pair| {
+            Err(ScenarioError::new(said)
+                .with_help(help)
+                .at_entry(key, pair.second())
+                .at_entry(key, pair.first())
+                .at("law.delta_m"))
+        };
         if let Some((pair, separation_m)) = first_within(&self.start.positions_m, delta_m) {
             let said = if separation_m == 0.0 {
                 format!("vehicles {pair} start at the same point")
             } else {
                 format!("vehicles {pair} start {separation_m} m apart, not more than delta = {delta_m} m")
             };
-            return Err(ScenarioError::new(said)
-                .with_help("move one of them away, or reduce law.delta_m: starts must be more than delta apart")
-                .at_entry("start.positions_m", pair.second())
-                .at_entry("start.positions_m", pair.first())
-                .at("law.delta_m"));
+            let help = "move one of them away, or reduce law.delta_m: starts must be more than delta apart";
+            return refuse(said, help, "start.positions_m", pair);
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
         if let Some((pair, distance_m)) = self.legs.iter().find_map(|leg| first_within(&leg.formation.slots_m, least_m))
@@ -230,11 +236,8 @@ impl Scenario {
                      billionth of it"
                 )
             };
-            return Err(ScenarioError::new(said)
-                .with_help("enlarge the formation, or reduce law.delta_m: slots must be more than delta apart")
-                .at_entry("formation.points_m", pair.second())
-                .at_entry("formation.points_m", pair.first())
-                .at("law.delta_m"));
+            let help = "enlarge the formation, or reduce law.delta_m: slots must be more than delta apart";
+            return refuse(said, help, "formation.points_m", pair);
         }
         Ok(())
     }
@@ -332,29 +335,16 @@ fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
 
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
 fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
-    if graph.is_connected() {
+    let apart = graph.unreachable();
+    if apart.is_empty() {
         return Ok(());
     }
-    let mut neighbours = vec![Vec::new(); graph.count()];
-    for (i, j) in graph.edges() {
-        neighbours[i].push(j);
-        neighbours[j].push(i);
-    }
-    let mut reached = vec![false; graph.count()];
-    reached[0] = true;
-    let mut open = vec![0];
-    while let Some(i) = open.pop() {
-        for &j in &neighbours[i] {
-            if !std::mem::replace(&mut reached[j], true) {
-                open.push(j);
-            }
-        }
-    }
-    let apart: Vec<String> =
-        (0..graph.count()).filter(|&i| !reached[i]).map(|i| (i + 1).to_string()).take(NAMED_VEHICLES + 1).collect();
+    let named: Vec<_> = apart.iter().take(NAMED_VEHICLES).map(|i| (i + 1).to_string()).collect();
     let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
-    let named = apart[..apart.len().min(NAMED_VEHICLES)].join(", ");
-    Err(ScenarioError::new(format!("the graph is not connected: no path joins vehicle 1 to {named}{more}"))
-        .with_help("add edges until every vehicle can be reached from every other")
-        .at("graph.edges"))
+    Err(ScenarioError::new(format!(
+        "the graph is not connected: no path joins vehicle 1 to {}{more}",
+        named.join(", ")
+    ))
+    .with_help("add edges until every vehicle can be reached from every other")
+    .at("graph.edges"))
 }
