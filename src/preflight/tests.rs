@@ -1,6 +1,7 @@
 use nalgebra::Vector3;
 
 use super::*;
+use crate::scenario::Space;
 use crate::formation::Formation;
 use crate::law::EdgeTension;
 use crate::scenario::{Override, Source};
