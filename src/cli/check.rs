@@ -10,8 +10,8 @@ use crate::preflight::Preflight;
 /// Arguments of `tautline check`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 1 where the flight cannot do what it is for: relative-velocity-unstable, start-on-line, start-in-plane. \
-Other warnings leave 0; a scenario that is wrong, such as a desired distance of not more than delta, is 2.")]
+Exits with 1 where the flight cannot do what it is for: relative-velocity-unstable, start-on-line, start-in-plane, \
+drift-unresolved. Other warnings leave 0; a scenario that is wrong, such as a desired distance of not more than delta, is 2.")]
 pub(super) struct CheckArguments {
     #[command(flatten)]
     what: ScenarioArguments,

@@ -86,6 +86,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))?;
     let preflight = Preflight::of(&scenario)?;
+    if preflight.refuses() {
+        console.warn(&preflight.headline());
+    }
     for warning in &preflight.warnings {
         console.warn(&warning.to_string());
     }

@@ -8,7 +8,7 @@ use crate::scenario::{Override, Scenario, Source};
 /// Which scenario, and what is changed of it.
 #[derive(Debug, Args)]
 pub(super) struct ScenarioArguments {
-    /// A scenario file, or the name of a built-in scenario.
+    /// A scenario file, the name of a built-in scenario, or - for standard input.
     #[arg(default_value = "pentagon")]
     pub(super) scenario: String,
     /// Set any key of the scenario; may be given several times.

@@ -13,9 +13,10 @@ use serde::Serialize;
 use crate::formation::affine_dimension;
 use crate::graph::Graph;
 use crate::law::{Controls, Law, ParameterError, Void};
-use crate::scenario::{PlantSpec, Precision, Scenario};
+use crate::scenario::{LARGEST, PlantSpec, Scenario};
 use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::text::at_least;
 
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 
@@ -29,6 +30,9 @@ pub const MOST_CONNECTED: usize = 1000;
 
 /// A velocity margin up to this part of its two terms is rounding of eigenvalues, not damping.
 const MARGIN_ROUNDING: f64 = 1e-12;
+
+/// A drift is harmless while so many spacings of numbers fit into what counts as reached.
+const FINE_SPACINGS: f64 = 100.0;
 
 /// What is known before the first step. SI units; what does not apply or is not known is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -56,6 +60,15 @@ pub struct Preflight {
     pub certified_m: Option<f64>,
     /// Why nothing is certified, a sentence each.
     pub certificate_void: Vec<String>,
+    /// Separation below which no pair joined by an edge ever comes \[m\], where the graph is not complete, so that no other
+    /// pair is kept apart, and the energy decays.
+    pub certified_edges_m: Option<f64>,
+    /// Relative distance between neighbouring numbers of those that positions are computed in.
+    pub epsilon: f64,
+    /// How far the swarm's mean is carried by the end, by its own velocity or by rounding \[m\].
+    pub drift_m: f64,
+    /// Distance between neighbouring numbers there \[m\].
+    pub spacing_m: f64,
     /// The scenario's step \[s\].
     pub dt_s: f64,
     /// Longest honest step \[s\], see [`Preflight::of`].
@@ -95,6 +108,8 @@ pub enum Code {
     StartOnLine,
     /// The start lies in a plane that the law never leaves, and the formation does not.
     StartInPlane,
+    /// By the end the swarm has drifted so far that numbers do not tell its positions apart.
+    DriftUnresolved,
     /// Nothing is certified about separations.
     NoCertificate,
     /// The formation can be bent without changing the length of an edge to first order.
@@ -111,7 +126,7 @@ impl Code {
     /// Whether the flight cannot do what it is for: the formation is out of reach, or nothing may be called stable.
     #[must_use]
     pub fn refuses(self) -> bool {
-        matches!(self, Self::RelativeVelocityUnstable | Self::StartOnLine | Self::StartInPlane)
+        matches!(self, Self::RelativeVelocityUnstable | Self::StartOnLine | Self::StartInPlane | Self::DriftUnresolved)
     }
 }
 
@@ -130,11 +145,11 @@ impl Preflight {
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
         let law = scenario.law()?;
-        let certificate = law
-            .certificate(&scenario.observation(&scenario.start))
-            .void_where(scenario.legs.len() > 1, Void::TargetChanges);
+        let start = scenario.observation(&scenario.start);
+        let certificate = law.certificate(&start).void_where(scenario.legs.len() > 1, Void::TargetChanges);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = connectivity(&scenario.graph);
+        let drift = scenario.drift(law.common_mode_rate_per_s(scenario.a22_per_s));
         let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
             scenario: scenario.name.clone(),
@@ -148,6 +163,10 @@ impl Preflight {
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+            certified_edges_m: None,
+            epsilon: scenario.plant.epsilon(),
+            drift_m: drift.distance_m,
+            spacing_m: drift.spacing_m,
             dt_s: scenario.time.dt_s,
             dt_max_s: law
                 .fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s)
@@ -160,10 +179,15 @@ impl Preflight {
             warnings: Vec::new(),
             controls_distances: law.controls() == Controls::Distances,
         };
+        let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
+        if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {
+            found.certified_edges_m = law.linked_separation_m(&start);
+        }
         let trap = if found.trap_dimension() == Some(2) { Code::StartInPlane } else { Code::StartOnLine };
         let warnings = [
-            (Code::RelativeVelocityUnstable, found.relative_velocity_unstable(law.as_ref(), scenario)),
+            (Code::RelativeVelocityUnstable, undamped),
             (trap, found.start_too_flat()),
+            (Code::DriftUnresolved, found.drift_unresolved(scenario)),
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
             (Code::FlatFormationInSpace, found.flat_formation_in_space()),
@@ -175,10 +199,16 @@ impl Preflight {
         Ok(found)
     }
 
-    /// Whether some warning refuses the flight ([`Code::refuses`]).
+    /// Stable names of the warnings that refuse the flight ([`Code::refuses`]).
+    #[must_use]
+    pub fn refusing(&self) -> Vec<&'static str> {
+        self.warnings.iter().filter(|warning| warning.code.refuses()).map(|warning| warning.code.name()).collect()
+    }
+
+    /// Whether some warning refuses the flight.
     #[must_use]
     pub fn refuses(&self) -> bool {
-        self.warnings.iter().any(|warning| warning.code.refuses())
+        !self.refusing().is_empty()
     }
 
     fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<String> {
@@ -214,7 +244,7 @@ impl Preflight {
     }
 
     fn no_certificate(&self) -> Option<String> {
-        let said = || format!("No separation is certified. {}", self.certificate_void.join(" ")).trim_end().to_owned();
+        let said = || format!("No separation is certified. {}", self.not_certified()).trim_end().to_owned();
         self.certified_m.is_none().then(said)
     }
 
@@ -244,27 +274,75 @@ impl Preflight {
         (self.controls_distances && self.is_flat_in_space()).then(|| said.to_owned())
     }
 
-    fn common_mode_unstable(&self, scenario: &Scenario) -> Option<String> {
-        let rate_per_s = self.common_mode_rate_per_s;
-        let rounding = match scenario.plant {
-            PlantSpec::Rapier(Precision::Single) => f64::from(f32::EPSILON),
-            #[cfg(feature = "double")]
-            PlantSpec::Rapier(Precision::Double) => f64::EPSILON,
-            #[cfg(feature = "ideal")]
-            PlantSpec::Ideal => f64::EPSILON,
+    /// Why no separation is certified, and what is in its place.
+    fn not_certified(&self) -> String {
+        let edges = self.certified_edges_m.map(|edges_m| {
+            let least = at_least(edges_m, 6);
+            format!(
+                "The energy decays, so pairs joined by an edge never come closer than {least} m in continuous time."
+            )
+        });
+        self.certificate_void.iter().cloned().chain(edges).collect::<Vec<_>>().join(" ")
+    }
+
+    /// What the mean velocity does, and how far that carries the swarm.
+    fn drift_in_words(&self, scenario: &Scenario, why: &str) -> String {
+        let drift = scenario.drift(self.common_mode_rate_per_s);
+        let seed = if scenario.start.mean_velocity_m_s().norm() > 0.0 { "it" } else { "rounding" };
+        format!(
+            "The mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the whole \
+             swarm {} m away",
+            self.common_mode_rate_per_s,
+            scenario.time.duration_s,
+            numbers::significant(drift.speed_m_s),
+            numbers::significant(drift.distance_m)
+        )
+    }
+
+    fn drift_unresolved(&self, scenario: &Scenario) -> Option<String> {
+        let (needed_m, spacing_m) = (scenario.arrival.edge_error_m, self.spacing_m);
+        let unresolved = if spacing_m > needed_m {
+            format!(
+                "where positions are {} m apart from number to number and {needed_m} m count",
+                numbers::significant(spacing_m)
+            )
+        } else if self.drift_m > LARGEST {
+            format!("farther than the {LARGEST:e} m that a flight is meant for")
+        } else {
+            return None;
         };
-        let why = if rate_per_s < scenario.a22_per_s {
+        let said = if self.common_mode_rate_per_s > 0.0 {
+            self.drift_in_words(scenario, self.why_common_mode_grows(scenario))
+        } else {
+            format!("The mean velocity carries the whole swarm {} m away", numbers::significant(self.drift_m))
+        };
+        let precision = if self.epsilon > f64::EPSILON { ", set plant.precision to \"double\"" } else { "" };
+        Some(format!(
+            "{said}, {unresolved}. Shorten time.duration_s{precision}, or reduce what drives the mean velocity."
+        ))
+    }
+
+    fn why_common_mode_grows(&self, scenario: &Scenario) -> &'static str {
+        if self.common_mode_rate_per_s < scenario.a22_per_s {
             "the law brakes it too little"
         } else {
             "the law cannot move the centre of mass"
-        };
-        (rate_per_s > 0.0).then(|| {
+        }
+    }
+
+    fn common_mode_unstable(&self, scenario: &Scenario) -> Option<String> {
+        if self.common_mode_rate_per_s <= 0.0 || self.drift_unresolved(scenario).is_some() {
+            return None;
+        }
+        let told = if FINE_SPACINGS * self.spacing_m <= scenario.arrival.edge_error_m {
+            ". No distance between vehicles feels that.".to_owned()
+        } else {
+            let spacing = numbers::significant(self.spacing_m);
             format!(
-                "The mean velocity grows as exp({rate_per_s} t), since {why}: rounding of {rounding:.0e} m/s grows to 1 m/s \
-                 in {:.0} s.",
-                -rounding.ln() / rate_per_s
+                ", where positions are told to {spacing} m only. Shorten time.duration_s, or reduce swarm.a22_per_s."
             )
-        })
+        };
+        Some(self.drift_in_words(scenario, self.why_common_mode_grows(scenario)) + &told)
     }
 
     fn dt_too_large(&self, scenario: &Scenario) -> Option<String> {

@@ -12,6 +12,7 @@ impl Code {
             Self::RelativeVelocityUnstable => "relative-velocity-unstable",
             Self::StartOnLine => "start-on-line",
             Self::StartInPlane => "start-in-plane",
+            Self::DriftUnresolved => "drift-unresolved",
             Self::NoCertificate => "no-certificate",
             Self::NotRigid => "not-rigid",
             Self::FlatFormationInSpace => "flat-formation-in-space",
@@ -32,8 +33,7 @@ impl Preflight {
     /// or `REFUSED: start-on-line`.
     #[must_use]
     pub fn headline(&self) -> String {
-        let refusing: Vec<_> =
-            self.warnings.iter().map(|warning| warning.code).filter(|code| code.refuses()).map(Code::name).collect();
+        let refusing = self.refusing();
         if !refusing.is_empty() {
             return format!("REFUSED: {}", refusing.join(", "));
         }
@@ -81,7 +81,7 @@ impl Preflight {
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
             Some(certified_m) => format!("{} m, from {energy}", at_least(certified_m, 6)),
-            None => format!("none. {} {energy}", self.certificate_void.join(" ")).trim_end().to_owned(),
+            None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }
     }
 
@@ -111,10 +111,26 @@ impl Preflight {
         };
         let convergence = match self.rigidity.rigid {
             Some(true) if self.controls_distances && !self.refuses() => ", exponential convergence near the goal",
-            Some(false) if self.controls_distances && !self.refuses() => ", algebraic convergence at best",
+            Some(false) if self.controls_distances && !self.refuses() => self.approach(),
             _ => "",
         };
         format!("rank {rank}: in the plane {}, in space {}{convergence}", place(2), place(3))
+    }
+}
+
+impl Preflight {
+    /// How a formation that is not rigid is approached.
+    fn approach(&self) -> &'static str {
+        let edges = self.rigidity.edges;
+        if self.rigidity.rank == Some(edges) {
+            // Each length can be set by itself: shapes with the right lengths are a smooth family, approached as such.
+            ", exponential convergence of the edges' lengths, which do not fix the shape"
+        } else if edges == self.vehicles * self.vehicles.saturating_sub(1) / 2 {
+            // All lengths fix the shape, and some motion changes none of them to first order.
+            ", algebraic convergence at best"
+        } else {
+            ", convergence perhaps slow"
+        }
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Findings<'a> {
     pub trap_dimension: Option<usize>,
     /// Dimension of the smallest flat that holds the formation.
     pub formation_dimension: usize,
+    /// Stable names of what refused the flight before the first step, such as `start-on-line`.
+    pub refused: &'a [&'static str],
     /// What the law promised.
     pub certificate: &'a Certificate,
     /// What the judge found.
@@ -35,9 +37,10 @@ pub struct Findings<'a> {
     pub run: &'a Run,
     /// Wall-clock times.
     pub performance: Performance,
-    /// Why the run ended before its time, such as `interrupted`, if it did.
-    pub ended_early: Option<&'a str>,
 }
+
+/// Why a run ended that its user stopped.
+pub const INTERRUPTED: &str = "interrupted";
 
 /// Facts of the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +51,8 @@ pub struct Run {
     pub dt_s: f64,
     /// Steps flown.
     pub steps: u64,
+    /// Why the run ended before its time, such as [`INTERRUPTED`]; null where it did not.
+    pub ended_early: Option<String>,
     /// Number of vehicles N.
     pub vehicles: usize,
     /// [`crate::record::StateHash`] of the recorded states.

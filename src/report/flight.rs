@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
 use super::findings::{Findings, Performance, Run, finite};
-use super::verdict::Verdict;
+use super::verdict::{Fails, Verdict, at_rest};
 use crate::audit::{self, Status};
 use crate::swarm::Pair;
 
@@ -149,6 +149,13 @@ pub struct FormationNumbers {
     pub reached: bool,
     /// From when on \[s\].
     pub reached_at_s: Option<f64>,
+    /// How long everything had been within the limits at the end \[s\]; null where something was not.
+    pub held_s: Option<f64>,
+    /// The number that keeps the formation from being reached; null where it is.
+    pub fails: Option<Fails>,
+    /// Where it is not reached: whether the vehicles have come to rest elsewhere, relative to each other; null where that
+    /// is not known.
+    pub at_rest: Option<bool>,
     /// Largest error of a desired distance at the end \[m\].
     pub max_edge_error_m: Option<f64>,
     /// Root mean square distance from the best-placed formation at the end \[m\].
@@ -223,6 +230,9 @@ impl Report {
             formation: FormationNumbers {
                 reached: summary.reached_at_s.is_some(),
                 reached_at_s: summary.reached_at_s.and_then(finite),
+                held_s: summary.held_s.and_then(finite),
+                fails: Fails::of(summary, findings.judge),
+                at_rest: at_rest(summary, findings.judge),
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),
             },

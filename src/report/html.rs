@@ -170,7 +170,8 @@ impl Report {
             PlantSpec::Rapier(precision) => (
                 format!(
                     "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
-                     at constant speed. The engine computes in {}, law and audit in double precision (64 bits).",
+                     at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
+                     so close that they touch. The engine computes in {}, law and audit in double precision (64 bits).",
                     match precision {
                         Precision::Single => "single precision (32 bits)",
                         Precision::Double => "double precision (64 bits)",
@@ -180,7 +181,8 @@ impl Report {
             ),
             PlantSpec::Ideal => (
                 "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
-                 8th order in double precision (64 bits); the audit takes them to move on straight lines within a step."
+                 8th order in double precision (64 bits); mass and hull play no part, and there is no engine to see \
+                 contacts. The audit takes them to move on straight lines within a step."
                     .to_owned(),
                 "recorded; the motion between follows the law in continuous time",
             ),

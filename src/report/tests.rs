@@ -43,13 +43,21 @@ struct Case {
     summary: Summary,
     trap_dimension: Option<usize>,
     ended_early: Option<&'static str>,
+    refused: &'static [&'static str],
     certificate: Certificate,
 }
 
 impl Case {
     fn good() -> Self {
         let certificate = Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![] };
-        Self { audit: passing(2.4607), summary: REACHED, trap_dimension: None, ended_early: None, certificate }
+        Self {
+            audit: passing(2.4607),
+            summary: REACHED,
+            trap_dimension: None,
+            ended_early: None,
+            refused: &[],
+            certificate,
+        }
     }
 
     fn report(&self) -> Report {
@@ -60,6 +68,7 @@ impl Case {
             judge: JUDGE,
             trap_dimension: self.trap_dimension,
             formation_dimension: 2,
+            refused: self.refused,
             certificate: &self.certificate,
             audit: &self.audit,
             engine_contact_pairs: Some(0),
@@ -68,6 +77,7 @@ impl Case {
                 duration_s: 120.0,
                 dt_s: 1.0 / 240.0,
                 steps: 28_800,
+                ended_early: self.ended_early.map(str::to_owned),
                 vehicles: 5,
                 state_hash: "0123456789abcdef".to_owned(),
             },
@@ -79,7 +89,6 @@ impl Case {
                 audit_s: 0.1,
                 record_s: 0.05,
             },
-            ended_early: self.ended_early,
         })
     }
 
@@ -114,6 +123,7 @@ tool
   version
 verdict
   pass
+  refused
   reasons
 separation
   delta_m
@@ -142,6 +152,9 @@ audit
 formation
   reached
   reached_at_s
+  held_s
+  fails
+  at_rest
   max_edge_error_m
   rms_position_error_m
 energy
@@ -158,6 +171,7 @@ run
   duration_s
   dt_s
   steps
+  ended_early
   vehicles
   state_hash
 performance
@@ -256,12 +270,64 @@ fn a_formation_that_is_not_reached_is_told_with_its_largest_error() {
     let case = Case { summary: NOT_REACHED, ..Case::good() };
     assert_eq!(
         case.reason(),
-        "The formation was not reached: at the end a distance is still wrong by 8.570 m, and 0.01 m are allowed."
+        "The formation was not reached: at the end a distance is still wrong by 8.570 m, and 0.01 m are allowed. The \
+         vehicles have come to rest elsewhere: more time does not help."
     );
     assert_eq!(
         case.report().headline(),
-        "CLEAR: never closer than 2.460 m (delta 2.000 m), formation NOT reached (largest edge error 8.57 m)"
+        "CLEAR: never closer than 2.460 m (delta 2.000 m), formation NOT reached (largest edge error 8.57 m, at rest \
+         elsewhere)"
     );
+}
+
+#[test]
+fn the_headline_names_the_number_that_fails() {
+    let said = |summary| {
+        let report = Case { summary, ..Case::good() }.report();
+        let headline = report.headline();
+        (report.formation.fails, headline.split_once("NOT reached").map(|(_, why)| why.to_owned()).unwrap_or_default())
+    };
+    let lost = Summary { reached_at_s: None, held_s: None, ..REACHED };
+    let cases = [
+        (REACHED, None, ""),
+        (
+            Summary { max_edge_error_m: 0.5, final_control_m_s2: 0.1, ..lost },
+            Some(Fails::MaxEdgeErrorM),
+            " (largest edge error 0.50 m, still moving)",
+        ),
+        (
+            Summary { rms_position_error_m: 0.6, ..lost },
+            Some(Fails::RmsPositionErrorM),
+            " (another shape, rms position error 0.60 m, at rest elsewhere)",
+        ),
+        (
+            Summary { disagreement_m_s: 0.7, ..lost },
+            Some(Fails::Disagreement),
+            " (largest relative speed 0.70 m/s, still moving)",
+        ),
+        (Summary { held_s: Some(0.4), ..lost }, Some(Fails::HeldS), " (kept for the last 0.40 s only)"),
+        (Summary { max_edge_error_m: f64::NAN, ..lost }, Some(Fails::Unknown), ""),
+        (
+            Summary { max_edge_error_m: 0.5, final_control_m_s2: f64::NAN, ..lost },
+            Some(Fails::MaxEdgeErrorM),
+            " (largest edge error 0.50 m)",
+        ),
+    ];
+    for (summary, fails, why) in cases {
+        assert_eq!(said(summary), (fails, why.to_owned()));
+    }
+}
+
+#[test]
+fn a_flight_that_was_refused_never_passes_and_says_so_in_its_headline() {
+    let case = Case { refused: &["start-on-line", "drift-unresolved"], ..Case::good() };
+    assert_eq!(case.reason(), "The flight was refused before its first step: start-on-line, drift-unresolved.");
+    let headline = case.report().headline();
+    assert!(
+        headline.starts_with("CLEAR: ")
+            && headline.ends_with("; refused before the first step: start-on-line, drift-unresolved")
+    );
+    assert!(!Case::good().report().headline().contains("refused"));
 }
 
 #[test]

@@ -2,17 +2,27 @@
 
 use super::findings::Performance;
 use super::flight::Report;
-use super::verdict::breaks_certificate;
+use super::verdict::{Fails, breaks_certificate};
 use crate::audit::Status;
 use crate::text::{at_least, counted, metres, metres_below, seconds, table};
 
 impl Report {
-    /// The verdict in one line.
+    /// The verdict in one line, with what refused the flight before its first step behind it.
     ///
     /// `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.5 s`, or
     /// `VIOLATION: vehicles 2-3 came to 1.533 m (delta 2.000 m) at 3.63 s`.
     #[must_use]
     pub fn headline(&self) -> String {
+        let refused = match &self.verdict.refused[..] {
+            [] => String::new(),
+            codes => format!("; refused before the first step: {}", codes.join(", ")),
+        };
+        let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
+        self.judged() + &ended.unwrap_or_default() + &refused
+    }
+
+    /// What was judged of what was flown.
+    fn judged(&self) -> String {
         let delta = metres(self.separation.delta_m);
         match self.audit.status {
             Status::Clear => {
@@ -20,9 +30,9 @@ impl Report {
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
                 let broken = match (self.separation.min_m, self.separation.certified_m) {
                     (Some(min_m), Some(certified_m)) if breaks_certificate(min_m, certified_m) => {
-                        ", which breaks the certificate"
+                        format!(", which breaks the certificate of {} m", at_least(certified_m, 6))
                     }
-                    _ => "",
+                    _ => String::new(),
                 };
                 format!("CLEAR: {closest} (delta {delta} m){broken}, {}", self.formation_in_words())
             }
@@ -40,11 +50,29 @@ impl Report {
     }
 
     fn formation_in_words(&self) -> String {
-        match (self.formation.reached_at_s, self.formation.max_edge_error_m) {
-            (Some(at_s), _) => format!("formation reached at {at_s:.1} s"),
-            (None, Some(error_m)) => format!("formation NOT reached (largest edge error {} m)", short(error_m)),
-            (None, None) => "formation NOT reached".to_owned(),
-        }
+        let formation = &self.formation;
+        let (what, number, unit) = match formation.fails {
+            None => {
+                let at_s = formation.reached_at_s.unwrap_or_default();
+                return format!("formation reached at {at_s:.1} s");
+            }
+            Some(Fails::Unknown) => return "formation NOT reached".to_owned(),
+            Some(Fails::HeldS) => {
+                let held_s = formation.held_s.unwrap_or_default();
+                return format!("formation NOT reached (kept for the last {} only)", seconds(held_s));
+            }
+            Some(Fails::MaxEdgeErrorM) => ("largest edge error", formation.max_edge_error_m, "m"),
+            Some(Fails::RmsPositionErrorM) => {
+                ("another shape, rms position error", formation.rms_position_error_m, "m")
+            }
+            Some(Fails::Disagreement) => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
+        };
+        let then = match formation.at_rest {
+            Some(true) => ", at rest elsewhere",
+            Some(false) => ", still moving",
+            None => "",
+        };
+        format!("formation NOT reached ({what} {} {unit}{then})", number.map_or("-".to_owned(), short))
     }
 
     fn deepest_in_words(&self) -> String {

@@ -21,7 +21,7 @@ use crate::target::Leg;
 /// Slots of the pentagon.
 const PENTAGON_COUNT: usize = 5;
 
-/// Completes a scenario. It still has to be validated.
+/// Completes a scenario, in double precision where none is given. It still has to be validated.
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
@@ -36,10 +36,15 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         a22_per_s: document.swarm.a22_per_s,
         legs: vec![Leg::first(formation(&document.formation.shape, count)?)],
         graph: graph(&document.graph.kind, count)?,
-        plant: plant(&document.plant),
+        plant: match document.plant {
+            PlantTable { kind: PlantKind::Rapier, precision } => {
+                PlantSpec::Rapier(precision.unwrap_or(Precision::Double))
+            }
+            PlantTable { kind: PlantKind::Ideal, .. } => PlantSpec::Ideal,
+        },
         time: document.time,
         arrival: document.arrival,
-        name: document.name,
+        name: document.name.unwrap_or_default(),
         space,
         law,
         delta_m,
@@ -144,13 +149,6 @@ fn formation(shape: &FormationShape, count: usize) -> Result<Formation, Scenario
         &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
         FormationShape::Points { points_m } => Formation::points(rows(points_m)),
     })
-}
-
-fn plant(table: &PlantTable) -> PlantSpec {
-    match table.kind {
-        PlantKind::Rapier => PlantSpec::Rapier(table.precision.unwrap_or(Precision::Single)),
-        PlantKind::Ideal => PlantSpec::Ideal,
-    }
 }
 
 /// Number of edges, at most, without making them.

@@ -16,7 +16,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The fields that hold a choice.
-const CHOICES: [&str; 2] = ["kind", "shape"];
+pub(super) const CHOICES: [&str; 2] = ["kind", "shape"];
 
 /// What is wrong with a key or its value.
 #[derive(Debug)]

@@ -3,6 +3,8 @@
 use std::fmt::Display;
 
 use super::error::ScenarioError;
+use crate::space::Spaced;
+use crate::swarm::{Pair, Rows, row};
 
 /// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such
 /// numbers stay finite in single precision too.
@@ -25,6 +27,11 @@ pub const CONTACT_PREDICTION_M: f64 = 0.02;
 
 /// Longest name \[characters\].
 pub const MAX_NAME_CHARS: usize = 64;
+
+/// Whether a name may hold this.
+pub(super) fn may_be_in_a_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '-' || c == '_'
+}
 
 /// Memory that a flight may be expected to take \[bytes\].
 pub const MAX_MEMORY_BYTES: u128 = 8 << 30;
@@ -86,6 +93,12 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
 pub(super) fn pair_count(count: usize) -> u128 {
     let count = count as u128;
     count * count.saturating_sub(1) / 2
+}
+
+/// The first vehicle, and the first before it, that are at most `distance_m` apart.
+pub(super) fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
+    let mut spaced = Spaced::new(distance_m);
+    (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
 }
 
 /// The number, if it is positive and within the limits.

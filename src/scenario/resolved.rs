@@ -55,7 +55,7 @@ impl From<&Scenario> for Document {
             PlantSpec::Ideal => (PlantKind::Ideal, None),
         };
         Self {
-            name: scenario.name.clone(),
+            name: Some(scenario.name.clone()),
             swarm: SwarmTable {
                 count: Some(scenario.count() as u64),
                 dimensions: Some(scenario.space.dimensions() as u64),

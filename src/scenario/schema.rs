@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::document::Document;
+use super::document::{DEFAULT_LAW, Document};
 use super::overrides::{ARRIVAL, OLD_ARRIVAL};
 use crate::law::LawSpec;
 
@@ -36,6 +36,11 @@ pub fn schema() -> Value {
     tidy(&mut schema, &bounds.collect());
     schema["properties"][OLD_ARRIVAL] =
         json!({ "$ref": "#/$defs/Arrival", "deprecated": true, "description": "The old name of `arrival`." });
+    for law in schema["$defs"]["LawTable"]["oneOf"].as_array_mut().into_iter().flatten() {
+        if law["properties"]["kind"]["const"] == DEFAULT_LAW {
+            law["required"] = json!([]);
+        }
+    }
     schema["not"] = json!({ "required": [ARRIVAL, OLD_ARRIVAL] });
     schema
 }

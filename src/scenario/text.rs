@@ -3,14 +3,15 @@
 //! Spans live in one address space: the file's bytes first, then each override's. A value therefore knows where it was
 //! written, whichever text that was.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use serde::Deserialize as _;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, map::Map};
 
-use super::deserializer::{KeyError, Unknown, Value};
-use super::document::Document;
+use super::deserializer::{CHOICES, KeyError, Unknown, Value};
+use super::document::{DEFAULT_LAW, Document};
 use super::error::{Field, Place, ScenarioError};
 use super::overrides::{ARRIVAL, OLD_ARRIVAL, Override};
 #[cfg(feature = "schema")]
@@ -40,15 +41,43 @@ pub(super) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Reads the keys of the scenario.
+    /// Reads the keys of the scenario, without those of a choice that an override has left.
     pub(super) fn decode(&self) -> Result<Document, ScenarioError> {
-        let root = self.tree()?;
-        if root.get_ref().as_table().is_some_and(Map::is_empty) {
-            return Err(ScenarioError::new("the scenario is empty")
-                .with_help("start from a built-in scenario, such as `pentagon`")
-                .with_place(Place::new(self.name, self.toml, 0..0)));
+        let mut left: Vec<(String, String)> = Vec::new();
+        loop {
+            let mut root = self.tree()?;
+            if root.get_ref().as_table().is_some_and(Map::is_empty) {
+                return Err(ScenarioError::new("the scenario is empty")
+                    .with_help("start from a built-in scenario, such as `pentagon`")
+                    .with_place(Place::new(self.name, self.toml, 0..0)));
+            }
+            left.iter().for_each(|(table, key)| remove(&mut root, table, key));
+            match Document::deserialize(Value::from(root)) {
+                Ok(document) => return Ok(document),
+                Err(error) => match self.left_behind(&error) {
+                    Some(key) => left.push(key),
+                    None => return Err(self.explain(error)),
+                },
+            }
         }
-        Document::deserialize(Value::from(root)).map_err(|error| self.explain(error))
+    }
+
+    /// The table and the key of the file that an error is about, where an override has left the choice that the key
+    /// belongs to: `--set law.kind=laplacian` leaves `law.alpha`.
+    fn left_behind(&self, error: &KeyError) -> Option<(String, String)> {
+        let (Some(Unknown::Key(key, _)), Some(span)) = (&error.unknown, &error.span) else { return None };
+        let in_file = |span: &Range<usize>| span.start <= self.toml.len();
+        let root = self.tree().ok()?;
+        let mut tables = root.get_ref().as_table()?.iter();
+        let (name, chosen) = tables.find_map(|(name, table)| {
+            let table = table.get_ref().as_table()?;
+            let (key, value) = table.get_key_value(key.as_str())?;
+            let holds_it = key.span() == *span && in_file(&value.span());
+            let chosen = CHOICES.iter().find_map(|choice| table.get(*choice));
+            holds_it.then_some((name.get_ref(), chosen?))
+        })?;
+        let is_of_a_choice = tables_with(key).iter().any(|place| place.starts_with(&format!("[{name}] with ")));
+        (!in_file(&chosen.span()) && is_of_a_choice).then(|| (name.to_string(), key.clone()))
     }
 
     /// Gives an error about keys its place in the text: at the first key that an override touched, or else at the
@@ -66,7 +95,7 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// The text as a tree, overrides applied, `[judge]` under its new name.
+    /// The text as a tree, overrides applied, `[judge]` under its new name, a law without a kind under the default one.
     fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
             ScenarioError::new(format!("this is not TOML: {}", error.message()))
@@ -87,6 +116,15 @@ impl<'a> Text<'a> {
         for set in self.overrides {
             set.apply(&mut root, base)?;
             base += set.text().len() + 1;
+        }
+        if let DeValue::Table(tables) = root.get_mut()
+            && let Some(law) = tables.get_mut("law")
+        {
+            let span = law.span();
+            if let DeValue::Table(keys) = law.get_mut() {
+                let kind = Spanned::new(span.clone(), DeValue::String(DEFAULT_LAW.into()));
+                keys.entry(Spanned::new(span, Cow::from("kind"))).or_insert(kind);
+            }
         }
         Ok(root)
     }
@@ -128,6 +166,15 @@ impl<'a> Text<'a> {
             ),
         };
         ScenarioError::new(said).with_help(help).with_place(self.locate(error.span.unwrap_or(0..0)))
+    }
+}
+
+/// Takes a key out of a table.
+fn remove(root: &mut Spanned<DeValue<'_>>, table: &str, key: &str) {
+    if let DeValue::Table(tables) = root.get_mut()
+        && let Some(DeValue::Table(keys)) = tables.get_mut(table).map(Spanned::get_mut)
+    {
+        keys.remove(key);
     }
 }
 

@@ -3,18 +3,14 @@
 use super::error::ScenarioError;
 use super::limits::{
     CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, at_least_zero, check_count, check_lengths,
-    check_memory, positive, require_finite, require_more_than_zero, require_positive,
+    check_memory, first_within, may_be_in_a_name, positive, require_finite, require_more_than_zero, require_positive,
 };
-use super::spec::{PlantSpec, Precision, Scenario, Space};
+use super::spec::{Scenario, Space};
 use super::time::TimeSpec;
 use crate::graph::Graph;
 use crate::law::Gain;
-use crate::space::Spaced;
-use crate::swarm::{Pair, Rows, mean_row, row};
+use crate::swarm::Pair;
 use crate::target::Begins;
-
-/// Largest error of a22 by the engine's rounding, as a share of a22.
-const DAMPING_RESOLUTION: f64 = 0.01;
 
 /// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
 /// step.
@@ -76,44 +72,6 @@ impl Scenario {
             .at("time.record_hz"));
         }
         Ok(())
-    }
-
-    /// Refuses what single precision would silently not move.
-    fn check_resolution(&self) -> Result<(), ScenarioError> {
-        if self.plant != PlantSpec::Rapier(Precision::Single) {
-            return Ok(());
-        }
-        let refuse = |said: String| {
-            Err(ScenarioError::new(said)
-                .with_help("set plant.precision to \"double\", or enlarge time.dt_s")
-                .at("time.dt_s")
-                .at("plant.precision"))
-        };
-        let (dt_s, half_ulp) = (self.time.dt_s, 0.5 * f64::from(f32::EPSILON));
-        let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
-        let extent_m = slots_m.fold(extent_m(&self.start.positions_m), f64::max);
-        let stalled_m_s = half_ulp * extent_m / dt_s;
-        if stalled_m_s > self.arrival.disagreement_m_s {
-            return refuse(format!(
-                "in single precision, {extent_m:.3e} m from the middle of the swarm and in steps of {dt_s} s, a vehicle \
-                 slower than {stalled_m_s:.1e} m/s does not move"
-            ));
-        }
-        let drift_per_s = half_ulp / dt_s;
-        if self.a22_per_s != 0.0 && drift_per_s > DAMPING_RESOLUTION * self.a22_per_s.abs() {
-            return refuse(format!(
-                "in single precision and steps of {dt_s} s, a22 = {} 1/s is off by {drift_per_s:.1e} 1/s",
-                self.a22_per_s
-            ));
-        }
-        let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
-        match first_within(&self.start.positions_m, rounded_m) {
-            Some((pair, separation_m)) => refuse(format!(
-                "vehicles {pair} start {separation_m} m apart, which single precision cannot tell from delta = {} m",
-                self.delta_m
-            )),
-            None => Ok(()),
-        }
     }
 
     /// The number of slots of the first leg that does not have one for each vehicle.
@@ -313,24 +271,12 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         "the name is empty".to_owned()
     } else if name.chars().count() > MAX_NAME_CHARS {
         format!("the name has more than {MAX_NAME_CHARS} characters")
-    } else if let Some(bad) = name.chars().find(|&c| !(c.is_ascii_alphanumeric() || c == '-' || c == '_')) {
+    } else if let Some(bad) = name.chars().find(|&c| !may_be_in_a_name(c)) {
         format!("the name holds {bad:?}")
     } else {
         return Ok(());
     };
     Err(ScenarioError::new(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
-}
-
-/// Largest distance of a row from the mean of all rows \[m\].
-fn extent_m(rows: &Rows) -> f64 {
-    let mean = mean_row(rows);
-    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm()).fold(0.0, f64::max)
-}
-
-/// The first vehicle, and the first before it, that are at most `distance_m` apart.
-fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
-    let mut spaced = Spaced::new(distance_m);
-    (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
 }
 
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
