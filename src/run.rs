@@ -11,9 +11,9 @@ use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash};
-use crate::report::{EndedEarly, Findings, Performance, Report, Run};
+use crate::report::{Findings, Performance, Report, Run};
 use crate::scenario::{PlantSpec, Scenario};
-use crate::sim::{self, Ending, Flight, Parts, SimError};
+use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 
 /// Flies a scenario to its end, hands what is recorded to `sink`, and reports.
 ///
@@ -100,7 +100,10 @@ fn report(
     metrics: &Metrics<'_>,
     state_hash: String,
 ) -> Report {
-    let reason = match &flight.ending {
+    let ended_early = match &flight.ending {
+        Ending::BrokeDown(why @ Breakdown::Unresolved { .. }) => {
+            Some(format!("{why}; shorten time.duration_s, or reduce what drives the mean velocity"))
+        }
         Ending::BrokeDown(why) => Some(format!("{why}; shorten time.dt_s, or look for speeds and gains that grow")),
         ending => ending.reason(),
     };
@@ -112,6 +115,7 @@ fn report(
         judge: scenario.arrival,
         trap_dimension: preflight.trap_dimension(),
         formation_dimension: preflight.formation_dimension,
+        refused: &preflight.refusing(),
         certificate: &flight.certificate,
         audit: &flight.audit,
         engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))
@@ -123,17 +127,17 @@ fn report(
             duration_s: flight.duration_s,
             dt_s: scenario.time.dt_s,
             steps: flight.steps,
+            ended_early,
             vehicles: scenario.count(),
             state_hash,
         },
         performance: Performance {
-            wall_s: Some(wall_s),
-            real_time_factor: Some(flight.duration_s / wall_s),
-            law_s: Some(flight.performance.law.as_secs_f64()),
-            physics_s: Some(flight.performance.physics.as_secs_f64()),
-            audit_s: Some(flight.performance.audit.as_secs_f64()),
-            record_s: Some(flight.performance.record.as_secs_f64()),
+            wall_s,
+            real_time_factor: Some(flight.duration_s / wall_s).filter(|factor| factor.is_finite()),
+            law_s: flight.performance.law.as_secs_f64(),
+            physics_s: flight.performance.physics.as_secs_f64(),
+            audit_s: flight.performance.audit.as_secs_f64(),
+            record_s: flight.performance.record.as_secs_f64(),
         },
-        ended_early: reason.as_deref().map(|reason| EndedEarly { time_s: flight.duration_s, reason }),
     })
 }

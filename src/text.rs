@@ -59,6 +59,11 @@ pub(crate) fn bound(error: f64, allowed: f64) -> String {
     }
 }
 
+/// Names and what is said of each, a line each, as a table.
+pub(crate) fn table<const N: usize>(rows: [(&str, String); N]) -> String {
+    rows.iter().map(|(name, content)| format!("{name:<12} {content}\n")).collect()
+}
+
 /// So many of a thing.
 pub(crate) fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })

@@ -3,14 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, TypedValueParser};
 use nalgebra::Vector3;
 
 use super::console::{self, Console};
 use super::events;
 use super::obstacles;
 use super::outputs;
-use super::reading::{self, ReadArguments};
+use super::reading::{self, ReadArguments, one_of};
 use super::{Exit, Failure};
 use crate::audit::recorded::{
     Approach, Motion, Outcome, PairSeries, RecordedError, Settings, TrackAuditor, VehicleSettings,
@@ -45,8 +46,8 @@ pub(super) struct AuditArguments {
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Question")]
     delta: Option<f64>,
     /// What happens between samples [default: linear for samples, polynomial for curves].
-    #[arg(long, value_name = "MOTION", help_heading = "Question")]
-    motion: Option<MotionArgument>,
+    #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Question")]
+    motion: Option<Motion>,
     /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
     #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
     max_accel: Vec<Named>,
@@ -98,17 +99,13 @@ pub(super) struct AuditArguments {
     allow_undecided: bool,
 }
 
-/// What happens between samples.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum MotionArgument {
-    /// Straight lines.
-    Linear,
-    /// Nothing, with a jump at each sample.
-    Hold,
-    /// The recording's own curves.
-    Polynomial,
-    /// Anything within the largest acceleration.
-    Bounded,
+fn motion() -> impl TypedValueParser<Value = Motion> {
+    one_of(vec![
+        (PossibleValue::new("linear").help("Straight lines"), Motion::Linear),
+        (PossibleValue::new("hold").help("Nothing, with a jump at each sample"), Motion::Hold),
+        (PossibleValue::new("polynomial").help("The recording's own curves"), Motion::Polynomial),
+        (PossibleValue::new("bounded").help("Anything within the largest acceleration"), Motion::Bounded),
+    ])
 }
 
 /// A number, perhaps of one vehicle alone.
@@ -171,20 +168,14 @@ impl AuditArguments {
         for (name, value) in &self.offset {
             vehicles.entry(name.clone()).or_default().offset_s = *value;
         }
-        let motion = self.motion.map(|motion| match motion {
-            MotionArgument::Linear => Motion::Linear,
-            MotionArgument::Hold => Motion::Hold,
-            MotionArgument::Polynomial => Motion::Polynomial,
-            MotionArgument::Bounded => Motion::Bounded,
-        });
-        if !self.max_accel.is_empty() && motion != Some(Motion::Bounded) {
+        if !self.max_accel.is_empty() && self.motion != Some(Motion::Bounded) {
             let help = "add --motion bounded, or leave --max-accel out";
             return Err(Failure::input("--max-accel says nothing of a motion that is known exactly", help));
         }
         let only: BTreeSet<String> = self.ids.iter().flat_map(|Listed(names)| names.iter().cloned()).collect();
         Ok(Settings {
             delta_m: self.delta,
-            motion,
+            motion: self.motion,
             max_accel_m_s2,
             radius_m,
             ellipsoid_m: self.ellipsoid,
@@ -222,7 +213,7 @@ impl AuditArguments {
     /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording.
     fn refuse_guessed_seconds(&self, unit: &str) -> Result<(), Failure> {
         let asked = [
-            (matches!(self.motion, Some(MotionArgument::Bounded)), "--motion bounded"),
+            (matches!(self.motion, Some(Motion::Bounded)), "--motion bounded"),
             (self.from.is_some(), "--from"),
             (self.to.is_some(), "--to"),
             (self.max_gap.is_some(), "--max-gap"),
@@ -245,8 +236,8 @@ impl AuditArguments {
             listed.collect::<Vec<_>>().join(", ")
         };
         match self.motion {
-            Some(MotionArgument::Hold) => "held between samples, jumps swept".to_owned(),
-            Some(MotionArgument::Bounded) => format!("accelerations of at most {}", most(&self.max_accel)),
+            Some(Motion::Hold) => "held between samples, jumps swept".to_owned(),
+            Some(Motion::Bounded) => format!("accelerations of at most {}", most(&self.max_accel)),
             _ if curves => "on the recording's curves".to_owned(),
             _ => "straight between samples".to_owned(),
         }
@@ -276,8 +267,7 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
     if arguments.json {
-        let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
-        console::data(&json)?;
+        console::json(&report)?;
     }
     if let Some(file) = &arguments.events {
         write_atomically(file, &events::csv(&report)?)?;
@@ -401,9 +391,7 @@ fn encounter(series: PairSeries, approach: &Approach, settings: &Settings, outco
 /// The command as it was given, for a shell.
 fn command() -> String {
     let words: Vec<String> = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
-    let words = || std::iter::once("tautline").chain(words.iter().map(String::as_str));
-    // Only a zero byte cannot be quoted, and no argument has one.
-    shlex::try_join(words()).unwrap_or_else(|_| words().collect::<Vec<_>>().join(" "))
+    console::command_line(words.iter().map(String::as_str))
 }
 
 impl From<RecordedError> for Failure {

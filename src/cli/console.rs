@@ -4,6 +4,7 @@ use std::io::{self, IsTerminal as _, Write as _};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
 
 use super::Failure;
 use super::diagnostic::harmless;
@@ -72,4 +73,19 @@ pub(super) fn data(text: &str) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Writes an answer to standard output, as indented JSON.
+pub(super) fn json(answer: &impl Serialize) -> Result<(), Failure> {
+    match serde_json::to_string_pretty(answer) {
+        Ok(json) => data(&(json + "\n")),
+        Err(error) => Err(Failure::machine(format!("cannot write the answer: {error}"))),
+    }
+}
+
+/// The program with these words behind it, for a shell.
+pub(super) fn command_line<'a>(words: impl Iterator<Item = &'a str> + Clone) -> String {
+    let words = std::iter::once("tautline").chain(words);
+    // Only a zero byte cannot be quoted, and no argument has one.
+    shlex::try_join(words.clone()).unwrap_or_else(|_| words.collect::<Vec<_>>().join(" "))
 }

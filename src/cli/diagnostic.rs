@@ -1,11 +1,10 @@
 //! Errors as a person reads them: what, where, and the remedy.
 
-use std::fmt;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use miette::{Diagnostic, GraphicalReportHandler, LabeledSpan, NamedSource, SourceCode};
+use miette::{GraphicalReportHandler, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 
 use crate::export::ExportError;
 use crate::law::ParameterError;
@@ -41,16 +40,9 @@ impl From<Exit> for ExitCode {
 #[derive(Debug)]
 pub(super) struct Failure {
     exit: Exit,
-    message: String,
-    help: Option<String>,
-    place: Option<Box<Excerpt>>,
-}
-
-/// Where in a text an error stands.
-#[derive(Debug)]
-struct Excerpt {
-    source: NamedSource<String>,
-    label: LabeledSpan,
+    pub(super) said: Box<MietteDiagnostic>,
+    /// The text that it is about.
+    source: Option<Box<NamedSource<String>>>,
 }
 
 impl Failure {
@@ -67,60 +59,49 @@ impl Failure {
     /// What an error says: the machine failed, or the input is wrong.
     pub(super) fn told(is_machine: bool, error: &dyn std::error::Error, help: Option<String>) -> Self {
         let exit = if is_machine { Exit::MachineFailed } else { Exit::WrongInput };
-        Self { help: help.map(|help| harmless(&help)), ..Self::plain(exit, error.to_string()) }
+        let failure = Self::plain(exit, error.to_string());
+        match help {
+            Some(help) => failure.with_help(help),
+            None => failure,
+        }
     }
 
-    pub(super) fn with_help(self, help: impl Into<String>) -> Self {
-        Self { help: Some(harmless(&help.into())), ..self }
+    pub(super) fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.said.help = Some(harmless(&help.into()));
+        self
     }
 
     /// The same failure, said of a file.
-    pub(super) fn of(self, file: &Path) -> Self {
-        Self { message: harmless(&format!("{}: {}", file.display(), self.message)), ..self }
+    pub(super) fn of(mut self, file: &Path) -> Self {
+        self.said.message = harmless(&format!("{}: {}", file.display(), self.said.message));
+        self
     }
 
     fn plain(exit: Exit, message: impl Into<String>) -> Self {
-        Self { exit, message: harmless(&message.into()), help: None, place: None }
+        Self { exit, said: Box::new(MietteDiagnostic::new(harmless(&message.into()))), source: None }
     }
 
     /// What is wrong and what helps, on one line.
     #[cfg(feature = "viewer")]
     pub(super) fn in_words(&self) -> String {
-        self.help.as_ref().map_or_else(|| self.message.clone(), |help| format!("{} ({help})", self.message))
+        let message = &self.said.message;
+        self.said.help.as_ref().map_or_else(|| message.clone(), |help| format!("{message} ({help})"))
     }
 
     /// Shows the error on standard error.
-    pub(super) fn show(&self) -> Exit {
+    pub(super) fn show(self) -> Exit {
+        let message = self.said.message.clone();
+        let mut report = Report::new(*self.said);
+        if let Some(source) = self.source {
+            report = report.with_source_code(*source);
+        }
         let mut text = String::new();
-        if GraphicalReportHandler::new().render_report(&mut text, self).is_err() {
-            text = format!("error: {}\n", self.message);
+        if GraphicalReportHandler::new().render_report(&mut text, report.as_ref()).is_err() {
+            text = format!("error: {message}\n");
         }
         // Nobody is left to tell where standard error is closed.
         let _ = std::io::stderr().lock().write_all(text.as_bytes());
         self.exit
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
-    }
-}
-
-impl std::error::Error for Failure {}
-
-impl Diagnostic for Failure {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.place.as_ref().map(|place| &place.source as &dyn SourceCode)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let label = self.place.as_ref()?.label.clone();
-        Some(Box::new(std::iter::once(label)))
     }
 }
 
@@ -130,21 +111,17 @@ impl From<ScenarioError> for Failure {
         if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
             return Self::plain(Exit::WrongInput, error.to_string());
         }
-        let field = error.field().filter(|_| error.place().is_none());
-        let message = match field {
+        let message = match error.field().filter(|_| error.place().is_none()) {
             Some(field) => format!("{field}: {}", error.message()),
             None => error.message().to_owned(),
         };
-        Self {
-            help: error.help().map(str::to_owned),
-            place: error.place().map(|place| {
-                Box::new(Excerpt {
-                    source: NamedSource::new(&place.source, harmless(&place.text)),
-                    label: LabeledSpan::underline(place.span.clone()),
-                })
-            }),
-            ..Self::plain(Exit::WrongInput, message)
+        let mut failure = Self::plain(Exit::WrongInput, message);
+        failure.said.help = error.help().map(str::to_owned);
+        if let Some(place) = error.place() {
+            failure.said.labels = Some(vec![LabeledSpan::underline(place.span.clone())]);
+            failure.source = Some(Box::new(NamedSource::new(&place.source, harmless(&place.text))));
         }
+        failure
     }
 }
 

@@ -4,7 +4,10 @@ use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use super::Failure;
+use crate::report::INTERRUPTED;
 
 /// A folder that is finished once it holds its report.
 pub(super) struct OutFolder {
@@ -33,11 +36,11 @@ impl OutFolder {
         self.file(self.report)
     }
 
-    /// Makes the folder ready. A finished one is kept unless `force` says otherwise.
+    /// Makes the folder ready. A finished one is kept unless `force` says otherwise; a run that its user stopped is not.
     /// The lock keeps another writer out until it is dropped, where the system can lock a folder.
     pub(super) fn open(&self, force: bool) -> Result<Option<File>, Failure> {
         let report = self.report();
-        if report.exists() && !force {
+        if report.exists() && !force && !was_interrupted(&report) {
             return Err(Failure::input(
                 format!("{} holds a finished {}", self.path.display(), self.what),
                 format!("give another folder with --out, or overwrite the {} with --force", self.what),
@@ -65,9 +68,14 @@ impl OutFolder {
     }
 }
 
-/// Makes a file in the folder and takes it away again.
-fn try_to_write_in(folder: &Path) -> io::Result<()> {
+/// Whether a report is of a run that its user stopped.
+fn was_interrupted(report: &Path) -> bool {
+    let text = fs::read_to_string(report).unwrap_or_default();
+    serde_json::from_str::<Value>(&text).is_ok_and(|report| report["run"]["ended_early"] == INTERRUPTED)
+}
+
+/// Makes a folder and a file in it, and takes the file away again.
+pub(super) fn try_to_write_in(folder: &Path) -> io::Result<()> {
     let probe = folder.join(format!(".tautline-{}", std::process::id()));
-    File::create(&probe)?;
-    fs::remove_file(&probe)
+    fs::create_dir_all(folder).and_then(|()| File::create(&probe)).and_then(|_| fs::remove_file(&probe))
 }

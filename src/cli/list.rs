@@ -1,28 +1,47 @@
-//! `tautline list`: the built-in scenarios.
+//! `tautline list`: the built-in scenarios, and the one of a recording.
+
+use std::path::Path;
 
 use clap::Args;
 
 use super::console;
 use super::{Exit, Failure};
+use crate::record::mcap::McapRecording;
 use crate::scenario::builtin;
 
 /// Arguments of `tautline list`.
 #[derive(Debug, Args)]
 pub(super) struct ListArguments {
-    /// Print this scenario as TOML instead.
-    #[arg(long, value_name = "NAME")]
+    /// Print this built-in scenario as TOML instead, or the one that a recording of a run holds, with every default
+    /// written out.
+    #[arg(long, value_name = "NAME|RECORDING")]
     show: Option<String>,
 }
 
 pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
     let text = match &arguments.show {
-        Some(name) => builtin::find(name).map(|builtin| builtin.toml.to_owned()).ok_or_else(|| {
-            Failure::input(format!("there is no built-in scenario `{name}`"), "`tautline list` shows their names")
-        })?,
+        Some(name) => match builtin::find(name) {
+            Some(builtin) => builtin.toml.to_owned(),
+            None => of_recording(name)?,
+        },
         None => table(),
     };
     console::data(&text)?;
     Ok(Exit::Good)
+}
+
+/// The scenario of a run's recording.
+fn of_recording(name: &str) -> Result<String, Failure> {
+    let path = Path::new(name);
+    if !path.exists() {
+        let help = "`tautline list` shows their names; a recording is given by its path, such as out/pentagon/run.mcap";
+        return Err(Failure::input(format!("there is no built-in scenario and no recording `{name}`"), help));
+    }
+    let recording = McapRecording::open(path).map_err(|error| {
+        Failure::from(error)
+            .with_help("only recordings of `tautline run` hold a scenario, such as out/pentagon/run.mcap")
+    })?;
+    Ok(recording.header().scenario_toml.clone())
 }
 
 fn table() -> String {

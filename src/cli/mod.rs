@@ -23,7 +23,9 @@ mod reading;
 #[cfg(feature = "viewer")]
 mod render;
 mod run;
+mod scenario;
 mod schema;
+#[cfg(feature = "viewer")]
 mod snapshots;
 mod validate;
 #[cfg(feature = "viewer")]
@@ -102,7 +104,7 @@ pub fn main() -> ExitCode {
             return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good }.into();
         }
     };
-    let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
+    let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::parse_from(["run"])));
     #[cfg(all(feature = "viewer", target_os = "linux"))]
     if matches!(&command, Command::Run(run) if run.draws()) || matches!(command, Command::Render(_) | Command::View(_))
     {
@@ -122,7 +124,7 @@ pub fn main() -> ExitCode {
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments, &mut Arguments::command()),
     };
-    done.unwrap_or_else(|failure| failure.show()).into()
+    done.unwrap_or_else(Failure::show).into()
 }
 
 #[cfg(test)]

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Vec<Obstacle>, String> {
-        parse(text, Path::new("obstacles.toml")).map_err(|failure| failure.to_string())
+        parse(text, Path::new("obstacles.toml")).map_err(|failure| failure.said.message)
     }
 
     #[test]

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     fn clash(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Option<String> {
-        check(inputs, outputs).err().map(|failure| failure.to_string())
+        check(inputs, outputs).err().map(|failure| failure.said.message)
     }
 
     #[test]

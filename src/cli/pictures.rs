@@ -6,52 +6,34 @@ use std::path::{Path, PathBuf};
 
 use super::Failure;
 use crate::figures::{self, Criteria, Figure, RunHistory};
-use crate::report::page::{Picture, Warning};
 use crate::report::{Report, RunPage, write_atomically};
 use crate::scenario::Scenario;
 
-/// Everything that the pictures of a run are made of, beside its report.
-pub(super) struct Pictures<'a> {
-    pub(super) scenario: &'a Scenario,
-    /// None where no figures are wanted.
-    pub(super) history: Option<&'a RunHistory>,
-    pub(super) warnings: &'a [Warning],
-    pub(super) command: &'a str,
-    /// The run as it looked, for the page.
-    pub(super) snapshots: &'a [Picture],
+/// A run as charts.
+pub(super) fn figures(scenario: &Scenario, history: &RunHistory, report: &Report) -> Vec<Figure> {
+    let criteria = Criteria {
+        delta_m: scenario.delta_m,
+        certified_m: report.separation.certified_m,
+        shape: Some((scenario.formation(), &scenario.graph)),
+        edge_error_m: Some(scenario.arrival.edge_error_m),
+        disagreement_m_s: Some(scenario.arrival.disagreement_m_s),
+    };
+    figures::of_run(history, &criteria)
 }
 
-impl Pictures<'_> {
-    /// Writes `figures/*.svg` and `report.html` into a run's folder and gives the path of the page. Figures of an
-    /// earlier run are removed.
-    pub(super) fn write(&self, folder: &Path, report: &Report) -> Result<PathBuf, Failure> {
-        let figures = self.figures(report);
-        let file = |name: &str| format!("{name}.svg");
-        let files: Vec<_> =
-            figures.iter().map(|figure| (file(&figure.name), figure.svg.clone().into_bytes())).collect();
-        write_files(&folder.join("figures"), &figures::NAMES_OF_RUN.map(file), &files)?;
-        let page = RunPage {
-            scenario: self.scenario,
-            warnings: self.warnings,
-            figures: &figures,
-            pictures: self.snapshots,
-            command: self.command,
-        };
-        let path = folder.join("report.html");
-        write_atomically(&path, report.to_html(&page).as_bytes())?;
-        Ok(path)
-    }
+/// Writes `figures/*.svg` and `report.html` into a run's folder and gives the path of the page. Figures of an earlier run
+/// are removed.
+pub(super) fn write(folder: &Path, report: &Report, page: &RunPage<'_>) -> Result<PathBuf, Failure> {
+    let names = figures::NAMES_OF_RUN.map(|name| format!("{name}.svg"));
+    write_files(&folder.join("figures"), &names, &svg_files(page.figures))?;
+    let path = folder.join("report.html");
+    write_atomically(&path, report.to_html(page).as_bytes())?;
+    Ok(path)
+}
 
-    fn figures(&self, report: &Report) -> Vec<Figure> {
-        let criteria = Criteria {
-            delta_m: self.scenario.delta_m,
-            certified_m: report.separation.certified_m,
-            shape: Some((self.scenario.formation(), &self.scenario.graph)),
-            edge_error_m: Some(self.scenario.arrival.edge_error_m),
-            disagreement_m_s: Some(self.scenario.arrival.disagreement_m_s),
-        };
-        self.history.map_or_else(Vec::new, |history| figures::of_run(history, &criteria))
-    }
+/// Figures as files.
+pub(super) fn svg_files(figures: &[Figure]) -> Vec<(String, Vec<u8>)> {
+    figures.iter().map(|figure| (format!("{}.svg", figure.name), figure.svg.clone().into_bytes())).collect()
 }
 
 /// Writes files of a folder whole; of those that could be there by their names, what is not written is removed.

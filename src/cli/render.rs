@@ -1,6 +1,6 @@
 //! `tautline render`: pictures and films of a recording.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -10,6 +10,7 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use super::console::Console;
 use super::drawing;
+use super::folder::try_to_write_in;
 use super::outputs::{self, Called};
 use super::reading::{self, ReadArguments};
 use super::{Exit, Failure};
@@ -219,11 +220,9 @@ fn write(path: &Path, picture: &Picture) -> Result<(), Failure> {
     Ok(write_atomically(path, &picture.to_png()?)?)
 }
 
-/// Makes a folder and a file in it, and takes the file away again.
+/// Whether a folder can be written to, before the work.
 fn writable(folder: &Path) -> Result<(), Failure> {
-    let probe = folder.join(format!(".tautline-{}", std::process::id()));
-    let tried = fs::create_dir_all(folder).and_then(|()| fs::write(&probe, [])).and_then(|()| fs::remove_file(&probe));
-    tried.map_err(|error| {
+    try_to_write_in(folder).map_err(|error| {
         Failure::machine(format!("cannot write to {}: {error}", folder.display()))
             .with_help("give a folder that can be written to with --out, or another --film")
     })

@@ -5,20 +5,23 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::Args;
+use clap::Parser;
+use rayon::ThreadPool;
 
 use super::console::{self, Console};
 use super::folder::OutFolder;
-use super::pictures::Pictures;
+use super::pictures;
+use super::scenario::{self, ScenarioArguments};
+#[cfg(feature = "viewer")]
 use super::snapshots::Watched;
 use super::{Exit, Failure};
 use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
 use crate::record::mcap::{Header, McapRecorder};
-use crate::report::{Report, page};
+use crate::report::{Report, RunPage};
 use crate::run::run_while;
-use crate::scenario::{Override, Scenario, Source};
+use crate::scenario::Scenario;
 
 /// Exit code of a second Ctrl-C, as shells give it.
 const INTERRUPTED_TWICE: i32 = 130;
@@ -30,15 +33,11 @@ const PROGRESS_EVERY: u64 = 64;
 const THREADS_OF_USE: usize = 2;
 
 /// Arguments of `tautline run`.
-#[derive(Debug, Args)]
+#[derive(Debug, Parser)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct RunArguments {
-    /// A scenario file, or the name of a built-in scenario.
-    #[arg(default_value = "pentagon")]
-    scenario: String,
-    /// Set any key of the scenario for this run; may be given several times.
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    overrides: Vec<String>,
+    #[command(flatten)]
+    what: ScenarioArguments,
     /// What moves the vehicles: rigid bodies, or the equation of motion solved in continuous time. Short for
     /// `--set plant.kind=...`.
     #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
@@ -71,26 +70,6 @@ pub(super) struct RunArguments {
     threads: Option<u16>,
 }
 
-impl Default for RunArguments {
-    fn default() -> Self {
-        Self {
-            scenario: "pentagon".to_owned(),
-            overrides: Vec::new(),
-            plant: None,
-            out: None,
-            force: false,
-            no_figures: false,
-            #[cfg(feature = "viewer")]
-            no_snapshots: false,
-            #[cfg(feature = "viewer")]
-            adapter: "best".to_owned(),
-            json: false,
-            quiet: false,
-            threads: None,
-        }
-    }
-}
-
 impl RunArguments {
     /// Whether pictures are taken.
     #[cfg(all(feature = "viewer", target_os = "linux"))]
@@ -100,52 +79,52 @@ impl RunArguments {
 
     /// The command that flies the same again, for a shell.
     fn command(&self) -> String {
-        let mut words = vec!["tautline", "run", &self.scenario];
-        words.extend(self.overrides.iter().flat_map(|text| ["--set", text]));
-        words.extend(self.plant.iter().flat_map(|plant| ["--plant", plant]));
-        // Only a zero byte cannot be quoted, and no argument has one.
-        shlex::try_join(words.iter().copied()).unwrap_or_else(|_| words.join(" "))
+        let sets = self.what.overrides.iter().flat_map(|text| ["--set", text]);
+        let plant = self.plant.iter().flat_map(|plant| ["--plant", plant]);
+        console::command_line(["run", &self.what.scenario].into_iter().chain(sets).chain(plant))
     }
 }
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let plant = arguments.plant.iter().map(|kind| format!("plant.kind={kind}"));
-    let overrides = arguments.overrides.iter().cloned().chain(plant);
-    let overrides = overrides.map(|text| Override::parse(&text)).collect::<Result<Vec<_>, _>>()?;
-    let scenario = Scenario::read(&Source::resolve(&arguments.scenario)?, &overrides)?;
+    let plant = arguments.plant.as_ref().map(|kind| format!("plant.kind={kind}"));
+    let scenario = scenario::read(&arguments.what.scenario, arguments.what.overrides.iter().chain(&plant))?;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))
-        .build()
-        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    let threads = threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))?;
     let preflight = Preflight::of(&scenario)?;
+    if preflight.refuses() {
+        console.warn(&preflight.headline());
+    }
     for warning in &preflight.warnings {
         console.warn(&warning.to_string());
     }
-    let warnings: Vec<_> = preflight
-        .warnings
-        .iter()
-        .map(|warning| page::Warning { code: warning.code.name().to_owned(), message: warning.message.clone() })
-        .collect();
+    let warnings: Vec<_> =
+        preflight.warnings.iter().map(|warning| (warning.code.name().to_owned(), warning.message.clone())).collect();
     let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
     let mut history = RunHistory::new();
-    let mut watched = Watched::new(arguments, &scenario);
+    #[cfg(feature = "viewer")]
+    let mut watched = Watched::new(&scenario, !arguments.no_snapshots, &arguments.adapter);
+    #[cfg(not(feature = "viewer"))]
+    let mut watched = ();
     let mut watchers = (&mut history, &mut watched);
     let report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
+    #[cfg(feature = "viewer")]
     let snapshots = watched.snapshots(folder.path(), console)?;
-    let pictures = Pictures {
+    #[cfg(not(feature = "viewer"))]
+    let snapshots = Vec::new();
+    let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(&scenario, &history, &report) };
+    let page = RunPage {
         scenario: &scenario,
-        history: (!arguments.no_figures).then_some(&history),
         warnings: &warnings,
+        figures: &figures,
+        pictures: &snapshots,
         command: &arguments.command(),
-        snapshots: &snapshots,
     };
-    let page = pictures.write(folder.path(), &report)?;
+    let page = pictures::write(folder.path(), &report, &page)?;
     report.write(&folder.report())?;
 
     console.say(&format!("{}\n{}", report.headline(), report.text()));
@@ -159,8 +138,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         page.display()
     ));
     if arguments.json {
-        let json = report.to_json().map_err(|error| Failure::machine(format!("cannot write the report: {error}")))?;
-        console::data(&json)?;
+        console::json(&report)?;
     }
     Ok(if report.verdict.pass { Exit::Good } else { Exit::Bad })
 }
@@ -195,16 +173,10 @@ fn fly(
     Ok(report)
 }
 
-impl Watched {
-    /// Watches what these arguments want pictures of.
-    fn new(arguments: &RunArguments, scenario: &Scenario) -> Self {
-        #[cfg(feature = "viewer")]
-        if !arguments.no_snapshots {
-            return Self::of(scenario, &arguments.adapter);
-        }
-        let _ = (arguments, scenario);
-        Self::nothing()
-    }
+/// So many threads; 0 for one a core.
+pub(super) fn threads(number: usize) -> Result<ThreadPool, Failure> {
+    let built = rayon::ThreadPoolBuilder::new().num_threads(number).build();
+    built.map_err(|error| Failure::machine(format!("cannot start threads: {error}")))
 }
 
 /// Set by Ctrl-C (and by a request to terminate). The second one does not wait for what is under way to end.

@@ -5,6 +5,6 @@ use super::{Exit, Failure};
 use crate::scenario;
 
 pub(super) fn schema() -> Result<Exit, Failure> {
-    console::data(&format!("{:#}\n", scenario::schema()))?;
+    console::json(&scenario::schema())?;
     Ok(Exit::Good)
 }

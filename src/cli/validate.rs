@@ -1,12 +1,13 @@
 //! `tautline validate`: judge every claim of ours and of the paper.
 
-use std::fs;
 use std::path::PathBuf;
 
 use clap::Args;
 
 use super::console::{self, Console};
 use super::folder::OutFolder;
+use super::pictures::{svg_files, write_files};
+use super::run::threads;
 use super::{Exit, Failure};
 use crate::report::write_atomically;
 use crate::validate::{self, Validation};
@@ -42,10 +43,7 @@ pub(super) fn validate(arguments: &ValidateArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json || arguments.markdown, quiet: arguments.quiet };
     let folder = OutFolder::at(&arguments.out, "validation", "validate.json");
     let _lock = folder.open(arguments.force)?;
-    let threads = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .build()
-        .map_err(|error| Failure::machine(format!("cannot start threads: {error}")))?;
+    let threads = threads(arguments.threads.map_or(0, usize::from))?;
     let bar = console.progress(validate::work(), "validate".to_owned());
     let validation = threads.install(|| validate::validate(&|units| bar.inc(units)));
     bar.finish_and_clear();
@@ -65,12 +63,7 @@ pub(super) fn validate(arguments: &ValidateArguments) -> Result<Exit, Failure> {
 
 /// Leaves figures, page and result in the folder; `validate.json`, which marks it as finished, comes last.
 fn leave(folder: &OutFolder, validation: &Validation, json: &str) -> Result<(), Failure> {
-    let figures = folder.file("figures");
-    fs::create_dir_all(&figures)
-        .map_err(|error| Failure::machine(format!("cannot write {}: {error}", figures.display())))?;
-    for figure in &validation.figures {
-        write_atomically(&figures.join(format!("{}.svg", figure.name)), figure.svg.as_bytes())?;
-    }
+    write_files(&folder.file("figures"), &[], &svg_files(&validation.figures))?;
     write_atomically(&folder.file(PAGE), validation.to_html().as_bytes())?;
     write_atomically(&folder.report(), json.as_bytes())?;
     Ok(())

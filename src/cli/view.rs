@@ -9,11 +9,12 @@ use clap::Args;
 use super::console::Console;
 use super::drawing;
 use super::reading::{self, ReadArguments};
+use super::scenario;
 use super::{Exit, Failure};
 use crate::read::{Format, ReadOptions};
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::render::{LiveUpdate, Theme, Timeline, show};
-use crate::scenario::{Override, Scenario, Source};
+use crate::scenario::Scenario;
 use crate::sim::{self, Parts};
 
 /// Samples of a flight in the air that wait for the window.
@@ -69,8 +70,7 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
             let help = "leave the options of reading out, or give a recording";
             return Err(Failure::input("a scenario is flown: how a recording is read has no effect on it", help));
         }
-        let overrides = arguments.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let scenario = Scenario::read(&Source::resolve(&path.to_string_lossy())?, &overrides)?;
+        let scenario = scenario::read(&arguments.what, &arguments.overrides)?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
     };
     show(timeline, live, arguments.theme, arguments.adapter.as_str().into())?;

@@ -204,10 +204,10 @@ impl Graph {
         roots.iter().enumerate().filter(|&(i, &root)| i == root).count()
     }
 
-    /// The first vehicle that no path joins to the first one, if any.
+    /// The vehicles that no path joins to the first one.
     #[must_use]
-    pub fn first_unreachable(&self) -> Option<usize> {
-        self.component_roots().iter().position(|&root| root != 0)
+    pub fn unreachable(&self) -> Vec<usize> {
+        self.component_roots().iter().enumerate().filter(|&(_, &root)| root != 0).map(|(i, _)| i).collect()
     }
 
     /// For each vehicle the lowest vehicle of its component, by union-find with path halving.

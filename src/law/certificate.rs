@@ -76,9 +76,9 @@ impl fmt::Display for Void {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoBarrier => f.write_str("The law has no barrier: it does not keep vehicles apart."),
-            Self::GraphNotComplete => f.write_str(
-                "The graph is not complete: pairs without an edge are not kept apart, and the energy may grow.",
-            ),
+            Self::GraphNotComplete => {
+                f.write_str("The graph is not complete: pairs without an edge are not kept apart.")
+            }
             Self::VelocityUndamped => {
                 f.write_str("The vehicles are fed more than the law brakes them: the energy may grow.")
             }

@@ -280,6 +280,11 @@ impl Law for EdgeTensionLaw {
         Some(consensus_margin(self.graph.count(), gain_per_s, connectivity, a22_per_s))
     }
 
+    fn linked_separation_m(&self, start: &Observation<'_>) -> Option<f64> {
+        let energy = self.try_energy(start.own).ok()?;
+        Some(self.tightest?.push_side_root(start.own.count() as f64 * energy))
+    }
+
     /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair, for ever. In s = (l - delta)/K all tensions are
     /// the same function, so the pair that may come closest is the one with the smallest K, and one root
     /// ([`EdgeTension::push_side_root`]) answers for all pairs.
@@ -296,12 +301,7 @@ impl Law for EdgeTensionLaw {
             void.push(Void::StartRefused(fault));
         }
         let energy_initial = energy.ok();
-        let certified_m = match (energy_initial, self.tightest) {
-            (Some(energy), Some(tension)) if void.is_empty() => {
-                Some(tension.push_side_root(start.own.count() as f64 * energy))
-            }
-            _ => None,
-        };
+        let certified_m = if void.is_empty() { self.linked_separation_m(start) } else { None };
         Certificate { certified_m, energy_initial, void }
     }
 }

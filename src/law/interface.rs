@@ -43,6 +43,12 @@ pub trait Law: DynClone + Send {
         Certificate::void(Void::NoBarrier)
     }
 
+    /// Distance below which no pair joined by a link comes for as long as the energy does not exceed that of this start
+    /// \[m\], where the law knows one. On a graph that is not complete it is no certificate: other pairs may come closer.
+    fn linked_separation_m(&self, _start: &Observation<'_>) -> Option<f64> {
+        None
+    }
+
     /// Distance at which the law's barrier is infinite \[m\], where it has a barrier. The loop refuses a step that
     /// takes more than half of the clearance above it from a linked pair, or from any pair where the law has a
     /// [sensing range](Law::sensing_range_m).

@@ -20,6 +20,12 @@ macro_rules! laws {
         }
 
         impl LawSpec {
+            /// Every law, with its default parameters.
+            #[must_use]
+            pub fn all() -> Vec<Self> {
+                vec![$(Self::$kind(<$keys>::default()),)+]
+            }
+
             /// The numbers among its keys.
             #[must_use]
             pub fn gains(&self) -> Vec<Gain> {

@@ -13,9 +13,10 @@ use serde::Serialize;
 use crate::formation::affine_dimension;
 use crate::graph::Graph;
 use crate::law::{Controls, Law, ParameterError, Void};
-use crate::scenario::{PlantSpec, Precision, Scenario, Space};
+use crate::scenario::{LARGEST, PlantSpec, Scenario};
 use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::text::at_least;
 
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 
@@ -25,6 +26,9 @@ pub const MOST_CONNECTED: usize = 1000;
 
 /// A velocity margin up to this part of its two terms is rounding of eigenvalues, not damping.
 const MARGIN_ROUNDING: f64 = 1e-12;
+
+/// A drift is harmless while so many spacings of numbers fit into what counts as reached.
+const FINE_SPACINGS: f64 = 100.0;
 
 /// What is known before the first step. SI units; what does not apply or is not known is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -52,6 +56,15 @@ pub struct Preflight {
     pub certified_m: Option<f64>,
     /// Why nothing is certified, a sentence each.
     pub certificate_void: Vec<String>,
+    /// Separation below which no pair joined by an edge ever comes \[m\], where the graph is not complete, so that no other
+    /// pair is kept apart, and the energy decays.
+    pub certified_edges_m: Option<f64>,
+    /// Relative distance between neighbouring numbers of those that positions are computed in.
+    pub epsilon: f64,
+    /// How far the swarm's mean is carried by the end, by its own velocity or by rounding \[m\].
+    pub drift_m: f64,
+    /// Distance between neighbouring numbers there \[m\].
+    pub spacing_m: f64,
     /// The scenario's step \[s\].
     pub dt_s: f64,
     /// Steps are flown in parts where the law's fastest rate asks for shorter ones: these are at least so long \[s\], see
@@ -92,6 +105,8 @@ pub enum Code {
     StartOnLine,
     /// The start lies in a plane that the law never leaves, and the formation does not.
     StartInPlane,
+    /// By the end the swarm has drifted so far that numbers do not tell its positions apart.
+    DriftUnresolved,
     /// Nothing is certified about separations.
     NoCertificate,
     /// The formation can be bent without changing the length of an edge to first order.
@@ -106,7 +121,7 @@ impl Code {
     /// Whether the flight cannot do what it is for: the formation is out of reach, or nothing may be called stable.
     #[must_use]
     pub fn refuses(self) -> bool {
-        matches!(self, Self::RelativeVelocityUnstable | Self::StartOnLine | Self::StartInPlane)
+        matches!(self, Self::RelativeVelocityUnstable | Self::StartOnLine | Self::StartInPlane | Self::DriftUnresolved)
     }
 }
 
@@ -125,17 +140,19 @@ impl Preflight {
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
         let law = scenario.law()?;
+        let start = scenario.observation(&scenario.start);
         let certificate = law
-            .certificate(&scenario.observation(&scenario.start))
+            .certificate(&start)
             .void_where(scenario.legs.len() > 1, Void::TargetChanges)
             .void_where(scenario.time.control_hz.is_some(), Void::CommandsHeld);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = connectivity(&scenario.graph);
+        let drift = scenario.drift(law.common_mode_rate_per_s(scenario.a22_per_s));
         let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
             scenario: scenario.name.clone(),
             vehicles: scenario.count(),
-            dimensions: dimensions(scenario.space),
+            dimensions: scenario.space.dimensions(),
             delta_m: scenario.delta_m,
             algebraic_connectivity: connectivity,
             velocity_margin_per_s: connectivity
@@ -144,6 +161,10 @@ impl Preflight {
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+            certified_edges_m: None,
+            epsilon: scenario.plant.epsilon(),
+            drift_m: drift.distance_m,
+            spacing_m: drift.spacing_m,
             dt_s: scenario.time.dt_s,
             dt_max_s: law
                 .fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s)
@@ -152,41 +173,53 @@ impl Preflight {
             start_margin_m: margin(&scenario.start.positions_m),
             formation_dimension,
             formation_margin_m: margin(&scenario.formation().slots_m),
-            rigidity: Rigidity::of(scenario.formation(), &scenario.graph, dimensions(scenario.space)),
+            rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
             controls_distances: law.controls() == Controls::Distances,
         };
+        let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
+        if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {
+            found.certified_edges_m = law.linked_separation_m(&start);
+        }
+        let trap = if found.trap_dimension() == Some(2) { Code::StartInPlane } else { Code::StartOnLine };
         let warnings = [
-            found.relative_velocity_unstable(law.as_ref(), scenario),
-            found.start_too_flat(),
-            found.no_certificate(),
-            found.not_rigid(scenario),
-            found.flat_formation_in_space(),
-            found.common_mode_unstable(scenario),
+            (Code::RelativeVelocityUnstable, undamped),
+            (trap, found.start_too_flat()),
+            (Code::DriftUnresolved, found.drift_unresolved(scenario)),
+            (Code::NoCertificate, found.no_certificate()),
+            (Code::NotRigid, found.not_rigid(scenario)),
+            (Code::FlatFormationInSpace, found.flat_formation_in_space()),
+            (Code::CommonModeUnstable, found.common_mode_unstable(scenario)),
         ];
-        found.warnings = warnings.into_iter().flatten().collect();
+        let said = |(code, message): (Code, Option<String>)| Some(Warning { code, message: message? });
+        found.warnings = warnings.into_iter().filter_map(said).collect();
         Ok(found)
     }
 
-    /// Whether some warning refuses the flight ([`Code::refuses`]).
+    /// Stable names of the warnings that refuse the flight ([`Code::refuses`]).
     #[must_use]
-    pub fn refuses(&self) -> bool {
-        self.warnings.iter().any(|warning| warning.code.refuses())
+    pub fn refusing(&self) -> Vec<&'static str> {
+        self.warnings.iter().filter(|warning| warning.code.refuses()).map(|warning| warning.code.name()).collect()
     }
 
-    fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<Warning> {
+    /// Whether some warning refuses the flight.
+    #[must_use]
+    pub fn refuses(&self) -> bool {
+        !self.refusing().is_empty()
+    }
+
+    fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<String> {
         // Fiedler: lambda2 is at most N/(N - 1) times the smallest degree.
         let count = self.vehicles as f64;
         let most = || smallest_degree(&scenario.graph) as f64 * count / (count - 1.0).max(1.0);
         let connectivity = self.algebraic_connectivity.unwrap_or_else(most);
         let margin = law.velocity_margin(connectivity, scenario.a22_per_s)?;
-        (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| Warning {
-            code: Code::RelativeVelocityUnstable,
-            message: format!(
-                "Relative velocities are not damped: their margin is {} 1/s and must be positive. {}",
-                numbers::rate(margin.per_s),
+        (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
+            let rate = numbers::rate(margin.per_s);
+            format!(
+                "Relative velocities are not damped: their margin is {rate} 1/s and must be positive. {}",
                 margin.remedy
-            ),
+            )
         })
     }
 
@@ -196,26 +229,23 @@ impl Preflight {
         (self.controls_distances && self.start_dimension < self.formation_dimension).then_some(self.start_dimension)
     }
 
-    fn start_too_flat(&self) -> Option<Warning> {
-        let (code, flat) = match self.trap_dimension()? {
-            0 | 1 => (Code::StartOnLine, "line"),
-            _ => (Code::StartInPlane, "plane"),
+    fn start_too_flat(&self) -> Option<String> {
+        let (place, flat) = match self.trap_dimension()? {
+            0 | 1 => ("on a line", "line"),
+            _ => ("in a plane", "plane"),
         };
-        let message = format!(
-            "The start lies on a {flat}, the law pushes and pulls along the lines between vehicles, and so they never leave \
+        Some(format!(
+            "The start lies {place}, the law pushes and pulls along the lines between vehicles, and so they never leave \
              that {flat}: the formation cannot be reached. Offset a start, or add start.jitter_m."
-        );
-        Some(Warning { code, message: message.replace("on a plane", "in a plane") })
+        ))
     }
 
-    fn no_certificate(&self) -> Option<Warning> {
-        self.certified_m.is_none().then(|| Warning {
-            code: Code::NoCertificate,
-            message: format!("No separation is certified. {}", self.certificate_void.join(" ")).trim_end().to_owned(),
-        })
+    fn no_certificate(&self) -> Option<String> {
+        let said = || format!("No separation is certified. {}", self.not_certified()).trim_end().to_owned();
+        self.certified_m.is_none().then(said)
     }
 
-    fn not_rigid(&self, scenario: &Scenario) -> Option<Warning> {
+    fn not_rigid(&self, scenario: &Scenario) -> Option<String> {
         // Out of its own flat a flat formation is never rigid in space, which has a warning of its own.
         let rigidity = if self.is_flat_in_space() {
             self.rigidity.within(self.formation_dimension, self.vehicles)
@@ -224,62 +254,97 @@ impl Preflight {
         };
         let remedy =
             if scenario.graph.is_complete() { "Bend the formation a little." } else { "Add edges to the graph." };
-        (self.controls_distances && rigidity.rigid == Some(false)).then(|| Warning {
-            code: Code::NotRigid,
-            message: format!(
+        (self.controls_distances && rigidity.rigid == Some(false)).then(|| {
+            format!(
                 "The formation is not rigid on its graph: {} of {} independent constraints hold it, so other shapes have \
                  the same edges or are approached only slowly. {remedy}",
                 rigidity.rank.map_or("too few".to_owned(), |rank| rank.to_string()),
                 rigidity.needed
-            ),
+            )
         })
     }
 
-    fn flat_formation_in_space(&self) -> Option<Warning> {
-        (self.controls_distances && self.is_flat_in_space()).then(|| Warning {
-            code: Code::FlatFormationInSpace,
-            message:
-                "The formation is flat and the swarm lives in space: at the goal nothing resists motion out of the \
-                      flat to first order, so that part of the error falls as t^(-1/2), not exponentially. Set \
-                      swarm.dimensions to 2 if the swarm may stay in the plane."
-                    .to_owned(),
-        })
+    fn flat_formation_in_space(&self) -> Option<String> {
+        let said = "The formation is flat and the swarm lives in space: at the goal nothing resists motion out of the \
+                    flat to first order, so that part of the error falls as t^(-1/2), not exponentially. Set \
+                    swarm.dimensions to 2 if the swarm may stay in the plane.";
+        (self.controls_distances && self.is_flat_in_space()).then(|| said.to_owned())
     }
 
-    fn common_mode_unstable(&self, scenario: &Scenario) -> Option<Warning> {
-        let rate_per_s = self.common_mode_rate_per_s;
-        let rounding = match scenario.plant {
-            PlantSpec::Rapier(Precision::Single) => f64::from(f32::EPSILON),
-            #[cfg(feature = "double")]
-            PlantSpec::Rapier(Precision::Double) => f64::EPSILON,
-            #[cfg(feature = "ideal")]
-            PlantSpec::Ideal => f64::EPSILON,
+    /// Why no separation is certified, and what is in its place.
+    fn not_certified(&self) -> String {
+        let edges = self.certified_edges_m.map(|edges_m| {
+            let least = at_least(edges_m, 6);
+            format!(
+                "The energy decays, so pairs joined by an edge never come closer than {least} m in continuous time."
+            )
+        });
+        self.certificate_void.iter().cloned().chain(edges).collect::<Vec<_>>().join(" ")
+    }
+
+    /// What the mean velocity does, and how far that carries the swarm.
+    fn drift_in_words(&self, scenario: &Scenario, why: &str) -> String {
+        let drift = scenario.drift(self.common_mode_rate_per_s);
+        let seed = if scenario.start.mean_velocity_m_s().norm() > 0.0 { "it" } else { "rounding" };
+        format!(
+            "The mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the whole \
+             swarm {} m away",
+            self.common_mode_rate_per_s,
+            scenario.time.duration_s,
+            numbers::significant(drift.speed_m_s),
+            numbers::significant(drift.distance_m)
+        )
+    }
+
+    fn drift_unresolved(&self, scenario: &Scenario) -> Option<String> {
+        let (needed_m, spacing_m) = (scenario.arrival.edge_error_m, self.spacing_m);
+        let unresolved = if spacing_m > needed_m {
+            format!(
+                "where positions are {} m apart from number to number and {needed_m} m count",
+                numbers::significant(spacing_m)
+            )
+        } else if self.drift_m > LARGEST {
+            format!("farther than the {LARGEST:e} m that a flight is meant for")
+        } else {
+            return None;
         };
-        (rate_per_s > 0.0).then(|| Warning {
-            code: Code::CommonModeUnstable,
-            message: format!(
-                "The mean velocity grows as exp({rate_per_s} t), since {}: rounding of {rounding:.0e} m/s grows to 1 m/s in \
-                 {:.0} s.",
-                if rate_per_s < scenario.a22_per_s {
-                    "the law brakes it too little"
-                } else {
-                    "the law cannot move the centre of mass"
-                },
-                -rounding.ln() / rate_per_s
-            ),
-        })
+        let said = if self.common_mode_rate_per_s > 0.0 {
+            self.drift_in_words(scenario, self.why_common_mode_grows(scenario))
+        } else {
+            format!("The mean velocity carries the whole swarm {} m away", numbers::significant(self.drift_m))
+        };
+        let precision = if self.epsilon > f64::EPSILON { ", set plant.precision to \"double\"" } else { "" };
+        Some(format!(
+            "{said}, {unresolved}. Shorten time.duration_s{precision}, or reduce what drives the mean velocity."
+        ))
+    }
+
+    fn why_common_mode_grows(&self, scenario: &Scenario) -> &'static str {
+        if self.common_mode_rate_per_s < scenario.a22_per_s {
+            "the law brakes it too little"
+        } else {
+            "the law cannot move the centre of mass"
+        }
+    }
+
+    fn common_mode_unstable(&self, scenario: &Scenario) -> Option<String> {
+        if self.common_mode_rate_per_s <= 0.0 || self.drift_unresolved(scenario).is_some() {
+            return None;
+        }
+        let told = if FINE_SPACINGS * self.spacing_m <= scenario.arrival.edge_error_m {
+            ". No distance between vehicles feels that.".to_owned()
+        } else {
+            let spacing = numbers::significant(self.spacing_m);
+            format!(
+                ", where positions are told to {spacing} m only. Shorten time.duration_s, or reduce swarm.a22_per_s."
+            )
+        };
+        Some(self.drift_in_words(scenario, self.why_common_mode_grows(scenario)) + &told)
     }
 
     /// Whether the formation spans less of space than so many vehicles can.
     fn is_flat_in_space(&self) -> bool {
         self.dimensions == 3 && self.formation_dimension < 3.min(self.vehicles.saturating_sub(1))
-    }
-}
-
-fn dimensions(space: Space) -> usize {
-    match space {
-        Space::Plane => 2,
-        Space::Volume => 3,
     }
 }
 

@@ -36,7 +36,7 @@ pub struct Rigidity {
     /// Whether the rank is the one needed; null where it cannot be told.
     pub rigid: Option<bool>,
     #[serde(skip)]
-    edges: usize,
+    pub(super) edges: usize,
 }
 
 impl Rigidity {

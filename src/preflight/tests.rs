@@ -3,7 +3,8 @@ use nalgebra::Vector3;
 use super::*;
 use crate::formation::Formation;
 use crate::law::EdgeTension;
-use crate::scenario::{Override, Source};
+
+use crate::scenario::{Override, Precision, Source, Space};
 
 /// Certified separations are printed with 6 digits.
 const PRINTED_M: f64 = 1e-6;
@@ -70,7 +71,15 @@ fn relative_velocities_of_a_star_are_damped_up_to_ten_vehicles_and_not_beyond() 
         assert!((found.velocity_margin_per_s.expect("a margin") - margin_per_s).abs() < ROUNDING, "{count}");
         assert_eq!(codes(&star).contains(&Code::RelativeVelocityUnstable), unstable, "{count}");
         assert_eq!(found.refuses(), unstable);
+        assert_eq!(found.certified_edges_m.is_some(), !unstable, "edges are certified where the energy decays");
+        assert_eq!(found.text().contains("joined by an edge never come closer than"), !unstable);
+        assert!(
+            !found.text().contains("algebraic convergence") && !found.text().contains("may grow"),
+            "{}",
+            found.text()
+        );
     }
+    assert!(check(&ring(10, Graph::star(10), 0.1)).text().contains("exponential convergence of the edges' lengths"));
     assert!(!codes(&ring(12, Graph::star(12), 0.0)).contains(&Code::RelativeVelocityUnstable));
 }
 
@@ -85,6 +94,32 @@ fn a_star_too_large_for_its_eigenvalues_is_refused_by_its_degrees() {
     assert!(found.refuses());
     let undamped = swarm(Formation::circle(count, radius_m), Graph::star(count), -0.1);
     assert!(!check(&undamped).refuses(), "drag damps relative velocities on every graph");
+}
+
+#[test]
+fn a_drift_is_worded_by_what_it_does_and_refused_where_numbers_run_out() {
+    let said = |sets: &[&str]| {
+        let found = check(&scenario("pentagon", sets));
+        let warning = found.warnings.iter().find(|warning| warning.message.contains("mean velocity grows"));
+        let warning = warning.expect("a22 > 0 is told").clone();
+        (warning.code, warning.message)
+    };
+    let (code, harmless) = said(&[]);
+    assert_eq!(code, Code::CommonModeUnstable);
+    assert!(harmless.contains("in 120 s rounding grows to about 0.0194 m/s and carries the whole swarm 0.194 m away"));
+    assert!(harmless.ends_with("No distance between vehicles feels that."), "{harmless}");
+    let single = "plant.precision=single";
+    let (code, felt) = said(&[single, "time.duration_s=230"]);
+    assert!(code == Code::CommonModeUnstable && felt.contains("positions are told to 0.00139 m only"), "{felt}");
+    for sets in [&[single, "time.duration_s=400"][..], &["swarm.a22_per_s=0.5"], &["time.duration_s=900"]] {
+        let (code, ruinous) = said(sets);
+        assert_eq!(code, Code::DriftUnresolved, "{ruinous}");
+        let found = check(&scenario("pentagon", sets));
+        assert!(found.refuses() && found.headline() == "REFUSED: drift-unresolved", "{}", found.headline());
+        assert!(!codes(&scenario("pentagon", sets)).contains(&Code::CommonModeUnstable), "it is told once");
+        assert_eq!(ruinous.contains("set plant.precision"), sets[0] == single, "{ruinous}");
+    }
+    assert!(!check(&scenario("pentagon", &["time.duration_s=400"])).refuses(), "64 bits are enough, and are taken");
 }
 
 #[test]
@@ -110,7 +145,7 @@ fn a_start_on_a_line_is_refused_where_the_formation_leaves_it() {
 
 #[test]
 fn relative_velocities_leave_a_line_and_common_ones_do_not() {
-    let mut line = scenario("pentagon-collinear", &[]);
+    let mut line = scenario("pentagon-collinear", &["swarm.a22_per_s=0"]);
     line.start.velocities_m_s.column_mut(1).fill(1.0);
     assert_eq!(check(&line).start_dimension, 1);
     line.start.velocities_m_s[(2, 1)] = 1.1;
@@ -273,6 +308,10 @@ fn the_json_has_the_promised_keys_and_codes() {
         "warnings",
         "energy_initial",
         "start_margin_m",
+        "certified_edges_m",
+        "epsilon",
+        "drift_m",
+        "spacing_m",
     ];
     for key in keys {
         assert!(json.get(key).is_some(), "{key}");
@@ -285,6 +324,7 @@ fn the_json_has_the_promised_keys_and_codes() {
         Code::RelativeVelocityUnstable,
         Code::StartOnLine,
         Code::StartInPlane,
+        Code::DriftUnresolved,
         Code::NoCertificate,
         Code::NotRigid,
         Code::FlatFormationInSpace,

@@ -1,10 +1,8 @@
 //! A pre-flight check in words: one line, and a table.
 
-use std::fmt::Write as _;
-
 use super::numbers::{rate, significant};
 use super::{Code, Preflight, Warning};
-use crate::text::{at_least, counted};
+use crate::text::{at_least, counted, table};
 
 impl Code {
     /// The stable name, such as `start-on-line`.
@@ -14,6 +12,7 @@ impl Code {
             Self::RelativeVelocityUnstable => "relative-velocity-unstable",
             Self::StartOnLine => "start-on-line",
             Self::StartInPlane => "start-in-plane",
+            Self::DriftUnresolved => "drift-unresolved",
             Self::NoCertificate => "no-certificate",
             Self::NotRigid => "not-rigid",
             Self::FlatFormationInSpace => "flat-formation-in-space",
@@ -33,8 +32,7 @@ impl Preflight {
     /// or `REFUSED: start-on-line`.
     #[must_use]
     pub fn headline(&self) -> String {
-        let refusing: Vec<_> =
-            self.warnings.iter().map(|warning| warning.code).filter(|code| code.refuses()).map(Code::name).collect();
+        let refusing = self.refusing();
         if !refusing.is_empty() {
             return format!("REFUSED: {}", refusing.join(", "));
         }
@@ -58,19 +56,14 @@ impl Preflight {
     /// The numbers as a short table, a line each, with a line end.
     #[must_use]
     pub fn text(&self) -> String {
-        let mut text = String::new();
-        for (name, content) in [
+        table([
             ("stability", self.stability_line()),
             ("certificate", self.certificate_line()),
             ("step", self.step_line()),
             ("start", self.start_line()),
             ("formation", self.formation_line()),
             ("rigidity", self.rigidity_line()),
-        ] {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{name:<12} {content}");
-        }
-        text
+        ])
     }
 
     fn stability_line(&self) -> String {
@@ -87,7 +80,7 @@ impl Preflight {
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
             Some(certified_m) => format!("{} m, from {energy}", at_least(certified_m, 6)),
-            None => format!("none. {} {energy}", self.certificate_void.join(" ")).trim_end().to_owned(),
+            None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }
     }
 
@@ -121,10 +114,26 @@ impl Preflight {
         };
         let convergence = match self.rigidity.rigid {
             Some(true) if self.controls_distances && !self.refuses() => ", exponential convergence near the goal",
-            Some(false) if self.controls_distances && !self.refuses() => ", algebraic convergence at best",
+            Some(false) if self.controls_distances && !self.refuses() => self.approach(),
             _ => "",
         };
         format!("rank {rank}: in the plane {}, in space {}{convergence}", place(2), place(3))
+    }
+}
+
+impl Preflight {
+    /// How a formation that is not rigid is approached.
+    fn approach(&self) -> &'static str {
+        let edges = self.rigidity.edges;
+        if self.rigidity.rank == Some(edges) {
+            // Each length can be set by itself: shapes with the right lengths are a smooth family, approached as such.
+            ", exponential convergence of the edges' lengths, which do not fix the shape"
+        } else if edges == self.vehicles * self.vehicles.saturating_sub(1) / 2 {
+            // All lengths fix the shape, and some motion changes none of them to first order.
+            ", algebraic convergence at best"
+        } else {
+            ", convergence perhaps slow"
+        }
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Findings<'a> {
     pub trap_dimension: Option<usize>,
     /// Dimension of the smallest flat that holds the formation.
     pub formation_dimension: usize,
+    /// Stable names of what refused the flight before the first step, such as `start-on-line`.
+    pub refused: &'a [&'static str],
     /// What the law promised.
     pub certificate: &'a Certificate,
     /// What the judge found.
@@ -39,22 +41,13 @@ pub struct Findings<'a> {
     pub run: &'a Run,
     /// Wall-clock times.
     pub performance: Performance,
-    /// How the run ended, if before its time.
-    pub ended_early: Option<EndedEarly<'a>>,
 }
 
-/// A run that ended before its time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EndedEarly<'a> {
-    /// When \[s\].
-    pub time_s: f64,
-    /// Why, such as `interrupted`.
-    pub reason: &'a str,
-}
+/// Why a run ended that its user stopped.
+pub const INTERRUPTED: &str = "interrupted";
 
 /// Facts of the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Run {
     /// Time flown \[s\].
     pub duration_s: f64,
@@ -62,6 +55,8 @@ pub struct Run {
     pub dt_s: f64,
     /// Steps flown.
     pub steps: u64,
+    /// Why the run ended before its time, such as [`INTERRUPTED`]; null where it did not.
+    pub ended_early: Option<String>,
     /// Number of vehicles N.
     pub vehicles: usize,
     /// [`crate::record::StateHash`] of the recorded states.
@@ -70,35 +65,19 @@ pub struct Run {
 
 /// Wall-clock times. Work done side by side counts in each kind.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Performance {
     /// From first to last step \[s\].
-    pub wall_s: Option<f64>,
-    /// Time flown over `wall_s`.
+    pub wall_s: f64,
+    /// Time flown over `wall_s`; null where that took no time.
     pub real_time_factor: Option<f64>,
     /// In the law \[s\].
-    pub law_s: Option<f64>,
+    pub law_s: f64,
     /// In the plant \[s\].
-    pub physics_s: Option<f64>,
+    pub physics_s: f64,
     /// In the judge \[s\].
-    pub audit_s: Option<f64>,
+    pub audit_s: f64,
     /// In the recorders \[s\].
-    pub record_s: Option<f64>,
-}
-
-impl Performance {
-    /// The same without what is no finite number.
-    pub(super) fn finite(self) -> Self {
-        let finite = |number: Option<f64>| number.and_then(finite);
-        Self {
-            wall_s: finite(self.wall_s),
-            real_time_factor: finite(self.real_time_factor),
-            law_s: finite(self.law_s),
-            physics_s: finite(self.physics_s),
-            audit_s: finite(self.audit_s),
-            record_s: finite(self.record_s),
-        }
-    }
+    pub record_s: f64,
 }
 
 /// None for what is no finite number.

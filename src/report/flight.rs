@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
 use super::findings::{Findings, Performance, Run, finite};
-use super::verdict::Verdict;
+use super::verdict::{Fails, Verdict, at_rest};
 use crate::audit::{self, Status};
 use crate::swarm::Pair;
 
@@ -15,7 +15,6 @@ pub const SCHEMA_VERSION: u32 = 1;
 
 /// The content of `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Report {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
@@ -45,7 +44,6 @@ pub struct Report {
 
 /// Which scenario it was.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct ScenarioIdentity {
     /// Name of the scenario.
     pub name: String,
@@ -55,7 +53,6 @@ pub struct ScenarioIdentity {
 
 /// Which program it was.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Tool {
     /// Name of the program.
     pub name: String,
@@ -65,7 +62,6 @@ pub struct Tool {
 
 /// How close vehicles came.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Separation<Delta = f64> {
     /// Safety distance delta \[m\]; of a recording, none where radii alone were asked about.
     pub delta_m: Delta,
@@ -83,7 +79,6 @@ pub struct Separation<Delta = f64> {
 
 /// What the judgement rests on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Audit {
     /// The judge's verdict on separation.
     pub status: Status,
@@ -103,7 +98,6 @@ pub struct Audit {
 
 /// A time during which a pair was closer than delta.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Violation {
     /// The pair.
     pub pair: Pair,
@@ -127,7 +121,6 @@ impl Violation {
 
 /// The closed-form sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct ClosedForm {
     /// Smallest distance of two centres \[m\].
     pub min_m: Option<f64>,
@@ -135,7 +128,6 @@ pub struct ClosedForm {
 
 /// The shape cast.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Parry {
     /// Earliest contact of two keep-out balls \[s\]; null where there was none.
     pub min_toi_s: Option<f64>,
@@ -145,7 +137,6 @@ pub struct Parry {
 
 /// The engine's own collision detection.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Rapier {
     /// Pairs whose keep-out balls it saw overlap at the end of some step; null for a plant without one.
     pub contact_pairs: Option<u64>,
@@ -153,12 +144,18 @@ pub struct Rapier {
 
 /// How near the formation was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct FormationNumbers {
     /// Whether it was reached and kept to the end.
     pub reached: bool,
     /// From when on \[s\].
     pub reached_at_s: Option<f64>,
+    /// How long everything had been within the limits at the end \[s\]; null where something was not.
+    pub held_s: Option<f64>,
+    /// The number that keeps the formation from being reached; null where it is.
+    pub fails: Option<Fails>,
+    /// Where it is not reached: whether the vehicles have come to rest elsewhere, relative to each other; null where that
+    /// is not known.
+    pub at_rest: Option<bool>,
     /// Largest error of a desired distance at the end \[m\].
     pub max_edge_error_m: Option<f64>,
     /// Root mean square distance from the best-placed formation at the end \[m\].
@@ -167,7 +164,6 @@ pub struct FormationNumbers {
 
 /// The law's energy \[m^2/s^2\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Energy {
     /// At the start.
     pub initial: Option<f64>,
@@ -180,7 +176,6 @@ pub struct Energy {
 
 /// Commanded accelerations, the largest of any vehicle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Control {
     /// Over all samples \[m/s^2\].
     pub peak_m_s2: Option<f64>,
@@ -190,7 +185,6 @@ pub struct Control {
 
 /// Velocities at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Velocity {
     /// Largest speed relative to the swarm's mean velocity \[m/s\].
     pub disagreement_m_s: Option<f64>,
@@ -204,6 +198,7 @@ impl Report {
     pub fn new(findings: &Findings<'_>) -> Self {
         let Findings { audit, summary, certificate, .. } = findings;
         let closest = audit.closest;
+        let min_m = closest.and_then(|closest| finite(closest.separation_m));
         Self {
             schema_version: SCHEMA_VERSION,
             scenario: ScenarioIdentity {
@@ -214,7 +209,7 @@ impl Report {
             verdict: Verdict::of(findings),
             separation: Separation {
                 delta_m: findings.delta_m,
-                min_m: closest.and_then(|closest| finite(closest.separation_m)),
+                min_m,
                 min_at_s: closest.and_then(|closest| finite(closest.time_s)),
                 min_pair: closest.map(|closest| closest.pair.numbers()),
                 certified_m: certificate.certified_m.and_then(finite),
@@ -225,7 +220,7 @@ impl Report {
                 violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
                 steps: audit.steps,
                 pairs_checked: audit.pairs_checked,
-                closed_form: ClosedForm { min_m: closest.and_then(|closest| finite(closest.separation_m)) },
+                closed_form: ClosedForm { min_m },
                 parry: Parry {
                     min_toi_s: audit.parry.min_toi_s.and_then(finite),
                     disagreements: audit.parry.disagreements,
@@ -235,6 +230,9 @@ impl Report {
             formation: FormationNumbers {
                 reached: summary.reached_at_s.is_some(),
                 reached_at_s: summary.reached_at_s.and_then(finite),
+                held_s: summary.held_s.and_then(finite),
+                fails: Fails::of(summary, findings.judge),
+                at_rest: at_rest(summary, findings.judge),
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),
             },
@@ -252,7 +250,7 @@ impl Report {
                 common_m_s: finite(summary.common_m_s),
             },
             run: findings.run.clone(),
-            performance: findings.performance.finite(),
+            performance: findings.performance,
         }
     }
 
@@ -261,9 +259,7 @@ impl Report {
     /// # Errors
     /// None in practice: every key is a string and every value has a JSON form.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
-        let mut json = serde_json::to_string_pretty(self)?;
-        json.push('\n');
-        Ok(json)
+        Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
     /// Writes the report as JSON to `path`: whole, or not at all.

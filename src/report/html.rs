@@ -1,8 +1,10 @@
 //! `report.html`: a run's report for people.
 
+use maud::{Markup, html};
+
 use super::findings::Performance;
-use super::flight::Report;
-use super::page::{Badge, Block, Cell, Column, Page, Picture, Section, Table, Warning};
+use super::flight::{Report, Violation};
+use super::page::{self, Badge, Page, Picture, noted, section};
 use crate::audit::Status;
 use crate::figures::Figure;
 use crate::scenario::{PlantSpec, Precision, Scenario};
@@ -20,7 +22,7 @@ pub struct RunPage<'a> {
     /// What was flown.
     pub scenario: &'a Scenario,
     /// What was known to be doubtful before the first step.
-    pub warnings: &'a [Warning],
+    pub warnings: &'a [(String, String)],
     /// The run as charts.
     pub figures: &'a [Figure],
     /// The run as it looked.
@@ -39,36 +41,32 @@ impl Report {
     }
 
     fn page(&self, page: &RunPage<'_>) -> Page {
-        let mut sections = vec![Section::new("Numbers", vec![Block::Tables(self.numbers())])];
+        let tables = [self.separation_table(), self.formation_table(), self.control_table(), self.run_table()];
+        let mut sections = vec![section("Numbers", &[html! { div.tables { @for table in tables { (table) } } }])];
         if !self.audit.violations.is_empty() {
-            sections.push(Section::new("Violations", self.violations()));
+            sections.push(section("Violations", &[self.violations()]));
         }
         if !page.pictures.is_empty() {
-            sections.push(Section::new("Pictures", vec![Block::Pictures(page.pictures.to_vec())]));
+            sections.push(section("Pictures", &[page::pictures(page.pictures)]));
         }
         if !page.figures.is_empty() {
-            sections.push(Section::new("Figures", vec![Block::Figures(page.figures.to_vec())]));
+            sections.push(section("Figures", &[page::figures(page.figures)]));
         }
-        sections.push(Section::new("What was assumed", vec![Block::List(self.assumptions(page.scenario))]));
-        sections.push(Section::new("Repeat it", self.repetition(page)));
-        sections.push(Section::new("Performance", vec![Block::Table(self.performance.table())]));
+        sections.push(section("What was assumed", &[page::list(&self.assumptions(page.scenario))]));
+        sections.push(section("Repeat it", &[self.repetition(page)]));
+        sections.push(section("Performance", &[self.performance.table()]));
         Page {
             title: self.scenario.name.clone(),
-            kind: "Flight report".to_owned(),
+            kind: "Flight report",
             badge: Badge::judged(self.verdict.pass),
             verdict: self.headline(),
             reasons: self.verdict.reasons.clone(),
             warnings: page.warnings.to_vec(),
             sections,
-            foot: format!("Made by {} {}.", self.tool.name, self.tool.version),
         }
     }
 
-    fn numbers(&self) -> Vec<Table> {
-        vec![self.separation_table(), self.formation_table(), self.control_table(), self.run_table()]
-    }
-
-    fn separation_table(&self) -> Table {
+    fn separation_table(&self) -> Markup {
         let Self { separation, audit, .. } = self;
         let pair = separation.min_pair.map(|[first, second]| format!("vehicles {first} and {second}"));
         let at = separation.min_at_s.map(|at_s| format!("at {}", seconds(at_s)));
@@ -87,7 +85,7 @@ impl Report {
         let contacts = audit.rapier.contact_pairs.map_or(NOT_KNOWN.to_owned(), |pairs| pairs.to_string());
         numbers(
             "Separation",
-            vec![
+            [
                 row("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
                 row("Smallest distance", proved_m(separation.min_m), &closest),
                 row("Certified distance", proved_m(separation.certified_m), &certificate),
@@ -99,12 +97,12 @@ impl Report {
         )
     }
 
-    fn formation_table(&self) -> Table {
+    fn formation_table(&self) -> Markup {
         let Self { formation, velocity, .. } = self;
         let reached = formation.reached_at_s.map_or("not reached".to_owned(), seconds);
         numbers(
             "Formation",
-            vec![
+            [
                 row("Reached", reached, "and kept from then on to the end"),
                 row("Largest edge error", with_unit(formation.max_edge_error_m, "m"), "at the end"),
                 row("Position error", with_unit(formation.rms_position_error_m, "m"), "root mean square, at the end"),
@@ -114,11 +112,11 @@ impl Report {
         )
     }
 
-    fn control_table(&self) -> Table {
+    fn control_table(&self) -> Markup {
         let Self { energy, control, .. } = self;
         numbers(
             "Energy and control",
-            vec![
+            [
                 row("Initial energy E(0)", with_unit(energy.initial, "m²/s²"), ""),
                 row("Final energy", with_unit(energy.at_end, "m²/s²"), ""),
                 row("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all samples"),
@@ -128,11 +126,11 @@ impl Report {
         )
     }
 
-    fn run_table(&self) -> Table {
+    fn run_table(&self) -> Markup {
         let run = &self.run;
         numbers(
             "Run",
-            vec![
+            [
                 row("Vehicles", run.vehicles.to_string(), ""),
                 row("Duration", with_unit(Some(run.duration_s), "s"), ""),
                 row("Step", with_unit(Some(run.dt_s * 1e3), "ms"), ""),
@@ -141,29 +139,22 @@ impl Report {
         )
     }
 
-    fn violations(&self) -> Vec<Block> {
+    fn violations(&self) -> Markup {
         let violations = &self.audit.violations;
-        let rows = violations.iter().take(LISTED_VIOLATIONS).map(|violation| {
-            let times = [violation.from_s, violation.to_s].map(seconds);
-            let smallest = [proved_m(Some(violation.min_m)), seconds(violation.min_at_s)];
-            [violation.pair.to_string()].into_iter().chain(times).chain(smallest).map(Cell::from).collect()
-        });
-        let table = Table {
-            caption: "Times that a pair was closer than δ".to_owned(),
-            columns: vec![
-                Column::words("Vehicles"),
-                Column::numbers("From"),
-                Column::numbers("To"),
-                Column::numbers("Smallest"),
-                Column::numbers("At"),
-            ],
-            rows: rows.collect(),
+        let row = |violation: &Violation| {
+            let [from, to, at] = [violation.from_s, violation.to_s, violation.min_at_s].map(seconds);
+            [violation.pair.to_string(), from, to, proved_m(Some(violation.min_m)), at]
         };
-        let mut blocks = vec![Block::Table(table)];
-        if let Some(more @ 1..) = violations.len().checked_sub(LISTED_VIOLATIONS) {
-            blocks.push(Block::Text(format!("{more} more are in report.json.")));
+        html! {
+            (page::numbers(
+                "Times that a pair was closer than δ",
+                &["Vehicles", "From", "To", "Smallest", "At"],
+                violations.iter().take(LISTED_VIOLATIONS).map(row),
+            ))
+            @if let Some(more @ 1..) = violations.len().checked_sub(LISTED_VIOLATIONS) {
+                p { (more) " more are in report.json." }
+            }
         }
-        blocks
     }
 
     fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
@@ -179,7 +170,8 @@ impl Report {
             PlantSpec::Rapier(precision) => (
                 format!(
                     "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
-                     at constant speed. The engine computes in {}, law and audit in double precision (64 bits).",
+                     at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
+                     so close that they touch. The engine computes in {}, law and audit in double precision (64 bits).",
                     match precision {
                         Precision::Single => "single precision (32 bits)",
                         Precision::Double => "double precision (64 bits)",
@@ -189,7 +181,8 @@ impl Report {
             ),
             PlantSpec::Ideal => (
                 "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
-                 8th order in double precision (64 bits); the audit takes them to move on straight lines within a step."
+                 8th order in double precision (64 bits); mass and hull play no part, and there is no engine to see \
+                 contacts. The audit takes them to move on straight lines within a step."
                     .to_owned(),
                 "recorded; the motion between follows the law in continuous time",
             ),
@@ -221,57 +214,64 @@ impl Report {
         ]
     }
 
-    fn repetition(&self, page: &RunPage<'_>) -> Vec<Block> {
-        vec![
-            Block::Command(page.command.to_owned()),
-            Block::Text(format!(
-                "The same program gives the same motion to the last bit, on any number of threads: the hash of all \
-                 recorded states is {}.",
-                self.run.state_hash
-            )),
-            folded_scenario(&page.scenario.resolved_toml(), &self.scenario.sha256),
-        ]
-    }
-}
-
-impl Performance {
-    fn table(&self) -> Table {
-        let spent = [
-            ("From first to last step", self.wall_s, "s"),
-            ("Time flown over that", self.real_time_factor, ""),
-            ("In the law", self.law_s, "s"),
-            ("In the physics", self.physics_s, "s"),
-            ("In the audit", self.audit_s, "s"),
-            ("In the recorders", self.record_s, "s"),
-        ];
-        Table {
-            caption: "Wall-clock time, which alone differs from run to run".to_owned(),
-            columns: vec![Column::words("Where"), Column::numbers("Time")],
-            rows: spent.map(|(name, number, unit)| vec![name.into(), with_unit(number, unit).into()]).to_vec(),
+    fn repetition(&self, page: &RunPage<'_>) -> Markup {
+        html! {
+            (page::command(page.command))
+            p {
+                "The same program gives the same motion to the last bit, on any number of threads: the hash of all recorded \
+                 states is " (self.run.state_hash) "."
+            }
+            (folded_scenario(&page.scenario.resolved_toml(), &self.scenario.sha256))
         }
     }
 }
 
+impl Performance {
+    fn table(&self) -> Markup {
+        let spent = [
+            ("From first to last step", Some(self.wall_s), "s"),
+            ("Time flown over that", self.real_time_factor, ""),
+            ("In the law", Some(self.law_s), "s"),
+            ("In the physics", Some(self.physics_s), "s"),
+            ("In the audit", Some(self.audit_s), "s"),
+            ("In the recorders", Some(self.record_s), "s"),
+        ];
+        page::numbers(
+            "Wall-clock time, which alone differs from run to run",
+            &["Where", "Time"],
+            spent.map(|(name, number, unit)| [name.to_owned(), with_unit(number, unit)]),
+        )
+    }
+}
+
 /// The resolved scenario, or so many of its lines as a page has room for.
-fn folded_scenario(toml: &str, sha256: &str) -> Block {
+fn folded_scenario(toml: &str, sha256: &str) -> Markup {
     let end = toml.floor_char_boundary(LONGEST_SCENARIO);
     let part = match toml.len() {
         all if end < all => format!("; its first {end} of {all} bytes, run.mcap holds all"),
         _ => String::new(),
     };
-    let summary = format!("The resolved scenario, SHA-256 {sha256}{part}");
-    Block::Folded { summary, text: toml[..end].to_owned() }
+    html! {
+        details {
+            summary { "The resolved scenario, SHA-256 " (sha256) (part) }
+            pre tabindex="0" { code { (toml[..end]) } }
+        }
+    }
 }
 
 const NOT_KNOWN: &str = "–";
 
-fn numbers(caption: &str, rows: Vec<Vec<Cell>>) -> Table {
-    Table { caption: caption.to_owned(), columns: vec![Column::words("Quantity"), Column::numbers("Value")], rows }
+fn numbers<const N: usize>(caption: &str, rows: [[Markup; 2]; N]) -> Markup {
+    page::numbers(caption, &["Quantity", "Value"], rows)
 }
 
-fn row(name: &str, value: String, remark: &str) -> Vec<Cell> {
-    let name = if remark.is_empty() { name.into() } else { Cell::Noted(name.to_owned(), remark.to_owned()) };
-    vec![name, value.into()]
+fn row(name: &str, value: String, remark: &str) -> [Markup; 2] {
+    let name = if remark.is_empty() {
+        html! { (name) }
+    } else {
+        noted(name, remark)
+    };
+    [name, html! { (value) }]
 }
 
 fn with_unit(number: Option<f64>, unit: &str) -> String {

@@ -17,13 +17,13 @@ mod words;
 
 pub use crate::audit::Status;
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
-pub use findings::{EndedEarly, Findings, Performance, Run};
+pub use findings::{Findings, INTERRUPTED, Performance, Run};
 pub use flight::{
     Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,
     Separation, Tool, Velocity, Violation,
 };
 pub use html::RunPage;
-pub use verdict::Verdict;
+pub use verdict::{Fails, Verdict};
 
 #[cfg(test)]
 mod tests;

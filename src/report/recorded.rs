@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::findings::finite;
 use super::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
-use super::page::{Badge, Block, Column, Page, Section, Table, Tone};
+use super::page::{self, Badge, Markup, Page, Tone, section};
 use crate::audit::recorded::{
     Approach, Contradiction, Gap, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS, WIDTH_M,
 };
@@ -322,26 +322,27 @@ impl RecordedReport {
     pub fn to_html(&self, figures: &[Figure], command: &str) -> String {
         let mut sections = Vec::new();
         if !self.closest.is_empty() {
-            sections.push(Section::new("Closest pairs", vec![Block::Table(closest_table(&self.closest))]));
+            sections.push(section("Closest pairs", &[closest_table(&self.closest)]));
         }
         if !figures.is_empty() {
-            sections.push(Section::new("Figures", vec![Block::Figures(figures.to_vec())]));
+            sections.push(section("Figures", &[page::figures(figures)]));
         }
         if !self.obstacles.closest.is_empty() {
-            sections.push(Section::new("Obstacles", vec![Block::Table(closest_table(&self.obstacles.closest))]));
+            sections.push(section("Obstacles", &[closest_table(&self.obstacles.closest)]));
         }
         for (heading, lines) in self.lists().into_iter().chain([("How it was read", self.source.notes.clone())]) {
             if !lines.is_empty() {
-                sections.push(Section::new(heading, vec![Block::List(listed(lines, LISTED_ON_PAGE).collect())]));
+                let lines: Vec<_> = listed(lines, LISTED_ON_PAGE).collect();
+                sections.push(section(heading, &[page::list(&lines)]));
             }
         }
-        let assumed = vec![
+        let assumed = [
             format!("Motion: {}.", self.motion),
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
-        sections.push(Section::new("What was assumed", vec![Block::List(assumed)]));
-        sections.push(Section::new("Repeat it", vec![Block::Command(command.to_owned())]));
+        sections.push(section("What was assumed", &[page::list(&assumed)]));
+        sections.push(section("Repeat it", &[page::command(command)]));
         let tone = match self.status {
             Status::Clear => Tone::Good,
             Status::Violation => Tone::Bad,
@@ -349,13 +350,12 @@ impl RecordedReport {
         };
         Page {
             title: self.source.recording.clone(),
-            kind: "Audit of a recording".to_owned(),
-            badge: Badge { tone, word: self.verdict().to_owned() },
+            kind: "Audit of a recording",
+            badge: Badge { tone, word: self.verdict() },
             verdict: self.finding(),
             reasons: Vec::new(),
             warnings: Vec::new(),
             sections,
-            foot: format!("Made by {} {}.", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
         }
         .render()
     }
@@ -412,23 +412,11 @@ pub fn interval(lower: f64, upper: f64) -> String {
     if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
 }
 
-fn closest_table(closest: &[OfPair<Approach>]) -> Table {
-    let rows = closest.iter().map(|OfPair { who: [first, second], finding }| {
-        vec![
-            format!("{first} and {second}").into(),
-            interval(finding.lower_m, finding.upper_m).into(),
-            fixed(finding.time_s, 3).into(),
-            metres(finding.limit_m).into(),
-        ]
-    });
-    Table {
-        caption: "Who came closest, and when".to_owned(),
-        columns: vec![
-            Column::words("who"),
-            Column::numbers("smallest distance"),
-            Column::numbers("at [s]"),
-            Column::numbers("limit"),
-        ],
-        rows: rows.collect(),
-    }
+fn closest_table(closest: &[OfPair<Approach>]) -> Markup {
+    let row = |OfPair { who: [first, second], finding }: &OfPair<Approach>| {
+        let apart = interval(finding.lower_m, finding.upper_m);
+        [format!("{first} and {second}"), apart, fixed(finding.time_s, 3), metres(finding.limit_m)]
+    };
+    let columns = ["who", "smallest distance", "at [s]", "limit"];
+    page::numbers("Who came closest, and when", &columns, closest.iter().map(row))
 }

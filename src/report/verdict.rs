@@ -5,22 +5,27 @@ use serde::{Deserialize, Serialize};
 use super::energy::{INTEGRATION, highest_honest};
 use super::findings::Findings;
 use crate::audit::Status;
+use crate::metrics::Summary;
+use crate::target::Arrival;
 use crate::text::{metres, metres_below, seconds};
 
 /// The judgement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Verdict {
-    /// Clear, reached, and flown to its end.
+    /// Clear, reached, flown to its end, and not refused before the first step.
     pub pass: bool,
+    /// Stable names of what refused the flight before the first step, such as `start-on-line`.
+    pub refused: Vec<String>,
     /// Why it did not pass, a sentence each; empty where it did.
     pub reasons: Vec<String>,
 }
 
 impl Verdict {
-    /// Passes where the audit is clear, both detectors agree, the formation is reached and the run was flown to its end.
+    /// Passes where nothing refused the flight, the audit is clear, both detectors agree, the formation is reached and the
+    /// run was flown to its end.
     pub(super) fn of(findings: &Findings<'_>) -> Self {
         let reasons: Vec<_> = [
+            refused(findings),
             violation(findings),
             disagreement(findings),
             undecided(findings),
@@ -33,8 +38,60 @@ impl Verdict {
         .into_iter()
         .flatten()
         .collect();
-        Self { pass: reasons.is_empty(), reasons }
+        let refused = findings.refused.iter().map(|&code| code.to_owned()).collect();
+        Self { pass: reasons.is_empty(), refused, reasons }
     }
+}
+
+/// The number that keeps a formation from being reached, by its key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fails {
+    /// Everything was within the limits at the end, for too short a time.
+    HeldS,
+    /// No state at the end is known.
+    Unknown,
+    /// The largest error of a desired distance.
+    MaxEdgeErrorM,
+    /// The root mean square distance from the formation: every edge has its length, and the shape is another one.
+    RmsPositionErrorM,
+    /// The largest speed relative to the mean.
+    #[serde(rename = "disagreement_m_s")]
+    Disagreement,
+}
+
+impl Fails {
+    pub(super) fn of(summary: &Summary, judge: Arrival) -> Option<Self> {
+        if summary.reached_at_s.is_some() {
+            None
+        } else if summary.held_s.is_some() {
+            Some(Self::HeldS)
+        } else if !summary.max_edge_error_m.is_finite() {
+            Some(Self::Unknown)
+        } else if summary.max_edge_error_m > judge.edge_error_m {
+            Some(Self::MaxEdgeErrorM)
+        } else if summary.rms_position_error_m > judge.edge_error_m {
+            Some(Self::RmsPositionErrorM)
+        } else {
+            Some(Self::Disagreement)
+        }
+    }
+}
+
+/// Speeds relative to the mean, and commanded accelerations over a second, below this part of what counts as reached are
+/// rest.
+const REST: f64 = 0.1;
+
+/// Where a formation is not reached: whether the vehicles have come to rest elsewhere; none where that is not known.
+pub(super) fn at_rest(summary: &Summary, judge: Arrival) -> Option<bool> {
+    let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
+    let known = summary.reached_at_s.is_none() && speed_m_s.is_finite() && command_m_s2.is_finite();
+    known.then_some(speed_m_s.max(command_m_s2) <= REST * judge.disagreement_m_s)
+}
+
+fn refused(findings: &Findings<'_>) -> Option<String> {
+    let codes = findings.refused.join(", ");
+    (!codes.is_empty()).then(|| format!("The flight was refused before its first step: {codes}."))
 }
 
 fn violation(findings: &Findings<'_>) -> Option<String> {
@@ -76,8 +133,8 @@ fn undecided(findings: &Findings<'_>) -> Option<String> {
 }
 
 fn ended_early(findings: &Findings<'_>) -> Option<String> {
-    let ended = findings.ended_early?;
-    Some(format!("The run ended early, at {}: {}.", seconds(ended.time_s), ended.reason.trim_end_matches('.')))
+    let why = findings.run.ended_early.as_deref()?.trim_end_matches('.');
+    Some(format!("The run ended early, at {}: {why}.", seconds(findings.run.duration_s)))
 }
 
 /// Whether a separation is below what was certified, by more of the certified clearance above delta than integration may
@@ -116,34 +173,39 @@ fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
 
 fn not_reached(findings: &Findings<'_>) -> Option<String> {
     let (summary, judge) = (findings.summary, findings.judge);
-    if summary.reached_at_s.is_some() {
-        return None;
-    }
-    let why = if let Some(held_s) = summary.held_s {
-        format!("it was kept for the last {} only, and {} are asked for", seconds(held_s), seconds(judge.hold_s))
-    } else if !summary.max_edge_error_m.is_finite() {
-        "no state at the end is known".to_owned()
-    } else if summary.max_edge_error_m > judge.edge_error_m {
-        format!(
+    let why = match Fails::of(summary, judge)? {
+        Fails::HeldS => format!(
+            "it was kept for the last {} only, and {} are asked for",
+            seconds(summary.held_s.unwrap_or_default()),
+            seconds(judge.hold_s)
+        ),
+        Fails::Unknown => "no state at the end is known".to_owned(),
+        Fails::MaxEdgeErrorM => format!(
             "at the end a distance is still wrong by {} m, and {} m are allowed",
             metres(summary.max_edge_error_m),
             judge.edge_error_m
-        )
-    } else if summary.rms_position_error_m > judge.edge_error_m {
-        format!(
+        ),
+        Fails::RmsPositionErrorM => format!(
             "at the end every edge has its length and the shape is another one: vehicles are {} m (root mean square) \
              from the formation, and {} m are allowed",
             metres(summary.rms_position_error_m),
             judge.edge_error_m
-        )
-    } else {
-        format!(
+        ),
+        Fails::Disagreement => format!(
             "at the end vehicles still differ by {} m/s from their mean velocity, and {} m/s are allowed",
             metres(summary.disagreement_m_s),
             judge.disagreement_m_s
-        )
+        ),
     };
-    Some(format!("The formation was not reached: {why}."))
+    let then = match at_rest(summary, judge) {
+        Some(true) if summary.held_s.is_none() => " The vehicles have come to rest elsewhere: more time does not help.",
+        Some(false) if summary.held_s.is_none() && findings.refused.is_empty() => {
+            " The vehicles are still moving: more time may help."
+        }
+        Some(false) if summary.held_s.is_none() => " The vehicles are still moving.",
+        _ => "",
+    };
+    Some(format!("The formation was not reached: {why}.{then}"))
 }
 
 /// A start flatter than the formation: forces along the lines between vehicles never leave it.

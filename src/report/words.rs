@@ -1,19 +1,28 @@
 //! A report in words: one line, and a table.
 
-use std::fmt::Write as _;
-
+use super::findings::Performance;
 use super::flight::Report;
-use super::verdict::breaks_certificate;
+use super::verdict::{Fails, breaks_certificate};
 use crate::audit::Status;
-use crate::text::{at_least, counted, metres, metres_below, seconds};
+use crate::text::{at_least, counted, metres, metres_below, seconds, table};
 
 impl Report {
-    /// The verdict in one line.
+    /// The verdict in one line, with what refused the flight before its first step behind it.
     ///
     /// `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.5 s`, or
     /// `VIOLATION: vehicles 2-3 came to 1.533 m (delta 2.000 m) at 3.63 s`.
     #[must_use]
     pub fn headline(&self) -> String {
+        let refused = match &self.verdict.refused[..] {
+            [] => String::new(),
+            codes => format!("; refused before the first step: {}", codes.join(", ")),
+        };
+        let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
+        self.judged() + &ended.unwrap_or_default() + &refused
+    }
+
+    /// What was judged of what was flown.
+    fn judged(&self) -> String {
         let delta = metres(self.separation.delta_m);
         match self.audit.status {
             Status::Clear => {
@@ -23,9 +32,9 @@ impl Report {
                     (Some(min_m), Some(certified_m))
                         if breaks_certificate(min_m, certified_m, self.separation.delta_m) =>
                     {
-                        ", which breaks the certificate"
+                        format!(", which breaks the certificate of {} m", at_least(certified_m, 6))
                     }
-                    _ => "",
+                    _ => String::new(),
                 };
                 format!("CLEAR: {closest} (delta {delta} m){broken}, {}", self.formation_in_words())
             }
@@ -43,11 +52,29 @@ impl Report {
     }
 
     fn formation_in_words(&self) -> String {
-        match (self.formation.reached_at_s, self.formation.max_edge_error_m) {
-            (Some(at_s), _) => format!("formation reached at {at_s:.1} s"),
-            (None, Some(error_m)) => format!("formation NOT reached (largest edge error {} m)", short(error_m)),
-            (None, None) => "formation NOT reached".to_owned(),
-        }
+        let formation = &self.formation;
+        let (what, number, unit) = match formation.fails {
+            None => {
+                let at_s = formation.reached_at_s.unwrap_or_default();
+                return format!("formation reached at {at_s:.1} s");
+            }
+            Some(Fails::Unknown) => return "formation NOT reached".to_owned(),
+            Some(Fails::HeldS) => {
+                let held_s = formation.held_s.unwrap_or_default();
+                return format!("formation NOT reached (kept for the last {} only)", seconds(held_s));
+            }
+            Some(Fails::MaxEdgeErrorM) => ("largest edge error", formation.max_edge_error_m, "m"),
+            Some(Fails::RmsPositionErrorM) => {
+                ("another shape, rms position error", formation.rms_position_error_m, "m")
+            }
+            Some(Fails::Disagreement) => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
+        };
+        let then = match formation.at_rest {
+            Some(true) => ", at rest elsewhere",
+            Some(false) => ", still moving",
+            None => "",
+        };
+        format!("formation NOT reached ({what} {} {unit}{then})", number.map_or("-".to_owned(), short))
     }
 
     fn deepest_in_words(&self) -> String {
@@ -67,31 +94,19 @@ impl Report {
     /// The numbers as a short table, a line each, with a line end.
     #[must_use]
     pub fn text(&self) -> String {
-        let mut text = String::new();
-        for (name, content) in [
+        let (control, velocity) = (&self.control, &self.velocity);
+        let [peak, last] = [control.peak_m_s2, control.final_m_s2].map(or_dash);
+        let [disagreement, common] = [velocity.disagreement_m_s, velocity.common_m_s].map(or_dash);
+        table([
             ("separation", self.separation_line()),
             ("audit", self.audit_line()),
             ("formation", self.formation_line()),
             ("energy", self.energy_line()),
-            (
-                "control",
-                format!("peak {}, final {} m/s^2", or_dash(self.control.peak_m_s2), or_dash(self.control.final_m_s2)),
-            ),
-            (
-                "velocity",
-                format!(
-                    "disagreement {}, common {} m/s",
-                    or_dash(self.velocity.disagreement_m_s),
-                    or_dash(self.velocity.common_m_s)
-                ),
-            ),
+            ("control", format!("peak {peak}, final {last} m/s^2")),
+            ("velocity", format!("disagreement {disagreement}, common {common} m/s")),
             ("run", self.run_line()),
             ("performance", self.performance_line()),
-        ] {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{name:<12} {content}");
-        }
-        text
+        ])
     }
 
     fn separation_line(&self) -> String {
@@ -169,16 +184,11 @@ impl Report {
     }
 
     fn performance_line(&self) -> String {
-        let performance = &self.performance;
-        let time = |time_s: Option<f64>| time_s.map_or("-".to_owned(), |time_s| format!("{time_s:.3}"));
-        let factor = performance.real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
+        let Performance { wall_s, real_time_factor, law_s, physics_s, audit_s, record_s } = self.performance;
+        let factor = real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
         format!(
-            "{} s wall, {factor} x real time (law {}, physics {}, audit {}, record {} s)",
-            time(performance.wall_s),
-            time(performance.law_s),
-            time(performance.physics_s),
-            time(performance.audit_s),
-            time(performance.record_s)
+            "{wall_s:.3} s wall, {factor} x real time (law {law_s:.3}, physics {physics_s:.3}, audit {audit_s:.3}, record \
+             {record_s:.3} s)"
         )
     }
 }

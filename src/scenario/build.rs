@@ -10,7 +10,7 @@ use super::document::{
     Document, Edge, FormationShape, GraphKind, PerVehicle, PlantKind, PlantTable, Point, StartShape, StartTable,
 };
 use super::error::ScenarioError;
-use super::limits::{check_count, check_memory, pair_count, positive};
+use super::limits::{check_count, check_lengths, check_memory, pair_count, positive};
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
 use crate::formation::Formation;
@@ -21,12 +21,12 @@ use crate::target::Leg;
 /// Slots of the pentagon.
 const PENTAGON_COUNT: usize = 5;
 
-/// Completes a scenario. It still has to be validated.
+/// Completes a scenario, in double precision where none is given. It still has to be validated.
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
     check_memory(count, edge_count(&document.graph.kind, count))?;
-    check_counts(&document, count)?;
+    check_lists(&document, count)?;
     let space = space(&document)?;
     let (law, delta_m) = (document.law.kind.complete(document.swarm.a22_per_s), document.law.delta_m);
     Ok(Scenario {
@@ -36,10 +36,15 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         a22_per_s: document.swarm.a22_per_s,
         legs: vec![Leg::first(formation(&document.formation.shape, count)?)],
         graph: graph(&document.graph.kind, count)?,
-        plant: plant(&document.plant),
+        plant: match document.plant {
+            PlantTable { kind: PlantKind::Rapier, precision } => {
+                PlantSpec::Rapier(precision.unwrap_or(Precision::Double))
+            }
+            PlantTable { kind: PlantKind::Ideal, .. } => PlantSpec::Ideal,
+        },
         time: document.time,
         arrival: document.arrival,
-        name: document.name,
+        name: document.name.unwrap_or_default(),
         space,
         law,
         delta_m,
@@ -52,46 +57,39 @@ fn count(document: &Document) -> Result<usize, ScenarioError> {
         return usize::try_from(count).map_err(|_| ScenarioError::new("too many vehicles").at("swarm.count"));
     }
     let listed = document.start.positions_m.as_ref().map(Vec::len);
-    let slots = match &document.formation.shape {
-        FormationShape::Points { points_m } => Some(points_m.len()),
-        FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
-        _ => None,
-    };
-    listed.or(slots).ok_or_else(|| {
+    listed.or(listed_slots(&document.formation.shape)).ok_or_else(|| {
         ScenarioError::new("the number of vehicles is not given")
             .with_help("add `count` to [swarm], for example count = 6")
             .at("swarm.count")
     })
 }
 
+/// Number of slots of a shape that has its own.
+fn listed_slots(shape: &FormationShape) -> Option<usize> {
+    match shape {
+        FormationShape::Points { points_m } => Some(points_m.len()),
+        FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
+        _ => None,
+    }
+}
+
 /// Refuses lists that are not as long as there are vehicles.
-fn check_counts(document: &Document, count: usize) -> Result<(), ScenarioError> {
+fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
     let per_vehicle = |numbers: &PerVehicle| match numbers {
         PerVehicle::All(_) => None,
         PerVehicle::Each(list) => Some(list.len()),
     };
-    let slots = match &document.formation.shape {
-        FormationShape::Points { points_m } => Some(points_m.len()),
-        FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
-        _ => None,
-    };
-    let lists = [
-        ("start.positions_m", "start positions", document.start.positions_m.as_ref().map(Vec::len)),
-        ("start.velocities_m_s", "start velocities", document.start.velocities_m_s.as_ref().map(Vec::len)),
-        ("formation.points_m", "slots in the formation", slots),
-        ("swarm.mass_kg", "masses", per_vehicle(&document.swarm.mass_kg)),
-        ("swarm.hull_radius_m", "hull radii", per_vehicle(&document.swarm.hull_radius_m)),
-    ];
-    for (key, what, listed) in lists {
-        if let Some(listed) = listed.filter(|&listed| listed != count) {
-            let vehicles = if count == 1 { "vehicle" } else { "vehicles" };
-            return Err(ScenarioError::new(format!("{listed} {what} for {count} {vehicles}"))
-                .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
-                .at(key)
-                .at("swarm.count"));
-        }
-    }
-    Ok(())
+    let Document { swarm, start, formation, .. } = document;
+    check_lengths(
+        count,
+        [
+            ("start.positions_m", "start positions", start.positions_m.as_ref().map(Vec::len)),
+            ("start.velocities_m_s", "start velocities", start.velocities_m_s.as_ref().map(Vec::len)),
+            ("formation.points_m", "slots in the formation", listed_slots(&formation.shape)),
+            ("swarm.mass_kg", "masses", per_vehicle(&swarm.mass_kg)),
+            ("swarm.hull_radius_m", "hull radii", per_vehicle(&swarm.hull_radius_m)),
+        ],
+    )
 }
 
 /// The space asked for, or else the plane if everything lies in it.
@@ -151,13 +149,6 @@ fn formation(shape: &FormationShape, count: usize) -> Result<Formation, Scenario
         &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
         FormationShape::Points { points_m } => Formation::points(rows(points_m)),
     })
-}
-
-fn plant(table: &PlantTable) -> PlantSpec {
-    match table.kind {
-        PlantKind::Rapier => PlantSpec::Rapier(table.precision.unwrap_or(Precision::Single)),
-        PlantKind::Ideal => PlantSpec::Ideal,
-    }
 }
 
 /// Number of edges, at most, without making them.

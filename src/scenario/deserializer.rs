@@ -9,14 +9,14 @@
 use std::fmt::{self, Display};
 use std::ops::Range;
 
-use serde::de::value::{MapDeserializer, SeqDeserializer};
-use serde::de::{self, DeserializeSeed, EnumAccess, Error as _, IntoDeserializer, Unexpected, VariantAccess, Visitor};
+use serde::de::value::{MapAccessDeserializer, MapDeserializer, SeqDeserializer};
+use serde::de::{self, Error as _, IntoDeserializer, Unexpected, Visitor};
 use serde::{Deserializer, forward_to_deserialize_any};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The fields that hold a choice.
-const CHOICES: [&str; 2] = ["kind", "shape"];
+pub(super) const CHOICES: [&str; 2] = ["kind", "shape"];
 
 /// What is wrong with a key or its value.
 #[derive(Debug)]
@@ -85,27 +85,13 @@ impl Display for KeyError {
 pub(super) struct Value<'de> {
     inner: DeValue<'de>,
     span: Range<usize>,
-    /// For a choice the keys of its table that are the choice's.
-    chosen: Option<Chosen<'de>>,
-}
-
-/// The keys of a choice.
-pub(super) struct Chosen<'de> {
-    keys: DeTable<'de>,
-    /// Those that the table has whatever is chosen.
-    common: &'static [&'static str],
-    /// The table.
-    span: Range<usize>,
+    /// Whether it is a choice: a table of the choice's name alone, which holds the table of its keys.
+    is_choice: bool,
 }
 
 impl<'de> Value<'de> {
-    /// The whole document.
-    pub(super) fn root(root: Spanned<DeTable<'de>>) -> Self {
-        Self::new(DeValue::Table(root.into_inner()), 0..0)
-    }
-
     fn new(inner: DeValue<'de>, span: Range<usize>) -> Self {
-        Self { inner, span, chosen: None }
+        Self { inner, span, is_choice: false }
     }
 
     fn unexpected(&self) -> Unexpected<'_> {
@@ -194,6 +180,13 @@ impl<'de> Deserializer<'de> for Value<'de> {
         visitor.visit_some(self)
     }
 
+    fn deserialize_unit<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, KeyError> {
+        match self.inner.as_table().and_then(|table| table.keys().next()) {
+            Some(key) => Err(KeyError::unknown_field(key.get_ref(), &[]).at(&key.span())),
+            None => visitor.visit_unit(),
+        }
+    }
+
     fn deserialize_struct<V: Visitor<'de>>(
         self,
         _: &'static str,
@@ -202,18 +195,21 @@ impl<'de> Deserializer<'de> for Value<'de> {
     ) -> Result<V::Value, KeyError> {
         let span = self.span.clone();
         let DeValue::Table(table) = self.inner else { return Err(self.wrong_type("a table")) };
-        let is_chosen = |key: &&&str| matches!(table.get(**key).map(Spanned::get_ref), Some(DeValue::String(_)));
-        let choice = CHOICES.iter().filter(|key| fields.contains(key)).find(is_chosen).copied();
-        let is_own = |key: &str| choice.is_none() || fields.contains(&key);
-        let (own, keys): (DeTable<'_>, _) = table.into_iter().partition(|(key, _)| is_own(key.get_ref()));
-        let mut chosen = Some(Chosen { keys, common: fields, span: span.clone() });
+        let is_chosen = |key: &&str| table.get(*key).is_some_and(|value| value.get_ref().is_str());
+        let Some(choice) = CHOICES.into_iter().find(|key| fields.contains(key) && is_chosen(key)) else {
+            return visitor.visit_map(MapDeserializer::new(entries(table))).map_err(|error| error.at(&span));
+        };
+        let (own, keys): (DeTable<'_>, _) = table.into_iter().partition(|(key, _)| fields.contains(&&**key.get_ref()));
+        let mut keys = Some(Spanned::new(span.clone(), DeValue::Table(keys)));
         let own = entries(own).map(|(key, mut value)| {
-            if matches!(&key.inner, DeValue::String(key) if Some(&**key) == choice) {
-                value.chosen = chosen.take();
+            if let (DeValue::String(name), true) = (&value.inner, key.inner.as_str() == Some(choice)) {
+                let name = Spanned::new(value.span.clone(), name.clone());
+                value.inner = DeValue::Table(keys.take().map(|keys| (name, keys)).into_iter().collect());
+                value.is_choice = true;
             }
             (key, value)
         });
-        visitor.visit_map(MapDeserializer::new(own)).map_err(|error| error.at(&span))
+        visitor.visit_map(MapDeserializer::new(own)).map_err(|error| error.beside(fields).at(&span))
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -222,14 +218,19 @@ impl<'de> Deserializer<'de> for Value<'de> {
         _: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, KeyError> {
+        let span = self.span;
         match self.inner {
-            DeValue::String(_) => visitor.visit_enum(self),
-            _ => Err(KeyError::custom("expected a string").at(&self.span)),
+            DeValue::Table(choice) if self.is_choice => {
+                visitor.visit_enum(MapAccessDeserializer::new(MapDeserializer::new(entries(choice))))
+            }
+            DeValue::String(name) => visitor.visit_enum(name.into_deserializer()),
+            _ => Err(KeyError::custom("expected a string")),
         }
+        .map_err(|error| error.at(&span))
     }
 
     forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u128 f32 char str string bytes byte_buf unit unit_struct newtype_struct seq tuple
+        bool i8 i16 i32 i64 i128 u8 u16 u128 f32 char str string bytes byte_buf unit_struct newtype_struct seq tuple
         tuple_struct map identifier ignored_any
     }
 }
@@ -239,43 +240,5 @@ impl<'de> IntoDeserializer<'de, KeyError> for Value<'de> {
 
     fn into_deserializer(self) -> Self {
         self
-    }
-}
-
-impl<'de> EnumAccess<'de> for Value<'de> {
-    type Error = KeyError;
-    type Variant = Chosen<'de>;
-
-    fn variant_seed<V: DeserializeSeed<'de>>(mut self, seed: V) -> Result<(V::Value, Chosen<'de>), KeyError> {
-        let none = || Chosen { keys: DeTable::new(), common: &[], span: self.span.clone() };
-        let chosen = self.chosen.take().unwrap_or_else(none);
-        Ok((seed.deserialize(self)?, chosen))
-    }
-}
-
-impl<'de> VariantAccess<'de> for Chosen<'de> {
-    type Error = KeyError;
-
-    fn unit_variant(self) -> Result<(), KeyError> {
-        let Some(key) = self.keys.keys().next() else { return Ok(()) };
-        Err(KeyError::unknown_field(key.get_ref(), self.common).at(&key.span()))
-    }
-
-    fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, KeyError> {
-        let keys = Value::new(DeValue::Table(self.keys), self.span);
-        seed.deserialize(keys).map_err(|error| error.beside(self.common))
-    }
-
-    fn struct_variant<V: Visitor<'de>>(
-        self,
-        fields: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, KeyError> {
-        let keys = Value::new(DeValue::Table(self.keys), self.span);
-        keys.deserialize_struct("", fields, visitor).map_err(|error| error.beside(self.common))
-    }
-
-    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, KeyError> {
-        Err(KeyError::invalid_type(Unexpected::TupleVariant, &visitor))
     }
 }

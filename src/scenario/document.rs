@@ -21,9 +21,9 @@ use crate::target::Arrival;
 #[cfg_attr(feature = "schema", derive(JsonSchema), schemars(title = "tautline scenario"))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Document {
-    /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`.
+    /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`. The file's name unless given.
     #[cfg_attr(feature = "schema", schemars(length(min = 1, max = 64), pattern("^[A-Za-z0-9_-]+$")))]
-    pub(super) name: String,
+    pub(super) name: Option<String>,
     /// The vehicles.
     #[serde(default)]
     pub(super) swarm: SwarmTable,
@@ -59,10 +59,11 @@ pub(super) struct SwarmTable {
     /// slot has z = 0, otherwise 3.
     #[cfg_attr(feature = "schema", schemars(range(min = 2, max = 3)))]
     pub(super) dimensions: Option<u64>,
-    /// Mass in kg: one number for all vehicles or a list with one for each.
+    /// Mass in kg: one number for all vehicles or a list with one for each. Laws command accelerations, so it changes no
+    /// motion until hulls touch; the ideal plant's vehicles are points and have no use for it.
     pub(super) mass_kg: PerVehicle,
     /// Radius of the solid hull in m, for all vehicles or for each. The hulls of any two vehicles must fit within
-    /// `law.delta_m`.
+    /// `law.delta_m`, so they change no motion until a pair is closer than that; the ideal plant has no hulls.
     pub(super) hull_radius_m: PerVehicle,
     /// Velocity coefficient a22 of p'' = a22 v + u in 1/s: negative is drag, positive feeds energy in.
     pub(super) a22_per_s: f64,
@@ -119,8 +120,8 @@ pub(super) enum StartShape {
     Random {
         /// Half the side of the square or cube around the origin in m.
         half_extent_m: f64,
-        /// Smallest distance between two vehicles in m: more than `law.delta_m`.
-        min_separation_m: f64,
+        /// Smallest distance between two vehicles in m: more than `law.delta_m`, and 1.5 times that unless given.
+        min_separation_m: Option<f64>,
     },
 }
 
@@ -170,6 +171,9 @@ pub(super) enum FormationShape {
     },
 }
 
+/// The law that is flown where `[law]` names none.
+pub(super) const DEFAULT_LAW: &str = "edge-tension";
+
 /// The control law and the safety distance.
 #[derive(Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
@@ -178,7 +182,6 @@ pub(super) struct LawTable {
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) kind: LawSpec,
     /// Safety distance delta in m: every flight is judged by it, whatever the law.
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub(super) delta_m: f64,
 }
 
@@ -218,7 +221,8 @@ pub(super) enum GraphKind {
 pub(super) struct PlantTable {
     /// What moves the vehicles.
     pub(super) kind: PlantKind,
-    /// Floating-point precision of Rapier: 32 or 64 bits. The ideal plant has no choice of it.
+    /// Floating-point precision of Rapier: 32 or 64 bits. Unless given, 32 where they tell positions apart to the end of
+    /// the flight, and 64 elsewhere. The ideal plant has no choice of it.
     #[cfg_attr(feature = "schema", schemars(with = "Precision"))]
     pub(super) precision: Option<Precision>,
 }
@@ -291,7 +295,7 @@ impl Default for GraphTable {
 
 impl Default for PlantTable {
     fn default() -> Self {
-        Self { kind: PlantKind::Rapier, precision: Some(Precision::Single) }
+        Self { kind: PlantKind::Rapier, precision: None }
     }
 }
 

@@ -3,6 +3,8 @@
 use std::fmt::Display;
 
 use super::error::ScenarioError;
+use crate::space::Spaced;
+use crate::swarm::{Pair, Rows, row};
 
 /// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such
 /// numbers stay finite in single precision too.
@@ -26,6 +28,11 @@ pub const CONTACT_PREDICTION_M: f64 = 0.02;
 /// Longest name \[characters\].
 pub const MAX_NAME_CHARS: usize = 64;
 
+/// Whether a name may hold this.
+pub(super) fn may_be_in_a_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '-' || c == '_'
+}
+
 /// Memory that a flight may be expected to take \[bytes\].
 pub const MAX_MEMORY_BYTES: u128 = 8 << 30;
 
@@ -48,6 +55,20 @@ pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
     Err(ScenarioError::new(format!("{count} {vehicles} cannot form a formation"))
         .with_help("a swarm has at least 2 vehicles")
         .at("swarm.count"))
+}
+
+/// Refuses the first list, by its key and what it holds, that is there and not as long as there are vehicles.
+pub(super) fn check_lengths<const N: usize>(
+    count: usize,
+    lists: [(&'static str, &str, Option<usize>); N],
+) -> Result<(), ScenarioError> {
+    match lists.into_iter().find(|&(.., length)| length.is_some_and(|length| length != count)) {
+        Some((key, what, Some(length))) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
+            .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
+            .at(key)
+            .at("swarm.count")),
+        _ => Ok(()),
+    }
 }
 
 /// Refuses a swarm that would take more memory than [`MAX_MEMORY_BYTES`].
@@ -74,21 +95,23 @@ pub(super) fn pair_count(count: usize) -> u128 {
     count * count.saturating_sub(1) / 2
 }
 
+/// The first vehicle, and the first before it, that are at most `distance_m` apart.
+pub(super) fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
+    let mut spaced = Spaced::new(distance_m);
+    (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
+}
+
 /// The number, if it is positive and within the limits.
 pub(super) fn positive(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
     require_positive(what, number).map_err(|error| error.at(key))
 }
 
-pub(super) fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<(), ScenarioError> {
-    require_finite(what, number)
-        .and_then(|number| {
-            if number >= 0.0 {
-                Ok(())
-            } else {
-                Err(ScenarioError::new(format!("{what} is {number}")).with_help("it must be at least 0"))
-            }
-        })
-        .map_err(|error| error.at(key))
+pub(super) fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
+    let required = require_finite(what, number).and_then(|number| match number {
+        0.0.. => Ok(number),
+        _ => Err(ScenarioError::new(format!("{what} is {number}")).with_help("it must be at least 0")),
+    });
+    required.map_err(|error| error.at(key))
 }
 
 pub(super) fn require_positive(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
@@ -105,11 +128,7 @@ pub(super) fn require_more_than_zero(what: impl Display, number: f64) -> Result<
     if number > 0.0 && number.is_finite() {
         return Ok(number);
     }
-    let shown = match number {
-        _ if number.is_nan() => "not a number".to_owned(),
-        f64::INFINITY => "infinite".to_owned(),
-        _ => number.to_string(),
-    };
+    let shown = not_finite(number).map_or_else(|| number.to_string(), str::to_owned);
     Err(ScenarioError::new(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
 }
 
@@ -117,12 +136,13 @@ pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, Sce
     if number.abs() <= LARGEST {
         return Ok(number);
     }
-    let (shown, help) = if number.is_nan() {
-        ("not a number".to_owned(), "give a number".to_owned())
-    } else if number.is_infinite() {
-        ("infinite".to_owned(), "give a finite number".to_owned())
-    } else {
-        (format!("{number:e}, too large to compute with"), format!("the most is {LARGEST:e} in either direction"))
-    };
-    Err(ScenarioError::new(format!("{what} is {shown}")).with_help(help))
+    Err(match not_finite(number) {
+        Some(shown) => ScenarioError::new(format!("{what} is {shown}")).with_help("give a finite number"),
+        None => ScenarioError::new(format!("{what} is {number:e}, too large to compute with"))
+            .with_help(format!("the most is {LARGEST:e} in either direction")),
+    })
+}
+
+fn not_finite(number: f64) -> Option<&'static str> {
+    (!number.is_finite()).then_some(if number.is_nan() { "not a number" } else { "infinite" })
 }

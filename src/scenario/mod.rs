@@ -17,6 +17,7 @@ mod error;
 mod limits;
 #[cfg(feature = "files")]
 mod overrides;
+mod resolution;
 #[cfg(feature = "files")]
 mod resolved;
 #[cfg(feature = "schema")]
@@ -40,6 +41,7 @@ pub use limits::{
 };
 #[cfg(feature = "files")]
 pub use overrides::Override;
+pub use resolution::Drift;
 #[cfg(feature = "schema")]
 pub use schema::schema;
 #[cfg(feature = "files")]

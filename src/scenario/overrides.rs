@@ -20,7 +20,8 @@ pub(super) const OLD_ARRIVAL: &str = "judge";
 /// The path is dotted: `law.delta_m=1.5`. Keys and tables that the file does not have are made:
 /// `plant.precision=double`. Entries of a list are counted from 1, as vehicles are, and `x`, `y`, `z` are other names
 /// for 1, 2, 3: `start.positions_m.4.x=-1` moves vehicle 4. The value is TOML, and a bare word is a string. A whole
-/// table is replaced by an inline table: `formation={shape="circle", radius_m=3}`.
+/// table is replaced by an inline table: `formation={shape="circle", radius_m=3}`. Another `kind` or `shape` leaves the
+/// keys behind that it does not have: `law.kind=laplacian` is enough where the file gives `law.alpha`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Override {
     text: String,
@@ -86,16 +87,35 @@ impl Override {
         Place::new(SOURCE, &self.text, span)
     }
 
-    /// Sets the key in a document. Spans of what is set count from `base`.
-    pub(super) fn apply<'a>(&'a self, root: &mut DeTable<'a>, base: usize) -> Result<(), ScenarioError> {
-        let mut value = self.value().map_err(|error| self.refuse(&self.value, error.message()))?;
-        shift(&mut value, base + self.value.start);
-        let Some((first, rest)) = self.path.split_first() else { return Ok(()) };
-        let table = match &self.text[first.clone()] {
-            OLD_ARRIVAL => ARRIVAL,
-            table => table,
-        };
-        self.set_key(root, (table, first), rest, value, base)
+    /// Sets the key in a document, and makes it and its tables where they are not there. Spans of what is set count from
+    /// `base`.
+    pub(super) fn apply<'a>(&'a self, root: &mut Spanned<DeValue<'a>>, base: usize) -> Result<(), ScenarioError> {
+        let value = self.value().map_err(|error| self.refuse(&self.value, error.message()))?;
+        let mut target = root;
+        for (depth, part) in self.path.iter().enumerate() {
+            let name = match &self.text[part.clone()] {
+                OLD_ARRIVAL if depth == 0 => ARRIVAL,
+                name => name,
+            };
+            target = match target.get_mut() {
+                DeValue::Table(table) => {
+                    let span = base + part.start..base + part.end;
+                    let below = Spanned::new(span.clone(), DeValue::Table(DeTable::new()));
+                    table.entry(Spanned::new(span, Cow::Borrowed(name))).or_insert(below)
+                }
+                DeValue::Array(list) => {
+                    let what = format!("the list has entries 1 to {}, not {name}", list.len());
+                    let entry = self.entry(part)?.checked_sub(1).and_then(|entry| list.get_mut(entry));
+                    entry.ok_or_else(|| self.refuse(part, &what))?
+                }
+                other => {
+                    let what = format!("there is nothing below a {}", other.type_str());
+                    return Err(self.refuse(part, &what));
+                }
+            };
+        }
+        *target = shifted(value, base + self.value.start);
+        Ok(())
     }
 
     /// The value, with spans from its own first byte.
@@ -108,65 +128,6 @@ impl Override {
                 Err(error)
             }
         })
-    }
-
-    fn set<'a>(
-        &'a self,
-        target: &mut DeValue<'a>,
-        path: &'a [Range<usize>],
-        value: Spanned<DeValue<'a>>,
-        base: usize,
-    ) -> Result<(), ScenarioError> {
-        let Some((first, rest)) = path.split_first() else {
-            *target = value.into_inner();
-            return Ok(());
-        };
-        match target {
-            DeValue::Table(table) => self.set_key(table, (&self.text[first.clone()], first), rest, value, base),
-            DeValue::Array(list) => {
-                let count = list.len();
-                let entry = self.entry(first)?.checked_sub(1).and_then(|entry| list.get_mut(entry));
-                let Some(entry) = entry else {
-                    let what = format!("the list has entries 1 to {count}, not {}", &self.text[first.clone()]);
-                    return Err(self.refuse(first, &what));
-                };
-                if rest.is_empty() {
-                    *entry = value;
-                    Ok(())
-                } else {
-                    self.set(entry.get_mut(), rest, value, base)
-                }
-            }
-            other => {
-                let what = format!("there is nothing below a {}", other.type_str());
-                Err(self.refuse(first, &what))
-            }
-        }
-    }
-
-    fn set_key<'a>(
-        &'a self,
-        table: &mut DeTable<'a>,
-        (name, key): (&'a str, &Range<usize>),
-        rest: &'a [Range<usize>],
-        value: Spanned<DeValue<'a>>,
-        base: usize,
-    ) -> Result<(), ScenarioError> {
-        let span = base + key.start..base + key.end;
-        if rest.is_empty() {
-            // Removed first: a map keeps the key that it has, and this key's place is here now.
-            table.remove(name);
-            table.insert(Spanned::new(span, Cow::Borrowed(name)), value);
-            return Ok(());
-        }
-        if !table.contains_key(name) {
-            let below = Spanned::new(span.clone(), DeValue::Table(DeTable::new()));
-            table.insert(Spanned::new(span, Cow::Borrowed(name)), below);
-        }
-        match table.get_mut(name) {
-            Some(below) => self.set(below.get_mut(), rest, value, base),
-            None => Ok(()),
-        }
     }
 
     /// The number of a list's entry, from 1.
@@ -199,25 +160,17 @@ fn is_word(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_' || c == '-'
 }
 
-/// Moves all spans within a value.
-fn shift(value: &mut Spanned<DeValue<'_>>, by: usize) {
+/// A value with all its spans moved.
+fn shifted(value: Spanned<DeValue<'_>>, by: usize) -> Spanned<DeValue<'_>> {
     let moved = |span: Range<usize>| span.start + by..span.end + by;
-    let inner = std::mem::replace(value.get_mut(), DeValue::Boolean(false));
-    let inner = match inner {
-        DeValue::Array(mut list) => {
-            list.iter_mut().for_each(|entry| shift(entry, by));
-            DeValue::Array(list)
+    let span = moved(value.span());
+    let inner = match value.into_inner() {
+        DeValue::Array(list) => DeValue::Array(list.into_iter().map(|entry| shifted(entry, by)).collect()),
+        DeValue::Table(table) => {
+            let key = |key: Spanned<_>| Spanned::new(moved(key.span()), key.into_inner());
+            DeValue::Table(table.into_iter().map(|(name, entry)| (key(name), shifted(entry, by))).collect())
         }
-        DeValue::Table(table) => DeValue::Table(
-            table
-                .into_iter()
-                .map(|(key, mut entry)| {
-                    shift(&mut entry, by);
-                    (Spanned::new(moved(key.span()), key.into_inner()), entry)
-                })
-                .collect(),
-        ),
         plain => plain,
     };
-    *value = Spanned::new(moved(value.span()), inner);
+    Spanned::new(span, inner)
 }

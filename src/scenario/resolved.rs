@@ -55,10 +55,10 @@ impl From<&Scenario> for Document {
             PlantSpec::Ideal => (PlantKind::Ideal, None),
         };
         Self {
-            name: scenario.name.clone(),
+            name: Some(scenario.name.clone()),
             swarm: SwarmTable {
                 count: Some(scenario.count() as u64),
-                dimensions: Some(if scenario.space == Space::Plane { 2 } else { 3 }),
+                dimensions: Some(scenario.space.dimensions() as u64),
                 mass_kg: per_vehicle(&scenario.mass_kg),
                 hull_radius_m: per_vehicle(&scenario.hull_radius_m),
                 a22_per_s: scenario.a22_per_s,

@@ -1,23 +1,53 @@
 //! The JSON Schema of the scenario file, and where a key belongs as it says.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
-use super::document::Document;
-use super::overrides::OLD_ARRIVAL;
+use super::document::{DEFAULT_LAW, Document};
+use super::overrides::{ARRIVAL, OLD_ARRIVAL};
+use crate::law::LawSpec;
 
-/// The JSON Schema of the scenario file, with descriptions, units and defaults.
+/// Keys, of any table, whose number is positive.
+const POSITIVE: [&str; 12] = [
+    "delta_m",
+    "disagreement_m_s",
+    "dt_s",
+    "duration_s",
+    "edge_error_m",
+    "half_extent_m",
+    "min_separation_m",
+    "PerVehicle",
+    "radius_m",
+    "record_hz",
+    "side_m",
+    "spacing_m",
+];
+/// Keys, of any table, whose number is 0 or positive.
+const FROM_ZERO: [&str; 2] = ["hold_s", "jitter_m"];
+
+/// The JSON Schema of the scenario file, with descriptions, units, bounds and defaults.
 #[must_use]
 pub fn schema() -> Value {
     let mut schema = schemars::schema_for!(Document).to_value();
-    tidy(&mut schema);
+    let gains = LawSpec::all().into_iter().flat_map(|law| law.complete(0.0).gains());
+    let gains = gains.map(|gain| (gain.key.trim_start_matches("law."), gain.may_be_zero));
+    let bounds = POSITIVE.map(|key| (key, false)).into_iter().chain(FROM_ZERO.map(|key| (key, true))).chain(gains);
+    tidy(&mut schema, &bounds.collect());
     schema["properties"][OLD_ARRIVAL] =
         json!({ "$ref": "#/$defs/Arrival", "deprecated": true, "description": "The old name of `arrival`." });
+    for law in schema["$defs"]["LawTable"]["oneOf"].as_array_mut().into_iter().flatten() {
+        if law["properties"]["kind"]["const"] == DEFAULT_LAW {
+            law["required"] = json!([]);
+        }
+    }
+    schema["not"] = json!({ "required": [ARRIVAL, OLD_ARRIVAL] });
     schema
 }
 
 /// TOML has no null: a key that may be left out has the type that it has when it is there. The defaults of a table stand
-/// at its keys.
-fn tidy(schema: &mut Value) {
+/// at its keys, and so do bounds: whether a number may be 0.
+fn tidy(schema: &mut Value, bounds: &BTreeMap<&str, bool>) {
     match schema {
         Value::Object(object) => {
             object.retain(|key, value| key != "default" || !(value.is_null() || value.is_object()));
@@ -29,11 +59,26 @@ fn tidy(schema: &mut Value) {
                             *value = only.take();
                         }
                     }
-                    other => tidy(other),
+                    _ => tidy(value, bounds),
+                }
+                if let Some(&may_be_zero) = bounds.get(key.as_str()) {
+                    bound(value, if may_be_zero { "minimum" } else { "exclusiveMinimum" });
                 }
             }
         }
-        Value::Array(list) => list.iter_mut().for_each(tidy),
+        Value::Array(list) => list.iter_mut().for_each(|value| tidy(value, bounds)),
+        _ => {}
+    }
+}
+
+/// Sets 0 as the bound of a number, or of those within.
+fn bound(schema: &mut Value, bound: &str) {
+    match schema {
+        Value::Object(object) if object.get("type").is_some_and(|of| of == "number") => {
+            object.insert(bound.to_owned(), 0.into());
+        }
+        Value::Object(object) => object.values_mut().for_each(|value| self::bound(value, bound)),
+        Value::Array(list) => list.iter_mut().for_each(|value| self::bound(value, bound)),
         _ => {}
     }
 }

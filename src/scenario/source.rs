@@ -4,9 +4,11 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::document::{PlantKind, PlantTable};
 use super::error::{Place, ScenarioError};
+use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
 use super::overrides::Override;
-use super::spec::Scenario;
+use super::spec::{PlantSpec, Scenario};
 use super::suggest::suggest;
 use super::text::Text;
 use super::{build, builtin};
@@ -14,6 +16,9 @@ use super::{build, builtin};
 /// Largest scenario file that is read \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge
 /// each. Reading takes about 45 times the length of the file in memory.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
+
+/// What standard input is called in messages.
+const STANDARD_INPUT: &str = "standard input";
 
 /// Where the text of a scenario comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,11 +37,16 @@ pub enum Source {
 }
 
 impl Source {
-    /// The built-in scenario of this name, or else the file at this path.
+    /// The built-in scenario of this name, or else the file at this path; standard input, which is read to its end, for
+    /// `-`.
     ///
     /// # Errors
-    /// [`ScenarioError`] when it is neither: a word without `.` or a separator of paths, and no such file.
+    /// [`ScenarioError`] when it is none of them: a word without `.` or a separator of paths, and no such file; or when
+    /// standard input cannot be read.
     pub fn resolve(name_or_path: &str) -> Result<Self, ScenarioError> {
+        if name_or_path == "-" {
+            return Ok(Self::Text { name: STANDARD_INPUT.to_owned(), text: read(STANDARD_INPUT, std::io::stdin())? });
+        }
         if builtin::find(name_or_path).is_some() {
             return Ok(Self::Builtin(name_or_path.to_owned()));
         }
@@ -60,7 +70,8 @@ impl Source {
 }
 
 impl Scenario {
-    /// Reads, completes and checks a scenario.
+    /// Reads, completes and checks a scenario. One without a name has that of its file, in which what a name may not hold
+    /// becomes `-`; where the precision of Rapier is not given, single is taken if it tells positions apart to the end.
     ///
     /// # Errors
     /// [`ScenarioError`] when the source cannot be read, is not TOML, has a key that is unknown, missing or of the
@@ -69,8 +80,15 @@ impl Scenario {
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
         let text = Text { name: &name, toml: &text, overrides };
-        let scenario = build::scenario(text.decode()?).map_err(|error| text.place(error))?;
+        let mut document = text.decode()?;
+        let stem = || Path::new(&name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        document.name = document.name.or_else(|| Some(as_name(&stem())));
+        let precision_is_open = matches!(document.plant, PlantTable { kind: PlantKind::Rapier, precision: None });
+        let mut scenario = build::scenario(document).map_err(|error| text.place(error))?;
         scenario.validate().map_err(|error| text.place(error))?;
+        if precision_is_open {
+            scenario.plant = PlantSpec::Rapier(scenario.needed_precision());
+        }
         Ok(scenario)
     }
 }
@@ -80,30 +98,34 @@ fn unknown_builtin(name: &str) -> ScenarioError {
     ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file")).with_help(suggest(name, &names))
 }
 
+/// What a name may not hold becomes `-`.
+fn as_name(text: &str) -> String {
+    text.chars().take(MAX_NAME_CHARS).map(|c| if may_be_in_a_name(c) { c } else { '-' }).collect()
+}
+
 /// The text of a file that is small enough and UTF-8.
 fn read_file(path: &Path) -> Result<String, ScenarioError> {
-    let shown = path.display();
-    let cannot = |error: std::io::Error| {
-        ScenarioError::new(format!("cannot read {shown}: {error}"))
-            .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
-    };
-    let too_large = || {
-        ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
-            .with_help("no scenario is that long: is it the right file?")
-    };
-    let metadata = std::fs::metadata(path).map_err(cannot)?;
-    if metadata.is_dir() {
+    let shown = path.display().to_string();
+    if path.is_dir() {
         return Err(ScenarioError::new(format!("{shown} is a directory"))
             .with_help("give the path of a scenario file within it"));
     }
-    if metadata.len() > MAX_FILE_BYTES {
-        return Err(too_large());
-    }
+    read(&shown, File::open(path).map_err(|error| unreadable(&shown, &error))?)
+}
+
+fn unreadable(shown: &str, error: &std::io::Error) -> ScenarioError {
+    ScenarioError::new(format!("cannot read {shown}: {error}"))
+        .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
+}
+
+/// What a source, shown by this name, holds to its end: not too much, and UTF-8.
+fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
     let mut bytes = Vec::new();
     // A device or a pipe does not say how long it is.
-    File::open(path).map_err(cannot)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(cannot)?;
+    source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(shown, &error))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(too_large());
+        return Err(ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
+            .with_help("no scenario is that long: is it the right file?"));
     }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
@@ -111,6 +133,6 @@ fn read_file(path: &Path) -> Result<String, ScenarioError> {
         let text = String::from_utf8_lossy(&bytes[..bytes.len().min(valid + 64)]);
         ScenarioError::new(format!("byte {valid} (from 0) is not UTF-8"))
             .with_help("save the file as UTF-8 text")
-            .with_place(Place::new(&shown.to_string(), &text, valid..valid + '\u{fffd}'.len_utf8()))
+            .with_place(Place::new(shown, &text, valid..valid + '\u{fffd}'.len_utf8()))
     })
 }

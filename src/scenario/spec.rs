@@ -60,6 +60,17 @@ pub enum Space {
     Volume,
 }
 
+impl Space {
+    /// Number of its axes.
+    #[must_use]
+    pub fn dimensions(self) -> usize {
+        match self {
+            Self::Plane => 2,
+            Self::Volume => 3,
+        }
+    }
+}
+
 /// Which plant flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlantSpec {

@@ -15,6 +15,9 @@ use crate::formation::Formation;
 use crate::space::Spaced;
 use crate::swarm::{Rows, row, set_row};
 
+/// Smallest distance of random positions unless given, as a multiple of delta.
+const DEFAULT_SEPARATION: f64 = 1.5;
+
 /// Random positions tried for one vehicle before the square or cube is called full.
 const TRIES: u32 = 1000;
 
@@ -40,6 +43,7 @@ pub(super) fn positions(
         StartShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
         StartShape::Random { half_extent_m, min_separation_m } => {
             let half_extent_m = positive("start.half_extent_m", "the half extent", half_extent_m)?;
+            let min_separation_m = min_separation_m.unwrap_or(DEFAULT_SEPARATION * delta_m);
             let min_separation_m = positive("start.min_separation_m", "the smallest separation", min_separation_m)?;
             if min_separation_m <= delta_m {
                 return Err(ScenarioError::new(format!(

@@ -3,14 +3,15 @@
 //! Spans live in one address space: the file's bytes first, then each override's. A value therefore knows where it was
 //! written, whichever text that was.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use serde::Deserialize as _;
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::{Spanned, map::Map};
 
-use super::deserializer::{KeyError, Unknown, Value};
-use super::document::Document;
+use super::deserializer::{CHOICES, KeyError, Unknown, Value};
+use super::document::{DEFAULT_LAW, Document};
 use super::error::{Field, Place, ScenarioError};
 use super::overrides::{ARRIVAL, OLD_ARRIVAL, Override};
 #[cfg(feature = "schema")]
@@ -40,15 +41,43 @@ pub(super) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Reads the keys of the scenario.
+    /// Reads the keys of the scenario, without those of a choice that an override has left.
     pub(super) fn decode(&self) -> Result<Document, ScenarioError> {
-        let root = self.tree()?;
-        if root.get_ref().is_empty() {
-            return Err(ScenarioError::new("the scenario is empty")
-                .with_help("start from a built-in scenario, such as `pentagon`")
-                .with_place(Place::new(self.name, self.toml, 0..0)));
+        let mut left: Vec<(String, String)> = Vec::new();
+        loop {
+            let mut root = self.tree()?;
+            if root.get_ref().as_table().is_some_and(Map::is_empty) {
+                return Err(ScenarioError::new("the scenario is empty")
+                    .with_help("start from a built-in scenario, such as `pentagon`")
+                    .with_place(Place::new(self.name, self.toml, 0..0)));
+            }
+            left.iter().for_each(|(table, key)| remove(&mut root, table, key));
+            match Document::deserialize(Value::from(root)) {
+                Ok(document) => return Ok(document),
+                Err(error) => match self.left_behind(&error) {
+                    Some(key) => left.push(key),
+                    None => return Err(self.explain(error)),
+                },
+            }
         }
-        Document::deserialize(Value::root(root)).map_err(|error| self.explain(error))
+    }
+
+    /// The table and the key of the file that an error is about, where an override has left the choice that the key
+    /// belongs to: `--set law.kind=laplacian` leaves `law.alpha`.
+    fn left_behind(&self, error: &KeyError) -> Option<(String, String)> {
+        let (Some(Unknown::Key(key, _)), Some(span)) = (&error.unknown, &error.span) else { return None };
+        let in_file = |span: &Range<usize>| span.start <= self.toml.len();
+        let root = self.tree().ok()?;
+        let mut tables = root.get_ref().as_table()?.iter();
+        let (name, chosen) = tables.find_map(|(name, table)| {
+            let table = table.get_ref().as_table()?;
+            let (key, value) = table.get_key_value(key.as_str())?;
+            let holds_it = key.span() == *span && in_file(&value.span());
+            let chosen = CHOICES.iter().find_map(|choice| table.get(*choice));
+            holds_it.then_some((name.get_ref(), chosen?))
+        })?;
+        let is_of_a_choice = tables_with(key).iter().any(|place| place.starts_with(&format!("[{name}] with ")));
+        (!in_file(&chosen.span()) && is_of_a_choice).then(|| (name.to_string(), key.clone()))
     }
 
     /// Gives an error about keys its place in the text: at the first key that an override touched, or else at the
@@ -66,25 +95,36 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// The text as a tree, overrides applied, `[judge]` under its new name.
-    fn tree(&self) -> Result<Spanned<DeTable<'a>>, ScenarioError> {
-        let mut root = DeTable::parse(self.toml).map_err(|error| {
+    /// The text as a tree, overrides applied, `[judge]` under its new name, a law without a kind under the default one.
+    fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
+        let parsed = DeTable::parse(self.toml).map_err(|error| {
             ScenarioError::new(format!("this is not TOML: {}", error.message()))
                 .with_help("a scenario is `key = value` lines below `[table]` headers")
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
-        if let Some((old, table)) = root.get_mut().remove_entry(OLD_ARRIVAL) {
-            if root.get_ref().contains_key(ARRIVAL) {
+        let mut tables = parsed.into_inner();
+        if let Some((old, table)) = tables.remove_entry(OLD_ARRIVAL) {
+            if tables.contains_key(ARRIVAL) {
                 return Err(ScenarioError::new("both [arrival] and [judge] are given")
                     .with_help("[judge] is the old name of [arrival]: keep one of them")
                     .with_place(self.locate(old.span())));
             }
-            root.get_mut().insert(Spanned::new(old.span(), ARRIVAL.into()), table);
+            tables.insert(Spanned::new(old.span(), ARRIVAL.into()), table);
         }
+        let mut root = Spanned::new(0..0, DeValue::Table(tables));
         let mut base = self.toml.len() + 1;
         for set in self.overrides {
-            set.apply(root.get_mut(), base)?;
+            set.apply(&mut root, base)?;
             base += set.text().len() + 1;
+        }
+        if let DeValue::Table(tables) = root.get_mut()
+            && let Some(law) = tables.get_mut("law")
+        {
+            let span = law.span();
+            if let DeValue::Table(keys) = law.get_mut() {
+                let kind = Spanned::new(span.clone(), DeValue::String(DEFAULT_LAW.into()));
+                keys.entry(Spanned::new(span, Cow::from("kind"))).or_insert(kind);
+            }
         }
         Ok(root)
     }
@@ -129,6 +169,15 @@ impl<'a> Text<'a> {
     }
 }
 
+/// Takes a key out of a table.
+fn remove(root: &mut Spanned<DeValue<'_>>, table: &str, key: &str) {
+    if let DeValue::Table(tables) = root.get_mut()
+        && let Some(DeValue::Table(keys)) = tables.get_mut(table).map(Spanned::get_mut)
+    {
+        keys.remove(key);
+    }
+}
+
 /// Only the schema knows.
 #[cfg(not(feature = "schema"))]
 fn tables_with(_key: &str) -> Vec<String> {
@@ -137,17 +186,15 @@ fn tables_with(_key: &str) -> Vec<String> {
 
 /// The span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its table
 /// if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
-fn find(root: &Spanned<DeTable<'_>>, field: Field, overridden: usize) -> Range<usize> {
+fn find(root: &Spanned<DeValue<'_>>, field: Field, overridden: usize) -> Range<usize> {
+    let at = |path: &str| path.split('.').try_fold(root, |value, key| value.get_ref().get(key));
     let origins = ORIGINS.iter().find(|(key, _)| *key == field.key).map_or(&[][..], |(_, origins)| origins);
-    let found = std::iter::once(field.key).chain(origins.iter().copied()).find_map(|key| lookup(root, key));
-    let Some(value) = found else {
+    let Some(value) = std::iter::once(&field.key).chain(origins).find_map(|key| at(key)) else {
         let table = field.key.split('.').next().unwrap_or_default();
-        return root.get_ref().get_key_value(table).map_or(0..0, |(key, _)| key.span());
+        let tables = root.get_ref().as_table();
+        return tables.and_then(|tables| tables.get_key_value(table)).map_or(0..0, |(key, _)| key.span());
     };
-    let value = match (value.get_ref(), field.entry) {
-        (DeValue::Array(list), Some(entry)) => list.get(entry).unwrap_or(value),
-        _ => value,
-    };
+    let value = field.entry.and_then(|entry| value.get_ref().get(entry)).unwrap_or(value);
     first_span_from(value, overridden).unwrap_or_else(|| value.span())
 }
 
@@ -156,18 +203,5 @@ fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<u
     if value.span().start >= least {
         return Some(value.span());
     }
-    match value.get_ref() {
-        DeValue::Array(list) => list.iter().find_map(|entry| first_span_from(entry, least)),
-        _ => None,
-    }
-}
-
-/// The value at a dotted path.
-fn lookup<'t, 'a>(root: &'t Spanned<DeTable<'a>>, path: &str) -> Option<&'t Spanned<DeValue<'a>>> {
-    let mut parts = path.split('.');
-    let first = root.get_ref().get(parts.next()?)?;
-    parts.try_fold(first, |value, key| match value.get_ref() {
-        DeValue::Table(table) => table.get(key),
-        _ => None,
-    })
+    value.get_ref().as_array()?.iter().find_map(|entry| first_span_from(entry, least))
 }

@@ -10,15 +10,12 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct TimeSpec {
     /// Length of the flight in s.
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub duration_s: f64,
     /// Physics step in s; the law is asked once a step. A step that is too long for the law is flown in parts.
     #[serde(default = "TimeSpec::default_dt_s")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub dt_s: f64,
     /// Samples recorded per second of flight in Hz, at most one a step.
     #[serde(default = "TimeSpec::default_record_hz")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub record_hz: f64,
     /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
     /// step as it is.

@@ -2,19 +2,15 @@
 
 use super::error::ScenarioError;
 use super::limits::{
-    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, at_least_zero, check_count, check_memory, positive,
-    require_finite, require_more_than_zero, require_positive,
+    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, at_least_zero, check_count, check_lengths,
+    check_memory, first_within, may_be_in_a_name, positive, require_finite, require_more_than_zero, require_positive,
 };
-use super::spec::{PlantSpec, Precision, Scenario, Space};
+use super::spec::{Scenario, Space};
 use super::time::TimeSpec;
 use crate::graph::Graph;
 use crate::law::Gain;
-use crate::space::Spaced;
-use crate::swarm::{Pair, Rows, mean_row, row};
+use crate::swarm::Pair;
 use crate::target::Begins;
-
-/// Largest error of a22 by the engine's rounding, as a share of a22.
-const DAMPING_RESOLUTION: f64 = 0.01;
 
 /// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
 /// step.
@@ -78,44 +74,6 @@ impl Scenario {
         Ok(())
     }
 
-    /// Refuses what single precision would silently not move.
-    fn check_resolution(&self) -> Result<(), ScenarioError> {
-        if self.plant != PlantSpec::Rapier(Precision::Single) {
-            return Ok(());
-        }
-        let refuse = |said: String| {
-            Err(ScenarioError::new(said)
-                .with_help("set plant.precision to \"double\", or enlarge time.dt_s")
-                .at("time.dt_s")
-                .at("plant.precision"))
-        };
-        let (dt_s, half_ulp) = (self.time.dt_s, 0.5 * f64::from(f32::EPSILON));
-        let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
-        let extent_m = slots_m.fold(extent_m(&self.start.positions_m), f64::max);
-        let stalled_m_s = half_ulp * extent_m / dt_s;
-        if stalled_m_s > self.arrival.disagreement_m_s {
-            return refuse(format!(
-                "in single precision, {extent_m:.3e} m from the middle of the swarm and in steps of {dt_s} s, a vehicle \
-                 slower than {stalled_m_s:.1e} m/s does not move"
-            ));
-        }
-        let drift_per_s = half_ulp / dt_s;
-        if self.a22_per_s != 0.0 && drift_per_s > DAMPING_RESOLUTION * self.a22_per_s.abs() {
-            return refuse(format!(
-                "in single precision and steps of {dt_s} s, a22 = {} 1/s is off by {drift_per_s:.1e} 1/s",
-                self.a22_per_s
-            ));
-        }
-        let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
-        match first_within(&self.start.positions_m, rounded_m) {
-            Some((pair, separation_m)) => refuse(format!(
-                "vehicles {pair} start {separation_m} m apart, which single precision cannot tell from delta = {} m",
-                self.delta_m
-            )),
-            None => Ok(()),
-        }
-    }
-
     /// The number of slots of the first leg that does not have one for each vehicle.
     fn slots_of_a_wrong_leg(&self) -> Option<usize> {
         self.legs.iter().map(|leg| leg.formation.count()).find(|&slots| slots != self.count())
@@ -137,38 +95,40 @@ impl Scenario {
     }
 
     fn check_lengths(&self) -> Result<(), ScenarioError> {
-        let count = self.count();
-        let lengths = [
-            ("start.velocities_m_s", "start velocities", self.start.velocities_m_s.nrows()),
-            ("formation.points_m", "slots in the formation", self.slots_of_a_wrong_leg().unwrap_or(count)),
-            ("swarm.mass_kg", "masses", self.mass_kg.len()),
-            ("swarm.hull_radius_m", "hull radii", self.hull_radius_m.len()),
-            ("graph.edges", "vehicles in the graph", self.graph.count()),
-        ];
-        match lengths.into_iter().find(|&(.., length)| length != count) {
-            Some((key, what, length)) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
-                .with_help("there must be one for each start position")
-                .at(key)),
-            None => Ok(()),
-        }
+        check_lengths(
+            self.count(),
+            [
+                ("start.velocities_m_s", "start velocities", Some(self.start.velocities_m_s.nrows())),
+                ("formation.points_m", "slots in the formation", self.slots_of_a_wrong_leg()),
+                ("swarm.mass_kg", "masses", Some(self.mass_kg.len())),
+                ("swarm.hull_radius_m", "hull radii", Some(self.hull_radius_m.len())),
+                ("graph.edges", "vehicles in the graph", Some(self.graph.count())),
+            ],
+        )
     }
 
     fn check_law(&self) -> Result<(), ScenarioError> {
         positive("law.delta_m", "the safety distance delta", self.delta_m)?;
         for Gain { key, name, value, may_be_zero } in self.law.gains() {
-            if may_be_zero { at_least_zero(key, name, value)? } else { positive(key, name, value).map(drop)? }
+            if may_be_zero {
+                at_least_zero(key, name, value)?
+            } else {
+                positive(key, name, value)?
+            };
         }
         Ok(())
     }
 
     fn check_vehicles(&self) -> Result<(), ScenarioError> {
-        for (i, &mass_kg) in self.mass_kg.iter().enumerate() {
-            require_positive(format_args!("the mass of vehicle {}", i + 1), mass_kg)
-                .map_err(|error| error.at_entry("swarm.mass_kg", i))?;
-        }
-        for (i, &radius_m) in self.hull_radius_m.iter().enumerate() {
-            require_positive(format_args!("the hull radius of vehicle {}", i + 1), radius_m)
-                .map_err(|error| error.at_entry("swarm.hull_radius_m", i))?;
+        let numbers = [
+            ("swarm.mass_kg", "the mass", &self.mass_kg),
+            ("swarm.hull_radius_m", "the hull radius", &self.hull_radius_m),
+        ];
+        for (key, what, numbers) in numbers {
+            for (i, &number) in numbers.iter().enumerate() {
+                require_positive(format_args!("{what} of vehicle {}", i + 1), number)
+                    .map_err(|error| error.at_entry(key, i))?;
+            }
         }
         Ok(())
     }
@@ -204,17 +164,21 @@ impl Scenario {
 
     fn check_separations(&self) -> Result<(), ScenarioError> {
         let delta_m = self.delta_m;
+        let refuse = |said: String, help: &str, key: &'static str, pair: Pair| {
+            Err(ScenarioError::new(said)
+                .with_help(help)
+                .at_entry(key, pair.second())
+                .at_entry(key, pair.first())
+                .at("law.delta_m"))
+        };
         if let Some((pair, separation_m)) = first_within(&self.start.positions_m, delta_m) {
             let said = if separation_m == 0.0 {
                 format!("vehicles {pair} start at the same point")
             } else {
                 format!("vehicles {pair} start {separation_m} m apart, not more than delta = {delta_m} m")
             };
-            return Err(ScenarioError::new(said)
-                .with_help("move one of them away, or reduce law.delta_m: starts must be more than delta apart")
-                .at_entry("start.positions_m", pair.second())
-                .at_entry("start.positions_m", pair.first())
-                .at("law.delta_m"));
+            let help = "move one of them away, or reduce law.delta_m: starts must be more than delta apart";
+            return refuse(said, help, "start.positions_m", pair);
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
         if let Some((pair, distance_m)) = self.legs.iter().find_map(|leg| first_within(&leg.formation.slots_m, least_m))
@@ -230,11 +194,8 @@ impl Scenario {
                      billionth of it"
                 )
             };
-            return Err(ScenarioError::new(said)
-                .with_help("enlarge the formation, or reduce law.delta_m: slots must be more than delta apart")
-                .at_entry("formation.points_m", pair.second())
-                .at_entry("formation.points_m", pair.first())
-                .at("law.delta_m"));
+            let help = "enlarge the formation, or reduce law.delta_m: slots must be more than delta apart";
+            return refuse(said, help, "formation.points_m", pair);
         }
         Ok(())
     }
@@ -322,7 +283,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         "the name is empty".to_owned()
     } else if name.chars().count() > MAX_NAME_CHARS {
         format!("the name has more than {MAX_NAME_CHARS} characters")
-    } else if let Some(bad) = name.chars().find(|&c| !(c.is_ascii_alphanumeric() || c == '-' || c == '_')) {
+    } else if let Some(bad) = name.chars().find(|&c| !may_be_in_a_name(c)) {
         format!("the name holds {bad:?}")
     } else {
         return Ok(());
@@ -330,43 +291,18 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     Err(ScenarioError::new(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
 }
 
-/// Largest distance of a row from the mean of all rows \[m\].
-fn extent_m(rows: &Rows) -> f64 {
-    let mean = mean_row(rows);
-    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm()).fold(0.0, f64::max)
-}
-
-/// The first vehicle, and the first before it, that are at most `distance_m` apart.
-fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
-    let mut spaced = Spaced::new(distance_m);
-    (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
-}
-
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
 fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
-    if graph.is_connected() {
+    let apart = graph.unreachable();
+    if apart.is_empty() {
         return Ok(());
     }
-    let mut neighbours = vec![Vec::new(); graph.count()];
-    for (i, j) in graph.edges() {
-        neighbours[i].push(j);
-        neighbours[j].push(i);
-    }
-    let mut reached = vec![false; graph.count()];
-    reached[0] = true;
-    let mut open = vec![0];
-    while let Some(i) = open.pop() {
-        for &j in &neighbours[i] {
-            if !std::mem::replace(&mut reached[j], true) {
-                open.push(j);
-            }
-        }
-    }
-    let apart: Vec<String> =
-        (0..graph.count()).filter(|&i| !reached[i]).map(|i| (i + 1).to_string()).take(NAMED_VEHICLES + 1).collect();
+    let named: Vec<_> = apart.iter().take(NAMED_VEHICLES).map(|i| (i + 1).to_string()).collect();
     let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
-    let named = apart[..apart.len().min(NAMED_VEHICLES)].join(", ");
-    Err(ScenarioError::new(format!("the graph is not connected: no path joins vehicle 1 to {named}{more}"))
-        .with_help("add edges until every vehicle can be reached from every other")
-        .at("graph.edges"))
+    Err(ScenarioError::new(format!(
+        "the graph is not connected: no path joins vehicle 1 to {}{more}",
+        named.join(", ")
+    ))
+    .with_help("add edges until every vehicle can be reached from every other")
+    .at("graph.edges"))
 }

@@ -81,6 +81,19 @@ pub enum Breakdown {
         /// The vehicle, from 0.
         vehicle: usize,
     },
+    /// The numbers that positions are computed in no longer tell them apart.
+    #[error(
+        "step {step}: the swarm is so far from its start that positions are {spacing_m:.1e} m apart from number to \
+         number, and {needed_m} m count"
+    )]
+    Unresolved {
+        /// The step, from 1.
+        step: u64,
+        /// Distance between neighbouring numbers \[m\].
+        spacing_m: f64,
+        /// What is to be told apart: the largest edge error that counts as reached \[m\].
+        needed_m: f64,
+    },
     /// The plant could not be solved any further.
     #[error("step {step}: the equation of motion cannot be solved to its tolerances")]
     Stalled {

@@ -10,6 +10,7 @@ mod ending;
 mod judge;
 mod motion;
 mod parts;
+mod resolution;
 mod simulation;
 
 use std::ops::ControlFlow;

@@ -7,6 +7,7 @@ use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError
 use super::judge::Judge;
 use super::motion::Motion;
 use super::parts::Parts;
+use super::resolution;
 use crate::feedback::Feedback as _;
 use crate::law::{Certificate, Void};
 use crate::plant::Path;
@@ -169,7 +170,7 @@ impl Simulation {
             return;
         }
         let step = self.steps + 1;
-        let flown = self.advance(step);
+        let flown = self.advance(step).and_then(|()| Ok(resolution::check(&self.state, &self.scenario, step)?));
         let completed = flown.is_ok() && step == self.scenario.time.steps();
         self.sample_is_due = flown.is_ok() && self.scenario.time.records(step);
         self.end_on(flown);

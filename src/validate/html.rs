@@ -3,7 +3,7 @@
 use super::claim::{Claim, Group, Kind};
 use super::convergence::Refinement;
 use super::result::Validation;
-use crate::report::page::{Badge, Block, Cell, Column, Page, Section, Table, Tone};
+use crate::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
 
 /// What the claims rest on.
 const ASSUMED: [&str; 3] = [
@@ -19,39 +19,31 @@ impl Validation {
     #[must_use]
     pub fn to_html(&self) -> String {
         let failed = self.claims().filter(|claim| !claim.pass);
-        let mut sections: Vec<Section> = self.groups.iter().map(section).collect();
+        let mut sections: Vec<Markup> = self.groups.iter().map(claims).collect();
         let (of_convergence, of_paper): (Vec<_>, Vec<_>) =
             self.figures.iter().cloned().partition(|figure| figure.name == "convergence");
         sections.extend([
-            Section::new(
-                "Convergence ladder",
-                vec![Block::Table(convergence(&self.convergence)), Block::Figures(of_convergence)],
-            ),
-            Section::new("The paper's figures", vec![Block::Figures(of_paper)]),
-            Section::new("What was assumed", vec![Block::List(ASSUMED.map(str::to_owned).to_vec())]),
-            Section::new("Repeat it", vec![Block::Command("tautline validate".to_owned())]),
+            section("Convergence ladder", &[convergence(&self.convergence), page::figures(&of_convergence)]),
+            section("The paper's figures", &[page::figures(&of_paper)]),
+            section("What was assumed", &[page::list(&ASSUMED)]),
+            section("Repeat it", &[page::command("tautline validate")]),
         ]);
         Page {
             title: "Validation".to_owned(),
-            kind: "Every claim, ours and the paper's, judged by measurement".to_owned(),
+            kind: "Every claim, ours and the paper's, judged by measurement",
             badge: Badge::judged(self.pass),
             verdict: self.headline(),
             reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),
             warnings: Vec::new(),
             sections,
-            foot: format!("Made by {} {}.", self.tool.name, self.tool.version),
         }
         .render()
     }
 }
 
-fn section(group: &Group) -> Section {
-    let table = Table {
-        caption: caption(group),
-        columns: vec![Column::words("Claim"), Column::words("Measured"), Column::words("Outcome")],
-        rows: group.claims.iter().map(row).collect(),
-    };
-    Section::new(group.title, vec![Block::Table(table)])
+fn claims(group: &Group) -> Markup {
+    let columns = ["Claim", "Measured", "Outcome"];
+    section(group.title, &[page::words(&caption(group), &columns, group.claims.iter().map(row))])
 }
 
 fn caption(group: &Group) -> String {
@@ -63,7 +55,7 @@ fn caption(group: &Group) -> String {
     }
 }
 
-fn row(claim: &Claim) -> Vec<Cell> {
+fn row(claim: &Claim) -> [Markup; 3] {
     let tone = match (claim.pass, claim.kind) {
         (false, _) => Tone::Bad,
         (true, Kind::PaperRefuted) => Tone::Neutral,
@@ -72,29 +64,22 @@ fn row(claim: &Claim) -> Vec<Cell> {
     let Claim { id, source, expected, tolerance, reason, .. } = claim;
     let finding = claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default();
     let judged = format!("Expected: {expected}. Tolerance: {tolerance} ({reason}).");
-    vec![
-        Cell::Noted(claim.statement.to_owned(), format!("{finding}{id}; {source}")),
-        Cell::Noted(claim.measured.clone(), judged),
-        Cell::Badge(Badge { tone, word: claim.outcome().to_owned() }),
+    [
+        noted(claim.statement, &format!("{finding}{id}; {source}")),
+        noted(&claim.measured, &judged),
+        Badge { tone, word: claim.outcome() }.render(),
     ]
 }
 
-fn convergence(refinements: &[Refinement]) -> Table {
-    let number = |x: f64| Cell::from(format!("{x:.2e}"));
+fn convergence(refinements: &[Refinement]) -> Markup {
     let row = |&Refinement { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. }: &Refinement| {
+        let [double, single, excess] = [double_m, single_m, energy_excess_m2_s2].map(|x| format!("{x:.2e}"));
         let order = order.map_or("–".to_owned(), |order| format!("{order:.3}"));
-        let step = Cell::from(format!("1/{:.0}", 1.0 / dt_s));
-        vec![step, number(double_m), Cell::from(order), number(single_m), number(energy_excess_m2_s2)]
+        [format!("1/{:.0}", 1.0 / dt_s), double, order, single, excess]
     };
-    Table {
-        caption: "Largest position error of Rapier on the pentagon's flight, by step".to_owned(),
-        columns: vec![
-            Column::words("Step [s]"),
-            Column::numbers("Double precision [m]"),
-            Column::numbers("Order"),
-            Column::numbers("Single precision [m]"),
-            Column::numbers("Energy excess [m²/s²]"),
-        ],
-        rows: refinements.iter().map(row).collect(),
-    }
+    page::numbers(
+        "Largest position error of Rapier on the pentagon's flight, by step",
+        &["Step [s]", "Double precision [m]", "Order", "Single precision [m]", "Energy excess [m²/s²]"],
+        refinements.iter().map(row),
+    )
 }

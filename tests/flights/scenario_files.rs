@@ -4,7 +4,7 @@ use std::fs;
 
 use proptest::prelude::*;
 use tautline::formation::Formation;
-use tautline::scenario::{self, Override, Scenario, ScenarioError, Source, Space, builtin};
+use tautline::scenario::{self, Override, PlantSpec, Precision, Scenario, ScenarioError, Source, Space, builtin};
 use tautline::swarm::{Rows, Swarm, separation};
 
 /// A minimal flight that is right: what the wrong ones below are changed from.
@@ -50,9 +50,7 @@ fn every_wrong_input_is_refused_at_its_place_with_a_remedy() {
         ("spacing_m", "spacing", "unknown key `spacing`", (9, 1)),
         ("spacing_m = 3.0", "radius_m = 3.0", "unknown key `radius_m`", (9, 1)),
         ("spacing_m = 3.0", "", "missing key `spacing_m`", (7, 1)),
-        ("kind = \"edge-tension\"", "", "missing key `kind`", (10, 1)),
         ("duration_s = 1.0", "", "missing key `duration_s`", (13, 1)),
-        ("name = \"pair\"", "", "missing key `name`", (1, 1)),
         ("\"line\"", "\"lien\"", "unknown choice `lien`", (8, 9)),
         ("\"line\"", "7", "expected a string", (8, 9)),
         ("2.0\n[time]", "\"two\"\n[time]", "expected a number", (12, 11)),
@@ -209,6 +207,67 @@ fn an_override_sets_any_key_and_makes_those_that_are_not_there() {
     assert!(says(&["time.dt_s=0.1", "time.dt_s=0.2"], "dt_s = 0.2"), "the last one wins");
     assert_eq!(set(&["graph.kind=star"]).graph.edge_count(), 4);
     assert_eq!(set(&["formation={shape=\"circle\", radius_m=3}"]).formation(), &Formation::circle(5, 3.0));
+}
+
+#[test]
+fn another_kind_leaves_the_keys_of_the_one_before_and_nothing_else() {
+    let law = |sets: &[&str]| read_builtin("pentagon", sets).map(|scenario| scenario.law);
+    let laplacian = law(&["law={kind=\"laplacian\", delta_m=2}"]).expect("a law");
+    assert_eq!(law(&["law.kind=laplacian"]), Ok(laplacian), "the pentagon's file gives law.alpha");
+    let circle = read_builtin("pentagon", &["formation.shape=circle", "formation.radius_m=3"]).expect("a circle");
+    assert_eq!(circle.formation(), &Formation::circle(5, 3.0), "the pentagon's file gives formation.side_m");
+    let refused = |text: &str, sets: &[&str]| {
+        let overrides = sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>().expect("overrides");
+        let source = Source::Text { name: "f".to_owned(), text: text.to_owned() };
+        Scenario::read(&source, &overrides).expect_err("refused").message().to_owned()
+    };
+    let alpha = RIGHT.replace("delta_m", "alpha = 1\ndelta_m");
+    let (wrong, slip) = (alpha.replace("edge-tension", "laplacian"), alpha.replace("alpha", "alhpa"));
+    assert!(refused(&wrong, &[]).contains("unknown key `alpha`"), "the file is wrong by itself");
+    assert!(refused(&slip, &["law.kind=laplacian"]).contains("unknown key `alhpa`"), "no kind has it");
+    assert!(
+        refused(&alpha, &["law.kind=laplacian", "law.alpha=2"]).contains("unknown key `alpha`"),
+        "it was asked for"
+    );
+    assert!(refused(RIGHT, &["law.kind=laplacian", "law.alpha=2"]).contains("unknown key `alpha`"), "it was asked for");
+    assert!(
+        refused(&alpha, &["formation.shape=circle", "formation.radius_m=3", "law.f1_per_s2=2"]).contains("`f1_per_s2`")
+    );
+}
+
+#[test]
+fn what_is_not_given_has_its_default() {
+    let named = |name: &str, text: &str| {
+        Scenario::read(&Source::Text { name: name.to_owned(), text: text.to_owned() }, &[]).expect("right")
+    };
+    let nameless = RIGHT.replace("name = \"pair\"\n", "");
+    assert_eq!(named("out/my flight.v2.toml", &nameless).name, "my-flight-v2");
+    assert_eq!(named("out/my flight.toml", RIGHT).name, "pair");
+    let kindless = RIGHT.replace("kind = \"edge-tension\"\n", "");
+    assert_eq!(named("f", &kindless), named("f", RIGHT));
+    let alpha = kindless.replace("delta_m", "alpha = 2\ndelta_m");
+    assert_eq!(named("f", &alpha).law, named("f", &alpha.replace("alpha", "kind = \"edge-tension\"\nalpha")).law);
+    let random = |more: &str| {
+        read_builtin("pentagon", &[&format!("start={{shape=\"random\", half_extent_m=20, seed=3{more}}}")])
+            .expect("room")
+    };
+    assert_eq!(random(""), random(", min_separation_m=3.0"), "1.5 times delta");
+}
+
+#[test]
+fn precision_is_chosen_by_need_where_it_is_not_given() {
+    let plant = |sets: &[&str]| read_builtin("pentagon", sets).expect("right").plant;
+    let [single, double] = [Precision::Single, Precision::Double].map(PlantSpec::Rapier);
+    assert_eq!(plant(&[]), single);
+    assert_eq!(plant(&["time.duration_s=400"]), double, "rounding drives the swarm 1e11 m away");
+    assert_eq!(plant(&["time.duration_s=400", "swarm.a22_per_s=0"]), single);
+    assert_eq!(plant(&["time.duration_s=400", "plant.precision=single"]), single, "what is asked for is flown");
+    assert_eq!(plant(&["start.velocities_m_s=[[500,0],[500,0],[500,0],[500,0],[500,0]]"]), double, "drift");
+    assert_eq!(plant(&["arrival.edge_error_m=1e-5"]), double, "tolerance");
+    assert_eq!(plant(&["start.positions_m.4.x=-2000"]), double, "extent");
+    assert_eq!(plant(&["time.dt_s=1e-6"]), double, "steps too short for 32 bits");
+    assert!(read_builtin("pentagon", &["time.dt_s=1e-6", "plant.precision=single"]).is_err());
+    assert_eq!(plant(&["plant.kind=ideal"]), PlantSpec::Ideal);
 }
 
 #[test]
@@ -462,9 +521,59 @@ fn the_schema_describes_every_key_and_refuses_null() {
     }
     assert!(text.contains("\"default\":0.004166666666666667") && text.contains("\"const\":\"edge-tension\""));
     assert!(!text.contains("null") && !text.contains("\\["), "{schema:#}");
-    assert_eq!(schema["required"], serde_json::json!(["name", "start", "formation", "law", "time"]));
+    assert_eq!(schema["required"], serde_json::json!(["start", "formation", "law", "time"]));
     assert!(described(&schema["properties"]));
     assert!(schema["$defs"].as_object().is_some_and(|defs| defs.values().all(|def| described(&def["properties"]))));
+}
+
+#[test]
+fn the_schema_bounds_a_number_where_the_reader_does() {
+    let schema = scenario::schema();
+    let mut bounded = 0;
+    for (table, place) in schema["properties"].as_object().expect("tables") {
+        let Some(of) = place["$ref"].as_str().filter(|_| place["deprecated"] != true) else { continue };
+        let definition = schema.pointer(of.trim_start_matches('#')).expect("a definition");
+        let listed = ["oneOf", "anyOf"].iter().filter_map(|of| definition[of].as_array()).flatten();
+        for alternative in listed.chain([&serde_json::json!({})]) {
+            let keys = |of: &str| -> Vec<(String, serde_json::Value)> {
+                let maps = [definition, alternative].map(|of_table| of_table[of].as_object().cloned());
+                maps.into_iter().flatten().flatten().collect()
+            };
+            let required = |key: &str| {
+                let lists = [definition, alternative].map(|of| of["required"].as_array().cloned());
+                lists.into_iter().flatten().flatten().any(|needed| needed == key)
+            };
+            let properties = keys("properties");
+            let of_numbers: Vec<_> = properties.iter().filter(|(_, value)| value["type"] == "number").collect();
+            for (key, property) in &of_numbers {
+                let others = properties
+                    .iter()
+                    .filter(|(other, value)| other != key && (required(other) || value["const"].is_string()));
+                let others = others.map(|(other, value)| match value["const"].as_str() {
+                    Some(choice) => format!(", {other} = \"{choice}\""),
+                    None => format!(", {other} = 3.0"),
+                });
+                let others: String = others.collect();
+                let refuses = |number: &str| {
+                    let start = "start={shape=\"line\", spacing_m=4}".to_owned();
+                    let set = format!("{table}={{{key} = {number}{others}}}");
+                    let sets = ["swarm.count=5".to_owned(), start, set];
+                    let sets =
+                        sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>().expect("TOML");
+                    let source = Source::Text { name: "f".to_owned(), text: RIGHT.to_owned() };
+                    let said = Scenario::read(&source, &sets).err().map(|error| error.message().to_owned());
+                    said.is_some_and(|said| said.contains(&format!(" is {number}")))
+                };
+                let (minimum, above) = (&property["minimum"], &property["exclusiveMinimum"]);
+                assert_eq!(refuses("-1"), minimum == 0 || above == 0, "{table}.{key}{others}");
+                assert_eq!(refuses("0"), above == 0, "{table}.{key}{others}");
+                bounded += usize::from(minimum == 0 || above == 0);
+            }
+        }
+    }
+    assert!(bounded > 20, "{bounded} numbers are bounded");
+    assert_eq!(schema["$defs"]["PerVehicle"]["anyOf"][0]["exclusiveMinimum"], 0);
+    assert_eq!(schema["not"]["required"], serde_json::json!(["arrival", "judge"]));
 }
 
 /// Whether every key of a table has a description.

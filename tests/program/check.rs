@@ -48,12 +48,18 @@ fn a_star_of_twelve_is_refused() {
     assert_eq!((code, codes(&found)[0]), (1, "relative-velocity-unstable"));
     let (code, found) = json(&[&star[..], &["--set", "swarm.count=10"]].concat());
     assert_eq!(code, 0, "ten are damped: {found}");
+    assert!(found["certified_m"].is_null() && found["certified_edges_m"].as_f64().is_some(), "{found}");
+    let (_, out, _) = tautline(&[&["check"], &star[..], &["--set", "swarm.count=10"]].concat());
+    assert!(out.contains("pairs joined by an edge never come closer than") && !out.contains("may grow"), "{out}");
+    assert!(!out.contains("algebraic convergence"), "{out}");
 }
 
 #[test]
 fn a_circle_in_space_is_warned_of_and_a_line_is_refused() {
     let (code, found) = json(&["circle", "--set", "swarm.dimensions=3"]);
     assert!(code == 0 && codes(&found).contains(&"flat-formation-in-space"), "{found}");
+    let (_, out, _) = tautline(&["check", "circle", "--set", "swarm.dimensions=3"]);
+    assert!(out.contains("algebraic convergence at best"), "there it is true: {out}");
     let (code, found) = json(&["pentagon-collinear"]);
     assert!(code == 1 && codes(&found).contains(&"start-on-line"), "{found}");
 }
@@ -70,6 +76,23 @@ fn wrong_input_is_told_apart_from_a_bad_flight() {
         assert_eq!((code, out.as_str()), (2, ""), "{arguments:?}: {err}");
         assert!(!err.is_empty());
     }
+}
+
+#[test]
+fn a_drift_that_numbers_do_not_follow_is_refused_and_precision_is_chosen_by_need() {
+    let check = |sets: &[&str]| json(&sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
+    let epsilon = |found: &Value| found["epsilon"].as_f64().expect("a number");
+    let (code, found) = check(&["swarm.a22_per_s=0.5"]);
+    assert_eq!((code, codes(&found)[0]), (1, "drift-unresolved"), "{found}");
+    let (code, found) = check(&["time.duration_s=400"]);
+    assert!(code == 0 && epsilon(&found) < 1e-15, "64 bits are taken: {found}");
+    let (code, found) = check(&["time.duration_s=400", "plant.precision=single"]);
+    assert_eq!((code, codes(&found)[0]), (1, "drift-unresolved"), "{found}");
+    let (code, found) = check(&[]);
+    assert!(code == 0 && epsilon(&found) > 1e-8, "32 bits are enough: {found}");
+    assert!(
+        found["warnings"][0]["message"].as_str().expect("words").contains("No distance between vehicles feels that")
+    );
 }
 
 #[test]

@@ -115,6 +115,18 @@ fn a_killed_run_is_flown_again_without_force() {
 }
 
 #[test]
+fn a_run_that_was_asked_to_stop_is_flown_again_without_force_and_one_that_ended_is_not() {
+    let mut underway = Underway::new();
+    underway.end_by("INT");
+    assert!(underway.report().exists(), "it left a report");
+    let again = flown(underway.folder.path(), "out", 60);
+    assert_eq!((again.exit, again.out.as_str(), again.err.as_str()), (Some(0), "", ""));
+    let finished = flown(underway.folder.path(), "out", 60);
+    assert_eq!(finished.exit, Some(2), "{}", finished.err);
+    assert!(finished.err.contains("out holds a finished run"), "{}", finished.err);
+}
+
+#[test]
 fn a_run_that_is_asked_to_stop_ends_with_a_report_on_what_it_flew() {
     for signal in ["INT", "TERM"] {
         let mut underway = Underway::new();

@@ -8,6 +8,8 @@ mod check;
 mod determinism;
 mod exports;
 mod interruption;
+mod keys;
 mod reads;
 mod refuses;
 mod runs;
+mod scenarios;

@@ -66,7 +66,7 @@ fn the_pentagon_as_json_is_the_reference_flight() {
     near("/energy/initial", 3.656_743, 1e-5);
     near("/formation/reached_at_s", 37.0, 1.0);
     assert!([vec![2, 3], vec![1, 3]].map(Value::from).contains(&report["separation"]["min_pair"]));
-    assert_eq!(report["verdict"], json(r#"{"pass": true, "reasons": []}"#));
+    assert_eq!(report["verdict"], json(r#"{"pass": true, "refused": [], "reasons": []}"#));
     assert_eq!(report["audit"]["status"], "clear");
     assert_eq!(report["audit"]["violations"], json("[]"));
     assert_eq!(report["audit"]["closed_form"]["min_m"], report["separation"]["min_m"]);
@@ -83,16 +83,17 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "schema_version",
         "scenario.name scenario.sha256",
         "tool.name tool.version",
-        "verdict.pass verdict.reasons",
+        "verdict.pass verdict.refused verdict.reasons",
         "separation.delta_m separation.min_m separation.min_at_s separation.min_pair separation.certified_m",
         "separation.certificate_void",
         "audit.status audit.violations audit.steps audit.pairs_checked audit.closed_form.min_m",
         "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
-        "formation.reached formation.reached_at_s formation.max_edge_error_m formation.rms_position_error_m",
+        "formation.reached formation.reached_at_s formation.held_s formation.fails formation.at_rest",
+        "formation.max_edge_error_m formation.rms_position_error_m",
         "energy.initial energy.final energy.max_over_initial",
         "control.peak_m_s2 control.final_m_s2",
         "velocity.disagreement_m_s velocity.common_m_s",
-        "run.duration_s run.dt_s run.steps run.vehicles run.state_hash",
+        "run.duration_s run.dt_s run.steps run.ended_early run.vehicles run.state_hash",
         "performance.wall_s performance.real_time_factor performance.law_s performance.physics_s",
         "performance.audit_s performance.record_s",
     ];

@@ -1,0 +1,123 @@
+//! Whether the numbers that a plant computes in tell positions apart.
+//!
+//! A plant counts positions from the middle of the start. Whatever moves the swarm as a whole (its mean velocity, which no
+//! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
+
+use super::error::ScenarioError;
+use super::limits::first_within;
+use super::spec::{PlantSpec, Precision, Scenario};
+use crate::swarm::{Rows, mean_row, row};
+
+/// Largest error of a22 by the engine's rounding, as a share of a22.
+const DAMPING_RESOLUTION: f64 = 0.01;
+
+/// Single precision is chosen where its numbers are this much finer than what counts as reached: each of some thousand
+/// steps rounds.
+#[cfg(feature = "files")]
+const FINER: f64 = 100.0;
+
+const SINGLE: PlantSpec = PlantSpec::Rapier(Precision::Single);
+
+/// How far the swarm as a whole is carried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    /// Speed of its mean at the end \[m/s\].
+    pub speed_m_s: f64,
+    /// Distance of its mean from the start at the end \[m\].
+    pub distance_m: f64,
+    /// Distance between neighbouring numbers there \[m\], for the vehicle farthest out.
+    pub spacing_m: f64,
+}
+
+impl PlantSpec {
+    /// Relative distance between neighbouring numbers of those that positions are computed in.
+    #[must_use]
+    pub fn epsilon(self) -> f64 {
+        match self {
+            Self::Rapier(Precision::Single) => f32::EPSILON.into(),
+            #[cfg(feature = "double")]
+            Self::Rapier(Precision::Double) => f64::EPSILON,
+            #[cfg(feature = "ideal")]
+            Self::Ideal => f64::EPSILON,
+        }
+    }
+}
+
+impl Scenario {
+    /// What the mean velocity, and with it a rounding error of [`PlantSpec::epsilon`] m/s, comes to by the end of the flight
+    /// where it grows at this rate \[1/s\].
+    #[must_use]
+    pub fn drift(&self, rate_per_s: f64) -> Drift {
+        self.drift_in(self.plant, rate_per_s)
+    }
+
+    fn drift_in(&self, plant: PlantSpec, rate_per_s: f64) -> Drift {
+        let (epsilon, duration_s) = (plant.epsilon(), self.time.duration_s);
+        let seed_m_s = self.start.mean_velocity_m_s().norm() + epsilon;
+        let grown = rate_per_s * duration_s;
+        let distance_m = seed_m_s * if grown == 0.0 { duration_s } else { grown.exp_m1() / rate_per_s };
+        let spacing_m = epsilon * (self.extent_m() + distance_m);
+        Drift { speed_m_s: seed_m_s * grown.exp(), distance_m, spacing_m }
+    }
+
+    /// The precision that tells positions apart to the end of the flight.
+    #[cfg(feature = "files")]
+    pub(super) fn needed_precision(&self) -> Precision {
+        let spacing_m = self.drift_in(SINGLE, self.a22_per_s).spacing_m;
+        if self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
+            Precision::Single
+        } else {
+            Precision::Double
+        }
+    }
+
+    /// Largest distance of a start or a slot from the middle of its swarm \[m\].
+    fn extent_m(&self) -> f64 {
+        let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
+        slots_m.fold(extent_m(&self.start.positions_m), f64::max)
+    }
+
+    /// Refuses what single precision would silently not move.
+    pub(super) fn check_resolution(&self) -> Result<(), ScenarioError> {
+        if self.plant == SINGLE { self.check_single() } else { Ok(()) }
+    }
+
+    fn check_single(&self) -> Result<(), ScenarioError> {
+        let refuse = |said: String| {
+            Err(ScenarioError::new(said)
+                .with_help("set plant.precision to \"double\", or enlarge time.dt_s")
+                .at("time.dt_s")
+                .at("plant.precision"))
+        };
+        let (dt_s, half_ulp) = (self.time.dt_s, 0.5 * SINGLE.epsilon());
+        let extent_m = self.extent_m();
+        let stalled_m_s = half_ulp * extent_m / dt_s;
+        if stalled_m_s > self.arrival.disagreement_m_s {
+            return refuse(format!(
+                "in single precision, {extent_m:.3e} m from the middle of the swarm and in steps of {dt_s} s, a vehicle \
+                 slower than {stalled_m_s:.1e} m/s does not move"
+            ));
+        }
+        let drift_per_s = half_ulp / dt_s;
+        if self.a22_per_s != 0.0 && drift_per_s > DAMPING_RESOLUTION * self.a22_per_s.abs() {
+            return refuse(format!(
+                "in single precision and steps of {dt_s} s, a22 = {} 1/s is off by {drift_per_s:.1e} 1/s",
+                self.a22_per_s
+            ));
+        }
+        let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
+        match first_within(&self.start.positions_m, rounded_m) {
+            Some((pair, separation_m)) => refuse(format!(
+                "vehicles {pair} start {separation_m} m apart, which single precision cannot tell from delta = {} m",
+                self.delta_m
+            )),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Largest distance of a row from the mean of all rows \[m\].
+fn extent_m(rows: &Rows) -> f64 {
+    let mean = mean_row(rows);
+    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm()).fold(0.0, f64::max)
+}

@@ -1,0 +1,91 @@
+//! docs/report.md names every key that the program prints, with its unit, and no other.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::program::{TAUTLINE, ran_by};
+use serde_json::Value;
+
+const PAGE: &str = include_str!("../../docs/report.md");
+
+/// The keys of a section of the page, each with its unit.
+fn documented(section: &str) -> BTreeMap<&'static str, &'static str> {
+    let text = PAGE.split("\n## ").find(|text| text.starts_with(section)).expect("a section");
+    let row = |line: &'static str| {
+        let mut cells = line.trim_matches('|').split(" | ").map(str::trim);
+        Some((cells.next()?.strip_prefix('`')?.strip_suffix('`')?, cells.next()?))
+    };
+    text.lines().map(|line| line.replace("| |", "| - |")).map(|line| &*line.leak()).filter_map(row).collect()
+}
+
+/// Every key of a JSON value by its path.
+fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(table) => {
+            for (key, value) in table {
+                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                keys(value, &path, found);
+            }
+        }
+        Value::Array(list) if list.iter().any(Value::is_object) => {
+            list.iter().for_each(|value| keys(value, &format!("{path}[]"), found));
+        }
+        _ => {
+            found.insert(path.to_owned());
+        }
+    }
+}
+
+/// What commands print, all their keys together.
+fn printed(commands: &[&[&str]]) -> BTreeSet<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut found = BTreeSet::new();
+    for command in commands {
+        let ran = ran_by(TAUTLINE, Path::new(folder.path()), command);
+        keys(&serde_json::from_str(&ran.out).expect("JSON"), "", &mut found);
+    }
+    found
+}
+
+fn assert_documented(section: &str, commands: &[&[&str]]) {
+    let documented = documented(section);
+    // A list of plain values is one key.
+    let named: BTreeSet<_> = documented.keys().map(|key| key.trim_end_matches("[]").to_owned()).collect();
+    assert_eq!(named, printed(commands), "{section}");
+    for (key, unit) in documented {
+        let units = [("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_per_s", "1/s"), ("_m", "m"), ("_s", "s")];
+        match units.iter().find(|(suffix, _)| key.ends_with(suffix)) {
+            Some((_, expected)) => assert_eq!(unit, *expected, "{key}"),
+            None => assert!(["-", "m^2/s^2"].contains(&unit), "{key}: {unit}"),
+        }
+    }
+}
+
+#[test]
+fn every_key_of_the_report_is_on_its_page() {
+    let violated =
+        ["run", "pentagon-laplacian", "--no-figures", "--no-snapshots", "--json", "--set", "time.duration_s=6"];
+    assert_documented("report.json", &[&violated]);
+}
+
+#[test]
+fn every_key_of_the_check_is_on_its_page() {
+    assert_documented("check --json", &[&["check", "--json"]]);
+}
+
+#[test]
+fn every_code_of_a_warning_is_on_its_page() {
+    use tautline::preflight::Code;
+    for code in [
+        Code::RelativeVelocityUnstable,
+        Code::StartOnLine,
+        Code::StartInPlane,
+        Code::DriftUnresolved,
+        Code::NoCertificate,
+        Code::NotRigid,
+        Code::FlatFormationInSpace,
+        Code::CommonModeUnstable,
+    ] {
+        assert!(PAGE.contains(&format!("`{}`", code.name())), "{}", code.name());
+    }
+}

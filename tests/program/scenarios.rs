@@ -1,0 +1,142 @@
+//! Where a scenario may come from, and what is refused before it is flown.
+
+use std::fs;
+use std::path::Path;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// A flight without a name and a kind of law.
+const SHORT: &str = r#"[start]
+positions_m = [[0.0, 0.0], [4.0, 0.0]]
+[formation]
+shape = "line"
+spacing_m = 3.0
+[law]
+delta_m = 2.0
+[time]
+duration_s = 1.5
+"#;
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect(text)
+}
+
+const RUN: [&str; 4] = ["run", "--no-figures", "--no-snapshots", "--json"];
+
+#[test]
+fn a_scenario_comes_from_a_file_that_names_it_or_from_standard_input() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("two by two.toml"), SHORT).expect("a file");
+    let of_file = ran(folder.path(), &[&RUN[..], &["two by two.toml"]].concat());
+    assert_eq!(json(&of_file.out)["scenario"]["name"], "two-by-two", "{}", of_file.err);
+    assert!(folder.path().join("out/two-by-two/run.mcap").exists());
+
+    let mut piped = Command::new(TAUTLINE);
+    let piped = piped.args(RUN).arg("-").current_dir(folder.path()).env("XDG_RUNTIME_DIR", folder.path());
+    let of_input = piped.write_stdin(SHORT).output().expect("the program");
+    let report = json(&String::from_utf8_lossy(&of_input.stdout));
+    assert_eq!(report["scenario"]["name"], "standard-input");
+    assert_eq!(report["run"]["state_hash"], json(&of_file.out)["run"]["state_hash"], "the same flight");
+
+    let mut wrong = Command::new(TAUTLINE);
+    let wrong =
+        wrong.args(["check", "-"]).write_stdin(SHORT.replace("delta_m", "delta")).output().expect("the program");
+    let said = String::from_utf8_lossy(&wrong.stderr).into_owned();
+    assert!(wrong.status.code() == Some(2) && said.contains("unknown key `delta`"), "{said}");
+    assert!(said.contains("standard input:7:1"), "{said}");
+    assert_eq!(ran(folder.path(), &["check", "-"]).exit, Some(2), "nothing is no scenario");
+}
+
+#[test]
+fn the_scenario_of_a_recording_can_be_had_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let flown = ran(folder.path(), &[&RUN[..], &["circle", "--set", "time.duration_s=1", "--out", "first"]].concat());
+    let shown = ran(folder.path(), &["list", "--show", "first/run.mcap"]);
+    assert_eq!((shown.exit, shown.err.as_str()), (Some(0), ""));
+    fs::write(folder.path().join("again.toml"), &shown.out).expect("a file");
+    let again = ran(folder.path(), &[&RUN[..], &["again.toml", "--out", "second"]].concat());
+    for key in ["/scenario/name", "/scenario/sha256", "/run/state_hash"] {
+        assert_eq!(json(&flown.out).pointer(key), json(&again.out).pointer(key), "{key}");
+    }
+    fs::write(folder.path().join("other.mcap"), b"no recording").expect("a file");
+    for (name, said) in [("other.mcap", "other.mcap"), ("again.toml", "hold a scenario"), ("nothing", "no built-in")] {
+        let refused = ran(folder.path(), &["list", "--show", name]);
+        assert_eq!((refused.exit, refused.out.as_str()), (Some(2), ""), "{name}");
+        assert!(refused.err.contains(said), "{}", refused.err);
+    }
+}
+
+#[test]
+fn what_check_refuses_is_said_first_and_in_the_headline_and_never_passes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Two vehicles on a line that reach a line at once: nothing is refused but what drives the swarm.
+    let unstable =
+        "[graph]\nkind = \"path\"\n[arrival]\nedge_error_m = 100.0\ndisagreement_m_s = 100.0\nhold_s = 0.1\n[time]";
+    let text = SHORT.replace("[time]", unstable);
+    fs::write(folder.path().join("pair.toml"), text).expect("a file");
+    let run = |more: &[&str]| ran(folder.path(), &[&RUN[..], &["pair.toml", "--force"], more].concat());
+    let good = run(&[]);
+    assert_eq!(good.exit, Some(0), "{}", good.err);
+    assert!(json(&good.out)["verdict"]["refused"] == json("[]") && !good.err.contains("refused"), "{}", good.err);
+
+    let refused = run(&["--set", "swarm.a22_per_s=0.5", "--set", "law={kind=\"laplacian\", delta_m=2, f2_per_s=0.1}"]);
+    assert_eq!(refused.exit, Some(1), "{}", refused.err);
+    assert!(refused.err.starts_with("REFUSED: relative-velocity-unstable\n"), "{}", refused.err);
+    let headline = refused.err.lines().find(|line| line.starts_with("CLEAR: ")).expect("it is flown and judged");
+    assert!(headline.contains("formation reached"), "{headline}");
+    assert!(headline.ends_with("; refused before the first step: relative-velocity-unstable"), "{headline}");
+    let report = json(&refused.out);
+    assert_eq!(report["verdict"]["refused"], json("[\"relative-velocity-unstable\"]"));
+    assert_eq!((&report["verdict"]["pass"], &report["formation"]["reached"]), (&json("false"), &json("true")));
+    let reasons = report["verdict"]["reasons"].as_array().expect("reasons");
+    assert_eq!(reasons.len(), 1, "{reasons:?}");
+    assert_eq!(report["run"]["steps"], 360, "to its end");
+}
+
+#[test]
+fn a_formation_that_is_not_reached_names_the_number_that_fails_and_whether_time_would_help() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let fly = |sets: &[&str]| {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let arguments: Vec<_> = RUN.into_iter().chain(["pentagon", "--force"]).chain(sets).collect();
+        let Ran { out, err, .. } = ran(folder.path(), &arguments);
+        let headline = err.lines().find(|line| line.contains("NOT reached")).expect("not reached").to_owned();
+        (json(&out)["formation"].clone(), headline)
+    };
+    let (line, said) = fly(&["start.positions_m=[[3,0],[9,0],[6,0],[0,0],[12,0]]"]);
+    assert_eq!((&line["fails"], &line["at_rest"]), (&json("\"max_edge_error_m\""), &json("true")));
+    assert!(said.contains("(largest edge error 8.57 m, at rest elsewhere)"), "{said}");
+    let (short, said) = fly(&["time.duration_s=10"]);
+    assert_eq!((&short["fails"], &short["at_rest"]), (&json("\"max_edge_error_m\""), &json("false")));
+    assert!(said.contains(", still moving)"), "{said}");
+    let (fast, said) = fly(&["time.duration_s=20", "arrival.edge_error_m=100"]);
+    assert_eq!(fast["fails"], "disagreement_m_s");
+    assert!(said.contains("(largest relative speed 0."), "{said}");
+    let (brief, said) = fly(&["time.duration_s=40", "arrival.hold_s=39"]);
+    assert!(brief["fails"] == "held_s" && brief["held_s"].as_f64().is_some_and(|held_s| held_s < 39.0), "{brief}");
+    assert!(said.contains("(kept for the last ") && brief["at_rest"].is_boolean(), "{said}");
+}
+
+#[test]
+fn positions_that_numbers_no_longer_tell_apart_end_a_flight() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let fly = |duration: &str| {
+        let sets = ["--set", "swarm.a22_per_s=0.5", "--set", "plant.precision=single", "--set", duration];
+        ran(folder.path(), &[&RUN[..], &["pentagon", "--force"], &sets].concat())
+    };
+    let lost = json(&fly("time.duration_s=70").out);
+    let reason = lost["run"]["ended_early"].as_str().expect("ended early");
+    assert!(reason.contains("apart from number to number, and 0.01 m count"), "{reason}");
+    let end_s = lost["run"]["duration_s"].as_f64().expect("a time");
+    // Rounding of 1e-7 m/s is 84 km after 53 s.
+    assert!((45.0..62.0).contains(&end_s), "{end_s}");
+    assert_eq!(lost["verdict"]["refused"], json("[\"drift-unresolved\"]"));
+    let told = json(&fly("time.duration_s=25").out);
+    assert!(told["run"]["ended_early"].is_null() && told["verdict"]["refused"] == json("[]"), "{told}");
+}
