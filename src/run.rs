@@ -5,13 +5,11 @@
 
 use std::ops::ControlFlow;
 
-use serde::{Deserialize, Serialize};
-
 use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash};
-use crate::report::{Findings, Performance, Report, Run};
+use crate::report::{Findings, Performance, Report, Run, Verification};
 use crate::scenario::{PlantSpec, Scenario};
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 
@@ -41,29 +39,7 @@ pub fn run_while(
     Ok(report(scenario, preflight, &flight, &metrics, state_hash.finish()))
 }
 
-/// The same flight with every step half as long, and what that changed.
-///
-/// What bounces hard off a barrier is chaotic: 10 to 20 of a hundred such flights end elsewhere however fine the step is. A
-/// verdict that two steps agree on is called firm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Verification {
-    /// Longest step of the second flight \[s\].
-    pub dt_s: f64,
-    /// Whether the second flight passed.
-    pub pass: bool,
-    /// Smallest separation of the second flight \[m\]; null for fewer than two vehicles.
-    pub min_m: Option<f64>,
-    /// When the second flight reached its formation \[s\].
-    pub reached_at_s: Option<f64>,
-    /// Whether both flights have the same verdict, and smallest separations that differ by at most [`FIRM`] of delta.
-    pub firm: bool,
-}
-
-/// Smallest separations that differ by this part of delta or less are the same.
-pub const FIRM: f64 = 0.01;
-
-/// Flies the scenario of `report` again at half the step.
+/// Flies the scenario of `report` again with every step half as long.
 ///
 /// # Errors
 /// As [`run`].
@@ -71,18 +47,7 @@ pub fn verify(scenario: &Scenario, report: &Report) -> Result<Verification, SimE
     let mut finer = scenario.clone();
     finer.time.dt_s *= 0.5;
     finer.time.max_rate_dt *= 0.5;
-    let again = run(&finer, &mut ())?;
-    let same_distance = match (report.separation.min_m, again.separation.min_m) {
-        (Some(before_m), Some(after_m)) => (before_m - after_m).abs() <= FIRM * scenario.delta_m,
-        (before_m, after_m) => before_m == after_m,
-    };
-    Ok(Verification {
-        dt_s: finer.time.dt_s,
-        pass: again.verdict.pass,
-        min_m: again.separation.min_m,
-        reached_at_s: again.formation.reached_at_s,
-        firm: same_distance && again.verdict.pass == report.verdict.pass && again.audit.status == report.audit.status,
-    })
+    Ok(Verification::of(report, &run(&finer, &mut ())?))
 }
 
 /// Whether the energy is proved never to grow: relative velocities are damped, and nothing voids the proof but that it

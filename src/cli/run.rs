@@ -19,8 +19,8 @@ use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
 use crate::record::mcap::{Header, McapRecorder};
-use crate::report::{Report, RunPage};
-use crate::run::run_while;
+use crate::report::{INTERRUPTED, Report, RunPage};
+use crate::run::{run_while, verify};
 use crate::scenario::Scenario;
 
 /// Exit code of a second Ctrl-C, as shells give it.
@@ -59,6 +59,9 @@ pub(super) struct RunArguments {
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
+    /// Fly again at half the step, and say what that changed.
+    #[arg(long)]
+    verify: bool,
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -111,7 +114,10 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     #[cfg(not(feature = "viewer"))]
     let mut watched = ();
     let mut watchers = (&mut history, &mut watched);
-    let report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
+    let mut report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
+    if arguments.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
+        report.verification = Some(threads.install(|| verify(&scenario, &report))?);
+    }
     #[cfg(feature = "viewer")]
     let snapshots = watched.snapshots(folder.path(), console)?;
     #[cfg(not(feature = "viewer"))]
@@ -130,6 +136,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     console.say(&format!("{}\n{}", report.headline(), report.text()));
     for reason in &report.verdict.reasons {
         console.say(reason);
+    }
+    if let Some(verification) = &report.verification {
+        console.say(&format!("{:<12} {}", "verified", verification.text()));
     }
     console.say(&format!(
         "wrote {}, {} and {}",

@@ -70,7 +70,7 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
             let help = "leave the options of reading out, or give a recording";
             return Err(Failure::input("a scenario is flown: how a recording is read has no effect on it", help));
         }
-        let scenario = scenario::read(&arguments.what, &arguments.overrides)?;
+        let scenario = scenario::read(&path.to_string_lossy(), &arguments.overrides)?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
     };
     show(timeline, live, arguments.theme, arguments.adapter.as_str().into())?;

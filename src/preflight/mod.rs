@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::formation::affine_dimension;
 use crate::graph::Graph;
 use crate::law::{Controls, Law, ParameterError, Void};
-use crate::scenario::{LARGEST, PlantSpec, Scenario};
+use crate::scenario::{LARGEST, Scenario};
 use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;

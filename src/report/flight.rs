@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
 use super::findings::{Findings, Performance, Run, finite};
-use super::verdict::{Fails, Verdict, at_rest};
+use super::verdict::{Fails, Verdict, at_rest, rises};
+use super::verification::Verification;
 use crate::audit::{self, Status};
 use crate::swarm::Pair;
 
@@ -38,6 +39,9 @@ pub struct Report {
     pub velocity: Velocity,
     /// Facts of the run.
     pub run: Run,
+    /// What flying again at half the step changed, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verification: Option<Verification>,
     /// Wall-clock times, the only part that differs between two runs of one scenario.
     pub performance: Performance,
 }
@@ -170,14 +174,17 @@ pub struct Energy {
     /// At the end.
     #[serde(rename = "final")]
     pub at_end: Option<f64>,
-    /// Largest over the samples, as a ratio to the initial one.
+    /// Largest over all steps, as a ratio to the initial one.
     pub max_over_initial: Option<f64>,
+    /// Whether it rose above its start by more than integration and rounding explain, where it is proved never to grow.
+    #[serde(default)]
+    pub rose: bool,
 }
 
 /// Commanded accelerations, the largest of any vehicle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Control {
-    /// Over all samples \[m/s^2\].
+    /// Over all steps \[m/s^2\].
     pub peak_m_s2: Option<f64>,
     /// At the end \[m/s^2\].
     pub final_m_s2: Option<f64>,
@@ -240,6 +247,7 @@ impl Report {
                 initial: summary.energy_initial.and_then(finite),
                 at_end: summary.energy_final.and_then(finite),
                 max_over_initial: summary.energy_max_over_initial.and_then(finite),
+                rose: rises(findings),
             },
             control: Control {
                 peak_m_s2: finite(summary.peak_control_m_s2),
@@ -250,6 +258,7 @@ impl Report {
                 common_m_s: finite(summary.common_m_s),
             },
             run: findings.run.clone(),
+            verification: None,
             performance: findings.performance,
         }
     }

@@ -13,6 +13,7 @@ mod html;
 pub mod page;
 pub mod recorded;
 mod verdict;
+mod verification;
 mod words;
 
 pub use crate::audit::Status;
@@ -24,6 +25,7 @@ pub use flight::{
 };
 pub use html::RunPage;
 pub use verdict::{Fails, Verdict};
+pub use verification::Verification;
 
 #[cfg(test)]
 mod tests;

@@ -145,6 +145,10 @@ pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f
 
 /// The proof says that the energy never grows: one that did was not flown by the law, but by a step too long for it or by
 /// numbers that ran out of digits.
+pub(super) fn rises(findings: &Findings<'_>) -> bool {
+    risen_energy(findings).is_some()
+}
+
 fn risen_energy(findings: &Findings<'_>) -> Option<String> {
     let (summary, vehicles) = (findings.summary, findings.run.vehicles);
     let (initial, most) = (summary.energy_initial?, summary.energy_max?);

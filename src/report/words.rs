@@ -36,7 +36,11 @@ impl Report {
                     }
                     _ => String::new(),
                 };
-                format!("CLEAR: {closest} (delta {delta} m){broken}, {}", self.formation_in_words())
+                let rose = match self.energy.max_over_initial.filter(|_| self.energy.rose) {
+                    Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
+                    None => String::new(),
+                };
+                format!("CLEAR: {closest} (delta {delta} m){broken}{rose}, {}", self.formation_in_words())
             }
             Status::Violation => {
                 let deepest = self.deepest_in_words();

@@ -81,20 +81,6 @@ pub enum PlantSpec {
     Ideal,
 }
 
-impl PlantSpec {
-    /// What part of its size a number of the plant resolves; the solver's tolerance in continuous time.
-    #[must_use]
-    pub fn epsilon(self) -> f64 {
-        match self {
-            Self::Rapier(Precision::Single) => f64::from(f32::EPSILON),
-            #[cfg(feature = "double")]
-            Self::Rapier(Precision::Double) => f64::EPSILON,
-            #[cfg(feature = "ideal")]
-            Self::Ideal => 1e-12,
-        }
-    }
-}
-
 /// Floating-point precision of the physics engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
