@@ -5,14 +5,11 @@
 //! enclose the distance from their chord. Halving the segment makes both bounds tight to second order. What rounding adds
 //! is bounded from the magnitudes that are summed, and widens the bounds.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
 use nalgebra::Vector3;
 
 use super::obstacle::Shape;
 use super::outcome::WIDTH_M;
-use super::polynomial::{BernsteinBasis, rescale, value};
+use super::polynomial::{BernsteinBasis, parts_told, rescale, value};
 use super::sweep::{RelativeMotion, Span};
 
 /// Parts that a search looks at before it gives up and answers with the interval it has.
@@ -48,35 +45,6 @@ pub(super) struct Minimum {
     pub(super) upper: f64,
     /// at this fraction of the segment.
     pub(super) at: f64,
-}
-
-/// A part of a segment that could hold the minimum.
-#[derive(Clone, Copy, Debug)]
-struct Part {
-    low: f64,
-    start: f64,
-    length: f64,
-}
-
-impl PartialEq for Part {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Part {}
-
-impl PartialOrd for Part {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Part {
-    /// The greatest part is the one with the lowest bound, and of those the earliest.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.low.total_cmp(&self.low).then(other.start.total_cmp(&self.start))
-    }
 }
 
 /// A relative position over a segment, and where it is close to a target.
@@ -128,31 +96,32 @@ impl<'a> Search<'a> {
     /// The smallest distance between two fractions of the segment, to within [`WIDTH_M`]; `None` if it is not below
     /// `cutoff`.
     pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64) -> Option<Minimum> {
-        let (low, _) = self.enclose(from, to - from);
-        if low >= cutoff {
-            return None;
-        }
+        let (mut length, mut open) = (to - from, vec![(self.enclose(from, to - from).0, from)]);
         let (start, end) = (self.distance(from), self.distance(to));
         let (mut upper, mut at) = if end < start { (end, to) } else { (start, from) };
-        let mut parts = BinaryHeap::from([Part { low, start: from, length: to - from }]);
-        let mut looked_at = 0;
-        let mut lower = f64::INFINITY;
-        while let Some(part) = parts.pop() {
-            lower = part.low;
-            if part.low >= cutoff || part.low >= upper - WIDTH_M || looked_at > MOST_PARTS {
+        let (mut lower, mut looked_at) = (upper, 0);
+        loop {
+            // What cannot hold anything below what is known leaves its bound behind.
+            let enough = cutoff.min(upper - WIDTH_M);
+            let give_up = looked_at > MOST_PARTS;
+            open.retain(|&(low, _)| {
+                let goes_on = low < enough && !give_up;
+                lower = if goes_on { lower } else { lower.min(low) };
+                goes_on
+            });
+            if open.is_empty() {
                 break;
             }
-            let half = 0.5 * part.length;
-            let middle = part.start + half;
-            let there = self.distance(middle);
-            if there < upper || (there == upper && middle < at) {
-                (upper, at) = (there, middle);
+            length *= 0.5;
+            for (low, start) in std::mem::take(&mut open) {
+                let middle = start + length;
+                let there = self.distance(middle);
+                if there < upper || (there == upper && middle < at) {
+                    (upper, at) = (there, middle);
+                }
+                open.extend([start, middle].map(|start| (self.enclose(start, length).0.max(low), start)));
             }
-            for start in [part.start, middle] {
-                let (low, _) = self.enclose(start, half);
-                parts.push(Part { low: low.max(part.low), start, length: half });
-            }
-            looked_at += 2;
+            looked_at += open.len();
         }
         let lower = lower.min(upper);
         (lower < cutoff).then_some(Minimum { lower, upper, at })
@@ -165,29 +134,19 @@ impl<'a> Search<'a> {
             let Span { enter, exit } = motion.below(distance, motion.closest());
             return vec![(enter, exit)];
         }
-        // An unbroken run of parts, and whether some of it is below for certain.
-        let mut runs: Vec<(f64, f64, bool)> = Vec::new();
-        let mut stack = vec![(0.0, 1.0)];
-        let mut looked_at = 0;
-        while let Some((start, length)) = stack.pop() {
-            let (low, high) = self.enclose(start, length);
-            looked_at += 1;
-            if low >= distance {
-                continue;
-            }
-            let certain = high < distance;
-            if !certain && length > SHORTEST_PART && looked_at < MOST_PARTS {
-                let half = 0.5 * length;
-                stack.extend([(start + half, half), (start, half)]);
-                continue;
-            }
-            match runs.last_mut() {
-                Some(run) if run.1 >= start => *run = (run.0, start + length, run.2 || certain),
-                _ => runs.push((start, start + length, certain)),
-            }
-        }
-        let holds = |run: &(f64, f64, bool)| run.2 || (run.0 <= at && at <= run.1);
-        let spans: Vec<_> = runs.into_iter().filter(holds).map(|(from, to, _)| (from, to)).collect();
+        let parts = parts_told(SHORTEST_PART, MOST_PARTS, |start, length| match self.enclose(start, length) {
+            (low, _) if low >= distance => Some(false),
+            (_, high) if high < distance => Some(true),
+            _ => None,
+        });
+        // Unbroken runs of parts that are not above for certain; kept is what is below for certain.
+        let runs = parts.chunk_by(|a, b| a.2 != Some(false) && b.2 != Some(false));
+        let spans = runs.filter_map(|run| {
+            let (from, to) = (run.first()?.0, run.last()?.1);
+            let told = |told| run.iter().any(|part| part.2 == Some(told));
+            (told(true) || !told(false) && from <= at && at <= to).then_some((from, to))
+        });
+        let spans: Vec<_> = spans.collect();
         if spans.is_empty() { vec![(at, at)] } else { spans }
     }
 

@@ -233,7 +233,7 @@ impl Overlap<'_> {
     /// what each has now, c = peak / `h_now`^2, times h^2.
     fn rate_hz(&self, margin: f64) -> Option<f64> {
         let curves = [self.first, self.second].into_iter().filter_map(|segment| segment.curve.as_ref());
-        let per_s2: f64 = curves.map(|curve| curve.deviation.peak() / (curve.to_s - curve.from_s).powi(2)).sum();
+        let per_s2: f64 = curves.map(|curve| curve.deviation.peak / (curve.to_s - curve.from_s).powi(2)).sum();
         let rate_hz = (per_s2 / margin).sqrt();
         (per_s2 > 0.0 && margin > 0.0 && rate_hz.is_finite()).then_some(rate_hz)
     }

@@ -89,21 +89,14 @@ impl TrackAuditor {
             self.vehicles.push(Vehicle::new(name, &self.settings, max_gap_s));
         }
         for item in items {
-            match item {
-                Item::Sample(sample) => self.take(sample.vehicle, sample.time_s, |vehicle| vehicle.sample(sample))?,
-                Item::Piece(piece) => self.take(piece.vehicle, piece.from_s, |vehicle| vehicle.piece(piece))?,
-            }
+            self.take(item)?;
         }
         Ok(())
     }
 
     #[inline]
-    fn take(
-        &mut self,
-        index: usize,
-        time_s: f64,
-        take: impl FnOnce(&mut Vehicle) -> Result<Option<Gap>, RecordedError>,
-    ) -> Result<(), RecordedError> {
+    fn take(&mut self, item: &Item) -> Result<(), RecordedError> {
+        let (index, time_s) = (item.vehicle(), item.time_s());
         if time_s != self.now_s {
             self.turn_to(time_s, index)?;
         }
@@ -114,7 +107,7 @@ impl TrackAuditor {
             return Ok(());
         }
         let unseen = vehicle.is_unseen();
-        let gap = take(vehicle)?;
+        let gap = vehicle.take(item)?;
         if unseen {
             vehicle.check(&self.settings)?;
         }
