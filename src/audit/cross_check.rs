@@ -1,4 +1,5 @@
-//! The second detector on recorded motion: parry, which shares no formula with the first.
+//! The second detector on recorded motion: parry, which shares the pairs and their relative motion with the first, and no
+//! formula for distances or contacts.
 
 use nalgebra::Vector3;
 use parry3d_f64::math::Vector;

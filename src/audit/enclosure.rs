@@ -12,8 +12,10 @@ use super::outcome::WIDTH_M;
 use super::polynomial::{BernsteinBasis, parts_told, rescale, value};
 use super::sweep::{RelativeMotion, Span};
 
-/// Parts that a search looks at before it gives up and answers with the interval it has.
+/// Parts that a search looks at in all before it gives up and answers with the interval it has, and products of Bernstein
+/// coefficients that these may take: those of twenty thousand parts of the seventh degree.
 const MOST_PARTS: usize = 20_000;
+const MOST_PRODUCTS: usize = MOST_PARTS * 15 * 15;
 /// Shortest part of a segment, as a fraction of it, that is looked at for when a distance is passed.
 const SHORTEST_PART: f64 = 1e-10;
 
@@ -55,6 +57,8 @@ pub(super) struct Search<'a> {
     basis: BernsteinBasis,
     part: Vec<Vector3<f64>>,
     squared: Vec<f64>,
+    /// Parts that may still be looked at.
+    left: usize,
 }
 
 impl<'a> Search<'a> {
@@ -63,7 +67,8 @@ impl<'a> Search<'a> {
         let degree = r.len().saturating_sub(1);
         let wanted = if matches!(target, Target::Origin) { 2 * degree } else { degree };
         let basis = BernsteinBasis::of_degree(wanted);
-        Self { target, r, basis, part: Vec::with_capacity(r.len()), squared: Vec::new() }
+        let left = MOST_PARTS.min(MOST_PRODUCTS / (wanted + 1).pow(2));
+        Self { target, r, basis, part: Vec::with_capacity(r.len()), squared: Vec::new(), left }
     }
 
     /// The motion, where it is straight.
@@ -99,11 +104,11 @@ impl<'a> Search<'a> {
         let (mut length, mut open) = (to - from, vec![(self.enclose(from, to - from).0, from)]);
         let (start, end) = (self.distance(from), self.distance(to));
         let (mut upper, mut at) = if end < start { (end, to) } else { (start, from) };
-        let (mut lower, mut looked_at) = (upper, 0);
+        let mut lower = upper;
         loop {
             // What cannot hold anything below what is known leaves its bound behind.
-            let enough = cutoff.min(upper - WIDTH_M);
-            let give_up = looked_at > MOST_PARTS;
+            let enough = cutoff.min(upper - self.width(upper));
+            let give_up = self.left == 0;
             open.retain(|&(low, _)| {
                 let goes_on = low < enough && !give_up;
                 lower = if goes_on { lower } else { lower.min(low) };
@@ -121,7 +126,6 @@ impl<'a> Search<'a> {
                 }
                 open.extend([start, middle].map(|start| (self.enclose(start, length).0.max(low), start)));
             }
-            looked_at += open.len();
         }
         let lower = lower.min(upper);
         (lower < cutoff).then_some(Minimum { lower, upper, at })
@@ -134,7 +138,7 @@ impl<'a> Search<'a> {
             let Span { enter, exit } = motion.below(distance, motion.closest());
             return vec![(enter, exit)];
         }
-        let parts = parts_told(SHORTEST_PART, MOST_PARTS, |start, length| match self.enclose(start, length) {
+        let parts = parts_told(SHORTEST_PART, self.left, |start, length| match self.enclose(start, length) {
             (low, _) if low >= distance => Some(false),
             (_, high) if high < distance => Some(true),
             _ => None,
@@ -161,6 +165,7 @@ impl<'a> Search<'a> {
 
     /// Lower and upper bound of the distance over a part of the segment.
     fn enclose(&mut self, start: f64, length: f64) -> (f64, f64) {
+        self.left = self.left.saturating_sub(1);
         self.part.clear();
         self.part.extend_from_slice(self.r);
         rescale(&mut self.part, start, length);
@@ -204,6 +209,15 @@ impl<'a> Search<'a> {
     /// What is summed for a position, at most.
     fn magnitude(&self) -> f64 {
         self.part.iter().map(Vector3::norm).sum()
+    }
+
+    /// How near the bounds of a distance are brought: no nearer than rounding lets them come.
+    fn width(&self, distance: f64) -> f64 {
+        let scale = match self.target {
+            Target::Origin => distance,
+            Target::Shape(_) => self.r.iter().map(Vector3::norm).sum(),
+        };
+        WIDTH_M.max(8.0 * self.r.len() as f64 * f64::EPSILON * scale)
     }
 }
 

@@ -85,6 +85,15 @@ impl<P: Copy + Ord> Ledger<P> {
         all.len() - 1
     }
 
+    /// Keeps the violations of which something holds.
+    pub(super) fn retain_violations(&mut self, holds: impl FnMut(&Violation<P>) -> bool) {
+        self.violations.retain(holds);
+        self.of_pair.clear();
+        for (index, violation) in self.violations.iter().enumerate() {
+            self.of_pair.entry(violation.pair).or_default().push(index);
+        }
+    }
+
     /// Enters a time that cannot be decided; adjacent ones of a pair become one.
     pub(super) fn undecided(&mut self, new: Undecided<P>) {
         let known = self.undecided.entry(new.pair).or_default();

@@ -1,4 +1,5 @@
-//! The second detector: parry's shape cast on keep-out balls, in double precision.
+//! The second detector: parry's shape cast on keep-out balls, in double precision. A cross-check of the closed form, on the
+//! relative motion that it is given too.
 
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::ShapeCastOptions;

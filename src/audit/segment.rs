@@ -16,8 +16,8 @@ pub(super) struct Segment {
     pub(super) to_s: f64,
     pub(super) from: Vector3<f64>,
     pub(super) to: Vector3<f64>,
-    /// The vehicle counts as on the ground.
-    pub(super) grounded: bool,
+    /// Whether the vehicle counts as on the ground; `None` where that cannot be told.
+    pub(super) grounded: Option<bool>,
     /// Where the segment is not a straight line known for certain.
     pub(super) curve: Option<Arc<Curve>>,
 }
@@ -96,14 +96,14 @@ impl Curve {
 impl Segment {
     /// A straight line.
     pub(super) fn straight(from_s: f64, to_s: f64, from: Vector3<f64>, to: Vector3<f64>) -> Self {
-        Self { from_s, to_s, from, to, grounded: false, curve: None }
+        Self { from_s, to_s, from, to, grounded: Some(false), curve: None }
     }
 
     /// A whole curve.
     pub(super) fn curved(curve: Curve) -> Self {
         let (from_s, to_s) = (curve.from_s, curve.to_s);
         let (from, to) = (curve.position(from_s), curve.position(to_s));
-        Self { from_s, to_s, from, to, grounded: false, curve: Some(Arc::new(curve)) }
+        Self { from_s, to_s, from, to, grounded: Some(false), curve: Some(Arc::new(curve)) }
     }
 
     /// Whether the vehicle is at two places at one instant.

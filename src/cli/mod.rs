@@ -10,12 +10,14 @@ mod console;
 mod diagnostic;
 #[cfg(feature = "viewer")]
 mod drawing;
+mod encounters;
 mod events;
 mod export;
 mod folder;
 mod list;
 mod obstacles;
 mod outputs;
+mod own;
 mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]

@@ -17,6 +17,8 @@ const SAME_INSTANT_S: f64 = 1e-6;
 const SHORTEST_PART: f64 = 1e-12;
 /// Parts of a curve that are looked at for that.
 const MOST_PARTS: usize = 2000;
+/// Coefficients of a piece of a curve: the work on a part of it grows with their square.
+const MOST_COEFFICIENTS: usize = 64;
 /// Shortest interval between two samples of a vehicle \[s\]: it can be divided by, twice.
 const SHORTEST_INTERVAL_S: f64 = 1e-70;
 /// Relative excess over the assumed acceleration that rounding explains.
@@ -148,7 +150,7 @@ impl Vehicle {
                 }
             }
             last => {
-                gap = last.map(|last| Gap { vehicle: sample.vehicle, from_s: last.time_s, to_s: time_s });
+                gap = last.map(|last| Gap::new(sample.vehicle, last.time_s, time_s));
                 self.last_interval = None;
                 let at = self.scaled(sample.position_m);
                 self.keep_straight((time_s, time_s), at, at);
@@ -178,7 +180,7 @@ impl Vehicle {
                     self.keep_straight((last.time_s.min(from_s), from_s), last.position_m, start);
                 }
             }
-            last => gap = last.map(|last| Gap { vehicle: piece.vehicle, from_s: last.time_s, to_s: from_s }),
+            last => gap = last.map(|last| Gap::new(piece.vehicle, last.time_s, from_s)),
         }
         self.keep(&segment);
         Ok(gap)
@@ -186,8 +188,11 @@ impl Vehicle {
 
     fn curve(&self, curve: Curve) -> Result<Segment, RecordedError> {
         let wrong = |what: &str| Err(self.wrong(curve.from_s, what.to_owned()));
-        if curve.coefficients.is_empty() {
-            return wrong("the piece has no coefficients");
+        if !(1..=MOST_COEFFICIENTS).contains(&curve.coefficients.len()) {
+            let count = curve.coefficients.len();
+            return wrong(&format!(
+                "the piece has {count} coefficients, and can be judged with 1 to {MOST_COEFFICIENTS}"
+            ));
         }
         if !(curve.from_s.is_finite() && curve.to_s.is_finite() && curve.to_s > curve.from_s) {
             return wrong("the piece does not end after it begins");
@@ -324,13 +329,13 @@ fn is_near(v: &Vector3<f64>) -> bool {
 }
 
 /// Splits a segment where it passes a height and says which parts are on the ground. A jump is on the ground if both ends
-/// are; what cannot be told on a curve is above.
+/// are; what cannot be told on a curve within some work is left open.
 fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
     let (low, high) = (segment.from.z.min(segment.to.z), segment.from.z.max(segment.to.z));
     if segment.curve.is_some() {
         split_curve_at_height(&segment, height, into);
     } else if segment.to_s <= segment.from_s || high <= height || low > height {
-        into.push(Segment { grounded: high <= height, ..segment });
+        into.push(Segment { grounded: Some(high <= height), ..segment });
     } else {
         let share = (height - segment.from.z) / (segment.to.z - segment.from.z);
         let at_s = segment.from_s + (segment.to_s - segment.from_s) * share.clamp(0.0, 1.0);
@@ -338,7 +343,7 @@ fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
         for (from_s, to_s, grounded) in [(segment.from_s, at_s, starts_low), (at_s, segment.to_s, !starts_low)] {
             if to_s > from_s {
                 let part = segment.clipped(Interval { from_s, to_s });
-                into.extend(part.map(|part| Segment { grounded, ..part }));
+                into.extend(part.map(|part| Segment { grounded: Some(grounded), ..part }));
             }
         }
     }
@@ -354,12 +359,14 @@ fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>
         match BernsteinBasis::of_degree(above.len() - 1).range(&above) {
             (_, high) if high <= 0.0 => Some(true),
             (low, _) if low > 0.0 => Some(false),
+            // Where the height is passed: so short that it is not worth a doubt.
+            _ if length <= SHORTEST_PART => Some(false),
             _ => None,
         }
     };
-    for (start, end, told) in parts_told(SHORTEST_PART, MOST_PARTS, on_ground) {
+    for (start, end, grounded) in parts_told(0.0, MOST_PARTS, on_ground) {
         let part = segment.clipped(Interval { from_s: at(start), to_s: at(end) });
-        into.extend(part.map(|part| Segment { grounded: told == Some(true), ..part }));
+        into.extend(part.map(|part| Segment { grounded, ..part }));
     }
 }
 
@@ -370,7 +377,7 @@ mod tests {
     fn parts(segment: Segment, height: f64) -> Vec<(f64, f64, bool)> {
         let mut into = Vec::new();
         split_at_height(segment, height, &mut into);
-        into.iter().map(|part| (part.from_s, part.to_s, part.grounded)).collect()
+        into.iter().map(|part| (part.from_s, part.to_s, part.grounded == Some(true))).collect()
     }
 
     #[test]

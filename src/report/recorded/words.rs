@@ -1,0 +1,281 @@
+//! The report on a recording in words and as a page.
+
+use std::fmt::Write as _;
+
+use super::report::{OfPair, OfVehicle, RecordedReport};
+use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
+use crate::audit::{Status, Undecided, Violation};
+use crate::figures::Figure;
+use crate::report::page::{Badge, Block, Column, Page, Section, Table, Tone};
+use crate::text::{at_least, counted, fixed, metres_below, seconds};
+
+/// Violations that are listed in words, and on the page.
+const LISTED_IN_WORDS: usize = 10;
+const LISTED_ON_PAGE: usize = 100;
+
+impl RecordedReport {
+    fn unit(&self) -> &'static str {
+        if self.measure == "metres" { " m" } else { " ellipsoids" }
+    }
+
+    /// The verdict in one line.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        format!("{}: {}", self.verdict(), self.finding())
+    }
+
+    fn verdict(&self) -> String {
+        match self.status {
+            Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
+            Status::Clear => format!("CLEAR if {}", self.motion),
+            Status::Violation => "VIOLATION".to_owned(),
+            Status::Undecided => "UNDECIDED".to_owned(),
+        }
+    }
+
+    /// The headline behind the verdict.
+    fn finding(&self) -> String {
+        let unit = self.unit();
+        let delta = self.separation.delta_m.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
+        match self.status {
+            Status::Clear => {
+                let all = self.closest.iter().chain(&self.obstacles.closest);
+                let lowest = all.min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
+                let closest = lowest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
+                    let (least, at) = (at_least(finding.lower_m, 6), seconds(finding.time_s));
+                    format!("never closer than {least}{unit}, {first} and {second} at {at} ")
+                });
+                let motion = if self.audit.proved { format!(", {}", self.motion) } else { String::new() };
+                format!("{closest}({delta}{motion})")
+            }
+            Status::Violation => {
+                let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
+                let deepest = self.violations.iter().min_by(|a, b| over(a).total_cmp(&over(b)));
+                let others = match self.violations.len() {
+                    0 | 1 => String::new(),
+                    count => format!("; {count} violations in all"),
+                };
+                deepest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
+                    format!(
+                        "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
+                        metres_below(finding.min_m, finding.limit_m),
+                        exact(finding.limit_m),
+                        seconds(finding.min_at_s),
+                        self.motion
+                    )
+                })
+            }
+            Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(), self.motion),
+        }
+    }
+
+    fn why_undecided(&self) -> String {
+        let unit = self.unit();
+        if self.audit.flight.parry.disagreements > 0 {
+            return "the two detectors disagree".to_owned();
+        }
+        if let Some(OfVehicle { vehicle, finding }) = &self.contradiction {
+            return format!(
+                "{vehicle} needs {} m/s^2 at {}, more than the assumed {:?} m/s^2",
+                fixed(finding.needs_m_s2, 3),
+                seconds(finding.time_s),
+                finding.assumed_m_s2
+            );
+        }
+        let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
+        if let Some(OfPair { who: [first, second], finding }) = closest {
+            let rate =
+                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
+            return format!(
+                "{first} and {second} came to between {}{unit} and {}{unit} by {}{rate}",
+                at_least(finding.lower_m, 6),
+                fixed(finding.upper_m, 6),
+                seconds(finding.to_s)
+            );
+        }
+        let longest_s = self.gaps.iter().map(|gap| gap.finding.joined_by_s).fold(0.0, f64::max);
+        // Rounded up: as it is said it is long enough.
+        let joined = format!("--max-gap {} would judge across", (longest_s * 1e6).ceil() / 1e6);
+        match &self.gaps[..] {
+            [] if self.span_s.is_none() => "there was nothing to judge".to_owned(),
+            [] => "at no time were there two to keep apart".to_owned(),
+            [OfVehicle { vehicle, finding }] => {
+                format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
+            }
+            [OfVehicle { vehicle, finding }, ..] => {
+                let (count, at) = (self.gaps.len(), seconds(finding.from_s));
+                format!("{count} gaps, the first of {vehicle} at {at}; {joined}")
+            }
+        }
+    }
+
+    /// The sampling rate that would decide everything undecided \[Hz\]; `None` where some of it no rate is known for.
+    fn rate_hz(&self) -> Option<f64> {
+        self.undecided.iter().map(|u| u.finding.rate_hz).try_fold(0.0, |most: f64, rate| Some(most.max(rate?)))
+    }
+
+    /// What was found of each kind, a sentence each.
+    fn lists(&self) -> [(&'static str, Vec<String>); 3] {
+        [
+            ("Violations", self.violations.iter().map(OfPair::<Violation<_>>::words).collect()),
+            ("Undecided", self.undecided.iter().map(OfPair::<Undecided<_>>::words).collect()),
+            ("Gaps", self.gaps.iter().map(OfVehicle::words).collect()),
+        ]
+    }
+
+    /// The closest pairs and what was found, a line each, with a line end.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let mut line = |words: String| {
+            let _ = writeln!(text, "{words}");
+        };
+        let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
+        line(format!(
+            "judged       {span}, {}, {} of motion, {} swept",
+            counted(self.judged as u64, "vehicle", "vehicles"),
+            counted(self.audit.flight.steps, "stretch", "stretches"),
+            self.audit.flight.pairs_checked
+        ));
+        for (heading, closest) in [("closest pairs", &self.closest), ("closest to obstacles", &self.obstacles.closest)]
+        {
+            if !closest.is_empty() {
+                line(format!("{heading} [{}]", self.unit().trim()));
+            }
+            for OfPair { who: [first, second], finding } in closest {
+                let (apart, at) = (interval(finding.lower_m, finding.upper_m), fixed(finding.time_s, 3));
+                line(format!("  {apart}  at {at} s  {first} and {second}"));
+            }
+        }
+        for (heading, lines) in self.lists() {
+            if !lines.is_empty() {
+                line(format!("{}: {}", heading.to_lowercase(), lines.len()));
+            }
+            listed(lines, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
+        }
+        text
+    }
+
+    /// The report as a self-contained HTML page.
+    #[must_use]
+    pub fn to_html(&self, figures: &[Figure], command: &str) -> String {
+        let mut sections = Vec::new();
+        if !self.closest.is_empty() {
+            sections.push(Section::new("Closest pairs", vec![Block::Table(closest_table(&self.closest))]));
+        }
+        if !figures.is_empty() {
+            sections.push(Section::new("Figures", vec![Block::Figures(figures.to_vec())]));
+        }
+        if !self.obstacles.closest.is_empty() {
+            sections.push(Section::new("Obstacles", vec![Block::Table(closest_table(&self.obstacles.closest))]));
+        }
+        for (heading, lines) in self.lists().into_iter().chain([("How it was read", self.source.notes.clone())]) {
+            if !lines.is_empty() {
+                sections.push(Section::new(heading, vec![Block::List(listed(lines, LISTED_ON_PAGE).collect())]));
+            }
+        }
+        let known = if self.audit.assumes.is_some() { "assumed" } else { "as recorded" };
+        let assumed = vec![
+            format!("Motion: {} ({known}).", self.motion),
+            "A distance strictly below its limit is a violation; equality is not.".to_owned(),
+            format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
+        ];
+        sections.push(Section::new("What was assumed", vec![Block::List(assumed)]));
+        sections.push(Section::new("Repeat it", vec![Block::Command(command.to_owned())]));
+        let tone = match self.status {
+            Status::Clear => Tone::Good,
+            Status::Violation => Tone::Bad,
+            Status::Undecided => Tone::Neutral,
+        };
+        Page {
+            title: self.source.recording.clone(),
+            kind: "Audit of a recording".to_owned(),
+            badge: Badge { tone, word: self.verdict() },
+            verdict: self.finding(),
+            reasons: Vec::new(),
+            warnings: Vec::new(),
+            sections,
+            foot: format!("Made by {} {}.", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+        }
+        .render()
+    }
+}
+
+/// The first of some lines, and how many more there are.
+fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
+    let rest = lines.len().saturating_sub(most);
+    lines.truncate(most);
+    lines.into_iter().chain((rest > 0).then(|| format!("and {rest} more")))
+}
+
+impl OfPair<Violation<ObjectPair>> {
+    fn words(&self) -> String {
+        let Self { who: [first, second], finding } = self;
+        let min = metres_below(finding.min_m, finding.limit_m);
+        format!(
+            "{first} and {second}: {min} at {} s, below {} from {}",
+            fixed(finding.min_at_s, 3),
+            exact(finding.limit_m),
+            span(finding.from_s, finding.to_s)
+        )
+    }
+}
+
+impl OfPair<Undecided<ObjectPair>> {
+    fn words(&self) -> String {
+        let Self { who: [first, second], finding } = self;
+        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
+        format!(
+            "{first} and {second}: {} from {}, limit {}{rate}",
+            interval(finding.lower_m, finding.upper_m),
+            span(finding.from_s, finding.to_s),
+            exact(finding.limit_m)
+        )
+    }
+}
+
+impl OfVehicle<Gap> {
+    fn words(&self) -> String {
+        format!("{} was not seen from {}", self.vehicle, span(self.finding.from_s, self.finding.to_s))
+    }
+}
+
+/// Two times in words.
+fn span(from_s: f64, to_s: f64) -> String {
+    format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
+}
+
+/// A limit with at least three decimals, and as many as it has: rounded it would be another one.
+fn exact(limit: f64) -> String {
+    let is_limit = |shown: &String| shown.parse() == Ok(limit);
+    (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
+}
+
+/// A distance with six decimals, rounded down, or an interval where its bounds differ.
+#[must_use]
+pub fn interval(lower: f64, upper: f64) -> String {
+    let (low, high) = (at_least(lower, 6), fixed(upper, 6));
+    if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
+}
+
+fn closest_table(closest: &[OfPair<Approach>]) -> Table {
+    let rows = closest.iter().map(|OfPair { who: [first, second], finding }| {
+        vec![
+            format!("{first} and {second}").into(),
+            interval(finding.lower_m, finding.upper_m).into(),
+            fixed(finding.time_s, 3).into(),
+            exact(finding.limit_m).into(),
+        ]
+    });
+    Table {
+        caption: "Who came closest, and when".to_owned(),
+        columns: vec![
+            Column::words("who"),
+            Column::numbers("smallest distance"),
+            Column::numbers("at [s]"),
+            Column::numbers("limit"),
+        ],
+        rows: rows.collect(),
+    }
+}
