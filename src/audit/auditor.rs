@@ -1,6 +1,6 @@
 //! The audit of a flight: straight steps of all vehicles, one after the other.
 
-use super::candidates::{Candidates, pair_count};
+use super::candidates::{Candidates, for_each_pair, pair_count};
 use super::error::AuditError;
 use super::ledger::Ledger;
 use super::outcome::{AuditOutcome, Status, StepFinding, Violation};
@@ -49,7 +49,7 @@ impl Auditor {
             time_s: None,
             positions_m: Rows::zeros(0),
             nearest_m: f64::INFINITY,
-            candidates: Candidates::new(),
+            candidates: Candidates::new(vehicles),
             ledger: Ledger::default(),
             began: Vec::new(),
             ended: Vec::new(),
@@ -139,7 +139,7 @@ impl Auditor {
         ended.clear();
 
         let bound_m = self.nearest_m.max(keep_out.delta_m);
-        let swept = self.candidates.cover(from, to, bound_m).for_each(|i, j| {
+        let swept = for_each_pair(self.candidates.cover(from, to, bound_m), self.vehicles, |i, j| {
             let motion = RelativeMotion::new(row(from, j) - row(from, i), row(to, j) - row(to, i));
             let point = motion.closest();
             if point.squared < closest.squared && point.separation_m() < closest.separation_m() {

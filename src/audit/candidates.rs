@@ -6,6 +6,8 @@
 //! within its budget of its reference position, a pair left out stays farther apart than R. The distance from a fixed point is
 //! convex along a straight line, so it is enough to look at the ends of each step.
 
+use nalgebra::Vector3;
+
 use crate::swarm::{Rows, row, separation};
 
 /// Up to this many vehicles a list costs more than it saves.
@@ -38,36 +40,22 @@ struct Reach {
     vehicle: u32,
 }
 
-/// The pairs to be swept, in the order of pairs.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Cover<'a> {
-    /// All pairs of so many vehicles.
-    All(usize),
-    /// These.
-    Listed(&'a [[u32; 2]]),
-}
-
-impl Cover<'_> {
-    /// Calls `f` with each pair and returns their number.
-    #[inline]
-    pub(super) fn for_each(self, mut f: impl FnMut(usize, usize)) -> u64 {
-        match self {
-            Self::All(n) => {
-                for i in 0..n {
-                    for j in i + 1..n {
-                        f(i, j);
-                    }
-                }
-                pair_count(n)
-            }
-            Self::Listed(pairs) => {
-                for &[i, j] in pairs {
-                    f(i as usize, j as usize);
-                }
-                pairs.len() as u64
-            }
+/// Calls `f` with each of these pairs, or with all of so many vehicles where none are listed, in the order of pairs; returns
+/// their number.
+#[inline]
+pub(super) fn for_each_pair(listed: Option<&[[u32; 2]]>, n: usize, mut f: impl FnMut(usize, usize)) -> u64 {
+    if let Some(pairs) = listed {
+        for &[i, j] in pairs {
+            f(i as usize, j as usize);
+        }
+        return pairs.len() as u64;
+    }
+    for i in 0..n {
+        for j in i + 1..n {
+            f(i, j);
         }
     }
+    pair_count(n)
 }
 
 /// N (N - 1) / 2.
@@ -76,30 +64,25 @@ pub(super) fn pair_count(n: usize) -> u64 {
 }
 
 impl Candidates {
-    pub(super) fn new() -> Self {
-        Self {
-            radius_m: None,
-            reference_m: Rows::zeros(0),
-            budget_m: Vec::new(),
-            pairs: Vec::new(),
-            reaches: Vec::new(),
-        }
+    /// Of so many vehicles.
+    pub(super) fn new(n: usize) -> Self {
+        let reference_m = Rows::zeros(n);
+        Self { radius_m: None, reference_m, budget_m: Vec::new(), pairs: Vec::new(), reaches: Vec::new() }
     }
 
-    /// The pairs to be swept for the straight motion between two instants: every pair that is not among them stays
-    /// farther apart than `bound_m` throughout.
+    /// The pairs to be swept for the straight motion between two instants, `None` for all: every pair that is not among
+    /// them stays farther apart than `bound_m` throughout.
     ///
     /// `from` must be the `to` of the call before. Memory is at most 8 bytes for half of all pairs; where more than that
     /// are near, all are swept and no list is kept.
-    pub(super) fn cover(&mut self, from: &Rows, to: &Rows, bound_m: f64) -> Cover<'_> {
-        let n = to.nrows();
-        if n <= SMALL_SWARM {
-            return Cover::All(n);
+    pub(super) fn cover(&mut self, from: &Rows, to: &Rows, bound_m: f64) -> Option<&[[u32; 2]]> {
+        if to.nrows() <= SMALL_SWARM {
+            return None;
         }
         if !self.still_covers(to, bound_m) {
             self.list(from, to, bound_m);
         }
-        if self.radius_m.is_some() { Cover::Listed(&self.pairs) } else { Cover::All(n) }
+        self.radius_m.is_some().then_some(&self.pairs)
     }
 
     fn still_covers(&self, to: &Rows, bound_m: f64) -> bool {
@@ -112,15 +95,10 @@ impl Candidates {
     }
 
     fn list(&mut self, from: &Rows, to: &Rows, bound_m: f64) {
-        let n = to.nrows();
         let radius_m = RADIUS_OVER_BOUND * bound_m;
-        if self.reference_m.nrows() == n {
-            self.reference_m.copy_from(from);
-        } else {
-            self.reference_m = from.clone();
-        }
+        self.reference_m.copy_from(from);
         self.budget_m.clear();
-        self.budget_m.extend((0..n).map(|i| {
+        self.budget_m.extend((0..to.nrows()).map(|i| {
             let needed_m = (row(to, i) - row(from, i)).norm();
             needed_m * (1.0 + ROUNDING) + SPARE_OVER_RADIUS * radius_m
         }));
@@ -130,17 +108,8 @@ impl Candidates {
 
     /// Sorts the vehicles by the lower end of their reach along the axis on which the swarm is longest.
     fn sort_reaches(&mut self, radius_m: f64) {
-        let extent = |axis: usize| {
-            let column = self.reference_m.column(axis);
-            column.max() - column.min()
-        };
-        let axis = if extent(0) >= extent(1).max(extent(2)) {
-            0
-        } else if extent(1) >= extent(2) {
-            1
-        } else {
-            2
-        };
+        let extents = self.reference_m.column_iter().map(|column| column.max() - column.min());
+        let axis = Vector3::from_iterator(extents).imax();
         let along = self.reference_m.column(axis);
         self.reaches.clear();
         self.reaches.extend(along.iter().zip(&self.budget_m).zip(0..).map(|((&x, &budget_m), vehicle)| {
@@ -182,29 +151,22 @@ mod tests {
     }
 
     fn listed(candidates: &mut Candidates, from: &Rows, to: &Rows, bound_m: f64) -> Option<Vec<[usize; 2]>> {
-        match candidates.cover(from, to, bound_m) {
-            Cover::All(_) => None,
-            cover @ Cover::Listed(_) => {
-                let mut pairs = vec![];
-                let count = cover.for_each(|i, j| pairs.push([i, j]));
-                assert_eq!(count, pairs.len() as u64);
-                Some(pairs)
-            }
-        }
+        let pairs = candidates.cover(from, to, bound_m)?;
+        Some(pairs.iter().map(|pair| pair.map(|vehicle| vehicle as usize)).collect())
     }
 
     #[test]
     fn a_small_swarm_is_swept_whole_and_in_the_order_of_pairs() {
         let rows = line(4, |_| 0.0);
         let mut pairs = vec![];
-        let count = Candidates::new().cover(&rows, &rows, 1.0).for_each(|i, j| pairs.push((i, j)));
+        let count = for_each_pair(Candidates::new(4).cover(&rows, &rows, 1.0), 4, |i, j| pairs.push((i, j)));
         assert_eq!((count, pairs), (6, vec![(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]));
     }
 
     #[test]
     fn a_list_is_kept_while_its_budget_lasts_and_made_anew_after() {
         let start = line(100, |_| 0.0);
-        let mut candidates = Candidates::new();
+        let mut candidates = Candidates::new(100);
         let neighbours: Vec<_> = (0..99).map(|i| [i, i + 1]).collect();
         assert_eq!(listed(&mut candidates, &start, &start, SPACING_M).as_ref(), Some(&neighbours));
         let spare_m = SPARE_OVER_RADIUS * RADIUS_OVER_BOUND * SPACING_M;
@@ -223,7 +185,7 @@ mod tests {
     fn a_vehicle_that_crosses_the_swarm_in_one_step_is_paired_with_all_it_could_meet() {
         let start = line(100, |_| 0.0);
         let thrown = line(100, |i| if i == 0 { 600.0 } else { 0.0 });
-        let pairs = listed(&mut Candidates::new(), &start, &thrown, SPACING_M).unwrap();
+        let pairs = listed(&mut Candidates::new(100), &start, &thrown, SPACING_M).unwrap();
         assert!((1..100).all(|j| pairs.contains(&[0, j])));
         assert_eq!(pairs.len(), 99 + 98);
     }
@@ -231,6 +193,6 @@ mod tests {
     #[test]
     fn a_crowd_has_no_list() {
         let rows = Rows::zeros(100);
-        assert_eq!(listed(&mut Candidates::new(), &rows, &rows, 1.0), None);
+        assert_eq!(listed(&mut Candidates::new(100), &rows, &rows, 1.0), None);
     }
 }

@@ -1,4 +1,5 @@
-//! The second detector on recorded motion: parry, which shares no formula with the first.
+//! The second detector on recorded motion: parry, which shares the pairs and their relative motion with the first, and no
+//! formula for distances or contacts.
 
 use nalgebra::Vector3;
 use parry3d_f64::math::Vector;
@@ -23,7 +24,7 @@ const ROUNDING: f64 = 1e-12;
 /// What the second detector says of a segment where the first found this minimum.
 pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minimum, rounding: f64) -> CrossCheck {
     match (search.target, search.exact()) {
-        (Target::Origin, Some(motion)) => keep_out.cross_check(&motion),
+        (Target::Origin, Some(motion)) => keep_out.compare(&motion, motion.closest(), keep_out.cast(&motion)).1,
         (Target::Origin, None) => along_chords(keep_out, search.r, found, rounding),
         (Target::Shape(shape), _) => from_shape(shape, keep_out.delta_m, found, |u| search.position(u)),
     }

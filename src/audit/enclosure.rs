@@ -5,18 +5,17 @@
 //! enclose the distance from their chord. Halving the segment makes both bounds tight to second order. What rounding adds
 //! is bounded from the magnitudes that are summed, and widens the bounds.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
 use nalgebra::Vector3;
 
 use super::obstacle::Shape;
 use super::outcome::WIDTH_M;
-use super::polynomial::{BernsteinBasis, rescale, value};
+use super::polynomial::{BernsteinBasis, parts_told, rescale, value};
 use super::sweep::{RelativeMotion, Span};
 
-/// Parts that a search looks at before it gives up and answers with the interval it has.
+/// Parts that a search looks at in all before it gives up and answers with the interval it has, and products of Bernstein
+/// coefficients that these may take: those of twenty thousand parts of the seventh degree.
 const MOST_PARTS: usize = 20_000;
+const MOST_PRODUCTS: usize = MOST_PARTS * 15 * 15;
 /// Shortest part of a segment, as a fraction of it, that is looked at for when a distance is passed.
 const SHORTEST_PART: f64 = 1e-10;
 
@@ -50,35 +49,6 @@ pub(super) struct Minimum {
     pub(super) at: f64,
 }
 
-/// A part of a segment that could hold the minimum.
-#[derive(Clone, Copy, Debug)]
-struct Part {
-    low: f64,
-    start: f64,
-    length: f64,
-}
-
-impl PartialEq for Part {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Part {}
-
-impl PartialOrd for Part {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Part {
-    /// The greatest part is the one with the lowest bound, and of those the earliest.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.low.total_cmp(&self.low).then(other.start.total_cmp(&self.start))
-    }
-}
-
 /// A relative position over a segment, and where it is close to a target.
 #[derive(Debug)]
 pub(super) struct Search<'a> {
@@ -87,6 +57,8 @@ pub(super) struct Search<'a> {
     basis: BernsteinBasis,
     part: Vec<Vector3<f64>>,
     squared: Vec<f64>,
+    /// Parts that may still be looked at.
+    left: usize,
 }
 
 impl<'a> Search<'a> {
@@ -95,7 +67,8 @@ impl<'a> Search<'a> {
         let degree = r.len().saturating_sub(1);
         let wanted = if matches!(target, Target::Origin) { 2 * degree } else { degree };
         let basis = BernsteinBasis::of_degree(wanted);
-        Self { target, r, basis, part: Vec::with_capacity(r.len()), squared: Vec::new() }
+        let left = MOST_PARTS.min(MOST_PRODUCTS / (wanted + 1).pow(2));
+        Self { target, r, basis, part: Vec::with_capacity(r.len()), squared: Vec::new(), left }
     }
 
     /// The motion, where it is straight.
@@ -128,31 +101,31 @@ impl<'a> Search<'a> {
     /// The smallest distance between two fractions of the segment, to within [`WIDTH_M`]; `None` if it is not below
     /// `cutoff`.
     pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64) -> Option<Minimum> {
-        let (low, _) = self.enclose(from, to - from);
-        if low >= cutoff {
-            return None;
-        }
+        let (mut length, mut open) = (to - from, vec![(self.enclose(from, to - from).0, from)]);
         let (start, end) = (self.distance(from), self.distance(to));
         let (mut upper, mut at) = if end < start { (end, to) } else { (start, from) };
-        let mut parts = BinaryHeap::from([Part { low, start: from, length: to - from }]);
-        let mut looked_at = 0;
-        let mut lower = f64::INFINITY;
-        while let Some(part) = parts.pop() {
-            lower = part.low;
-            if part.low >= cutoff || part.low >= upper - WIDTH_M || looked_at > MOST_PARTS {
+        let mut lower = upper;
+        loop {
+            // What cannot hold anything below what is known leaves its bound behind.
+            let enough = cutoff.min(upper - self.width(upper));
+            let give_up = self.left == 0;
+            open.retain(|&(low, _)| {
+                let goes_on = low < enough && !give_up;
+                lower = if goes_on { lower } else { lower.min(low) };
+                goes_on
+            });
+            if open.is_empty() {
                 break;
             }
-            let half = 0.5 * part.length;
-            let middle = part.start + half;
-            let there = self.distance(middle);
-            if there < upper || (there == upper && middle < at) {
-                (upper, at) = (there, middle);
+            length *= 0.5;
+            for (low, start) in std::mem::take(&mut open) {
+                let middle = start + length;
+                let there = self.distance(middle);
+                if there < upper || (there == upper && middle < at) {
+                    (upper, at) = (there, middle);
+                }
+                open.extend([start, middle].map(|start| (self.enclose(start, length).0.max(low), start)));
             }
-            for start in [part.start, middle] {
-                let (low, _) = self.enclose(start, half);
-                parts.push(Part { low: low.max(part.low), start, length: half });
-            }
-            looked_at += 2;
         }
         let lower = lower.min(upper);
         (lower < cutoff).then_some(Minimum { lower, upper, at })
@@ -165,29 +138,19 @@ impl<'a> Search<'a> {
             let Span { enter, exit } = motion.below(distance, motion.closest());
             return vec![(enter, exit)];
         }
-        // An unbroken run of parts, and whether some of it is below for certain.
-        let mut runs: Vec<(f64, f64, bool)> = Vec::new();
-        let mut stack = vec![(0.0, 1.0)];
-        let mut looked_at = 0;
-        while let Some((start, length)) = stack.pop() {
-            let (low, high) = self.enclose(start, length);
-            looked_at += 1;
-            if low >= distance {
-                continue;
-            }
-            let certain = high < distance;
-            if !certain && length > SHORTEST_PART && looked_at < MOST_PARTS {
-                let half = 0.5 * length;
-                stack.extend([(start + half, half), (start, half)]);
-                continue;
-            }
-            match runs.last_mut() {
-                Some(run) if run.1 >= start => *run = (run.0, start + length, run.2 || certain),
-                _ => runs.push((start, start + length, certain)),
-            }
-        }
-        let holds = |run: &(f64, f64, bool)| run.2 || (run.0 <= at && at <= run.1);
-        let spans: Vec<_> = runs.into_iter().filter(holds).map(|(from, to, _)| (from, to)).collect();
+        let parts = parts_told(SHORTEST_PART, self.left, |start, length| match self.enclose(start, length) {
+            (low, _) if low >= distance => Some(false),
+            (_, high) if high < distance => Some(true),
+            _ => None,
+        });
+        // Unbroken runs of parts that are not above for certain; kept is what is below for certain.
+        let runs = parts.chunk_by(|a, b| a.2 != Some(false) && b.2 != Some(false));
+        let spans = runs.filter_map(|run| {
+            let (from, to) = (run.first()?.0, run.last()?.1);
+            let told = |told| run.iter().any(|part| part.2 == Some(told));
+            (told(true) || !told(false) && from <= at && at <= to).then_some((from, to))
+        });
+        let spans: Vec<_> = spans.collect();
         if spans.is_empty() { vec![(at, at)] } else { spans }
     }
 
@@ -202,6 +165,7 @@ impl<'a> Search<'a> {
 
     /// Lower and upper bound of the distance over a part of the segment.
     fn enclose(&mut self, start: f64, length: f64) -> (f64, f64) {
+        self.left = self.left.saturating_sub(1);
         self.part.clear();
         self.part.extend_from_slice(self.r);
         rescale(&mut self.part, start, length);
@@ -245,6 +209,15 @@ impl<'a> Search<'a> {
     /// What is summed for a position, at most.
     fn magnitude(&self) -> f64 {
         self.part.iter().map(Vector3::norm).sum()
+    }
+
+    /// How near the bounds of a distance are brought: no nearer than rounding lets them come.
+    fn width(&self, distance: f64) -> f64 {
+        let scale = match self.target {
+            Target::Origin => distance,
+            Target::Shape(_) => self.r.iter().map(Vector3::norm).sum(),
+        };
+        WIDTH_M.max(8.0 * self.r.len() as f64 * f64::EPSILON * scale)
     }
 }
 

@@ -49,10 +49,8 @@ impl<P: Copy + Ord> Ledger<P> {
         contact: Option<f64>,
     ) -> Option<usize> {
         let (limit_m, min_m) = (keep_out.delta_m, approach.separation_m());
-        let span = (min_m < limit_m).then(|| motion.below(limit_m, approach));
-        let agrees = keep_out.agrees(motion, approach, span, contact);
-        let enter = span.map(|span| span.enter);
-        self.cross_check(pair, over, min_m, enter, CrossCheck { contact, agrees });
+        let (span, check) = keep_out.compare(motion, approach, contact);
+        self.cross_check(pair, over, min_m, span.map(|span| span.enter), check);
         let Some(span) = span else {
             if is_coarse(motion, min_m, limit_m) {
                 self.unresolved += 1;
@@ -85,6 +83,15 @@ impl<P: Copy + Ord> Ledger<P> {
         known.push(all.len());
         all.push(new);
         all.len() - 1
+    }
+
+    /// Keeps the violations of which something holds.
+    pub(super) fn retain_violations(&mut self, holds: impl FnMut(&Violation<P>) -> bool) {
+        self.violations.retain(holds);
+        self.of_pair.clear();
+        for (index, violation) in self.violations.iter().enumerate() {
+            self.of_pair.entry(violation.pair).or_default().push(index);
+        }
     }
 
     /// Enters a time that cannot be decided; adjacent ones of a pair become one.

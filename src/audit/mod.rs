@@ -3,11 +3,14 @@
 //! It is fed with motion alone and knows no controller and no engine. Motion comes in segments: the steps of a flight, in
 //! which every vehicle moves on a straight line from one instant to the next ([`Auditor`]), or what a recording says of
 //! each vehicle at times of its own, on lines, on curves, or within a bound ([`recorded`]). Whole segments are swept, so
-//! nothing passes between samples. Two detectors look at each pair:
+//! nothing passes between samples. Two detectors look at each pair that is swept:
 //!
 //! - the closed form: the smallest |r0 + s d| over s from 0 to 1, where r0 is the relative position at the start of the
 //!   segment and d its change. It gives the verdict. On curves the smallest distance is enclosed;
-//! - parry's shape cast of two keep-out balls of radius delta/2, on the same relative motion. It must agree.
+//! - parry's shape cast of two keep-out balls of radius delta/2. It must agree.
+//!
+//! The second is a cross-check of the formula and no second proof: both are given the same list of pairs and the same
+//! relative motion, so a pair that is wrongly left out, or a motion that is wrongly read, is wrong for both.
 //!
 //! A violation is a separation **strictly** below the limit. Both work on relative positions, so coordinates far from the
 //! origin lose nothing that the positions themselves have not lost. The closed form resolves a separation to 4 eps

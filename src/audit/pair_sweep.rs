@@ -104,7 +104,7 @@ impl PairSweep<'_> {
                 && !of.jumps()
                 && of.position(over.from_s).z + of.deviation_at(over.from_s) <= above
         };
-        of.grounded || self.above.is_some_and(starts_there)
+        of.grounded == Some(true) || self.above.is_some_and(starts_there)
     }
 
     fn offer(&self, lower_m: f64, upper_m: f64, time_s: f64, results: &mut Results) {
@@ -150,7 +150,9 @@ impl PairSweep<'_> {
             self.offer(lower_m, upper_m, over.at(drawn.at), results);
         }
         let mut enter = None;
-        if upper_m < limit_m {
+        // Where it cannot be told whether both are on the ground, nothing too close is a violation for certain.
+        let counts = [first, second].iter().any(|segment| segment.grounded == Some(false));
+        if upper_m < limit_m && counts {
             for (from, to) in search.below(limit_m, drawn.at) {
                 let holds = from <= drawn.at && drawn.at <= to;
                 let other = if holds { None } else { search.minimum_within((from, to), f64::INFINITY) };
@@ -233,7 +235,7 @@ impl Overlap<'_> {
     /// what each has now, c = peak / `h_now`^2, times h^2.
     fn rate_hz(&self, margin: f64) -> Option<f64> {
         let curves = [self.first, self.second].into_iter().filter_map(|segment| segment.curve.as_ref());
-        let per_s2: f64 = curves.map(|curve| curve.deviation.peak() / (curve.to_s - curve.from_s).powi(2)).sum();
+        let per_s2: f64 = curves.map(|curve| curve.deviation.peak / (curve.to_s - curve.from_s).powi(2)).sum();
         let rate_hz = (per_s2 / margin).sqrt();
         (per_s2 > 0.0 && margin > 0.0 && rate_hz.is_finite()).then_some(rate_hz)
     }

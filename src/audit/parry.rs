@@ -1,4 +1,5 @@
-//! The second detector: parry's shape cast on keep-out balls, in double precision.
+//! The second detector: parry's shape cast on keep-out balls, in double precision. A cross-check of the closed form, on the
+//! relative motion that it is given too.
 
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::ShapeCastOptions;
@@ -43,13 +44,6 @@ impl KeepOut {
         Self { ball: Ball::new(delta_m / 2.0), delta_m }
     }
 
-    /// The cast beside the closed form.
-    pub(super) fn cross_check(&self, motion: &RelativeMotion) -> CrossCheck {
-        let (approach, contact) = (motion.closest(), self.cast(motion));
-        let below = (approach.separation_m() < self.delta_m).then(|| motion.below(self.delta_m, approach));
-        CrossCheck { contact, agrees: self.agrees(motion, approach, below, contact) }
-    }
-
     /// When the balls first touch, as a fraction of the step; NaN if parry cannot tell.
     #[inline]
     pub(super) fn cast(&self, motion: &RelativeMotion) -> Option<f64> {
@@ -69,30 +63,30 @@ impl KeepOut {
         closest.squared <= self.delta_m * self.delta_m + self.grazing_band(motion)
     }
 
+    /// When a motion that is closest here is below delta by the closed form, beside what the cast says.
+    pub(super) fn compare(
+        &self,
+        motion: &RelativeMotion,
+        closest: ClosestPoint,
+        contact: Option<f64>,
+    ) -> (Option<Span>, CrossCheck) {
+        let below = (closest.separation_m() < self.delta_m).then(|| motion.below(self.delta_m, closest));
+        (below, CrossCheck { contact, agrees: self.agrees(motion, closest, below, contact) })
+    }
+
     /// Whether the two answers are the same up to rounding ([`GRAZING_BAND`]).
     ///
     /// Where one says contact and the other none, the smallest separation must lie in the band. Where both say contact,
     /// the squared separation must change by less than the band between the two entries: that is l (2 h + l) for entries
     /// l apart along the path, with h half the chord that the path cuts out of the ball of radius delta.
-    pub(super) fn agrees(
+    fn agrees(
         &self,
         motion: &RelativeMotion,
         closest: ClosestPoint,
         below: Option<Span>,
-        cast: Option<f64>,
+        contact: Option<f64>,
     ) -> bool {
-        self.difference(motion, closest, below, cast) <= self.grazing_band(motion)
-    }
-
-    /// How far the two answers are apart, in squared separation \[m^2\]; NaN if parry could not tell.
-    fn difference(
-        &self,
-        motion: &RelativeMotion,
-        closest: ClosestPoint,
-        below: Option<Span>,
-        cast: Option<f64>,
-    ) -> f64 {
-        match (below, cast) {
+        let apart_squared = match (below, contact) {
             (None, None) => 0.0,
             (None, Some(toi)) if toi.is_nan() => f64::NAN,
             (Some(_), None) | (None, Some(_)) => {
@@ -106,7 +100,8 @@ impl KeepOut {
                 let apart = (toi - span.enter).abs() * speed_squared.sqrt();
                 apart * (chord + apart)
             }
-        }
+        };
+        apart_squared <= self.grazing_band(motion)
     }
 
     /// Width of the band for this motion \[m^2\].
@@ -128,12 +123,6 @@ mod tests {
     use super::*;
 
     const DELTA_M: f64 = 2.0;
-
-    fn answers(keep_out: &KeepOut, motion: &RelativeMotion) -> (ClosestPoint, Option<Span>, Option<f64>) {
-        let closest = motion.closest();
-        let below = (closest.separation_m() < keep_out.delta_m).then(|| motion.below(keep_out.delta_m, closest));
-        (closest, below, keep_out.cast(motion))
-    }
 
     /// A straight pass: `miss_m` from zero at the closest, seen from `before_m` ahead of it to `after_m` behind it, in the
     /// plane of two directions.
@@ -160,10 +149,11 @@ mod tests {
             let miss_m = DELTA_M + depth + (ulps * rounding_m).clamp(-1.0, 1.0);
             let Some(motion) = pass(miss_m, before_m, after_m, along, aside) else { return Ok(()) };
             let keep_out = KeepOut::new(DELTA_M);
-            let (closest, below, cast) = answers(&keep_out, &motion);
-            prop_assert!(keep_out.agrees(&motion, closest, below, cast), "{below:?} {cast:?}");
+            let closest = motion.closest();
+            let (below, check) = keep_out.compare(&motion, closest, keep_out.cast(&motion));
+            prop_assert!(check.agrees, "{below:?} {check:?}");
             // What needs no closer look is clear to both.
-            prop_assert!(keep_out.is_near(&motion, closest) || (below.is_none() && cast.is_none()));
+            prop_assert!(keep_out.is_near(&motion, closest) || (below.is_none() && check.contact.is_none()));
         }
     }
 
@@ -172,8 +162,7 @@ mod tests {
         let keep_out = KeepOut::new(DELTA_M);
         let agrees = |miss_m: f64, change: fn(Option<f64>) -> Option<f64>| {
             let motion = pass(miss_m, 10.0, 10.0, [1.0, 2.0, 0.5], [0.0, 1.0, -1.0]).unwrap();
-            let (closest, below, cast) = answers(&keep_out, &motion);
-            keep_out.agrees(&motion, closest, below, change(cast))
+            keep_out.compare(&motion, motion.closest(), change(keep_out.cast(&motion))).1.agrees
         };
         for (miss_m, changes) in [
             (1.0, [|_| None, |toi: Option<f64>| toi.map(|toi| toi + 1e-12), |_| Some(f64::NAN)]),

@@ -64,6 +64,35 @@ impl BernsteinBasis {
     }
 }
 
+/// Halves the fractions from 0 to 1 until each part is told a yes or a no, is as short as asked, or so many parts were looked
+/// at; `tell` is given the start and the length of a part. Neighbours that are told the same are one part: its start, its end
+/// and what it is told.
+pub(super) fn parts_told(
+    shortest: f64,
+    most: usize,
+    mut tell: impl FnMut(f64, f64) -> Option<bool>,
+) -> Vec<(f64, f64, Option<bool>)> {
+    let (mut parts, mut open, mut length, mut looked_at) = (Vec::new(), vec![0.0], 1.0, 0);
+    while !open.is_empty() {
+        looked_at += open.len();
+        let is_last = length <= shortest || looked_at >= most;
+        for start in std::mem::take(&mut open) {
+            match tell(start, length) {
+                None if !is_last => open.extend([start, start + 0.5 * length]),
+                told => parts.push((start, start + length, told)),
+            }
+        }
+        length *= 0.5;
+    }
+    parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    parts.dedup_by(|later, part| {
+        let same = later.2 == part.2;
+        part.1 = if same { later.1 } else { part.1 };
+        same
+    });
+    parts
+}
+
 /// Farthest that a polynomial strays from the straight way between its ends, by its control points.
 pub(super) fn stray(c: &[Vector3<f64>]) -> f64 {
     let n = c.len();
@@ -84,5 +113,18 @@ mod tests {
         assert_eq!(stray(&r), 2.0);
         assert_eq!(stray(&r[..2]), 0.0);
         assert_eq!(BernsteinBasis::of_degree(2).range(&[0.0, 4.0, -4.0]), (0.0, 2.0));
+    }
+
+    #[test]
+    fn what_cannot_be_told_is_halved_down_to_the_shortest_part_or_as_often_as_allowed() {
+        // Below and above 0.3, which no part that holds it can be told.
+        let tell = |start: f64, length: f64| match 0.3 {
+            crossing if start + length <= crossing => Some(true),
+            crossing if start >= crossing => Some(false),
+            _ => None,
+        };
+        assert_eq!(parts_told(0.25, 99, tell), [(0.0, 0.25, Some(true)), (0.25, 0.5, None), (0.5, 1.0, Some(false))]);
+        assert_eq!(parts_told(1e-9, 3, tell), [(0.0, 0.5, None), (0.5, 1.0, Some(false))]);
+        assert_eq!(parts_told(1e-9, 1, tell), [(0.0, 1.0, None)]);
     }
 }

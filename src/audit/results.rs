@@ -28,6 +28,12 @@ impl ClosestPairs {
         known.map_or(self.threshold, |kept| if kept.is_known() { kept.lower_m } else { kept.upper_m })
     }
 
+    /// Keeps those of which something holds; from then on any pair can be among the closest.
+    pub(super) fn retain(&mut self, holds: impl FnMut(&Approach) -> bool) {
+        self.kept.retain(holds);
+        self.threshold = f64::INFINITY;
+    }
+
     /// Keeps the closer of two approaches of one pair, and the closest pairs.
     pub(super) fn offer(&mut self, approach: Approach) {
         match self.kept.iter_mut().find(|kept| kept.pair == approach.pair) {

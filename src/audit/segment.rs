@@ -16,8 +16,8 @@ pub(super) struct Segment {
     pub(super) to_s: f64,
     pub(super) from: Vector3<f64>,
     pub(super) to: Vector3<f64>,
-    /// The vehicle counts as on the ground.
-    pub(super) grounded: bool,
+    /// Whether the vehicle counts as on the ground; `None` where that cannot be told.
+    pub(super) grounded: Option<bool>,
     /// Where the segment is not a straight line known for certain.
     pub(super) curve: Option<Arc<Curve>>,
 }
@@ -31,54 +31,39 @@ pub(super) struct Curve {
     pub(super) deviation: Deviation,
 }
 
-/// How far a vehicle of bounded acceleration can be from the curve drawn through two samples h apart, x being the
+/// How far a vehicle of bounded acceleration A can be from the curve drawn through two samples h apart, x being the
 /// fraction of h that has passed.
 ///
 /// Both bounds follow from Peano's form of the error, e(x) = h^2 * integral of K(x, s) p''(s) over s from 0 to 1, so that
 /// |e(x)| <= A h^2 * integral of |K(x, s)|.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Deviation {
-    /// The vehicle is on the curve.
-    None,
-    /// Samples of position alone, joined by the chord: K(x, s) is -s (1 - x) for s <= x and -x (1 - s) beyond, which
-    /// integrates to x (1 - x) / 2. At most A h^2 / 8, in the middle.
-    Chord {
-        /// A h^2 / 8.
-        peak: f64,
-    },
-    /// Samples of position and velocity, joined by the cubic of Hermite. For s > x
-    ///
-    /// ```text
-    /// K(x, s) = -x^2 [(3 - 2 x) (1 - s) - (1 - x)]
-    /// ```
-    ///
-    /// which changes its sign once, at 1 - s = (1 - x) / (3 - 2 x), and K(x, s) = K(1 - x, 1 - s) for s < x. With
-    /// y = 2 x - 1 the two integrals of |K| add up to (1 - y^2)^2 / (4 (4 - y^2)), which falls as |y| grows: at most
-    /// A h^2 / 16, in the middle. Half of what the chord allows.
-    Hermite {
-        /// A h^2 / 16.
-        peak: f64,
-    },
+///
+/// Samples of position alone are joined by the chord: K(x, s) is -s (1 - x) for s <= x and -x (1 - s) beyond, which
+/// integrates to x (1 - x) / 2. At most A h^2 / 8, in the middle.
+///
+/// Samples of position and velocity are joined by the cubic of Hermite. For s > x
+///
+/// ```text
+/// K(x, s) = -x^2 [(3 - 2 x) (1 - s) - (1 - x)]
+/// ```
+///
+/// which changes its sign once, at 1 - s = (1 - x) / (3 - 2 x), and K(x, s) = K(1 - x, 1 - s) for s < x. With
+/// y = 2 x - 1 the two integrals of |K| add up to (1 - y^2)^2 / (4 (4 - y^2)), which falls as |y| grows: at most
+/// A h^2 / 16, in the middle. Half of what the chord allows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Deviation {
+    /// The largest deviation, in the middle; 0 where the vehicle is on the curve.
+    pub(super) peak: f64,
+    /// Whether velocities shaped the curve.
+    pub(super) hermite: bool,
 }
 
 impl Deviation {
-    /// The largest deviation over the whole segment.
-    pub(super) fn peak(self) -> f64 {
-        match self {
-            Self::None => 0.0,
-            Self::Chord { peak } | Self::Hermite { peak } => peak,
-        }
-    }
-
     /// The largest deviation when a fraction `x` has passed.
     fn at(self, x: f64) -> f64 {
         let y = 2.0 * x.clamp(0.0, 1.0) - 1.0;
         let rest = (1.0 - y) * (1.0 + y);
-        match self {
-            Self::None => 0.0,
-            Self::Chord { peak } => peak * rest,
-            Self::Hermite { peak } => peak * rest * rest * 4.0 / (4.0 - y * y),
-        }
+        let of_chord = self.peak * rest;
+        if self.hermite { of_chord * rest * 4.0 / (4.0 - y * y) } else { of_chord }
     }
 }
 
@@ -111,14 +96,14 @@ impl Curve {
 impl Segment {
     /// A straight line.
     pub(super) fn straight(from_s: f64, to_s: f64, from: Vector3<f64>, to: Vector3<f64>) -> Self {
-        Self { from_s, to_s, from, to, grounded: false, curve: None }
+        Self { from_s, to_s, from, to, grounded: Some(false), curve: None }
     }
 
     /// A whole curve.
     pub(super) fn curved(curve: Curve) -> Self {
         let (from_s, to_s) = (curve.from_s, curve.to_s);
         let (from, to) = (curve.position(from_s), curve.position(to_s));
-        Self { from_s, to_s, from, to, grounded: false, curve: Some(Arc::new(curve)) }
+        Self { from_s, to_s, from, to, grounded: Some(false), curve: Some(Arc::new(curve)) }
     }
 
     /// Whether the vehicle is at two places at one instant.
@@ -128,7 +113,7 @@ impl Segment {
 
     /// How far the vehicle can be from the curve, anywhere on the segment.
     pub(super) fn deviation(&self) -> f64 {
-        self.curve.as_ref().map_or(0.0, |curve| curve.deviation.peak())
+        self.curve.as_ref().map_or(0.0, |curve| curve.deviation.peak)
     }
 
     /// How far the vehicle can be from the curve at a time.
@@ -208,7 +193,7 @@ mod tests {
 
     #[test]
     fn a_part_of_a_curve_as_a_polynomial_of_its_fraction_is_the_same_curve() {
-        let curve = curve(Deviation::None);
+        let curve = curve(Deviation::default());
         let local = curve.local(Interval { from_s: 10.5, to_s: 11.75 });
         for u in [0.0, 0.2, 0.7, 1.0] {
             let there = local.iter().rev().fold(Vector3::zeros(), |sum, c| sum * u + c);
@@ -233,10 +218,11 @@ mod tests {
             let reached = |with_velocity| {
                 (0..CELLS).map(|k| missed((f64::from(k) + 0.5) * cell, with_velocity).abs() * cell).sum::<f64>()
             };
-            let (chord, cubic) = (Deviation::Chord { peak: 1.0 / 8.0 }, Deviation::Hermite { peak: 1.0 / 16.0 });
+            let chord = Deviation { peak: 1.0 / 8.0, hermite: false };
+            let cubic = Deviation { peak: 1.0 / 16.0, hermite: true };
             assert!((reached(false) - chord.at(x)).abs() < 1e-6, "{} {}", reached(false), chord.at(x));
             assert!((reached(true) - cubic.at(x)).abs() < 1e-6, "{} {}", reached(true), cubic.at(x));
-            assert!(cubic.at(x) <= cubic.peak() && chord.at(x) <= chord.peak());
+            assert!(cubic.at(x) <= cubic.peak && chord.at(x) <= chord.peak);
         }
     }
 
@@ -246,7 +232,7 @@ mod tests {
         let part = line.clipped(Interval { from_s: 2.0, to_s: 9.0 }).unwrap();
         assert_eq!((part.from_s, part.to_s, part.from, part.to), (2.0, 3.0, Vector3::new(2.0, 0.0, 1.0), line.to));
         assert!(line.clipped(Interval { from_s: 3.5, to_s: 9.0 }).is_none());
-        let whole = Segment::curved(curve(Deviation::None));
+        let whole = Segment::curved(curve(Deviation::default()));
         let part = whole.clipped(Interval { from_s: 10.5, to_s: 11.0 }).unwrap();
         assert_eq!(part.position(10.75), whole.position(10.75));
     }

@@ -8,31 +8,28 @@ use clap::builder::{PossibleValue, TypedValueParser};
 use nalgebra::Vector3;
 
 use super::console::{self, Console};
+use super::encounters;
 use super::events;
 use super::obstacles;
 use super::outputs;
+use super::own::OwnRecording;
 use super::reading::{self, ReadArguments, one_of};
 use super::{Exit, Failure};
-use crate::audit::recorded::{
-    Approach, Motion, Outcome, PairSeries, RecordedError, Settings, TrackAuditor, VehicleSettings,
-};
-use crate::figures::{self, Encounter, Figure};
+use crate::audit::recorded::{Motion, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings};
 use crate::read::{self, Format, ReadOptions};
-use crate::record::mcap::McapRecording;
-use crate::report::recorded::{Clock, RecordedReport, Source, interval};
+use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
+use crate::text::counted;
 use crate::track::Item;
 
 /// Items that are read before the first is judged: usual intervals are learnt from them.
 const OPENING: usize = 65_536;
-/// Pairs, and approaches to obstacles, that the page draws.
-const DRAWN: usize = 3;
 
 /// Arguments of `tautline audit`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where it is proved that nothing came too close, with 1 where something did or where it cannot be told \
-(unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
+Exits with 0 where nothing came too close, proved or as assumed between samples, with 1 where something did or where it \
+cannot be told (unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
 below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
@@ -75,6 +72,9 @@ pub(super) struct AuditArguments {
     /// Add this to the times of a vehicle whose clock was off [s]; may be given several times.
     #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
     offset: Vec<(String, f64)>,
+    /// How many vehicles there must be to judge: another number is wrong input.
+    #[arg(long, value_name = "N", help_heading = "Question")]
+    expect_vehicles: Option<usize>,
     /// Longest time between two samples that is no gap [s] [default: 1.5 of the vehicle's usual interval].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     max_gap: Option<f64>,
@@ -198,16 +198,40 @@ impl AuditArguments {
         outputs::check(&inputs, &outputs)
     }
 
-    /// Delta of a recording of ours where nothing else says how close vehicles may come \[m\].
-    fn own_delta_m(&self, options: &ReadOptions) -> Option<f64> {
-        let path = &self.reading.recording;
-        let silent = self.delta.is_none() && self.radius.is_empty() && self.ellipsoid.is_none();
-        let may_be_ours = path.is_file() && self.format.is_none_or(|format| format == Format::Mcap);
-        if !silent {
-            return None;
+    /// What a recording of ours says of itself.
+    fn own(&self, scale: f64) -> Option<OwnRecording> {
+        let may_be_ours = self.format.is_none_or(|format| format == Format::Mcap);
+        may_be_ours.then(|| OwnRecording::read(&self.reading.recording, scale)).flatten()
+    }
+
+    /// Refuses to judge a vehicle alone, and another number of vehicles than is expected.
+    fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
+        let path = self.reading.recording.display();
+        let judged = outcome.presence.iter().flatten().count();
+        if let Some(expected) = self.expect_vehicles
+            && judged != expected
+        {
+            let message = format!("{path}: {} to judge, not {expected}", counted(judged as u64, "vehicle", "vehicles"));
+            return Err(Failure::input(
+                message,
+                "look for who is missing or too many, or give another --expect-vehicles",
+            ));
         }
-        let ours = may_be_ours.then(|| McapRecording::open(path).ok()).flatten();
-        ours.map(|ours| ours.header().delta_m).or_else(|| read::own_limit_m(path, options))
+        let asked =
+            outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
+        let asked = asked.count();
+        if asked < 2 && settings.obstacles.is_empty() {
+            let message =
+                format!("{path}: {} to judge, and nothing to keep apart", counted(asked as u64, "vehicle", "vehicles"));
+            let help =
+                "judge two vehicles or more (--ids, --frame, --column id=NAME say which are there), or --obstacles";
+            return Err(Failure::input(message, help));
+        }
+        if judged == 0 && (self.from.is_some() || self.to.is_some()) {
+            let message = format!("{path}: no vehicle is there between --from and --to");
+            return Err(Failure::input(message, "give a window in which the recording has vehicles"));
+        }
+        Ok(())
     }
 
     /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording.
@@ -227,7 +251,8 @@ impl AuditArguments {
         Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")))
     }
 
-    fn motion_in_words(&self, curves: bool) -> String {
+    /// What is taken to happen between samples of a recording of curves alone, or that may be ours.
+    fn between(&self, curves: bool, own: Option<&OwnRecording>) -> Between {
         let most = |accel: &[Named]| {
             let listed = accel.iter().map(|(name, a)| match name {
                 Some(name) => format!("{a:?} m/s^2 for {name}"),
@@ -235,12 +260,14 @@ impl AuditArguments {
             });
             listed.collect::<Vec<_>>().join(", ")
         };
-        match self.motion {
-            Some(Motion::Hold) => "held between samples, jumps swept".to_owned(),
-            Some(Motion::Bounded) => format!("accelerations of at most {}", most(&self.max_accel)),
-            _ if curves => "on the recording's curves".to_owned(),
-            _ => "straight between samples".to_owned(),
-        }
+        let (motion, basis) = match self.motion {
+            Some(Motion::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
+            Some(Motion::Bounded) => (format!("accelerations of at most {}", most(&self.max_accel)), Basis::Bounded),
+            _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
+            _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
+            _ => ("straight between samples".to_owned(), Basis::Assumed),
+        };
+        Between { motion, basis }
     }
 }
 
@@ -250,19 +277,26 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let mut settings = arguments.settings()?;
     let options = arguments.reading.options(arguments.format)?;
     let path = &arguments.reading.recording;
-    let own_delta_m = arguments.own_delta_m(&options);
+    let own = arguments.own(options.scale);
+    let is_silent = arguments.delta.is_none() && arguments.radius.is_empty() && arguments.ellipsoid.is_none();
+    let own_delta_m = own.as_ref().map(|own| own.delta_m).or_else(|| read::own_limit_m(path, &options));
+    let own_delta_m = own_delta_m.filter(|_| is_silent);
     settings.delta_m = settings.delta_m.or(own_delta_m);
     let mut auditor = TrackAuditor::new(settings.clone())?;
     if arguments.html.is_some() {
         auditor = auditor.with_smallest();
     }
+    own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
+    arguments.check_count(&outcome, &settings)?;
+    let between = arguments.between(curves, own.as_ref());
+    notes.extend(own.as_ref().and_then(OwnRecording::note));
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
     for note in &notes {
         console.warn(&format!("note: {note}"));
     }
     let source = Source { recording: path.display().to_string(), clock, notes };
-    let report = RecordedReport::new(&outcome, &settings, source, &arguments.motion_in_words(curves));
+    let report = RecordedReport::new(&outcome, &settings, source, between);
 
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
@@ -276,7 +310,7 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
         write_atomically(file, events::junit(&report, arguments.allow_undecided)?.as_bytes())?;
     }
     if let Some(html) = &arguments.html {
-        let figures = figures(arguments, &options, &settings, &outcome)?;
+        let figures = encounters::figures(&arguments.reading, &options, &settings, &outcome)?;
         write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
     }
     Ok(match report.status {
@@ -325,67 +359,6 @@ fn judged(
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
     let outcome = auditor.finish().map_err(|error| Failure::from(error).of(path))?;
     Ok(Judged { outcome, clock, notes: recording.notes().to_vec(), curves })
-}
-
-/// Reads the recording again for those who came closest.
-fn figures(
-    arguments: &AuditArguments,
-    options: &ReadOptions,
-    settings: &Settings,
-    outcome: &Outcome,
-) -> Result<Vec<Figure>, Failure> {
-    let follow = |approach: &Approach| Ok((PairSeries::new(settings, outcome, approach.pair)?, *approach));
-    let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();
-    let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
-    let mut recording = arguments.reading.open(options)?;
-    let (mut items, mut more) = (Vec::new(), !(pairs.is_empty() && obstacles.is_empty()));
-    while more {
-        items.clear();
-        more = recording.read(&mut items)?;
-        for (series, _) in pairs.iter_mut().chain(&mut obstacles) {
-            series.push(&items)?;
-        }
-    }
-    let drawn = |followed: Vec<(PairSeries, Approach)>| -> Vec<Encounter> {
-        followed.into_iter().map(|(series, approach)| encounter(series, &approach, settings, outcome)).collect()
-    };
-    let (pairs, obstacles) = (drawn(pairs), drawn(obstacles));
-    let mut drawn = Vec::new();
-    if let Some(nearest) = pairs.first() {
-        drawn.push(figures::encounters(&pairs, "encounters", "Distances of the closest pairs"));
-        drawn.push(figures::closest_approach(nearest, "Closest approach from above"));
-        let smallest = outcome.smallest.iter().map(|found| found.map(|found| (found.time_s, found.certain_m())));
-        drawn.push(figures::smallest(&smallest.collect::<Vec<_>>(), nearest, "Smallest distance of all"));
-    }
-    if !obstacles.is_empty() {
-        drawn.push(figures::encounters(&obstacles, "obstacles", "Distances from the closest obstacles"));
-    }
-    Ok(drawn)
-}
-
-/// What a figure shows of two who came close.
-fn encounter(series: PairSeries, approach: &Approach, settings: &Settings, outcome: &Outcome) -> Encounter {
-    let unit = if settings.ellipsoid_m.is_some() { "ellipsoids" } else { "m" };
-    let mut encounter = Encounter {
-        names: outcome.names(approach.pair, &settings.obstacles),
-        unit,
-        distances: Vec::new(),
-        paths_m: [Vec::new(), Vec::new()],
-        limit_m: approach.limit_m,
-        closest_s: approach.time_s,
-        closest: format!("{} {unit}", interval(approach.lower_m, approach.upper_m)),
-    };
-    for sample in series.finish() {
-        if sample.unseen_before {
-            encounter.distances.push((sample.time_s, f64::NAN, 0.0));
-            encounter.paths_m.iter_mut().for_each(|path| path.push((f64::NAN, f64::NAN)));
-        }
-        encounter.distances.push((sample.time_s, sample.distance_m, sample.deviation_m));
-        for (path, at) in encounter.paths_m.iter_mut().zip(sample.positions_m) {
-            path.push((at.x, at.y));
-        }
-    }
-    encounter
 }
 
 /// The command as it was given, for a shell.

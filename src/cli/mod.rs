@@ -12,12 +12,14 @@ mod diagnostic;
 mod drawing;
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 mod driver;
+mod encounters;
 mod events;
 mod export;
 mod folder;
 mod list;
 mod obstacles;
 mod outputs;
+mod own;
 mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]

@@ -166,8 +166,8 @@ pub enum Event {
         /// When \[s\].
         time_s: f64,
     },
-    /// A step was refused and flown in shorter ones, because it took more than half of a clearance or bent too far from
-    /// the straight line that is audited.
+    /// A step is flown in shorter ones, because it is too long for the law's fastest rate, took more than half of a
+    /// clearance, or bent too far from the straight line that is audited. Told where their length changes.
     StepRefined {
         /// When the step began \[s\].
         time_s: f64,

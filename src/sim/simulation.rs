@@ -56,6 +56,8 @@ pub struct Simulation {
     time_s: f64,
     steps: u64,
     events: Vec<Event>,
+    /// The fewest parts at once in the last step.
+    shortest: u64,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     /// Since the last sample.
@@ -110,6 +112,7 @@ impl Simulation {
             time_s: 0.0,
             steps: 0,
             events: Vec::new(),
+            shortest: 0,
             energy: None,
             peaks: Peaks::default(),
             sample_is_due: false,
@@ -284,11 +287,12 @@ impl Simulation {
         let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
         let mut shortest = whole;
         let flown = self.fly_parts(step, whole, &mut shortest);
-        if shortest < whole {
+        if shortest < whole && shortest != self.shortest {
             let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
             let dt_s = length_s * (shortest as f64 / whole as f64);
             self.events.push(Event::StepRefined { time_s, dt_s });
         }
+        self.shortest = shortest;
         flown
     }
 
@@ -301,8 +305,8 @@ impl Simulation {
             .map_or(f64::INFINITY, |rate_per_s| self.scenario.time.max_rate_dt / rate_per_s)
     }
 
-    /// Flies the `whole` parts of a step, as many at once as are honest and not refused; the fewest at once that a refusal
-    /// left are `shortest`.
+    /// Flies the `whole` parts of a step, as many at once as are honest and not refused; the fewest at once are
+    /// `shortest`.
     fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<(), Ending> {
         let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
         let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
@@ -311,6 +315,7 @@ impl Simulation {
             let longest_s = self.longest_step_s();
             while part > 1 && seconds(part) > longest_s {
                 part /= 2;
+                *shortest = part.min(*shortest);
             }
             self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();

@@ -1,8 +1,8 @@
 //! The energy and what it certifies, on random starts.
 
-use super::claim::{Claim, Kind};
+use super::claim::Claim;
 use super::flights::{certified_m, continuous, engine_to_any_end, larger, separation_m, times, with_step};
-use super::interface::{Judged, Progress, Untried, try_each};
+use super::interface::{Judged, Progress, Untried, stated, try_each};
 use super::starts::{COUNTS, DELTA_M, random_starts};
 use crate::continuous::{self, IdealError, Tolerances};
 use crate::formation::Formation;
@@ -19,8 +19,6 @@ const SEED: u64 = 2;
 const DURATION_S: f64 = 10.0;
 /// Looks at the energy per second \[Hz\].
 const LOOKS_HZ: f64 = 8.0;
-/// The solver's error per step is 1e-12, and some hundred steps of it add up in E; relative to E(0).
-const ENERGY_TOLERANCE: f64 = 1e-9;
 /// Largest share of the fastest oscillation at the certified separation that a step may cover: omega dt <= 0.3.
 const STIFF_SHARE: f64 = 0.3;
 /// Longest step of the engine \[s\].
@@ -29,8 +27,6 @@ const LONGEST_STEP_S: f64 = 1.0 / 240.0;
 /// Closing speeds of each of two vehicles \[m/s\].
 const HEAD_ON_M_S: [f64; 3] = [1.0, 4.0, 16.0];
 const HEAD_ON_NAMES: [&str; 3] = ["ratio_at_1_m_s", "ratio_at_4_m_s", "ratio_at_16_m_s"];
-/// How near to 1 the fastest pair comes.
-const TIGHT: f64 = 0.15;
 
 /// What one start gave.
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +93,8 @@ pub(super) fn judge(progress: &Progress<'_>) -> Judged {
     let trials = try_each(&random_starts(SEED, STARTS, DURATION_S)?, progress, |start| fly(start, Scenario::law))?;
     let tight = tight()?;
     progress(1);
-    Ok(vec![energy(&trials), energy_in_the_engine(&trials), in_continuous_time(&trials), tight, in_the_engine(&trials)])
+    let [energy, in_engine, certificate, certificate_in_engine] = claims(&trials)?;
+    Ok(vec![energy, in_engine, certificate, tight, certificate_in_engine])
 }
 
 /// Two vehicles head on, from twice delta, at this closing speed of each \[m/s\]: clearance left over clearance certified.
@@ -113,47 +110,40 @@ fn tight() -> Result<Claim, Untried> {
     let ratios = HEAD_ON_M_S.iter().map(|&speed_m_s| head_on(speed_m_s)).collect::<Result<Vec<_>, _>>()?;
     let list = HEAD_ON_M_S.iter().zip(&ratios).map(|(speed_m_s, ratio)| format!("{ratio:.3} at {speed_m_s} m/s"));
     let last = ratios.last().copied().unwrap_or(f64::NAN);
-    Ok(Claim::new(Kind::Ours, "certificate-is-tight", "the collision theorem")
-        .statement("The certificate is tight for two vehicles: head on they use it up as they get faster.")
-        .expected("clearance left over clearance certified falls towards 1")
-        .measured(list.collect::<Vec<_>>().join(", "))
-        .values(HEAD_ON_NAMES.into_iter().zip(ratios.iter().copied()))
-        .tolerance(format!("{TIGHT} at the fastest"))
-        .reason("damping over the last metre takes a share of 1/speed of the energy")
-        .pass(ratios.is_sorted_by(|a, b| a > b) && (1.0..1.0 + TIGHT).contains(&last)))
+    let claim = stated("certificate-is-tight")?;
+    let pass = ratios.is_sorted_by(|a, b| a > b) && (1.0..1.0 + claim.limit()).contains(&last);
+    let words = list.collect::<Vec<_>>().join(", ");
+    Ok(claim.measured(words, HEAD_ON_NAMES.into_iter().zip(ratios)).pass(pass))
 }
 
-fn energy(trials: &[Trial]) -> Claim {
+/// What the trials say of the energy and of the certificate, each in continuous time and in the engine.
+fn claims(trials: &[Trial]) -> Result<[Claim; 4], Untried> {
+    Ok([energy(trials)?, energy_in_the_engine(trials)?, in_continuous_time(trials)?, in_the_engine(trials)?])
+}
+
+fn energy(trials: &[Trial]) -> Result<Claim, Untried> {
+    let claim = stated("energy-never-increases")?;
     let rise = trials.iter().map(|trial| trial.energy_rise).fold(0.0, larger);
-    Claim::new(Kind::Ours, "energy-never-increases", "the stability theorem, complete graph")
-        .statement("In continuous time the energy E never increases.")
-        .expected("no rise from one look to the next")
-        .measured(format!(
-            "largest rise {} of E(0) over {STARTS} random starts of {DURATION_S} s with {LOOKS_HZ} looks a second",
-            bound(rise, ENERGY_TOLERANCE)
-        ))
-        .at_most("largest_rise_over_initial", rise, ENERGY_TOLERANCE)
-        .reason("the solver's tolerance of 1e-12 a step, summed over the steps")
+    let words = format!(
+        "largest rise {} of E(0) over {STARTS} random starts of {DURATION_S} s with {LOOKS_HZ} looks a second",
+        bound(rise, claim.limit())
+    );
+    Ok(claim.measured(words, [("largest_rise_over_initial", rise)]).within_limit())
 }
 
-fn energy_in_the_engine(trials: &[Trial]) -> Claim {
+fn energy_in_the_engine(trials: &[Trial]) -> Result<Claim, Untried> {
+    let claim = stated("energy-in-the-engine")?;
     let excess = trials.iter().map(|trial| trial.engine_energy_excess).fold(0.0, larger);
     let rise = trials.iter().map(|trial| trial.engine_energy_rise).fold(0.0, larger);
-    Claim::new(Kind::Ours, "energy-in-the-engine", "the stability theorem, in discrete time")
-        .statement(
-            "In Rapier, with a step that resolves the tension at the certified separation, E never exceeds E(0).",
-        )
-        .expected("no excess at any step")
-        .measured(format!(
-            "largest excess {} of E(0) over every step of {}; from its lowest value so far E rises by up to \
-             {rise:.1e} of E(0), as the method's does where a mode oscillates",
-            bound(excess, ENERGY_TOLERANCE),
-            population()
-        ))
-        .values([("largest_excess_over_initial", excess), ("largest_rise_over_initial", rise)])
-        .tolerance(format!("{ENERGY_TOLERANCE:e}"))
-        .reason("rounding, summed over the steps")
-        .pass(excess <= ENERGY_TOLERANCE)
+    let words = format!(
+        "largest excess {} of E(0) over every step of {}; from its lowest value so far E rises by up to {rise:.1e} of \
+         E(0), as the method's does where a mode oscillates",
+        bound(excess, claim.limit()),
+        population()
+    );
+    let pass = excess <= claim.limit();
+    let values = [("largest_excess_over_initial", excess), ("largest_rise_over_initial", rise)];
+    Ok(claim.measured(words, values).pass(pass))
 }
 
 fn population() -> String {
@@ -170,49 +160,36 @@ fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
     (broken, margins_m.fold(f64::INFINITY, f64::min), ratios.fold(f64::INFINITY, f64::min))
 }
 
-fn in_continuous_time(trials: &[Trial]) -> Claim {
+fn in_continuous_time(trials: &[Trial]) -> Result<Claim, Untried> {
     let (broken, margin_m, ratio) = kept(trials, |trial| trial.continuous_m);
-    Claim::new(Kind::Ours, "certificate", "the collision theorem, complete graph")
-        .statement("No pair ever comes closer than the separation certified before the first step.")
-        .expected("never broken")
-        .measured(format!(
-            "broken {broken} times in {}; smallest margin {margin_m:.4} m, where clearance above delta was {ratio:.2} \
-             times the certified one or more",
-            population()
-        ))
-        .values([("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)])
-        .tolerance("0")
-        .reason("continuous time is what the proof is about")
-        .pass(broken == 0)
+    let words = format!(
+        "broken {broken} times in {}; smallest margin {margin_m:.4} m, where clearance above delta was {ratio:.2} times \
+         the certified one or more",
+        population()
+    );
+    let values = [("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)];
+    Ok(stated("certificate")?.measured(words, values).pass(broken == 0))
 }
 
-fn in_the_engine(trials: &[Trial]) -> Claim {
+fn in_the_engine(trials: &[Trial]) -> Result<Claim, Untried> {
     let (broken, margin_m, _) = kept(trials, |trial| trial.engine_m);
     let differences_m = trials.iter().map(|trial| (trial.engine_m - trial.continuous_m).abs());
     let difference_m = differences_m.fold(0.0, larger);
     let shortest_s = trials.iter().map(|trial| trial.dt_s).fold(f64::INFINITY, f64::min);
-    Claim::new(Kind::Ours, "certificate-in-the-engine", "the collision theorem, in discrete time")
-        .statement(
-            "In Rapier, with a step that resolves the tension at the certified separation, the certificate \
-             holds too.",
-        )
-        .expected("never broken")
-        .measured(format!(
-            "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} \
-             m of continuous time; steps of {:.2} ms to {:.2} ms, double precision",
-            population(),
-            shortest_s * 1e3,
-            LONGEST_STEP_S * 1e3
-        ))
-        .values([
-            ("broken", broken as f64),
-            ("smallest_margin_m", margin_m),
-            ("largest_difference_m", difference_m),
-            ("shortest_dt_s", shortest_s),
-        ])
-        .tolerance("0")
-        .reason("a step with omega dt <= 0.3 errs by less than what damping leaves of the certified clearance")
-        .pass(broken == 0)
+    let words = format!(
+        "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} m of \
+         continuous time; steps of {:.2} ms to {:.2} ms, double precision",
+        population(),
+        shortest_s * 1e3,
+        LONGEST_STEP_S * 1e3
+    );
+    let values = [
+        ("broken", broken as f64),
+        ("smallest_margin_m", margin_m),
+        ("largest_difference_m", difference_m),
+        ("shortest_dt_s", shortest_s),
+    ];
+    Ok(stated("certificate-in-the-engine")?.measured(words, values).pass(broken == 0))
 }
 
 #[cfg(test)]
@@ -274,21 +251,23 @@ mod tests {
             Trial { certified_m, engine_m, dt_s, ..GOOD }
         };
         let honest = trial(honest_step_s(&scenario, certified_m).expect("a tension"));
-        assert!(in_the_engine(&[honest]).pass, "{honest:?}");
+        let judge = |trials: &[Trial]| in_the_engine(trials).expect("a claim");
+        assert!(judge(&[honest]).pass, "{honest:?}");
         let jumped = trial(0.5);
-        assert!(!in_the_engine(&[honest, jumped]).pass, "{jumped:?}");
-        assert_eq!(in_the_engine(&[honest, jumped]).value("broken"), Some(1.0));
+        assert!(!judge(&[honest, jumped]).pass, "{jumped:?}");
+        assert_eq!(judge(&[honest, jumped]).value("broken"), Some(1.0));
     }
 
     #[test]
     fn an_energy_that_rises_or_is_no_number_is_a_claim_that_fails() {
-        assert!(energy(&[GOOD]).pass && energy_in_the_engine(&[GOOD]).pass);
+        let passes = |second: Trial| claims(&[GOOD, second]).expect("claims").map(|claim| claim.pass);
+        assert_eq!(passes(GOOD), [true; 4]);
         for rise in [1e-3, f64::NAN] {
-            assert!(!energy(&[GOOD, Trial { energy_rise: rise, ..GOOD }]).pass);
-            assert!(!energy_in_the_engine(&[GOOD, Trial { engine_energy_excess: rise, ..GOOD }]).pass);
+            assert_eq!(passes(Trial { energy_rise: rise, ..GOOD }), [false, true, true, true]);
+            assert_eq!(passes(Trial { engine_energy_excess: rise, ..GOOD }), [true, false, true, true]);
         }
         let lost = Trial { continuous_m: f64::NAN, ..GOOD };
-        assert!(!in_continuous_time(&[GOOD, lost]).pass, "a separation that is no number keeps no promise");
+        assert_eq!(passes(lost), [true, true, false, true], "a separation that is no number keeps no promise");
     }
 
     use crate::observation::Observation;
@@ -319,9 +298,7 @@ mod tests {
         let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
         let flipped: MakeLaw = |scenario| Ok(Box::new(Flipped(scenario.law()?, scenario.start.clone())));
         let trials: Vec<Trial> = starts.par_iter().map(|start| fly(start, flipped).expect("a trial")).collect();
-        for claim in
-            [energy(&trials), energy_in_the_engine(&trials), in_continuous_time(&trials), in_the_engine(&trials)]
-        {
+        for claim in claims(&trials).expect("claims") {
             assert!(!claim.pass, "{claim:?}");
         }
     }

@@ -1,30 +1,34 @@
 //! One statement, judged.
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 /// A statement of ours or of the paper, with what was measured about it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+///
+/// `claims.json` holds what is known before anything is measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Claim {
     /// Stable name.
     pub id: &'static str,
     /// Where the statement comes from: equation, figure or theorem.
     pub source: &'static str,
     /// The finding about the paper, F1 to F7, that the claim measures.
+    #[serde(borrow)]
     pub finding: Option<&'static str>,
     /// Whose statement it is, and how it is expected to fare.
     pub kind: Kind,
     /// What is stated.
     pub statement: &'static str,
     /// What the measurement should give.
-    pub expected: String,
+    pub expected: &'static str,
     /// What it gave, in words.
     pub measured: String,
     /// The key numbers behind these words by name, units in the names; a JSON object in files, where a number that is not
     /// finite is null.
-    #[serde(serialize_with = "as_object")]
+    #[serde(serialize_with = "as_object", skip_deserializing)]
     pub values: Vec<(&'static str, f64)>,
     /// By how much the measurement may differ.
-    pub tolerance: String,
+    pub tolerance: &'static str,
     /// Why by so much.
     pub reason: &'static str,
     /// Whether the measurement is as expected.
@@ -32,7 +36,7 @@ pub struct Claim {
 }
 
 /// Whose statement it is, and how it is expected to fare.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// This program's own: it must hold.
@@ -55,58 +59,45 @@ pub struct Group {
     pub claims: Vec<Claim>,
 }
 
-/// A claim is built up by the methods of its fields' names; it fails until `pass` or `at_most` judges
-/// it.
 impl Claim {
-    pub(super) fn new(kind: Kind, id: &'static str, source: &'static str) -> Self {
-        Self { id, source, kind, ..Self::default() }
-    }
-
     /// What stands in the place of claims that could not be tried.
     pub(super) fn untried(error: &impl ToString) -> Self {
-        Self::new(Kind::Ours, "tried", "this program")
-            .statement("These claims can be tried.")
-            .expected("every flight can be flown")
-            .measured(error.to_string())
-            .tolerance("none")
-            .reason("a law or a plant that gives up is broken")
+        Self {
+            id: "tried",
+            source: "this program",
+            statement: "These claims can be tried.",
+            expected: "every flight can be flown",
+            measured: error.to_string(),
+            tolerance: "none",
+            reason: "a law or a plant that gives up is broken",
+            ..Self::default()
+        }
     }
 
-    pub(super) fn finding(self, finding: &'static str) -> Self {
-        Self { finding: Some(finding), ..self }
+    /// The number that the tolerance begins with; NaN, which nothing is within, where it begins with none.
+    pub(super) fn limit(&self) -> f64 {
+        self.tolerance.split(' ').next().and_then(|word| word.parse().ok()).unwrap_or(f64::NAN)
     }
 
-    pub(super) fn statement(self, statement: &'static str) -> Self {
-        Self { statement, ..self }
-    }
-
-    pub(super) fn expected(self, expected: impl Into<String>) -> Self {
-        Self { expected: expected.into(), ..self }
-    }
-
-    pub(super) fn measured(self, measured: impl Into<String>) -> Self {
-        Self { measured: measured.into(), ..self }
-    }
-
-    pub(super) fn values(self, values: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
-        Self { values: values.into_iter().collect(), ..self }
-    }
-
-    pub(super) fn tolerance(self, tolerance: impl Into<String>) -> Self {
-        Self { tolerance: tolerance.into(), ..self }
-    }
-
-    pub(super) fn reason(self, reason: &'static str) -> Self {
-        Self { reason, ..self }
+    /// What the measurement gave; the claim still fails until it is judged.
+    pub(super) fn measured(self, words: String, values: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
+        Self { measured: words, values: values.into_iter().collect(), ..self }
     }
 
     pub(super) fn pass(self, pass: bool) -> Self {
         Self { pass, ..self }
     }
 
-    /// A claim that a ratio of this name, its only number, is within this tolerance of 0.
-    pub(super) fn at_most(self, name: &'static str, ratio: f64, limit: f64) -> Self {
-        self.values([(name, ratio)]).tolerance(format!("{limit:e}")).pass(ratio <= limit)
+    /// A claim that every number measured is, without its sign, at most [`Claim::limit`].
+    pub(super) fn within_limit(self) -> Self {
+        let limit = self.limit();
+        let pass = self.values.iter().all(|(_, number)| number.abs() <= limit);
+        self.pass(pass)
+    }
+
+    pub(super) fn but_only_if(self, holds: bool) -> Self {
+        let pass = self.pass && holds;
+        self.pass(pass)
     }
 
     /// How the statement fared, in two words at most.

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::claim::{Claim, Kind};
+use super::claim::Claim;
 use super::flights::{builtin, continuous, engine, larger, relative_speed_squared, times, with_step};
-use super::interface::{Progress, Untried};
+use super::interface::{Judged, Progress, Untried, stated};
 use crate::continuous::Tolerances;
 use crate::plant::{Path, rapier};
 use crate::scenario::{Precision, Scenario};
@@ -21,16 +21,12 @@ const DURATION_S: f64 = 10.0;
 const COMPARED_HZ: f64 = 10.0;
 /// Semi-implicit Euler is of order 1.
 const ORDER: std::ops::RangeInclusive<f64> = 0.9..=1.1;
-/// Rounding to 6e-8 of velocities of some 1 m/s, adding up one-sidedly over the 20000 steps of the best flight, moves a
-/// vehicle by at most 20000 * 6e-8 m.
-const SINGLE_FLOOR_M: f64 = 1.2e-3;
 
 /// Free decay: coefficients \[1/s\], steps taken, and their lengths in turn \[s\].
 const FREE_A22_PER_S: [f64; 3] = [-1.0, -0.1, 0.1];
 const FREE_STEPS: usize = 6000;
 const FREE_STEP_S: [f64; 3] = [1.0 / 60.0, 1.0 / 240.0, 1.0 / 1000.0];
-/// Rounding of 6000 steps, relative: a few eps each.
-const FREE_DOUBLE: f64 = 1e-11;
+/// Rounding of 6000 steps in single precision, relative: a few eps each.
 const FREE_SINGLE: f64 = 2e-3;
 
 /// One step length and the errors of a flight in such steps.
@@ -120,89 +116,63 @@ pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, Untrie
 }
 
 /// The claims about it.
-pub(super) fn claims(refinements: &[Refinement]) -> Vec<Claim> {
-    vec![converges(refinements), single_precision(refinements), energy_excess(refinements), energy_rise(refinements)]
+pub(super) fn claims(refinements: &[Refinement]) -> Judged {
+    let error = |first, last| format!("largest position error {first:.1e} m to {last:.1e} m");
+    let excess = |first, last| format!("excess {first:.1e} to {last:.1e} m^2/s^2");
+    let [of_error, of_excess] =
+        [["coarsest_error_m", "finest_error_m"], ["coarsest_excess_m2_s2", "finest_excess_m2_s2"]];
+    Ok(vec![
+        of_first_order("order-of-the-engine", refinements, of_error, |one| one.double_m, error)?,
+        single_precision(refinements)?,
+        of_first_order("energy-excess-of-the-engine", refinements, of_excess, |one| one.energy_excess_m2_s2, excess)?,
+        energy_rise(refinements)?,
+    ])
 }
 
 fn steps() -> String {
     format!("dt = 1/{} s to 1/{} s", STEPS_HZ[0], STEPS_HZ[STEPS_HZ.len() - 1])
 }
 
-/// Judges that a number of each flight falls in proportion to the step. The names are those of its values, the measurement
-/// is said of its first and last.
+/// Judges that a number of each flight falls in proportion to the step. The names and the words are those of its first and
+/// last.
 fn of_first_order(
-    claim: Claim,
+    id: &str,
     refinements: &[Refinement],
     names: [&'static str; 2],
     number: fn(&Refinement) -> f64,
-    measured: impl Fn(f64, f64) -> String,
-) -> Claim {
+    words: impl Fn(f64, f64) -> String,
+) -> Result<Claim, Untried> {
     let numbers: Vec<f64> = refinements.iter().map(number).collect();
     let orders: Vec<f64> = numbers.windows(2).map(|pair| order(pair[0], pair[1])).collect();
     let (low, high) =
         (orders.iter().copied().fold(f64::INFINITY, f64::min), orders.iter().copied().fold(f64::NEG_INFINITY, larger));
-    let [first, .., last] = numbers[..] else { return claim };
-    claim
-        .measured(format!("order {low:.2} to {high:.2} over {}; {}", steps(), measured(first, last)))
-        .values([("lowest_order", low), ("highest_order", high), (names[0], first), (names[1], last)])
-        .tolerance("0.1")
-        .reason("second-order terms of the coarsest step")
-        .pass(orders.iter().all(|order| ORDER.contains(order)))
+    let claim = stated(id)?;
+    let [first, .., last] = numbers[..] else { return Ok(claim) };
+    let words = format!("order {low:.2} to {high:.2} over {}; {}", steps(), words(first, last));
+    let values = [("lowest_order", low), ("highest_order", high), (names[0], first), (names[1], last)];
+    Ok(claim.measured(words, values).pass(orders.iter().all(|order| ORDER.contains(order))))
 }
 
-fn converges(refinements: &[Refinement]) -> Claim {
-    let claim = Claim::new(Kind::Ours, "order-of-the-engine", "discrete time")
-        .statement("In double precision Rapier converges to continuous time with order 1.")
-        .expected(format!("an observed order of {} to {} from each step to its half", ORDER.start(), ORDER.end()));
-    let names = ["coarsest_error_m", "finest_error_m"];
-    let measured = |first, last| format!("largest position error {first:.1e} m to {last:.1e} m");
-    of_first_order(claim, refinements, names, |one| one.double_m, measured)
-}
-
-fn single_precision(refinements: &[Refinement]) -> Claim {
+fn single_precision(refinements: &[Refinement]) -> Result<Claim, Untried> {
     let best = refinements.iter().min_by(|a, b| a.single_m.total_cmp(&b.single_m)).copied().unwrap_or_default();
     let finest = refinements.last().copied().unwrap_or_default();
-    Claim::new(Kind::Ours, "single-precision-floor", "discrete time")
-        .statement("In single precision the error falls to a floor of rounding, and no shorter step is better.")
-        .expected(format!("a floor of at most {SINGLE_FLOOR_M:e} m, above that of double precision, and more beyond"))
-        .measured(format!(
-            "floor {:.1e} m at dt = 1/{:.0} s; {:.1e} m at dt = 1/{:.0} s",
-            best.single_m,
-            1.0 / best.dt_s,
-            finest.single_m,
-            1.0 / finest.dt_s
-        ))
-        .values([("floor_m", best.single_m), ("floor_dt_s", best.dt_s), ("finest_error_m", finest.single_m)])
-        .tolerance(format!("{SINGLE_FLOOR_M:e} m"))
-        .reason("velocities of 1 m/s rounded to 6e-8 at every step of some 20000, all to one side")
-        .pass(
-            best.single_m <= SINGLE_FLOOR_M
-                && best.single_m > best.double_m
-                && finest.dt_s < best.dt_s
-                && finest.single_m > 2.0 * best.single_m,
-        )
+    let (floor_m, finest_m) = (best.single_m, finest.single_m);
+    let claim = stated("single-precision-floor")?;
+    // Rounding to 6e-8 of velocities of some 1 m/s, adding up one-sidedly over the 20000 steps of the best flight, moves a
+    // vehicle by at most 20000 * 6e-8 m.
+    let of_rounding = floor_m <= claim.limit() && floor_m > best.double_m;
+    let pass = of_rounding && finest.dt_s < best.dt_s && finest_m > 2.0 * floor_m;
+    let [best_hz, finest_hz] = [best.dt_s, finest.dt_s].map(f64::recip);
+    let words = format!("floor {floor_m:.1e} m at dt = 1/{best_hz:.0} s; {finest_m:.1e} m at dt = 1/{finest_hz:.0} s");
+    let values = [("floor_m", floor_m), ("floor_dt_s", best.dt_s), ("finest_error_m", finest_m)];
+    Ok(claim.measured(words, values).pass(pass))
 }
 
-fn energy_excess(refinements: &[Refinement]) -> Claim {
-    let claim = Claim::new(Kind::Ours, "energy-excess-of-the-engine", "discrete time, dE/dt = -sum |v_i - mean v|^2")
-        .statement("In Rapier, E exceeds what the dissipation leaves of E(0) only in proportion to dt.")
-        .expected(format!("an observed order of {} to {}", ORDER.start(), ORDER.end()));
-    let names = ["coarsest_excess_m2_s2", "finest_excess_m2_s2"];
-    let measured = |first, last| format!("excess {first:.1e} to {last:.1e} m^2/s^2");
-    of_first_order(claim, refinements, names, |one| one.energy_excess_m2_s2, measured)
-}
-
-fn energy_rise(refinements: &[Refinement]) -> Claim {
-    const ROUNDING: f64 = 1e-12;
+fn energy_rise(refinements: &[Refinement]) -> Result<Claim, Untried> {
+    let claim = stated("energy-of-the-engine")?;
     let rise = refinements.iter().map(|one| one.energy_rise_m2_s2).fold(0.0, larger);
-    Claim::new(Kind::Ours, "energy-of-the-engine", "the stability theorem, in discrete time")
-        .statement("In Rapier, E never rises along the pentagon's flight.")
-        .expected("no rise above its lowest value so far")
-        .measured(format!("largest rise {} m^2/s^2 over {}", bound(rise, ROUNDING), steps()))
-        .values([("largest_rise_m2_s2", rise)])
-        .tolerance(format!("{ROUNDING:e} m^2/s^2"))
-        .reason("rounding of E, which starts at 3.7 m^2/s^2")
-        .pass(rise <= ROUNDING)
+    let words = format!("largest rise {} m^2/s^2 over {}", bound(rise, claim.limit()), steps());
+    Ok(claim.measured(words, [("largest_rise_m2_s2", rise)]).within_limit())
 }
 
 /// Largest relative error of a free velocity against v(0) exp(a22 t).
@@ -238,16 +208,13 @@ pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, Untried> {
     let (double, single) = rayon::join(|| free_decay_error(Precision::Double), || free_decay_error(Precision::Single));
     let (double, single) = (double?, single?);
     progress(1);
-    Ok(Claim::new(Kind::Ours, "free-decay", "equation (1) with u = 0")
-        .statement("In Rapier a free velocity is v(0) exp(a22 t), whatever the step.")
-        .expected("exact to rounding")
-        .measured(format!(
-            "largest relative error {} in double and {single:.0e} in single precision after {FREE_STEPS} steps of \
-             mixed lengths with a22 of {FREE_A22_PER_S:?} 1/s",
-            bound(double, FREE_DOUBLE)
-        ))
-        .values([("double_relative_error", double), ("single_relative_error", single)])
-        .tolerance(format!("{FREE_DOUBLE:e} in double, {FREE_SINGLE:e} in single precision"))
-        .reason("a few roundings a step")
-        .pass(double <= FREE_DOUBLE && single <= FREE_SINGLE))
+    let claim = stated("free-decay")?;
+    let words = format!(
+        "largest relative error {} in double and {single:.0e} in single precision after {FREE_STEPS} steps of mixed lengths \
+         with a22 of {FREE_A22_PER_S:?} 1/s",
+        bound(double, claim.limit())
+    );
+    let pass = double <= claim.limit() && single <= FREE_SINGLE;
+    let values = [("double_relative_error", double), ("single_relative_error", single)];
+    Ok(claim.measured(words, values).pass(pass))
 }

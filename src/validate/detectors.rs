@@ -1,8 +1,8 @@
 //! Three detectors, one answer: the closed form, parry's shape cast and the engine's own contacts.
 
-use super::claim::{Claim, Kind};
+use super::claim::Claim;
 use super::flights::{builtin, engine, separation_m};
-use super::interface::{Progress, Untried};
+use super::interface::{Judged, Progress, Untried, stated};
 use crate::audit::Status;
 use crate::figures::RunHistory;
 use crate::metrics::Metrics;
@@ -11,9 +11,6 @@ use crate::swarm::Pair;
 
 /// Both detectors place the first contact within a step; they may differ by rounding \[s\].
 const CONTACT_TOLERANCE_S: f64 = 1e-9;
-/// The default flight (single precision, 1/240 s) against continuous time \[m\]: four times the position error measured
-/// for this step.
-const CLOSEST_TOLERANCE_M: f64 = 0.005;
 
 /// Closest approaches in continuous time \[m\], as an independent integrator gives them.
 const PENTAGON_MIN_M: f64 = 2.460_353;
@@ -72,77 +69,59 @@ pub(super) fn flights(progress: &Progress<'_>) -> Result<Flights, Untried> {
 }
 
 /// The claims about them.
-pub(super) fn claims(flights: &Flights) -> Vec<Claim> {
-    vec![
-        flown_clear("figure-2-in-the-engine", "Fig. 2", &flights.pentagon, PENTAGON_MIN_M),
-        flown_clear("figure-3-in-the-engine", "Fig. 3", &flights.circle, CIRCLE_MIN_M),
-        agree_on_clear(&flights.pentagon.flight),
-        agree_on_violation(&flights.baseline.flight),
-    ]
+pub(super) fn claims(flights: &Flights) -> Judged {
+    Ok(vec![
+        flown_clear("figure-2-in-the-engine", &flights.pentagon, PENTAGON_MIN_M)?,
+        flown_clear("figure-3-in-the-engine", &flights.circle, CIRCLE_MIN_M)?,
+        agree_on_clear(&flights.pentagon.flight)?,
+        agree_on_violation(&flights.baseline.flight)?,
+    ])
 }
 
-fn flown_clear(id: &'static str, source: &'static str, flown: &Flown, expected_m: f64) -> Claim {
+fn flown_clear(id: &str, flown: &Flown, expected_m: f64) -> Result<Claim, Untried> {
     let (min_m, reached_at_s) = (separation_m(flown.flight.audit.closest), flown.reached_at_s);
     let clear = flown.flight.audit.status == Status::Clear;
-    Claim::new(Kind::Ours, id, source)
-        .statement("Rigid bodies in Rapier fly the figure with the program's defaults: clear and reached.")
-        .expected(format!("clear, reached, closest {expected_m} m as in continuous time"))
-        .measured(format!(
-            "{}, reached at {reached_at_s:.1} s, closest {min_m:.4} m",
-            if clear { "clear" } else { "not clear" }
-        ))
-        .values([("min_m", min_m), ("reached_at_s", reached_at_s)])
-        .tolerance(format!("{CLOSEST_TOLERANCE_M} m"))
-        .reason("a step of 1/240 s in single precision")
-        .pass(clear && reached_at_s.is_finite() && (min_m - expected_m).abs() <= CLOSEST_TOLERANCE_M)
+    let not = if clear { "" } else { "not " };
+    let claim = stated(id)?;
+    let pass = clear && reached_at_s.is_finite() && (min_m - expected_m).abs() <= claim.limit();
+    let words = format!("{not}clear, reached at {reached_at_s:.1} s, closest {min_m:.4} m");
+    Ok(claim.measured(words, [("min_m", min_m), ("reached_at_s", reached_at_s)]).pass(pass))
 }
 
-fn agree_on_clear(flight: &Flight) -> Claim {
+fn agree_on_clear(flight: &Flight) -> Result<Claim, Untried> {
     let (found, contacts) = (violating(flight), &flight.engine_contacts);
     let (parry, disagreements) = (flight.audit.parry.min_toi_s, flight.audit.parry.disagreements);
-    Claim::new(Kind::Ours, "detectors-on-a-clear-flight", "the audit")
-        .statement("On the pentagon's flight closed form, parry and Rapier find nothing, each by itself.")
-        .expected("no violation, no contact, no overlap")
-        .measured(format!(
-            "violations: {}; contacts by parry: {}; overlaps in Rapier: {}; {disagreements} disagreements in {} casts",
-            names(&found),
-            parry.map_or("none".to_owned(), |time_s| format!("from {time_s:.3} s")),
-            names(contacts),
-            flight.audit.pairs_checked
-        ))
-        .values([("pairs_checked", flight.audit.pairs_checked as f64), ("disagreements", disagreements as f64)])
-        .tolerance("0")
-        .reason("each answer is a yes or a no")
-        .pass(found.is_empty() && parry.is_none() && contacts.is_empty() && disagreements == 0)
+    let words = format!(
+        "violations: {}; contacts by parry: {}; overlaps in Rapier: {}; {disagreements} disagreements in {} casts",
+        names(&found),
+        parry.map_or("none".to_owned(), |time_s| format!("from {time_s:.3} s")),
+        names(contacts),
+        flight.audit.pairs_checked
+    );
+    let pass = found.is_empty() && parry.is_none() && contacts.is_empty() && disagreements == 0;
+    let values = [("pairs_checked", flight.audit.pairs_checked as f64), ("disagreements", disagreements as f64)];
+    Ok(stated("detectors-on-a-clear-flight")?.measured(words, values).pass(pass))
 }
 
-fn agree_on_violation(flight: &Flight) -> Claim {
+fn agree_on_violation(flight: &Flight) -> Result<Claim, Untried> {
     let (found, contacts) = (violating(flight), &flight.engine_contacts);
     let disagreements = flight.audit.parry.disagreements;
     let first_s = flight.audit.violations.iter().map(|violation| violation.from_s).fold(f64::INFINITY, f64::min);
     let contact_s = flight.audit.parry.min_toi_s.unwrap_or(f64::NAN);
-    Claim::new(Kind::Ours, "detectors-on-a-violation", "the audit")
-        .statement("On the baseline's flight closed form, parry and Rapier find the same pairs.")
-        .expected("the same pairs, and the first contact at the same time")
-        .measured(format!(
-            "violations: {}; overlaps in Rapier: {}; first contact at {first_s:.3} s by the closed form and \
-             {contact_s:.3} s by parry; {disagreements} disagreements in {} casts",
-            names(&found),
-            names(contacts),
-            flight.audit.pairs_checked
-        ))
-        .values([
-            ("violating_pairs", found.len() as f64),
-            ("closed_form_from_s", first_s),
-            ("parry_from_s", contact_s),
-            ("disagreements", disagreements as f64),
-        ])
-        .tolerance(format!("0 pairs; {CONTACT_TOLERANCE_S:e} s"))
-        .reason("rounding of two ways to solve the same quadratic equation")
-        .pass(
-            !found.is_empty()
-                && found == *contacts
-                && disagreements == 0
-                && (first_s - contact_s).abs() <= CONTACT_TOLERANCE_S,
-        )
+    let words = format!(
+        "violations: {}; overlaps in Rapier: {}; first contact at {first_s:.3} s by the closed form and {contact_s:.3} s by \
+         parry; {disagreements} disagreements in {} casts",
+        names(&found),
+        names(contacts),
+        flight.audit.pairs_checked
+    );
+    let values = [
+        ("violating_pairs", found.len() as f64),
+        ("closed_form_from_s", first_s),
+        ("parry_from_s", contact_s),
+        ("disagreements", disagreements as f64),
+    ];
+    let same = !found.is_empty() && found == *contacts && disagreements == 0;
+    let pass = same && (first_s - contact_s).abs() <= CONTACT_TOLERANCE_S;
+    Ok(stated("detectors-on-a-violation")?.measured(words, values).pass(pass))
 }

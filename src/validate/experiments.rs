@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::claim::{Claim, Kind};
-use super::flights::{builtin, certified_m, continuous, end, reached_at_s, times};
-use super::interface::{Judged, Progress, Untried, try_each};
+use super::claim::Claim;
+use super::flights::{builtin, certified_m, continuous, end, larger, reached_at_s, times};
+use super::interface::{Judged, Progress, Untried, stated, try_each};
 use crate::continuous::{Solution, Tolerances};
 use crate::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use crate::scenario::Scenario;
@@ -26,39 +26,23 @@ const TURN_RAD: f64 = 1.0;
 const A22_PER_S: [f64; 3] = [-0.5, 0.0, 0.1];
 const COMPARED_S: f64 = 10.0;
 
-const REFERENCE: &str = "the reference is an independent 8th-order Runge-Kutta integrator at relative tolerance 1e-10";
-
-/// A number of the independent integrator and ours.
-struct Check {
-    name: &'static str,
-    /// Digits of the reference after the point.
-    decimals: u32,
-    expected: f64,
-    measured: f64,
+/// Whether a number agrees with a printed one, to half a unit of its last digit.
+fn agrees(measured: f64, printed: &str) -> bool {
+    let decimals = printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    printed.parse::<f64>().is_ok_and(|expected| (measured - expected).abs() <= 0.5 * libm::exp10(-(decimals as f64)))
 }
 
-fn check(name: &'static str, decimals: u32, expected: f64, measured: f64) -> Check {
-    Check { name, decimals, expected, measured }
-}
-
-/// Whether a number agrees with one of so many digits after the point.
-fn agrees(measured: f64, expected: f64, decimals: u32) -> bool {
-    (measured - expected).abs() <= 0.5 / f64::from(10_u32.pow(decimals))
-}
-
-fn list(checks: &[Check], of: fn(&Check) -> f64) -> String {
-    let entries = checks.iter().map(|check| format!("{} {:.*}", check.name, check.decimals as usize, of(check)));
-    entries.collect::<Vec<_>>().join(", ")
-}
-
-fn against_reference(id: &'static str, source: &'static str, checks: &[Check]) -> Claim {
-    Claim::new(Kind::Ours, id, source)
-        .expected(list(checks, |check| check.expected))
-        .measured(list(checks, |check| check.measured))
-        .values(checks.iter().map(|check| (check.name, check.measured)))
-        .tolerance("half a unit of the last digit of the reference")
-        .reason(REFERENCE)
-        .pass(checks.iter().all(|check| agrees(check.measured, check.expected, check.decimals)))
+/// Holds these numbers against those of the independent integrator, which are what the claim expects, in its order.
+fn against_reference(claim: Claim, measured: &[f64]) -> Claim {
+    let expected: Vec<_> = claim.expected.split(", ").filter_map(|entry| entry.split_once(' ')).collect();
+    let entries = || expected.iter().zip(measured).map(|(&(name, printed), &measured)| (name, printed, measured));
+    let words = |(name, printed, measured): (&str, &str, f64)| {
+        let decimals = printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        format!("{name} {measured:.decimals$}")
+    };
+    let pass = expected.len() == measured.len() && entries().all(|(_, printed, measured)| agrees(measured, printed));
+    let values: Vec<_> = entries().map(|(name, _, measured)| (name, measured)).collect();
+    claim.measured(entries().map(words).collect::<Vec<_>>().join(", "), values).pass(pass)
 }
 
 /// An experiment: the scenario, its flight, and its numbers.
@@ -98,26 +82,18 @@ impl Experiment {
     }
 
     /// The paper's statement about a figure under the edge-tension law: formed, and never below delta.
-    fn formed(&self, id: &'static str, source: &'static str) -> Claim {
+    fn formed(&self, id: &str) -> Result<Claim, Untried> {
         let (min_m, at_s) = self.closest();
         let (reached_at_s, error_m) = (self.reached_at_s(), self.last_edge_error_m());
-        let delta_m = self.scenario.delta_m;
-        Claim::new(Kind::PaperHolds, id, source)
-            .expected(format!("never below delta = {delta_m} m, and the formation reached"))
-            .measured(format!(
-                "closest {min_m:.6} m at {at_s:.3} s; largest edge error below {REACHED_M} m from \
-                 {reached_at_s:.1} s on, {} m after {DURATION_S} s",
-                bound(error_m, CONVERGED_M)
-            ))
-            .values([
-                ("min_m", min_m),
-                ("min_at_s", at_s),
-                ("reached_at_s", reached_at_s),
-                ("final_edge_error_m", error_m),
-            ])
-            .tolerance(format!("{CONVERGED_M:e} m at the end"))
-            .reason("rounding, after common motion has grown by e^12")
-            .pass(min_m > delta_m && reached_at_s.is_finite() && error_m <= CONVERGED_M)
+        let words = format!(
+            "closest {min_m:.6} m at {at_s:.3} s; largest edge error below {REACHED_M} m from {reached_at_s:.1} s on, {} m \
+             after {DURATION_S} s",
+            bound(error_m, CONVERGED_M)
+        );
+        let values =
+            [("min_m", min_m), ("min_at_s", at_s), ("reached_at_s", reached_at_s), ("final_edge_error_m", error_m)];
+        let pass = min_m > self.scenario.delta_m && reached_at_s.is_finite() && error_m <= CONVERGED_M;
+        Ok(stated(id)?.measured(words, values).pass(pass))
     }
 }
 
@@ -141,64 +117,40 @@ fn pentagon() -> Judged {
     let at_10_s = flight.times_s.iter().position(|&time_s| time_s == 10.0).map(|k| &flight.solution.states[k]);
     let position = at_10_s.map_or_else(Vector3::zeros, |state| row(&state.positions_m, 0));
     let (min_m, min_at_s) = flight.closest();
-    let checks = [
-        check("energy_initial_m2_s2", 8, 3.656_742_96, flight.energy_initial()?),
-        check("certified_m", 6, 2.055_307, certified_m(&flight.scenario)?),
-        check("min_m", 6, 2.460_353, min_m),
-        check("min_at_s", 3, 2.151, min_at_s),
-        check("reached_at_s", 1, 36.5, flight.reached_at_s()),
-        check("vehicle_1_control_x_m_s2", 9, 0.860_843_123, control[(0, 0)]),
-        check("vehicle_1_control_y_m_s2", 9, -0.021_225_585, control[(0, 1)]),
-        check("vehicle_1_x_at_10_s_m", 7, 4.318_055_1, position.x),
-        check("vehicle_1_y_at_10_s_m", 7, -1.043_487_6, position.y),
+    let measured = [
+        flight.energy_initial()?,
+        certified_m(&flight.scenario)?,
+        min_m,
+        min_at_s,
+        flight.reached_at_s(),
+        control[(0, 0)],
+        control[(0, 1)],
+        position.x,
+        position.y,
     ];
-    Ok(vec![
-        flight
-            .formed("figure-2", "Fig. 2, equation (8)")
-            .statement("Five vehicles leave a line and form the pentagon without coming closer than delta."),
-        against_reference("figure-2-reference", "Fig. 2", &checks)
-            .statement("The pentagon's flight agrees with an independent integrator."),
-    ])
+    Ok(vec![flight.formed("figure-2")?, against_reference(stated("figure-2-reference")?, &measured)])
 }
 
 fn circle() -> Judged {
     let flight = Experiment::fly(builtin("circle")?)?;
     let (min_m, min_at_s) = flight.closest();
-    let checks = [
-        check("energy_initial_m2_s2", 8, 4.479_772_16, flight.energy_initial()?),
-        check("certified_m", 6, 1.019_476, certified_m(&flight.scenario)?),
-        check("min_m", 6, 1.238_135, min_m),
-        check("min_at_s", 2, 4.18, min_at_s),
-        check("reached_at_s", 1, 44.3, flight.reached_at_s()),
-    ];
-    Ok(vec![
-        flight
-            .formed("figure-3", "Fig. 3, equation (8)")
-            .statement("Six vehicles leave a line and form the circle without coming closer than delta."),
-        against_reference("figure-3-reference", "Fig. 3", &checks)
-            .statement("The circle's flight agrees with an independent integrator."),
-    ])
+    let measured = [flight.energy_initial()?, certified_m(&flight.scenario)?, min_m, min_at_s, flight.reached_at_s()];
+    Ok(vec![flight.formed("figure-3")?, against_reference(stated("figure-3-reference")?, &measured)])
 }
 
 fn baseline() -> Result<Claim, Untried> {
     let flight = Experiment::fly(builtin("pentagon-laplacian")?)?;
     let (min_m, min_at_s) = flight.closest();
     let (delta_m, error_m) = (flight.scenario.delta_m, flight.last_edge_error_m());
-    Ok(Claim::new(Kind::PaperHolds, "figure-4", "Fig. 4, equation (3)")
-        .statement(
-            "Under the Laplacian law (3) the same start reaches the pentagon, but vehicles come closer than delta.",
-        )
-        .expected("reached; closest 1.5327 m at 3.63 s")
-        .measured(format!(
-            "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s, largest \
-             edge error {} m after {DURATION_S} s",
-            flight.reached_at_s(),
-            bound(error_m, CONVERGED_M)
-        ))
-        .values([("min_m", min_m), ("min_at_s", min_at_s), ("final_edge_error_m", error_m)])
-        .tolerance("half a unit of the last digit")
-        .reason(REFERENCE)
-        .pass(agrees(min_m, 1.5327, 4) && agrees(min_at_s, 3.63, 2) && error_m <= CONVERGED_M))
+    let words = format!(
+        "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s, largest edge error {} m after \
+         {DURATION_S} s",
+        flight.reached_at_s(),
+        bound(error_m, CONVERGED_M)
+    );
+    let pass = agrees(min_m, "1.5327") && agrees(min_at_s, "3.63") && error_m <= CONVERGED_M;
+    let values = [("min_m", min_m), ("min_at_s", min_at_s), ("final_edge_error_m", error_m)];
+    Ok(stated("figure-4")?.measured(words, values).pass(pass))
 }
 
 fn straight_line() -> Result<Claim, Untried> {
@@ -207,19 +159,13 @@ fn straight_line() -> Result<Claim, Untried> {
     let error_m = flight.last_edge_error_m();
     let states = &flight.solution.states;
     let off_line_m = states.iter().map(|state| state.positions_m.columns(1, 2).amax()).fold(0.0, f64::max);
-    Ok(Claim::new(Kind::PaperRefuted, "straight-line", "the convergence theorem")
-        .finding("F2")
-        .statement("The law drives the vehicles to the formation from any start without overlap.")
-        .expected("from an exactly straight line never: closest 2.458145 m, largest edge error 8.57 m for ever")
-        .measured(format!(
-            "largest distance from the line {}; closest {min_m:.6} m; largest edge error {error_m:.2} m after \
-             {DURATION_S} s",
-            if off_line_m == 0.0 { "exactly 0".to_owned() } else { format!("{off_line_m:.1e} m") }
-        ))
-        .values([("off_line_m", off_line_m), ("min_m", min_m), ("final_edge_error_m", error_m)])
-        .tolerance("0 from the line, half a unit of the last digit for the rest")
-        .reason("forces along the line have no other component, not even by rounding")
-        .pass(off_line_m == 0.0 && agrees(min_m, 2.458_145, 6) && agrees(error_m, 8.57, 2)))
+    let words = format!(
+        "largest distance from the line {}; closest {min_m:.6} m; largest edge error {error_m:.2} m after {DURATION_S} s",
+        if off_line_m == 0.0 { "exactly 0".to_owned() } else { format!("{off_line_m:.1e} m") }
+    );
+    let pass = off_line_m == 0.0 && agrees(min_m, "2.458145") && agrees(error_m, "8.57");
+    let values = [("off_line_m", off_line_m), ("min_m", min_m), ("final_edge_error_m", error_m)];
+    Ok(stated("straight-line")?.measured(words, values).pass(pass))
 }
 
 /// F6: turn and mirror the start, and everything that follows is turned and mirrored with it.
@@ -244,23 +190,16 @@ fn up_to_rigid_motion() -> Result<Claim, Untried> {
     let turn_rad = motion.map_or(f64::NAN, |motion| motion.rotation[(1, 0)].atan2(motion.rotation[(0, 0)]));
     let offsets_m = (0..formation.count()).map(|i| (row(positions_m, i) - row(&formation.slots_m, i)).norm());
     let farthest_m = offsets_m.fold(0.0, f64::max);
-    Ok(Claim::new(Kind::PaperRefuted, "up-to-rigid-motion", "section 4, goal positions h_p")
-        .finding("F6")
-        .statement("The vehicles reach the goal positions.")
-        .expected(format!(
-            "only the shape: a start turned by {TURN_RAD} rad and mirrored gives an end turned by {TURN_RAD} \
-             rad and mirrored"
-        ))
-        .measured(format!(
-            "best rigid fit {} m (rms) either way; turned by {turn_rad:.6} rad and {}; a vehicle is {farthest_m:.2} \
-             m from its slot",
-            bound(fit_m, CONVERGED_M),
-            if mirrored { "mirrored" } else { "not mirrored" }
-        ))
-        .values([("fit_rms_m", fit_m), ("turn_rad", turn_rad), ("farthest_from_slot_m", farthest_m)])
-        .tolerance(format!("{CONVERGED_M:e} m for the fit, {CONVERGED_M:e} rad for the turn"))
-        .reason("rounding, after common motion has grown by e^12")
-        .pass(fit_m <= CONVERGED_M && mirrored && (turn_rad - TURN_RAD).abs() <= CONVERGED_M && farthest_m > 0.1))
+    let words = format!(
+        "best rigid fit {} m (rms) either way; turned by {turn_rad:.6} rad and {}; a vehicle is {farthest_m:.2} m from its \
+         slot",
+        bound(fit_m, CONVERGED_M),
+        if mirrored { "mirrored" } else { "not mirrored" }
+    );
+    let turned = mirrored && (turn_rad - TURN_RAD).abs() <= CONVERGED_M;
+    let values = [("fit_rms_m", fit_m), ("turn_rad", turn_rad), ("farthest_from_slot_m", farthest_m)];
+    let pass = fit_m <= CONVERGED_M && turned && farthest_m > 0.1;
+    Ok(stated("up-to-rigid-motion")?.measured(words, values).pass(pass))
 }
 
 /// Relative motion on the complete graph is the same for every a22.
@@ -273,16 +212,10 @@ fn relative_motion() -> Result<Claim, Untried> {
     let offset = |swarm: &Swarm, i| row(&swarm.positions_m, i) - row(&swarm.positions_m, 0);
     let [first, others @ ..] = &ends[..] else { return Err("no flight to compare".into()) };
     let apart_m = |other| (0..first.count()).map(move |i| (offset(other, i) - offset(first, i)).norm());
-    let difference_m = others.iter().flat_map(apart_m).fold(0.0, f64::max);
-    Ok(Claim::new(Kind::Ours, "relative-motion", "the stability theorem, complete graph")
-        .statement("On the complete graph a22 cancels: relative motion does not depend on it.")
-        .expected("the same pentagon flight")
-        .measured(format!(
-            "relative positions after {COMPARED_S} s differ by {} m between a22 of {A22_PER_S:?} 1/s",
-            bound(difference_m, CONVERGED_M)
-        ))
-        .values([("largest_difference_m", difference_m)])
-        .tolerance(format!("{CONVERGED_M:e} m"))
-        .reason("the solver's tolerance of 1e-12 a step")
-        .pass(difference_m <= CONVERGED_M))
+    let difference_m = others.iter().flat_map(apart_m).fold(0.0, larger);
+    let words = format!(
+        "relative positions after {COMPARED_S} s differ by {} m between a22 of {A22_PER_S:?} 1/s",
+        bound(difference_m, CONVERGED_M)
+    );
+    Ok(stated("relative-motion")?.measured(words, [("largest_difference_m", difference_m)]).within_limit())
 }

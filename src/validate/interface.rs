@@ -13,6 +13,12 @@ pub(super) type Untried = Box<dyn std::error::Error + Send + Sync>;
 /// Claims, judged.
 pub(super) type Judged = Result<Vec<Claim>, Untried>;
 
+/// The claim of this name as `claims.json` states it: it fails until it is judged.
+pub(super) fn stated(id: &str) -> Result<Claim, Untried> {
+    let claims: Vec<Claim> = serde_json::from_str(include_str!("claims.json"))?;
+    claims.into_iter().find(|claim| claim.id == id).ok_or_else(|| format!("there is no claim {id}").into())
+}
+
 /// Tries each of these in parallel, a unit of work each; the results are in their order.
 pub(super) fn try_each<T: Sync, R: Send>(
     trials: &[T],

@@ -1,8 +1,8 @@
 //! The law (8) at single instants: its matrix form, its sum, and what it does to the energy.
 
-use super::claim::{Claim, Kind};
-use super::flights::{relative_speed_squared, relative_velocities};
-use super::interface::{Judged, Progress, Untried};
+use super::claim::Claim;
+use super::flights::{larger, relative_speed_squared, relative_velocities};
+use super::interface::{Judged, Progress, Untried, stated};
 use super::starts::{DELTA_M, random_starts};
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -14,9 +14,6 @@ use crate::text::bound;
 /// Random states that each claim is tried on; every one with each kind of graph.
 const STATES: usize = 200;
 const SEED: u64 = 1;
-/// Sums of up to 8 vectors, each rounded a few times.
-const ROUNDING: f64 = 1e-13;
-const SUM: &str = "rounding of sums of up to 8 terms, relative to the largest";
 /// Values of a22 \[1/s\] that a state is tried with.
 const A22_PER_S: [f64; 3] = [-0.5, 0.0, 0.1];
 
@@ -92,73 +89,57 @@ fn states() -> Result<Vec<State>, Untried> {
     Ok(states)
 }
 
-/// The largest of a number over the states.
-fn largest(states: &[State], of: impl Fn(&State) -> Result<f64, Untried>) -> Result<f64, Untried> {
-    states.iter().try_fold(0.0, |largest, state| Ok(f64::max(largest, of(state)?)))
+/// The claim that a ratio is within rounding at every state; `words` says so of the bound of the largest, which has this
+/// name.
+fn within_rounding(
+    states: &[State],
+    id: &str,
+    name: &'static str,
+    words: impl Fn(&str) -> String,
+    ratio: impl Fn(&State) -> Result<f64, Untried>,
+) -> Result<Claim, Untried> {
+    let claim = stated(id)?;
+    let largest = states.iter().try_fold(0.0, |largest, state| Ok::<_, Untried>(larger(largest, ratio(state)?)))?;
+    let words = words(&bound(largest, claim.limit()));
+    Ok(claim.measured(words, [(name, largest)]).within_limit())
 }
 
 fn matrix_form(states: &[State]) -> Result<Claim, Untried> {
-    let error = largest(states, |state| {
+    let words = |bound: &str| format!("largest difference {bound} of the largest component, {} states", states.len());
+    within_rounding(states, "matrix-form", "largest_relative_difference", words, |state| {
         let control = state.control()?;
         Ok((state.law()?.matrix_form(&state.swarm)? - &control).amax() / control.amax())
-    })?;
-    Ok(Claim::new(Kind::PaperHolds, "matrix-form", "equations (8), (9)")
-        .statement("The sum over neighbours (8) and the weighted Laplacian (9) are the same law.")
-        .expected("equal to rounding")
-        .measured(format!(
-            "largest difference {} of the largest component, {} states",
-            bound(error, ROUNDING),
-            states.len()
-        ))
-        .at_most("largest_relative_difference", error, ROUNDING)
-        .reason(SUM))
+    })
 }
 
 fn zero_sum(states: &[State]) -> Result<Claim, Untried> {
-    let error = largest(states, |state| {
+    let words = |bound: &str| format!("largest mean {bound} of the largest component, {} states", states.len());
+    within_rounding(states, "zero-net-control", "largest_relative_mean", words, |state| {
         let control = state.control()?;
         Ok(mean_row(&control).norm() / control.amax())
-    })?;
-    Ok(Claim::new(Kind::Ours, "zero-net-control", "equation (8)")
-        .statement("The controls sum to zero: the law cannot move the centre of mass.")
-        .expected("a zero mean")
-        .measured(format!("largest mean {} of the largest component, {} states", bound(error, ROUNDING), states.len()))
-        .at_most("largest_relative_mean", error, ROUNDING)
-        .reason(SUM))
+    })
 }
 
 fn energy_rate(states: &[State]) -> Result<Claim, Untried> {
-    let error = largest(states, |state| {
+    let words =
+        |bound: &str| format!("largest relative error {bound} over {STATES} states with a22 of {A22_PER_S:?} 1/s");
+    within_rounding(states, "energy-rate", "largest_relative_error", words, |state| {
         if !state.graph.is_complete() {
             return Ok(0.0);
         }
         let (rate, scale) = state.energy_rate()?;
         Ok((rate + relative_speed_squared(&state.swarm)).abs() / scale)
-    })?;
-    Ok(Claim::new(Kind::Ours, "energy-rate", "the stability theorem, complete graph")
-        .statement("On the complete graph dE/dt = -sum |v_i - mean v|^2, whatever a22 is.")
-        .expected("equal at every state")
-        .measured(format!(
-            "largest relative error {} over {STATES} states with a22 of {A22_PER_S:?} 1/s",
-            bound(error, ROUNDING)
-        ))
-        .at_most("largest_relative_error", error, ROUNDING)
-        .reason("rounding, relative to the terms that are summed"))
+    })
 }
 
 fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, Untried> {
-    let excess = largest(states, |state| {
+    let words = |bound: &str| format!("largest relative excess {bound} over {} states", states.len());
+    within_rounding(states, "energy-rate-on-graphs", "largest_relative_excess", words, |state| {
         let (rate, scale) = state.energy_rate()?;
         let (a22, connectivity) = (state.parameters.a22_per_s, state.graph.algebraic_connectivity());
         let margin = (1.0 + a22) * connectivity / state.swarm.count() as f64 - a22;
         Ok(((rate + margin * relative_speed_squared(&state.swarm)) / scale).max(0.0))
-    })?;
-    Ok(Claim::new(Kind::Ours, "energy-rate-on-graphs", "theory of the general graph")
-        .statement("On any graph dE/dt <= -[(1 + a22) lambda2/N - a22] sum |v_i - mean v|^2.")
-        .expected("never more")
-        .measured(format!("largest relative excess {} over {} states", bound(excess, ROUNDING), states.len()))
-        .at_most("largest_relative_excess", excess, ROUNDING)
-        .reason("rounding, relative to the terms that are summed"))
+    })
 }
 
 /// Equation (3) with h as section 4 writes it, zeros over `h_p`: the goal is then a velocity.
@@ -180,16 +161,12 @@ fn literal_baseline() -> Result<Claim, Untried> {
         law.command(&at, &mut control).map(|()| (0..count).map(|i| row(&control, i).norm()).fold(0.0, f64::max))
     };
     let (at_goal, at_scaled) = (control_at(1.0)?, control_at(f2_per_s / f1_per_s2)?);
-    Ok(Claim::new(Kind::PaperRefuted, "goal-as-printed", "section 4, equation (3)")
-        .finding("F7")
-        .statement("With h = [0; 1] (x) h_p the law (3) comes to rest at the goal h_p.")
-        .expected("rest at (1 + a22) h_p instead: read h as goal positions h_p and goal velocities 0")
-        .measured(format!(
-            "at rest at h_p the law still commands {at_goal:.4} m/s^2, at {f2_per_s} h_p {}",
-            bound(at_scaled, ROUNDING)
-        ))
-        .values([("control_at_goal_m_s2", at_goal), ("control_at_scaled_goal_m_s2", at_scaled)])
-        .tolerance(format!("{ROUNDING:e} m/s^2"))
-        .reason("rounding; the pentagon of side 3 m, a22 = 0.1 1/s")
-        .pass(at_goal > 0.1 && at_scaled <= ROUNDING))
+    let claim = stated("goal-as-printed")?;
+    let words = format!(
+        "at rest at h_p the law still commands {at_goal:.4} m/s^2, at {f2_per_s} h_p {}",
+        bound(at_scaled, claim.limit())
+    );
+    let pass = at_goal > 0.1 && at_scaled <= claim.limit();
+    let values = [("control_at_goal_m_s2", at_goal), ("control_at_scaled_goal_m_s2", at_scaled)];
+    Ok(claim.measured(words, values).pass(pass))
 }

@@ -26,7 +26,7 @@ mod tension;
 
 pub use claim::{Claim, Group, Kind};
 pub use convergence::Refinement;
-pub use result::{Performance, SCHEMA_VERSION, Tool, Validation};
+pub use result::{Performance, SCHEMA_VERSION, Validation};
 
 use std::time::Instant;
 
@@ -35,30 +35,15 @@ use rayon::prelude::*;
 use interface::{Judged, Progress, Untried};
 
 /// A file of claims: its name, its subject, the units of work that it counts, and its judgement.
-struct Part {
-    id: &'static str,
-    title: &'static str,
-    work: u64,
-    judge: fn(&Progress<'_>) -> Judged,
-}
-
-impl Part {
-    const fn new(id: &'static str, title: &'static str, work: u64, judge: fn(&Progress<'_>) -> Judged) -> Self {
-        Self { id, title, work, judge }
-    }
-
-    fn group(&self, progress: &Progress<'_>) -> Group {
-        group(self.id, self.title, (self.judge)(progress))
-    }
-}
+type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> Judged);
 
 const PARTS: [Part; 6] = [
-    Part::new("tension", "The edge tension", 1, tension::judge),
-    Part::new("law", "The law at single instants", 1, law::judge),
-    Part::new("certificate", "Energy and certificate", certificate::STARTS as u64 + 1, certificate::judge),
-    Part::new("figures", "The paper's figures", 6, experiments::judge),
-    Part::new("equilibria", "Where the law comes to rest", equilibria::FLIGHTS, equilibria::judge),
-    Part::new("rates", "Rates near the formation", 5, rates::judge),
+    ("tension", "The edge tension", 1, tension::judge),
+    ("law", "The law at single instants", 1, law::judge),
+    ("certificate", "Energy and certificate", certificate::STARTS as u64 + 1, certificate::judge),
+    ("figures", "The paper's figures", 6, experiments::judge),
+    ("equilibria", "Where the law comes to rest", equilibria::FLIGHTS, equilibria::judge),
+    ("rates", "Rates near the formation", 5, rates::judge),
 ];
 /// Convergence in both precisions, free motion, and three flights.
 const ENGINE_WORK: u64 = 2 * convergence::STEPS_HZ.len() as u64 + 1 + 3;
@@ -66,14 +51,14 @@ const ENGINE_WORK: u64 = 2 * convergence::STEPS_HZ.len() as u64 + 1 + 3;
 /// Units of work that [`validate`] counts in all.
 #[must_use]
 pub fn work() -> u64 {
-    PARTS.iter().map(|part| part.work).sum::<u64>() + ENGINE_WORK
+    PARTS.iter().map(|&(_, _, work, _)| work).sum::<u64>() + ENGINE_WORK
 }
 
 /// Judges the claims of one group that needs no figure, by its name: `tension`, `law`, `certificate`, `figures`,
 /// `equilibria` or `rates`. None where there is no such group.
 #[must_use]
 pub fn judge(id: &str) -> Option<Group> {
-    PARTS.iter().find(|part| part.id == id).map(|part| part.group(&|_| ()))
+    PARTS.iter().find(|part| part.0 == id).map(|&(id, title, _, judge)| group(id, title, judge(&|_| ())))
 }
 
 /// Judges every claim. `progress` is told how many further units of [`work`] are done, from any thread.
@@ -82,14 +67,14 @@ pub fn judge(id: &str) -> Option<Group> {
 #[must_use]
 pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Validation {
     let began = Instant::now();
-    let parts = || PARTS.par_iter().map(|part| part.group(progress)).collect::<Vec<_>>();
+    let parts = || PARTS.par_iter().map(|&(id, title, _, judge)| group(id, title, judge(progress))).collect::<Vec<_>>();
     let engine = || -> Result<_, Untried> {
         let convergence = convergence::measure(progress)?;
-        let mut claims = convergence::claims(&convergence);
+        let mut claims = convergence::claims(&convergence)?;
         claims.push(convergence::free_decay(progress)?);
         let flights = detectors::flights(progress)?;
         let figures = figures::draw(&flights, &convergence)?;
-        Ok((claims, detectors::claims(&flights), convergence, figures))
+        Ok((claims, detectors::claims(&flights)?, convergence, figures))
     };
     let (mut groups, engine) = rayon::join(parts, engine);
     let engine_group = |judged| group("engine", "The engine against continuous time", judged);

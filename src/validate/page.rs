@@ -92,15 +92,10 @@ mod tests {
     use super::*;
 
     fn claim(id: &'static str, kind: Kind, pass: bool) -> Claim {
-        let claim = Claim::new(kind, id, "equation (0)")
-            .statement("Nothing moves.")
-            .expected("no motion")
-            .measured("none")
-            .values([("speed_m_s", 0.0), ("unknown", f64::NAN)])
-            .tolerance("0")
-            .reason("exact")
-            .pass(pass);
-        if kind == Kind::PaperRefuted { claim.finding("F9") } else { claim }
+        let (source, statement, expected) = ("equation (0)", "Nothing moves.", "no motion");
+        let finding = (kind == Kind::PaperRefuted).then_some("F9");
+        let claim = Claim { id, source, kind, statement, expected, finding, reason: "exact", ..Claim::default() };
+        claim.measured("none".to_owned(), [("speed_m_s", 0.0), ("unknown", f64::NAN)]).pass(pass)
     }
 
     fn validation(claims: Vec<Claim>) -> Validation {

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::claim::{Claim, Kind};
-use super::flights::{continuous, end, engine, engine_to_any_end, separation_m, with_step};
-use super::interface::{Judged, Progress, Untried, try_each};
+use super::claim::Claim;
+use super::flights::{continuous, end, engine, engine_to_any_end, larger, separation_m, with_step};
+use super::interface::{Judged, Progress, Untried, stated, try_each};
 use crate::continuous::Tolerances;
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
@@ -22,14 +22,10 @@ const DELTA_M: f64 = 1.0;
 const BEND_M: f64 = 0.16;
 /// When the bend is measured \[s\]: early, and late enough for the power law.
 const BEND_TIMES_S: [f64; 4] = [100.0, 300.0, 10_000.0, 30_000.0];
-/// 1/A^2 grows linearly from its start, so the exponent at a bend A is -1/2 (1 - A^2/A(0)^2): 1 % short of its limit.
-const EXPONENT_TOLERANCE: f64 = 0.01;
 
 /// Common velocity for the growth of the common mode \[m/s\], and how long it grows \[s\].
 const COMMON_M_S: f64 = 1e-3;
 const COMMON_S: f64 = 100.0;
-/// The solver's tolerance and the rounding of 1e5 steps, over 100 s.
-const COMMON_TOLERANCE_PER_S: f64 = 1e-9;
 /// The engine's step where no closed form depends on it \[s\].
 const ENGINE_STEP_S: f64 = 1.0 / 60.0;
 /// Time by which rounding has grown by e^120 \[s\].
@@ -46,8 +42,6 @@ const STAR_RADIUS_M: f64 = 3.0;
 /// Transverse speed of two followers \[m/s\], so small that edges stay straight to 1e-9 m.
 const STAR_M_S: f64 = 1e-6;
 const STAR_S: f64 = 100.0;
-/// Edges that bend by (1e-4 m)^2 pull back with some 1e-12 m/s^2, 1e-6 of the speed.
-const STAR_TOLERANCE_PER_S: f64 = 1e-6;
 /// Far below the speeds of the star.
 const FINE: Tolerances = Tolerances { relative: 1e-12, absolute: 1e-18 };
 
@@ -84,18 +78,15 @@ fn bent_hexagon() -> Result<Claim, Untried> {
     let at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
     let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
-    Ok(Claim::new(Kind::PaperRefuted, "bent-hexagon", "the convergence theorem")
-        .finding("F4")
-        .statement("The law converges to the formation exponentially, in space as in the plane.")
-        .expected("a flat formation in space is reached as t^(-1/2): nothing resists a bend to first order")
-        .measured(format!(
-            "a hexagon bent by {BEND_M} m still is by {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s and \
-             {at_10000_m:.3} m after 10000 s; exponent {exponent:.2} between 10000 s and 30000 s"
-        ))
-        .values([("after_100_s_m", at_100_m), ("after_300_s_m", at_300_m), ("exponent", exponent)])
-        .tolerance(format!("{EXPONENT_TOLERANCE} in the exponent"))
-        .reason("the power law is the limit for late times")
-        .pass((exponent + 0.5).abs() <= EXPONENT_TOLERANCE))
+    let words = format!(
+        "a hexagon bent by {BEND_M} m still is by {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s and \
+         {at_10000_m:.3} m after 10000 s; exponent {exponent:.2} between 10000 s and 30000 s"
+    );
+    let claim = stated("bent-hexagon")?;
+    // 1/A^2 grows linearly from its start, so the exponent at a bend A is -1/2 (1 - A^2/A(0)^2): 1 % short of its limit.
+    let pass = (exponent + 0.5).abs() <= claim.limit();
+    let values = [("after_100_s_m", at_100_m), ("after_300_s_m", at_300_m), ("exponent", exponent)];
+    Ok(claim.measured(words, values).pass(pass))
 }
 
 /// The hexagon in formation, moving as a whole.
@@ -109,32 +100,22 @@ fn drifting() -> Scenario {
     scenario
 }
 
-fn common_rate(kind: Kind, id: &'static str, last: &Swarm, duration_s: f64) -> Claim {
+fn common_rate(id: &str, last: &Swarm, duration_s: f64) -> Result<Claim, Untried> {
     let rate_per_s = (last.mean_velocity_m_s().norm() / COMMON_M_S).ln() / duration_s;
     let error_per_s = rate_per_s - A22_PER_S;
-    Claim::new(kind, id, "the stability theorem")
-        .finding("F5")
-        .expected(format!("the common velocity grows at a22 = {A22_PER_S} 1/s"))
-        .measured(format!(
-            "{rate_per_s:.6} 1/s over {COMMON_S} s, error {} 1/s",
-            bound(error_per_s, COMMON_TOLERANCE_PER_S)
-        ))
-        .values([("rate_per_s", rate_per_s)])
-        .tolerance(format!("{COMMON_TOLERANCE_PER_S:e} 1/s"))
-        .reason("the solver's tolerance, or the rounding of the steps, over 100 s")
-        .pass(error_per_s.abs() <= COMMON_TOLERANCE_PER_S)
+    let claim = stated(id)?;
+    let (pass, error) = (error_per_s.abs() <= claim.limit(), bound(error_per_s, claim.limit()));
+    let words = format!("{rate_per_s:.6} 1/s over {COMMON_S} s, error {error} 1/s");
+    Ok(claim.measured(words, [("rate_per_s", rate_per_s)]).pass(pass))
 }
 
 fn common_mode() -> Result<Claim, Untried> {
-    let last = end(&drifting(), Tolerances::default())?;
-    Ok(common_rate(Kind::PaperRefuted, "common-mode", &last, COMMON_S)
-        .statement("The formation is asymptotically stable for a22 > 0."))
+    common_rate("common-mode", &end(&drifting(), Tolerances::default())?, COMMON_S)
 }
 
 fn common_mode_in_the_engine() -> Result<Claim, Untried> {
     let flight = engine(&with_step(&drifting(), Precision::Double, ENGINE_STEP_S), |_| ())?;
-    Ok(common_rate(Kind::Ours, "common-mode-in-the-engine", &flight.last, flight.duration_s)
-        .statement("In Rapier as in continuous time the common velocity grows at a22, which the law cannot touch."))
+    common_rate("common-mode-in-the-engine", &flight.last, flight.duration_s)
 }
 
 fn lost_to_rounding() -> Result<Claim, Untried> {
@@ -162,27 +143,14 @@ fn lost_to_rounding() -> Result<Claim, Untried> {
         Ending::BrokeDown(_) => "ended by numbers that ran out",
     };
     let lost = if lost_at_s.is_nan() { "never lost".to_owned() } else { format!("lost after {lost_at_s:.0} s") };
-    Ok(Claim::new(Kind::Ours, "lost-to-rounding", "the stability theorem")
-        .finding("F5")
-        .statement(
-            "With a22 > 0 rounding alone destroys a formation at rest: the common velocity grows until positions \
-                    have no digits left for their differences.",
-        )
-        .expected(format!("the hexagon lost before {LOST_S} s with a22 = {A22_PER_S} 1/s"))
-        .measured(format!(
-            "the hexagon, at rest in formation, is {lost} in double precision; the flight is {ending} at \
-             {:.0} s with a common speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
-            flight.duration_s
-        ))
-        .values([
-            ("lost_at_s", lost_at_s),
-            ("end_s", flight.duration_s),
-            ("final_common_m_s", common_m_s),
-            ("min_m", min_m),
-        ])
-        .tolerance(format!("lost: a largest edge error above {LOST_M} m"))
-        .reason("e^120 is 1e52, rounding starts near 1e-17 m/s")
-        .pass(lost_at_s < LOST_S && common_m_s > RUNAWAY_M_S))
+    let words = format!(
+        "the hexagon, at rest in formation, is {lost} in double precision; the flight is {ending} at {:.0} s with a common \
+         speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
+        flight.duration_s
+    );
+    let values =
+        [("lost_at_s", lost_at_s), ("end_s", flight.duration_s), ("final_common_m_s", common_m_s), ("min_m", min_m)];
+    Ok(stated("lost-to-rounding")?.measured(words, values).pass(lost_at_s < LOST_S && common_m_s > RUNAWAY_M_S))
 }
 
 /// Growth rate of the relative velocities of a star of so many vehicles in formation \[1/s\].
@@ -204,22 +172,13 @@ fn star_rate_per_s(count: usize) -> Result<f64, Untried> {
 fn stars() -> Result<Claim, Untried> {
     let expected = STARS.map(|count| A22_PER_S - (1.0 + A22_PER_S) / count as f64);
     let rates = try_each(&STARS, &|_| (), |&count| star_rate_per_s(count))?;
-    let error_per_s = rates.iter().zip(expected).map(|(rate, expected)| (rate - expected).abs()).fold(0.0, f64::max);
-    let list = |rates: &[f64]| {
-        let entries = STARS.iter().zip(rates).map(|(count, rate)| format!("N = {count}: {:+.6} 1/s", rate + 0.0));
-        entries.collect::<Vec<_>>().join(", ")
-    };
-    Ok(Claim::new(Kind::Ours, "star", "general graphs, a22 < (1 + a22) lambda2/N")
-        .statement("Relative velocities on a star grow at a22 - (1 + a22)/N: damped for 10 vehicles, not for 12.")
-        .expected(list(&expected))
-        .measured(format!("{}; largest error {} 1/s", list(&rounded(&rates)), bound(error_per_s, STAR_TOLERANCE_PER_S)))
-        .values(["rate_10_per_s", "rate_11_per_s", "rate_12_per_s"].into_iter().zip(rates.iter().copied()))
-        .tolerance(format!("{STAR_TOLERANCE_PER_S:e} 1/s"))
-        .reason("edges that bend by 1e-4 m pull back with 1e-6 of the speed")
-        .pass(error_per_s <= STAR_TOLERANCE_PER_S))
-}
-
-/// To what is printed, so that a rate of rounding size has no sign.
-fn rounded(rates: &[f64]) -> Vec<f64> {
-    rates.iter().map(|rate| (rate * 1e6).round() / 1e6).collect()
+    let error_per_s = rates.iter().zip(expected).map(|(rate, expected)| (rate - expected).abs()).fold(0.0, larger);
+    let claim = stated("star")?;
+    let pass = error_per_s <= claim.limit();
+    // Rounded to what is printed, so that a rate of rounding size has no sign.
+    let entry = |(count, rate): (&usize, &f64)| format!("N = {count}: {:+.6} 1/s", (rate * 1e6).round() / 1e6 + 0.0);
+    let list = STARS.iter().zip(&rates).map(entry).collect::<Vec<_>>().join(", ");
+    let words = format!("{list}; largest error {} 1/s", bound(error_per_s, claim.limit()));
+    let values = ["rate_10_per_s", "rate_11_per_s", "rate_12_per_s"].into_iter().zip(rates);
+    Ok(claim.measured(words, values).pass(pass))
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::claim::{Claim, Group};
 use super::convergence::Refinement;
 use crate::figures::Figure;
+use crate::report::Tool;
 
 /// Version of the keys of `validate.json`: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -30,15 +31,6 @@ pub struct Validation {
     pub performance: Performance,
 }
 
-/// The program that judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Tool {
-    /// Its name.
-    pub name: &'static str,
-    /// Its version.
-    pub version: &'static str,
-}
-
 /// Wall-clock time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Performance {
@@ -50,7 +42,7 @@ impl Validation {
     pub(super) fn new(groups: Vec<Group>, convergence: Vec<Refinement>, figures: Vec<Figure>, wall_s: f64) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
-            tool: Tool { name: env!("CARGO_PKG_NAME"), version: env!("CARGO_PKG_VERSION") },
+            tool: Tool { name: env!("CARGO_PKG_NAME").to_owned(), version: env!("CARGO_PKG_VERSION").to_owned() },
             pass: groups.iter().flat_map(|group| &group.claims).all(|claim| claim.pass),
             groups,
             convergence,

@@ -1,7 +1,7 @@
 //! The edge tension (5), (6): its minimum and its derivatives.
 
-use super::claim::{Claim, Kind};
-use super::interface::{Judged, Progress, Untried};
+use super::claim::Claim;
+use super::interface::{Judged, Progress, Untried, stated};
 use crate::law::EdgeTension;
 use crate::text::bound;
 
@@ -10,19 +10,12 @@ const FIGURE_1_DELTA_M: f64 = 0.5;
 const FIGURE_1_K_M: f64 = 1.0;
 const FIGURE_1_PRINTED: f64 = 3.2956;
 const PRINTED_FOR_DELTA_M: f64 = 1.0;
-/// Half a unit of the last digit that the caption prints.
-const PRINTED_RESOLUTION: f64 = 0.5e-4;
 
 /// Clearances l - delta from 2^-40 m to 2^20 m: powers of two, so that l and both ends of every difference are exact.
 const CLEARANCE_EXPONENTS: std::ops::RangeInclusive<i32> = -40..=20;
-/// Half width of a difference over the clearance.
+/// Half width of a difference over the clearance. One of fourth order is off by 4 STEP^4 = 4e-12 for truncation and by
+/// 1.5 eps/STEP = 3e-13 for rounding, relative to the terms that it subtracts; six times that is allowed.
 const STEP: f64 = 1.0 / 1024.0;
-/// A difference of fourth order with this step is off by 4 STEP^4 = 4e-12 for truncation and by 1.5 eps/STEP = 3e-13 for
-/// rounding, relative to the terms that it subtracts; six times that.
-const DIFFERENCE_TOLERANCE: f64 = 3e-11;
-const DIFFERENCE: &str = "truncation and rounding of a fourth-order difference with a step of 1/1024 of the clearance";
-/// A few roundings of numbers of order 1.
-const ROUNDING: f64 = 1e-14;
 
 pub(super) fn judge(progress: &Progress<'_>) -> Judged {
     let claims = vec![minimum()?, figure_1()?, slope()?, curvature()?];
@@ -47,35 +40,28 @@ fn minimum() -> Result<Claim, Untried> {
     let bracketed = tension.derivative(rest_m.next_down()) <= 0.0 && tension.derivative(rest_m.next_up()) >= 0.0;
     let literal = 1.0 / (1.0_f64.asinh()).tanh() + rest_m / tension.k_m() - tension.minimum();
     let (value, slope) = (tension.value(rest_m), tension.derivative(rest_m));
-    Ok(Claim::new(Kind::PaperHolds, "tension-minimum", "equations (5), (6)")
-        .statement("The tension has its only minimum, 0, at the desired distance d = delta + K ln(3 + 2 sqrt 2)/2.")
-        .expected("V(d) = V'(d) = 0, and V' changes sign at d")
-        .measured(format!(
-            "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) evaluated literally {}; V' {}",
-            bound(value, ROUNDING),
-            bound(slope, ROUNDING),
-            bound(literal, ROUNDING),
-            if bracketed { "changes sign" } else { "does not change sign" }
-        ))
-        .values([("value_m2_s2", value), ("slope_m_s2", slope), ("literal_m2_s2", literal)])
-        .tolerance(format!("{ROUNDING:e} m^2/s^2"))
-        .reason("a few roundings of numbers of order 1")
-        .pass(bracketed && [value, slope, literal].iter().all(|x| x.abs() <= ROUNDING)))
+    let claim = stated("tension-minimum")?;
+    let near_0 = |number| bound(number, claim.limit());
+    let words = format!(
+        "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) evaluated literally {}; V' {}",
+        near_0(value),
+        near_0(slope),
+        near_0(literal),
+        if bracketed { "changes sign" } else { "does not change sign" }
+    );
+    let claim = claim.measured(words, [("value_m2_s2", value), ("slope_m_s2", slope), ("literal_m2_s2", literal)]);
+    Ok(claim.within_limit().but_only_if(bracketed))
 }
 
 fn figure_1() -> Result<Claim, Untried> {
     let of_caption = of_figure_1()?.minimum();
     let of_other = unit_tension(PRINTED_FOR_DELTA_M, FIGURE_1_K_M)?.minimum();
-    let is_of_other = (of_other - FIGURE_1_PRINTED).abs() <= PRINTED_RESOLUTION;
-    Ok(Claim::new(Kind::PaperRefuted, "figure-1-caption", "Fig. 1, equation (5)")
-        .finding("F1")
-        .statement("With delta = 0.5, alpha = K = 1 the constant Vmin is 3.2956.")
-        .expected("another number; 3.2956 is the constant of delta = 1")
-        .measured(format!("Vmin = {of_caption:.9} for delta = 0.5 and {of_other:.9} for delta = 1"))
-        .values([("minimum_delta_0_5_m2_s2", of_caption), ("minimum_delta_1_m2_s2", of_other)])
-        .tolerance(format!("{PRINTED_RESOLUTION:e}"))
-        .reason("half a unit of the last printed digit")
-        .pass(is_of_other && (of_caption - FIGURE_1_PRINTED).abs() > PRINTED_RESOLUTION))
+    let claim = stated("figure-1-caption")?;
+    let printed_of = |number: f64| (number - FIGURE_1_PRINTED).abs() <= claim.limit();
+    let pass = printed_of(of_other) && !printed_of(of_caption);
+    let words = format!("Vmin = {of_caption:.9} for delta = 0.5 and {of_other:.9} for delta = 1");
+    let values = [("minimum_delta_0_5_m2_s2", of_caption), ("minimum_delta_1_m2_s2", of_other)];
+    Ok(claim.measured(words, values).pass(pass))
 }
 
 /// The derivative at `x` of `f` by the difference of fourth order over x - 2h .. x + 2h.
@@ -101,8 +87,11 @@ fn largest_difference(
         .fold(0.0, f64::max)
 }
 
-fn decades() -> f64 {
-    f64::from(CLEARANCE_EXPONENTS.end() - CLEARANCE_EXPONENTS.start()) * std::f64::consts::LOG10_2
+/// A claim about such an error.
+fn of_difference(id: &str, error: f64, more: &str) -> Result<Claim, Untried> {
+    let decades = f64::from(CLEARANCE_EXPONENTS.end() - CLEARANCE_EXPONENTS.start()) * std::f64::consts::LOG10_2;
+    let words = format!("largest relative error {error:.0e} over {decades:.0} decades of clearance{more}");
+    Ok(stated(id)?.measured(words, [("largest_relative_error", error)]).within_limit())
 }
 
 fn slope() -> Result<Claim, Untried> {
@@ -115,12 +104,7 @@ fn slope() -> Result<Claim, Untried> {
         |l| tension.derivative(l),
         |l, _| (2.0 * alpha / k_m - tension.derivative(l)).abs(),
     );
-    Ok(Claim::new(Kind::Ours, "tension-slope", "equation (6)")
-        .statement("V'(l) = (alpha/K) [1 - csch^2 s] is the derivative of V, from the barrier to far away.")
-        .expected("equal to differences of V")
-        .measured(format!("largest relative error {error:.0e} over {:.0} decades of clearance", decades()))
-        .at_most("largest_relative_error", error, DIFFERENCE_TOLERANCE)
-        .reason(DIFFERENCE))
+    of_difference("tension-slope", error, "")
 }
 
 fn curvature() -> Result<Claim, Untried> {
@@ -137,16 +121,6 @@ fn curvature() -> Result<Claim, Untried> {
         // Beyond some 350 K it is smaller than any double.
         curvature > 0.0 || (curvature == 0.0 && e > 8)
     });
-    Ok(Claim::new(Kind::Ours, "tension-curvature", "equation (6)")
-        .statement("V''(l) = (2 alpha/K^2) coth(s) csch^2(s) is the derivative of V' and never negative: V is convex.")
-        .expected("equal to differences of V'")
-        .measured(format!(
-            "largest relative error {error:.0e} over {:.0} decades of clearance; {}",
-            decades(),
-            if positive { "never negative" } else { "negative somewhere" }
-        ))
-        .values([("largest_relative_error", error)])
-        .tolerance(format!("{DIFFERENCE_TOLERANCE:e}"))
-        .reason(DIFFERENCE)
-        .pass(positive && error <= DIFFERENCE_TOLERANCE))
+    let sign = if positive { "; never negative" } else { "; negative somewhere" };
+    Ok(of_difference("tension-curvature", error, sign)?.but_only_if(positive))
 }

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use tautline::audit::recorded::{
-    Motion, ObjectPair, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings, WIDTH_M, audit,
+    Approach, Motion, ObjectPair, Outcome, RecordedError, Settings, Told, TrackAuditor, VehicleSettings, WIDTH_M, audit,
 };
 use tautline::audit::{Obstacle, Shape, Status};
+use tautline::swarm::{ClosestApproach, Pair};
 use tautline::track::{Item, Piece, Sample};
 
 /// Rounding of a handful of operations on numbers around ten.
@@ -79,7 +80,11 @@ fn the_first_instant_and_a_single_sample_are_judged() {
 #[test]
 fn nothing_to_judge_is_undecided() {
     assert_eq!(audit(&[], &[], Settings::delta(1.0)).unwrap().status, Status::Undecided);
-    assert_eq!(status(&[seen(0, 0.0, [0.0; 3])], Settings::delta(1.0)), Status::Clear);
+    assert_eq!(status(&[seen(0, 0.0, [0.0; 3])], Settings::delta(1.0)), Status::Undecided, "a vehicle alone");
+    // Two that were never there together; an instant together is enough.
+    let after = |second_s| [seen(0, 0.0, [0.0; 3]), seen(1, second_s, [9.0, 0.0, 0.0])];
+    assert_eq!(status(&after(1.0), Settings::delta(1.0)), Status::Undecided);
+    assert_eq!(status(&after(0.0), Settings::delta(1.0)), Status::Clear);
     let elsewhere = Settings { from_s: Some(5.0), ..Settings::delta(1.0) };
     assert_eq!(status(&pass(3.0), elsewhere), Status::Undecided);
 }
@@ -304,7 +309,10 @@ fn pairs_on_the_ground_are_left_out_until_one_of_them_leaves_it() {
     };
     let above = Settings { above_m: Some(0.25), ..Settings::delta(1.5) };
     assert_eq!(status(&items(1.0), Settings::delta(1.5)), Status::Violation);
-    assert_eq!(status(&items(0.2), above.clone()), Status::Clear);
+    assert_eq!(status(&items(0.2), above.clone()), Status::Undecided, "nothing was judged");
+    let mut seen_from_above = items(0.2);
+    seen_from_above.extend([2.0, 3.0].map(|time_s| seen(2, time_s, [0.0, 0.0, 9.0])));
+    assert_eq!(status(&seen_from_above, above.clone()), Status::Clear);
     let outcome = asked(&items(1.0), above.clone());
     assert_eq!(outcome.violations[0].from_s, 0.5, "{outcome:?}");
     assert!((outcome.closest[0].lower_m - 1.0_f64.hypot(0.25)).abs() < ROUNDING);
@@ -381,6 +389,17 @@ fn a_gap_is_undecided_unless_it_is_bridged() {
     assert!(asked(&flown(19), Settings::delta(2.0)).gaps.is_empty());
     // Nor is one that ends before the window.
     assert_eq!(status(&flown(7), Settings { from_s: Some(1.0), ..Settings::delta(2.0) }), Status::Clear);
+    // Nor is one in which nobody else is there, unless something stands in the way.
+    let mut left = flown(7);
+    left.retain(|item| item.vehicle() == 1 || item.time_s() < 0.55);
+    let outcome = asked(&left, Settings::delta(2.0));
+    assert_eq!((outcome.status, outcome.gaps.len()), (Status::Clear, 0));
+    let tower = thing(Shape::Ball { radius_m: 1.0 }, [90.0, 0.0, 0.0]);
+    let outcome = asked(&left, Settings { obstacles: vec![tower], ..Settings::delta(2.0) });
+    assert_eq!((outcome.status, outcome.gaps.len()), (Status::Undecided, 1));
+    // What would join it is told, of one that the window cuts too.
+    let cut = asked(&flown(7), Settings { from_s: Some(0.75), ..Settings::delta(2.0) });
+    assert!((cut.gaps[0].joined_by_s - 0.2).abs() < ROUNDING && cut.gaps[0].from_s == 0.75, "{:?}", cut.gaps);
     // A gap between curves.
     let mut curves = curves(5.0);
     curves.retain(|item| !(item.vehicle() == 0 && item.time_s() == 1.0));
@@ -591,4 +610,78 @@ proptest! {
             Settings { motion, above_m: above, max_accel_m_s2: Some(1.0), obstacles, ..Settings::delta(1.0) };
         let _ = audit(&names(4), &items, settings);
     }
+}
+
+/// A vehicle that rises by a polynomial in height, and one that stands beside it.
+fn rising(z: &[f64], beside_m: f64) -> Vec<Item> {
+    let piece = |vehicle, x: f64, z: &[f64]| {
+        let coefficients = z.iter().enumerate().map(|(k, z)| Vector3::new(if k == 0 { x } else { 0.0 }, 0.0, *z));
+        Item::Piece(Piece { vehicle, from_s: 0.0, to_s: 1.0, coefficients: coefficients.collect() })
+    };
+    vec![piece(0, 0.0, z), piece(1, beside_m, &[0.0])]
+}
+
+#[test]
+fn a_height_that_rounding_hides_ends_as_undecided_and_not_in_a_search_without_end() {
+    let above = Settings { above_m: Some(0.5), ..Settings::delta(2.0) };
+    assert_eq!(status(&rising(&[0.5, 1e-18], 1.0), above.clone()), Status::Undecided);
+    assert_eq!(status(&rising(&[0.5, 1e-18], 3.0), above.clone()), Status::Clear);
+    // Above for certain, and on the ground for certain: of the two one must be above for a violation.
+    assert_eq!(status(&rising(&[0.5, 1e-3], 1.0), above.clone()), Status::Violation);
+    assert_ne!(status(&rising(&[0.4, 1e-18], 1.0), above), Status::Violation);
+}
+
+#[test]
+fn a_curve_with_more_coefficients_than_can_be_judged_is_refused() {
+    let rises = |count: usize| rising(&vec![1e-3; count], 9.0);
+    assert_eq!(status(&rises(64), Settings::delta(1.0)), Status::Clear);
+    let refused = audit(&names(2), &rises(65), Settings::delta(1.0));
+    assert!(matches!(refused, Err(RecordedError::Item { .. })), "{refused:?}");
+}
+
+#[test]
+fn two_that_are_far_from_the_origin_and_from_each_other_are_enclosed_without_a_search_to_its_limit() {
+    // Rounding of the distance alone is above 1e-9 m, so bounds never come as near to each other.
+    let curve = |vehicle, k: f64, y: f64| {
+        let at = [Vector3::new(0.0, y, 0.0), Vector3::new(0.0, 0.3 * k, 0.0), Vector3::new(0.0, -0.3, 0.0)];
+        Item::Piece(Piece { vehicle, from_s: k, to_s: k + 1.0, coefficients: at.to_vec() })
+    };
+    let pieces = (0..2000).flat_map(|k| [curve(0, f64::from(k), 0.0), curve(1, f64::from(k), 1e8)]);
+    let settings = Settings { max_gap_s: Some(1.0), ..Settings::delta(1.0) };
+    let outcome = asked(&pieces.collect::<Vec<_>>(), settings);
+    let Approach { lower_m, upper_m, .. } = outcome.closest[0];
+    assert!(outcome.status == Status::Clear && upper_m - lower_m < 1e-5, "{lower_m} {upper_m}");
+}
+
+#[test]
+fn what_a_recording_says_of_the_time_between_its_samples_goes_before_what_is_drawn() {
+    let told = |separation_m, time_s| Told {
+        from_s: 0.0,
+        to_s: 1.0,
+        closest: ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s },
+    };
+    let judged = |items: &[Item], told: Told, settings: Settings| {
+        let mut auditor = TrackAuditor::new(settings).expect("settings");
+        auditor.tell(told);
+        auditor.push(&names(2), items).expect("items");
+        auditor.finish().expect("an outcome")
+    };
+    // Drawn clear, and too close in between.
+    let hit = judged(&pass(3.0), told(0.5, 0.25), Settings::delta(2.0));
+    let found = hit.violations[0];
+    assert_eq!((hit.status, found.min_m, found.min_at_s), (Status::Violation, 0.5, 0.25));
+    assert_eq!(hit.closest[0].upper_m, 0.5);
+    // Drawn too close, and nobody was.
+    let missed = judged(&pass(1.0), told(2.5, 0.25), Settings::delta(2.0));
+    assert_eq!((missed.status, missed.closest[0].lower_m), (Status::Clear, 2.5));
+    // What is so at a sample no word takes back.
+    let mut sampled = pass(3.0);
+    sampled.extend([seen(0, 2.0, [0.0; 3]), seen(1, 2.0, [1.0, 0.0, 0.0])]);
+    let words = Told { from_s: 1.0, to_s: 2.0, ..told(2.5, 1.5) };
+    assert_eq!(judged(&sampled, words, Settings::delta(2.0)).status, Status::Violation);
+    // Of a pair that is not asked about, or after the window, nothing is entered; metres say nothing of ellipsoids.
+    let elsewhere = Settings { to_s: Some(0.2), ..Settings::delta(2.0) };
+    assert_eq!(judged(&pass(3.0), told(0.5, 0.25), elsewhere).status, Status::Clear);
+    let scaled = Settings { ellipsoid_m: Some(Vector3::repeat(0.5)), ..Settings::default() };
+    assert_eq!(judged(&pass(3.0), told(0.5, 0.25), scaled).status, Status::Clear);
 }

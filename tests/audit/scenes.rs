@@ -277,7 +277,11 @@ fn compare(number: u64, tracks: &Tracks) -> bool {
         "scene {number}: {:?}",
         told.symmetric_difference(&true_ones).map(|p| answers[p]).collect::<Vec<_>>()
     );
-    let status = if true_ones.is_empty() { Status::Clear } else { Status::Violation };
+    let status = match (answers.is_empty(), true_ones.is_empty()) {
+        (true, _) => Status::Undecided,
+        (false, true) => Status::Clear,
+        (false, false) => Status::Violation,
+    };
     assert_eq!(outcome.status, status, "scene {number}: {outcome:?}");
     assert_eq!(outcome.parry.disagreements, 0, "scene {number}: {:?}", outcome.parry.first_disagreement);
 

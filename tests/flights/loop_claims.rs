@@ -295,7 +295,7 @@ fn a_step_too_long_for_the_fastest_rate_is_flown_in_parts_and_keeps_the_energy_b
     let mut scenario =
         builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10", "plant.precision=double"]);
     let (honest, log) = fly(&scenario);
-    assert_eq!(refinements(&log), [], "no step is refused that was shortened before");
+    assert!(!refinements(&log).is_empty(), "it is told");
     assert!(honest.audit.steps > honest.steps);
     assert!(energy_excess(&log) < 1e-3, "{}", energy_excess(&log));
     (scenario.time.max_rate_dt, scenario.time.max_halvings) = (1e9, 0);

@@ -31,7 +31,9 @@ fn the_first_line_says_it_and_so_does_the_exit_code() {
     let clear = audit(folder.path(), &["pass.csv", "--delta", "0.5"]);
     assert_eq!(clear.exit, Some(0), "{clear:?}");
     assert!(
-        clear.out.starts_with("PROVED CLEAR: never closer than 1.000000 m, alpha and bravo at 0.50 s"),
+        clear.out.starts_with(
+            "CLEAR if straight between samples: never closer than 1.000000 m, alpha and bravo at 0.50 s (delta 0.500 m)"
+        ),
         "{clear:?}"
     );
     let violation = audit(folder.path(), &["pass.csv", "--delta", "2"]);
@@ -71,10 +73,11 @@ fn a_recording_of_ours_is_judged_by_its_own_delta_unless_another_is_given() {
     ran_by(TAUTLINE, folder.path(), &fly);
     let own = audit(folder.path(), &["out/run.mcap"]);
     assert_eq!(own.exit, Some(0), "{own:?}");
-    assert!(own.out.contains("(delta 1.000 m,"), "{own:?}");
+    assert!(own.out.contains("(delta 1.000 m)"), "{own:?}");
+    assert!(own.err.contains("note: up to 4 steps were flown between two samples"), "{own:?}");
     assert!(own.err.contains("note: the safety distance is the recording's own, 1.0 m"), "{own:?}");
     let another = audit(folder.path(), &["out/run.mcap", "--delta", "1.5"]);
-    assert!(another.out.contains("(delta 1.500 m,") && !another.err.contains("own"), "{another:?}");
+    assert!(another.out.contains("(delta 1.500 m)") && !another.err.contains("recording's own"), "{another:?}");
     let of_others = audit(folder.path(), &["pass.csv"]);
     assert_eq!(of_others.exit, Some(2), "{of_others:?}");
     assert!(of_others.err.contains("there is no delta"), "{of_others:?}");
@@ -128,10 +131,11 @@ fn every_question_can_be_asked() {
         (&["--delta", "2", "--to", "0.4"], 0),
         (&["--delta", "2", "--from", "0.6"], 0),
         (&["--delta", "2", "--from", "0.3", "--to", "0.45"], 1),
-        (&["--delta", "2", "--above", "0.5"], 0),
+        (&["--delta", "2", "--above", "0.5"], 1),
         (&["--delta", "2", "--above", "-0.5"], 1),
-        (&["--delta", "2", "--ids", "alpha"], 0),
-        (&["--delta", "2", "--offset", "bravo=9"], 0),
+        (&["--delta", "0.5", "--ids", "alpha,bravo"], 0),
+        (&["--delta", "2", "--offset", "bravo=9"], 1),
+        (&["--delta", "0.5", "--expect-vehicles", "2"], 0),
         (&["--delta", "2", "--max-gap", "0.5"], 1),
         (&["--delta", "0.5", "--max-gap", "2"], 0),
         (&["--delta", "1", "--obstacles", "tower.toml"], 0),
@@ -147,7 +151,9 @@ fn every_question_can_be_asked() {
 #[test]
 fn wrong_input_is_named_with_its_remedy_and_exits_with_2() {
     let bad = "[[obstacle]]\nname = \"tower\"\nbal = { radius_m = 1.0 }\n";
-    let files = [("pass.csv", PASS), ("bad.toml", bad), ("text.csv", "t,id,x,y,z\n0,a,here,0,0\n")];
+    let alone = "t,id,x,y,z\n0,a,0,0,0\n1,a,1,0,0\n";
+    let files =
+        [("pass.csv", PASS), ("bad.toml", bad), ("text.csv", "t,id,x,y,z\n0,a,here,0,0\n"), ("alone.csv", alone)];
     let folder = folder(&files);
     for (arguments, said) in [
         (&["pass.csv"][..], "--radius NAME=R"),
@@ -178,6 +184,12 @@ fn wrong_input_is_named_with_its_remedy_and_exits_with_2() {
         (&["pass.csv", "--delta", "1", "--offset", "alpha"], "NAME=SECONDS"),
         (&["none.csv", "--delta", "1"], "none.csv"),
         (&["text.csv", "--delta", "1"], "line 2"),
+        (&["pass.csv", "--delta", "2", "--ids", "alpha"], "1 vehicle to judge, and nothing to keep apart"),
+        (&["alone.csv", "--delta", "2"], "1 vehicle to judge, and nothing to keep apart"),
+        (&["alone.csv", "--delta", "2", "--allow-undecided"], "judge two vehicles or more"),
+        (&["pass.csv", "--delta", "0.5", "--from", "5"], "no vehicle is there between --from and --to"),
+        (&["pass.csv", "--delta", "0.5", "--expect-vehicles", "3"], "2 vehicles to judge, not 3"),
+        (&["alone.csv", "--delta", "0.5", "--expect-vehicles", "2"], "1 vehicle to judge, not 2"),
     ] {
         let ran = audit(folder.path(), arguments);
         assert_eq!(ran.exit, Some(2), "{arguments:?}: {ran:?}");
@@ -215,10 +227,12 @@ fn what_is_said_names_the_closest_and_every_limit_as_it_is() {
     assert!(events.contains("violation,big,too,0.0,0.0,9.0,9.0,0.0,10.0,"), "{events}");
     // The mast is closer than the two ever are to each other, and may be touched.
     let mast = audit(folder.path(), &["pass.csv", "--delta", "0.5", "--obstacles", "mast.toml", "--html", "a.html"]);
-    assert!(mast.out.starts_with("PROVED CLEAR: never closer than 0.500000 m, alpha and mast at 0.00 s"), "{mast:?}");
+    let said = "CLEAR if straight between samples: never closer than 0.500000 m, alpha and mast at 0.00 s";
+    assert!(mast.out.starts_with(said), "{mast:?}");
     let page = fs::read_to_string(folder.path().join("a.html")).expect("a page");
     assert!(page.contains("Distances from the closest obstacles"));
-    let alone = audit(folder.path(), &["pass.csv", "--delta", "0.5", "--ids", "alpha", "--html", "a.html"]);
+    let of_alpha = ["pass.csv", "--delta", "0.5", "--ids", "alpha", "--obstacles", "mast.toml", "--html", "a.html"];
+    let alone = audit(folder.path(), &of_alpha);
     assert!(alone.out.contains("1.000 s, 1 vehicle, "), "{alone:?}");
     assert!(!fs::read_to_string(folder.path().join("a.html")).expect("a page").contains("Closest pairs"));
 }
@@ -243,4 +257,98 @@ fn the_page_says_what_the_verdict_says() {
     assert!(scaled.contains("distance [ellipsoids]") && scaled.contains("closest 2.000000 ellipsoids"), "{scaled}");
     let doubtful = page(&["pass.csv", "--delta", "0.9", "--motion", "bounded", "--max-accel", "1"]);
     assert!(doubtful.contains("closest 0.750000 .. 1.250000 m at 0.500 s") && !doubtful.contains("UNDECIDED:"));
+}
+
+#[test]
+fn what_is_proved_and_what_is_assumed_is_said_in_the_headline_and_in_the_keys() {
+    let head = "duration,x^0,x^1,x^2,x^3,x^4,x^5,x^6,x^7,y^0,y^1,y^2,y^3,y^4,y^5,y^6,y^7,z^0,z^1,z^2,z^3,z^4,z^5,z^6,z^7,\
+                yaw^0,yaw^1,yaw^2,yaw^3,yaw^4,yaw^5,yaw^6,yaw^7";
+    let curve =
+        |x: &str, z: &str| format!("{head}\n1,{x},0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,{z},0,0,0,0,0,0,0,0,0,0,0,0,0,0\n");
+    let folder = folder(&[("pass.csv", PASS)]);
+    fs::create_dir(folder.path().join("curves")).expect("a folder");
+    for (name, x, z) in [("cf1.csv", "0", "0.5,1e-18"), ("cf2.csv", "1", "0,0")] {
+        fs::write(folder.path().join("curves").join(name), curve(x, z)).expect("a file");
+    }
+    let said = |arguments: &[&str]| {
+        let ran = audit(folder.path(), &[arguments, &["--json"]].concat());
+        let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON alone");
+        let headline = ran.err.lines().find(|line| line.contains("CLEAR")).unwrap_or_default().to_owned();
+        (ran.exit, headline, json["audit"]["proved"].clone(), json["audit"]["assumes"].clone())
+    };
+    let drawn = said(&["pass.csv", "--delta", "0.5"]);
+    assert!(drawn.1.starts_with("CLEAR if straight between samples: "), "{drawn:?}");
+    assert_eq!((drawn.0, drawn.2, drawn.3), (Some(0), false.into(), "straight between samples".into()));
+    let bounded = said(&["pass.csv", "--delta", "0.5", "--motion", "bounded", "--max-accel", "1"]);
+    assert!(bounded.1.starts_with("PROVED CLEAR: "), "{bounded:?}");
+    assert_eq!((bounded.0, bounded.2, bounded.3), (Some(0), true.into(), "accelerations of at most 1.0 m/s^2".into()));
+    let curves = said(&["curves", "--delta", "0.5"]);
+    assert!(curves.1.starts_with("PROVED CLEAR: "), "{curves:?}");
+    assert_eq!((curves.0, curves.2, curves.3), (Some(0), true.into(), serde_json::Value::Null));
+    let violation = said(&["pass.csv", "--delta", "2"]);
+    assert_eq!((violation.0, violation.2), (Some(1), false.into()));
+    // A limit is said with every digit that it has.
+    let digits = audit(folder.path(), &["pass.csv", "--delta", "0.9999996"]);
+    assert!(
+        digits.out.contains("never closer than 1.000000 m") && digits.out.contains("delta 0.9999996 m"),
+        "{digits:?}"
+    );
+    // Risen by less than rounding shows: nobody knows whether both are on the ground, and the search ends.
+    let hidden = audit(folder.path(), &["curves", "--delta", "2", "--above", "0.5"]);
+    assert_eq!(hidden.exit, Some(1), "{hidden:?}");
+    assert!(hidden.out.starts_with("UNDECIDED: "), "{hidden:?}");
+}
+
+#[test]
+fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
+    // Charlie is alone when it is not seen; bravo has left by then.
+    let mut rows = "t,id,x,y,z\n".to_owned();
+    for t in 0..20 {
+        let seen = [t < 8, t < 7, t > 9 && t != 14].into_iter().zip(["alpha", "bravo", "charlie"]).zip([0, 9, 18]);
+        for ((_, name), x) in seen.filter(|((is_seen, _), _)| *is_seen) {
+            let _ = writeln!(rows, "{}.5,{name},{x},0,0", t);
+        }
+    }
+    let folder = folder(&[("late.csv", &rows), ("gap.csv", &rows.replace("\n3.5,bravo,9,0,0", ""))]);
+    let late = audit(folder.path(), &["late.csv", "--delta", "1", "--junit", "late.xml"]);
+    assert_eq!(late.exit, Some(0), "{late:?}");
+    let junit = fs::read_to_string(folder.path().join("late.xml")).expect("JUnit");
+    assert!(junit.contains("failures=\"0\"") && !late.out.contains("not seen"), "{junit} {late:?}");
+    let gap = audit(folder.path(), &["gap.csv", "--delta", "1"]);
+    assert_eq!(gap.exit, Some(1), "{gap:?}");
+    let said = "UNDECIDED: bravo was not seen from 2.500 s to 4.500 s; --max-gap 2 would judge across (delta 1.000 m";
+    assert!(gap.out.starts_with(said), "{gap:?}");
+    assert_eq!(audit(folder.path(), &["gap.csv", "--delta", "1", "--max-gap", "2"]).exit, Some(0));
+}
+
+#[test]
+fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
+    let folder = folder(&[]);
+    let fly = |out: &str, sets: &[&str]| {
+        let fixed = ["--out", out, "--no-snapshots", "--no-figures", "--quiet"];
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let arguments: Vec<_> = ["run", "pentagon-laplacian"].into_iter().chain(fixed).chain(sets).collect();
+        ran_by(TAUTLINE, folder.path(), &arguments);
+        let report = fs::read_to_string(folder.path().join(out).join("report.json")).expect("a report");
+        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        let recording = format!("{out}/run.mcap");
+        let ran = audit(folder.path(), &[&recording, "--json"]);
+        let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
+        assert_eq!(json["separation"]["min_m"], report["separation"]["min_m"], "{out}: {ran:?}");
+        assert_eq!(json["separation"]["min_pair"], report["separation"]["min_pair"], "{out}");
+        assert_eq!(json["status"], report["audit"]["status"], "{out}");
+        (ran.exit, json)
+    };
+    // Stiff, so that vehicles pass each other between two samples a second apart.
+    let stiff = ["law.f1_per_s2=30", "law.f2_per_s=1", "time.record_hz=1", "time.duration_s=20"];
+    let (exit, coarse) = fly("coarse", &stiff);
+    assert_eq!((exit, &coarse["status"]), (Some(1), &"violation".into()));
+    // What straight lines say of it, and the run knows better.
+    let (exit, apart) = fly("apart", &[&stiff[..], &["law.delta_m=0.4", "time.record_hz=1"]].concat());
+    assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &false.into()), "{apart}");
+    assert_eq!(apart["audit"]["assumes"], "straight between samples");
+    // Every step is recorded: proved.
+    let (exit, every) = fly("every", &["time.duration_s=2", "time.record_hz=240"]);
+    assert_eq!((exit, &every["audit"]["proved"]), (Some(0), &true.into()), "{every}");
+    assert_eq!(every["audit"]["assumes"], serde_json::Value::Null);
 }

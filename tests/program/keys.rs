@@ -63,8 +63,16 @@ fn assert_documented(section: &str, commands: &[&[&str]]) {
 
 #[test]
 fn every_key_of_the_report_is_on_its_page() {
-    let violated =
-        ["run", "pentagon-laplacian", "--no-figures", "--no-snapshots", "--json", "--set", "time.duration_s=6"];
+    let violated = [
+        "run",
+        "pentagon-laplacian",
+        "--verify",
+        "--no-figures",
+        "--no-snapshots",
+        "--json",
+        "--set",
+        "time.duration_s=6",
+    ];
     assert_documented("report.json", &[&violated]);
 }
 

@@ -1,10 +1,11 @@
 //! The audit of a recording, as it is read.
 
 use super::error::RecordedError;
-use super::outcome::{Gap, Outcome};
+use super::outcome::{Gap, Outcome, Presence, Told};
 use super::rates::Rates;
 use super::settings::{LARGEST, Settings};
 use super::smallest::Smallest;
+use super::told::AllTold;
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::audit::outcome::Status;
@@ -32,6 +33,7 @@ pub struct TrackAuditor {
     results: Results,
     gaps: Vec<Gap>,
     smallest: Option<Smallest>,
+    told: AllTold,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
     /// Time of the last item, and of the last one before that time \[s\].
@@ -69,6 +71,7 @@ impl TrackAuditor {
             results: Results::default(),
             gaps: Vec::new(),
             smallest: None,
+            told: AllTold::default(),
             now_s: f64::NEG_INFINITY,
             before_s: f64::NEG_INFINITY,
             done_s: f64::NEG_INFINITY,
@@ -99,21 +102,23 @@ impl TrackAuditor {
             self.vehicles.push(Vehicle::new(name, &self.settings, max_gap_s));
         }
         for item in items {
-            match item {
-                Item::Sample(sample) => self.take(sample.vehicle, sample.time_s, |vehicle| vehicle.sample(sample))?,
-                Item::Piece(piece) => self.take(piece.vehicle, piece.from_s, |vehicle| vehicle.piece(piece))?,
-            }
+            self.take(item)?;
         }
         Ok(())
     }
 
+    /// Takes what the recording itself says of the time since the instant before; in order of time, and at any time before
+    /// the end. It counts where distances are metres and no clock is set right.
+    pub fn tell(&mut self, told: Told) {
+        let clocks_are_right = self.settings.vehicles.values().all(|of| of.offset_s == 0.0);
+        if self.settings.ellipsoid_m.is_none() && clocks_are_right {
+            self.told.push(told);
+        }
+    }
+
     #[inline]
-    fn take(
-        &mut self,
-        index: usize,
-        time_s: f64,
-        take: impl FnOnce(&mut Vehicle) -> Result<Option<Gap>, RecordedError>,
-    ) -> Result<(), RecordedError> {
+    fn take(&mut self, item: &Item) -> Result<(), RecordedError> {
+        let (index, time_s) = (item.vehicle(), item.time_s());
         if time_s != self.now_s {
             self.turn_to(time_s, index)?;
         }
@@ -124,7 +129,7 @@ impl TrackAuditor {
             return Ok(());
         }
         let unseen = vehicle.is_unseen();
-        let gap = take(vehicle)?;
+        let gap = vehicle.take(item)?;
         if unseen {
             vehicle.check(&self.settings)?;
         }
@@ -209,11 +214,22 @@ impl TrackAuditor {
         let span_s = there().map(|there| (there.from_s, there.to_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let contradiction =
             self.vehicles.iter().filter_map(|v| v.contradiction).max_by(|a, b| a.needs_m_s2.total_cmp(&b.needs_m_s2));
+        // Of a gap that nobody could have used nothing is asked.
+        let obstructed = !self.settings.obstacles.is_empty();
+        self.gaps.retain(|gap| {
+            let others = presence.iter().enumerate().filter(|(vehicle, _)| *vehicle != gap.vehicle);
+            let meets = |other: &Presence| other.from_s < gap.to_s && gap.from_s < other.to_s;
+            obstructed || others.filter_map(|(_, there)| there.as_ref()).any(meets)
+        });
         self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
-        let in_the_way = there().count() > 1 || !self.settings.obstacles.is_empty();
-        let unseen = in_the_way && !self.gaps.is_empty();
+        let radius_of = |vehicle: usize| -> Option<f64> {
+            let of = self.vehicles.get(vehicle).filter(|of| of.asked_for)?;
+            Some(of.radius_m.unwrap_or(0.0))
+        };
+        self.told.correct(&mut self.results, &self.settings, radius_of);
         let Results { ledger, closest, obstacles, swept } = self.results;
-        let decided = span_s.is_some() && ledger.is_decided() && !unseen && contradiction.is_none();
+        let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
+        let decided = looked_at && ledger.is_decided() && self.gaps.is_empty() && contradiction.is_none();
         let parry = ledger.parry;
         let (violations, undecided) = ledger.into_lists();
         Ok(Outcome {

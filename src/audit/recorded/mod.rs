@@ -17,7 +17,10 @@
 //!
 //! Every instant counts, the first and the last too, and a vehicle that was seen once is judged where it was seen. A
 //! vehicle that is late or leaves early is judged while it is there. While a vehicle is not seen for longer than
-//! [`Settings::max_gap_s`], nothing is known of it.
+//! [`Settings::max_gap_s`], nothing is known of it. Where there never were two to keep apart nothing is clear.
+//!
+//! A run knows more than it records: what it says of the time between two instants ([`Told`]) goes before what is drawn
+//! between them.
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -45,6 +48,7 @@ mod rates;
 mod series;
 mod settings;
 mod smallest;
+mod told;
 mod vehicle;
 mod window;
 
@@ -52,6 +56,6 @@ pub use super::limits::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use error::RecordedError;
-pub use outcome::{Contradiction, Gap, Outcome, Presence};
+pub use outcome::{Contradiction, Gap, Outcome, Presence, Told};
 pub use series::{PairSample, PairSeries};
 pub use settings::{Motion, Settings, VehicleSettings};

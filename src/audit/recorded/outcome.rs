@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
+use crate::swarm::ClosestApproach;
 
 /// A time during which a vehicle was not seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -15,6 +16,15 @@ pub struct Gap {
     pub from_s: f64,
     /// When it was seen again \[s\].
     pub to_s: f64,
+    /// The [`max_gap_s`](super::Settings::max_gap_s) that would join what is before it to what is after it \[s\]; longer than
+    /// the gap where that is cut by the window.
+    pub joined_by_s: f64,
+}
+
+impl Gap {
+    pub(super) fn new(vehicle: usize, from_s: f64, to_s: f64) -> Self {
+        Self { vehicle, from_s, to_s, joined_by_s: to_s - from_s }
+    }
 }
 
 /// When a vehicle is there.
@@ -24,6 +34,17 @@ pub struct Presence {
     pub from_s: f64,
     /// Last seen \[s\].
     pub to_s: f64,
+}
+
+/// What a recording itself says of the time between two of its instants: the closest that any two of its vehicles came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Told {
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// Who it was, how close \[m\] and when \[s\].
+    pub closest: ClosestApproach,
 }
 
 /// Where a recording contradicts the bound on acceleration that it is judged by.
@@ -44,7 +65,7 @@ pub struct Contradiction {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Clear where everything asked for was judged and nothing came too close; undecided where something could not be
-    /// told; a violation, whatever else there was, where two came too close.
+    /// told, or there never were two to keep apart; a violation, whatever else there was, where two came too close.
     pub status: Status,
     /// Names of the vehicles, as the recording has them; those that were not asked for are among them.
     pub vehicles: Vec<String>,
@@ -66,7 +87,7 @@ pub struct Outcome {
     pub violations: Vec<Violation<ObjectPair>>,
     /// Every time that could not be decided, in order of time.
     pub undecided: Vec<Undecided<ObjectPair>>,
-    /// Every gap, in order of time. A gap that somebody could have used is undecided.
+    /// Every gap in which somebody else was there or an obstacle in the way, in order of time: what happened is not known.
     pub gaps: Vec<Gap>,
     /// The largest contradiction to the assumed bound on acceleration, if there is one: then nothing is proved clear.
     pub contradiction: Option<Contradiction>,

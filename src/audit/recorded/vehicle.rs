@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::error::RecordedError;
 use super::outcome::{Contradiction, Gap, Presence};
 use super::settings::{Motion, Settings};
-use crate::audit::polynomial::BernsteinBasis;
+use crate::audit::polynomial::{BernsteinBasis, parts_told};
 use crate::audit::segment::{Curve, Deviation, Segment};
 use crate::audit::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use crate::track::{Item, Piece, Sample};
@@ -15,6 +15,10 @@ use crate::track::{Item, Piece, Sample};
 const SAME_INSTANT_S: f64 = 1e-6;
 /// Shortest part of a curve, as a fraction of it, that is looked at for when the ground is left.
 const SHORTEST_PART: f64 = 1e-12;
+/// Parts of a curve that are looked at for that.
+const MOST_PARTS: usize = 2000;
+/// Coefficients of a piece of a curve: the work on a part of it grows with their square.
+const MOST_COEFFICIENTS: usize = 64;
 /// Shortest interval between two samples of a vehicle \[s\]: it can be divided by, twice.
 const SHORTEST_INTERVAL_S: f64 = 1e-70;
 /// Relative excess over the assumed acceleration that rounding explains.
@@ -43,25 +47,11 @@ pub(super) struct Vehicle {
     pub(super) segments: Vec<Segment>,
     /// When the vehicle was there, as far as it was forgotten.
     pub(super) presence: Option<Presence>,
-    last: Option<Fix>,
+    /// Where it was last seen, by its clock.
+    last: Option<Sample>,
     /// Speed over the last interval \[m/s\] and its length \[s\].
     last_interval: Option<(Vector3<f64>, f64)>,
     pub(super) contradiction: Option<Contradiction>,
-}
-
-/// Where the vehicle was last known to be.
-#[derive(Clone, Copy, Debug)]
-struct Fix {
-    time_s: f64,
-    position_m: Vector3<f64>,
-    velocity_m_s: Option<Vector3<f64>>,
-}
-
-impl Fix {
-    #[inline]
-    fn new(time_s: f64, sample: &Sample) -> Self {
-        Self { time_s, position_m: sample.position_m, velocity_m_s: sample.velocity_m_s }
-    }
 }
 
 impl Vehicle {
@@ -121,13 +111,14 @@ impl Vehicle {
 
     /// Takes a sample; returns the gap before it, if there is one.
     #[inline]
-    pub(super) fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
+    fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
         let motion = self.motion.unwrap_or(Motion::Linear);
         if motion == Motion::Polynomial {
             return Err(RecordedError::NotACurve { vehicle: self.name.clone() });
         }
-        let time_s = sample.time_s + self.offset_s;
         self.check_sample(sample)?;
+        let time_s = sample.time_s + self.offset_s;
+        let seen = Sample { time_s, ..*sample };
         if let Some(last) = &self.last
             && time_s - last.time_s < SHORTEST_INTERVAL_S
         {
@@ -152,35 +143,35 @@ impl Vehicle {
                         self.keep_straight((time_s, time_s), from, to);
                     }
                     Motion::Bounded => {
-                        let (last, fix) = (*last, Fix::new(time_s, sample));
-                        self.compare_with_bound(sample.vehicle, &last, &fix);
-                        self.keep_bounded(&last, &fix);
+                        let last = *last;
+                        self.compare_with_bound(&last, &seen);
+                        self.keep_bounded(&last, &seen);
                     }
                 }
             }
             last => {
-                gap = last.map(|last| Gap { vehicle: sample.vehicle, from_s: last.time_s, to_s: time_s });
+                gap = last.map(|last| Gap::new(sample.vehicle, last.time_s, time_s));
                 self.last_interval = None;
                 let at = self.scaled(sample.position_m);
                 self.keep_straight((time_s, time_s), at, at);
             }
         }
-        self.last = Some(Fix::new(time_s, sample));
+        self.last = Some(seen);
         Ok(gap)
     }
 
     /// Takes a piece of a curve; returns the gap before it, if there is one.
-    pub(super) fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
+    fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
         if !matches!(self.motion, None | Some(Motion::Polynomial)) {
             return Err(RecordedError::NotSamples { vehicle: self.name.clone() });
         }
         let (from_s, to_s) = (piece.from_s + self.offset_s, piece.to_s + self.offset_s);
         let coefficients: Vec<_> = piece.coefficients.iter().map(|c| self.scaled(*c)).collect();
-        let segment = self.curve(Curve { from_s, to_s, coefficients, deviation: Deviation::None })?;
+        let segment = self.curve(Curve { from_s, to_s, coefficients, deviation: Deviation::default() })?;
         let (start, end) = (segment.from, segment.to);
-        let fix = Fix { time_s: to_s, position_m: end, velocity_m_s: None };
+        let seen = Sample { vehicle: piece.vehicle, time_s: to_s, position_m: end, velocity_m_s: None, radius_m: None };
         let mut gap = None;
-        match self.last.replace(fix) {
+        match self.last.replace(seen) {
             Some(last) if from_s < last.time_s - SAME_INSTANT_S => {
                 return Err(self.not_increasing(last.time_s, from_s));
             }
@@ -189,7 +180,7 @@ impl Vehicle {
                     self.keep_straight((last.time_s.min(from_s), from_s), last.position_m, start);
                 }
             }
-            last => gap = last.map(|last| Gap { vehicle: piece.vehicle, from_s: last.time_s, to_s: from_s }),
+            last => gap = last.map(|last| Gap::new(piece.vehicle, last.time_s, from_s)),
         }
         self.keep(&segment);
         Ok(gap)
@@ -197,8 +188,11 @@ impl Vehicle {
 
     fn curve(&self, curve: Curve) -> Result<Segment, RecordedError> {
         let wrong = |what: &str| Err(self.wrong(curve.from_s, what.to_owned()));
-        if curve.coefficients.is_empty() {
-            return wrong("the piece has no coefficients");
+        if !(1..=MOST_COEFFICIENTS).contains(&curve.coefficients.len()) {
+            let count = curve.coefficients.len();
+            return wrong(&format!(
+                "the piece has {count} coefficients, and can be judged with 1 to {MOST_COEFFICIENTS}"
+            ));
         }
         if !(curve.from_s.is_finite() && curve.to_s.is_finite() && curve.to_s > curve.from_s) {
             return wrong("the piece does not end after it begins");
@@ -213,29 +207,29 @@ impl Vehicle {
 
     /// Keeps the chord, or the cubic, between two samples, and how far the vehicle can be from it.
     #[inline(never)]
-    fn keep_bounded(&mut self, last: &Fix, fix: &Fix) {
-        let h = fix.time_s - last.time_s;
-        let (from, to) = (self.scaled(last.position_m), self.scaled(fix.position_m));
+    fn keep_bounded(&mut self, last: &Sample, seen: &Sample) {
+        let h = seen.time_s - last.time_s;
+        let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
         // Lengths are divided by the axes of the ellipsoid, so deviations by its shortest.
         let accel = self.max_accel_m_s2 * self.scale.map_or(1.0, |scale| scale.max());
-        let (coefficients, deviation) = match last.velocity_m_s.zip(fix.velocity_m_s) {
+        let (coefficients, deviation) = match last.velocity_m_s.zip(seen.velocity_m_s) {
             Some((start, end)) => {
                 let (by, start, end) = (to - from, self.scaled(start), self.scaled(end));
                 let second = (by * 3.0 / h - start * 2.0 - end) / h;
                 let third = (start + end - by * 2.0 / h) / (h * h);
-                (vec![from, start, second, third], Deviation::Hermite { peak: accel * h * h / 16.0 })
+                (vec![from, start, second, third], Deviation { peak: accel * h * h / 16.0, hermite: true })
             }
-            None => (vec![from, (to - from) / h], Deviation::Chord { peak: accel * h * h / 8.0 }),
+            None => (vec![from, (to - from) / h], Deviation { peak: accel * h * h / 8.0, hermite: false }),
         };
-        let curve = Curve { from_s: last.time_s, to_s: fix.time_s, coefficients, deviation };
+        let curve = Curve { from_s: last.time_s, to_s: seen.time_s, coefficients, deviation };
         self.keep(&Segment { from, to, ..Segment::curved(curve) });
     }
 
     /// Notes where two samples, or three without velocities, cannot be joined within the bound.
-    fn compare_with_bound(&mut self, index: usize, last: &Fix, fix: &Fix) {
-        let h = fix.time_s - last.time_s;
-        let mean = (fix.position_m - last.position_m) / h;
-        let rounding = 4.0 * f64::EPSILON * (fix.position_m.norm() + last.position_m.norm()) / (h * h);
+    fn compare_with_bound(&mut self, last: &Sample, seen: &Sample) {
+        let h = seen.time_s - last.time_s;
+        let mean = (seen.position_m - last.position_m) / h;
+        let rounding = 4.0 * f64::EPSILON * (seen.position_m.norm() + last.position_m.norm()) / (h * h);
         let mut needs = 0.0_f64;
         if let Some((before, before_s)) = self.last_interval {
             let apart_s = 0.5 * (before_s + h);
@@ -244,19 +238,19 @@ impl Vehicle {
         if let Some(start) = last.velocity_m_s {
             needs = needs.max(2.0 * (mean - start).norm() / h - 2.0 * rounding);
         }
-        if let Some(end) = fix.velocity_m_s {
+        if let Some(end) = seen.velocity_m_s {
             needs = needs.max(2.0 * (end - mean).norm() / h - 2.0 * rounding);
         }
-        if let Some((start, end)) = last.velocity_m_s.zip(fix.velocity_m_s) {
+        if let Some((start, end)) = last.velocity_m_s.zip(seen.velocity_m_s) {
             needs = needs.max((end - start).norm() / h);
         }
         self.last_interval = Some((mean, h));
         let assumed_m_s2 = self.max_accel_m_s2;
         let excess = needs > assumed_m_s2 * (1.0 + ROUNDING);
-        let judged = self.window.from_s <= fix.time_s && last.time_s <= self.window.to_s;
+        let judged = self.window.from_s <= seen.time_s && last.time_s <= self.window.to_s;
         if excess && judged && self.contradiction.is_none_or(|largest| needs > largest.needs_m_s2) {
-            self.contradiction =
-                Some(Contradiction { vehicle: index, time_s: last.time_s, needs_m_s2: needs, assumed_m_s2 });
+            let (vehicle, time_s) = (seen.vehicle, last.time_s);
+            self.contradiction = Some(Contradiction { vehicle, time_s, needs_m_s2: needs, assumed_m_s2 });
         }
     }
 
@@ -294,28 +288,18 @@ impl Vehicle {
 
     #[inline]
     fn check_sample(&self, sample: &Sample) -> Result<(), RecordedError> {
-        if sample.time_s.is_finite()
-            && is_near(&sample.position_m)
-            && sample.velocity_m_s.as_ref().is_none_or(is_near)
-            && sample.radius_m.is_none_or(is_radius)
-        {
-            return Ok(());
-        }
-        Err(self.not_finite(sample))
-    }
-
-    #[cold]
-    fn not_finite(&self, sample: &Sample) -> RecordedError {
         let what = if !sample.time_s.is_finite() {
             "the time"
         } else if !is_near(&sample.position_m) {
             "the position"
         } else if sample.velocity_m_s.is_some_and(|v| !is_near(&v)) {
             "the velocity"
-        } else {
+        } else if sample.radius_m.is_some_and(|radius_m| !(0.0..=MAX_LENGTH_M).contains(&radius_m)) {
             "the radius, which must not be below 0 m,"
+        } else {
+            return Ok(());
         };
-        self.wrong(sample.time_s, format!("{what} is not a finite number below 1e70"))
+        Err(self.wrong(sample.time_s, format!("{what} is not a finite number below 1e70")))
     }
 
     #[cold]
@@ -344,18 +328,14 @@ fn is_near(v: &Vector3<f64>) -> bool {
     (v.x.abs() <= MAX_LENGTH_M) & (v.y.abs() <= MAX_LENGTH_M) & (v.z.abs() <= MAX_LENGTH_M)
 }
 
-fn is_radius(radius_m: f64) -> bool {
-    (0.0..=MAX_LENGTH_M).contains(&radius_m)
-}
-
 /// Splits a segment where it passes a height and says which parts are on the ground. A jump is on the ground if both ends
-/// are; what cannot be told on a curve is above.
+/// are; what cannot be told on a curve within some work is left open.
 fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
     let (low, high) = (segment.from.z.min(segment.to.z), segment.from.z.max(segment.to.z));
     if segment.curve.is_some() {
         split_curve_at_height(&segment, height, into);
     } else if segment.to_s <= segment.from_s || high <= height || low > height {
-        into.push(Segment { grounded: high <= height, ..segment });
+        into.push(Segment { grounded: Some(high <= height), ..segment });
     } else {
         let share = (height - segment.from.z) / (segment.to.z - segment.from.z);
         let at_s = segment.from_s + (segment.to_s - segment.from_s) * share.clamp(0.0, 1.0);
@@ -363,7 +343,7 @@ fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
         for (from_s, to_s, grounded) in [(segment.from_s, at_s, starts_low), (at_s, segment.to_s, !starts_low)] {
             if to_s > from_s {
                 let part = segment.clipped(Interval { from_s, to_s });
-                into.extend(part.map(|part| Segment { grounded, ..part }));
+                into.extend(part.map(|part| Segment { grounded: Some(grounded), ..part }));
             }
         }
     }
@@ -371,29 +351,22 @@ fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
 
 fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>) {
     let length_s = segment.to_s - segment.from_s;
-    let mut stack = vec![(0.0, 1.0)];
-    let mut runs: Vec<(f64, f64, bool)> = Vec::new();
-    while let Some((start, length)) = stack.pop() {
+    let at = |u: f64| if u >= 1.0 { segment.to_s } else { segment.from_s + length_s * u };
+    let on_ground = |start: f64, length: f64| {
         let [from_s, to_s] = [start, start + length].map(|u| segment.from_s + length_s * u);
-        let local = segment.local(Interval { from_s, to_s });
-        let mut above: Vec<f64> = local.iter().map(|c| c.z).collect();
+        let mut above: Vec<f64> = segment.local(Interval { from_s, to_s }).iter().map(|c| c.z).collect();
         above[0] -= height;
-        let (low, high) = BernsteinBasis::of_degree(above.len() - 1).range(&above);
-        if high > 0.0 && low <= 0.0 && length > SHORTEST_PART {
-            let half = 0.5 * length;
-            stack.extend([(start + half, half), (start, half)]);
-            continue;
+        match BernsteinBasis::of_degree(above.len() - 1).range(&above) {
+            (_, high) if high <= 0.0 => Some(true),
+            (low, _) if low > 0.0 => Some(false),
+            // Where the height is passed: so short that it is not worth a doubt.
+            _ if length <= SHORTEST_PART => Some(false),
+            _ => None,
         }
-        let grounded = high <= 0.0;
-        match runs.last_mut() {
-            Some(run) if run.2 == grounded => run.1 = start + length,
-            _ => runs.push((start, start + length, grounded)),
-        }
-    }
-    for (start, end, grounded) in runs {
-        let from_s = if start <= 0.0 { segment.from_s } else { segment.from_s + length_s * start };
-        let to_s = if end >= 1.0 { segment.to_s } else { segment.from_s + length_s * end };
-        into.extend(segment.clipped(Interval { from_s, to_s }).map(|part| Segment { grounded, ..part }));
+    };
+    for (start, end, grounded) in parts_told(0.0, MOST_PARTS, on_ground) {
+        let part = segment.clipped(Interval { from_s: at(start), to_s: at(end) });
+        into.extend(part.map(|part| Segment { grounded, ..part }));
     }
 }
 
@@ -404,7 +377,7 @@ mod tests {
     fn parts(segment: Segment, height: f64) -> Vec<(f64, f64, bool)> {
         let mut into = Vec::new();
         split_at_height(segment, height, &mut into);
-        into.iter().map(|part| (part.from_s, part.to_s, part.grounded)).collect()
+        into.iter().map(|part| (part.from_s, part.to_s, part.grounded == Some(true))).collect()
     }
 
     #[test]
@@ -421,7 +394,7 @@ mod tests {
     fn a_hop_on_a_curve_is_above_between_its_two_crossings() {
         // z = 4 u (1 - u): above 0.75 between 1/4 and 3/4.
         let coefficients = vec![Vector3::zeros(), Vector3::new(0.0, 0.0, 4.0), Vector3::new(0.0, 0.0, -4.0)];
-        let hop = Segment::curved(Curve { from_s: 0.0, to_s: 1.0, coefficients, deviation: Deviation::None });
+        let hop = Segment::curved(Curve { from_s: 0.0, to_s: 1.0, coefficients, deviation: Deviation::default() });
         let found = parts(hop, 0.75);
         assert_eq!(found.iter().map(|part| part.2).collect::<Vec<_>>(), [true, false, true]);
         assert!((found[0].1 - 0.25).abs() < 1e-9 && (found[1].1 - 0.75).abs() < 1e-9, "{found:?}");

@@ -90,7 +90,7 @@ impl Near {
 impl Windows {
     pub(super) fn new(limits: Limits, obstacles: &[Obstacle]) -> Self {
         // The ground is where nothing but the vehicle matters, so an obstacle always counts as on it.
-        let grounded = |part| Segment { grounded: true, ..part };
+        let grounded = |part| Segment { grounded: Some(true), ..part };
         let with_path =
             |obstacle: &Obstacle| (obstacle.clone(), obstacle.segments().into_iter().map(grounded).collect());
         Self { limits, obstacles: obstacles.iter().map(with_path).collect(), extents: Vec::new(), near: Vec::new() }
@@ -311,7 +311,7 @@ impl Extent {
             high: chord.from.sup(&chord.to) + aside,
             chord,
             radius: of.radius_m.unwrap_or(0.0),
-            grounded: parts.iter().all(|part| part.grounded),
+            grounded: parts.iter().all(|part| part.grounded == Some(true)),
             vehicle,
             segments,
         })

@@ -1,0 +1,64 @@
+//! What a recording of `tautline run` says of itself beside positions.
+
+use std::path::Path;
+
+use crate::audit::recorded::Told;
+use crate::record::Event;
+use crate::record::mcap::{Entry, McapRecording};
+use crate::scenario::{self, PlantSpec, Scenario};
+
+/// A recording of ours.
+pub(super) struct OwnRecording {
+    /// Its safety distance \[m\].
+    pub(super) delta_m: f64,
+    /// What it says of the time between its samples, in order of time; nothing where it holds every step that was flown.
+    pub(super) told: Vec<Told>,
+    /// Whether it holds every step that was flown, and every step was straight.
+    pub(super) has_every_step: bool,
+    /// Most steps between two of its samples.
+    pub(super) most_steps: u64,
+}
+
+impl OwnRecording {
+    /// Reads it; `None` where the file is none of ours, or is damaged, which reading its positions tells better. `scale` is
+    /// what its lengths are multiplied by.
+    pub(super) fn read(path: &Path, scale: f64) -> Option<Self> {
+        let recording = path.is_file().then(|| McapRecording::open(path).ok()).flatten()?;
+        let header = recording.header();
+        let text = header.scenario_toml.clone();
+        let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
+        let is_straight =
+            Scenario::read(&source, &[]).is_ok_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
+        let mut own = Self { delta_m: header.delta_m, told: Vec::new(), has_every_step: is_straight, most_steps: 0 };
+        let mut before: Option<(u64, f64)> = None;
+        for entry in recording {
+            match entry.ok()? {
+                Entry::Sample(sample) => {
+                    let (step, from_s) = before.unwrap_or((sample.step, sample.time_s));
+                    own.most_steps = own.most_steps.max(sample.step.saturating_sub(step));
+                    own.told.extend(sample.separation.map(|mut closest| {
+                        closest.separation_m *= scale;
+                        Told { from_s, to_s: sample.time_s, closest }
+                    }));
+                    before = Some((sample.step, sample.time_s));
+                }
+                Entry::Event(event) => own.has_every_step &= !matches!(event, Event::StepRefined { .. }),
+            }
+        }
+        own.has_every_step &= own.most_steps <= 1;
+        if own.has_every_step {
+            own.told.clear();
+        }
+        Some(own)
+    }
+
+    /// What a person should know about how it is judged.
+    pub(super) fn note(&self) -> Option<String> {
+        let steps = self.most_steps;
+        (!self.has_every_step).then(|| {
+            format!(
+                "up to {steps} steps were flown between two samples: the closest approach that the run saw there counts"
+            )
+        })
+    }
+}

@@ -1,0 +1,205 @@
+//! What `tautline audit --json` holds.
+
+use serde::Serialize;
+
+use crate::audit::recorded::{Approach, Contradiction, Gap, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS};
+use crate::audit::{Status, Undecided, Violation};
+use crate::report::findings::finite;
+use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
+use crate::swarm::Pair;
+
+/// What was read.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Source {
+    /// The recording.
+    pub recording: String,
+    /// How it counts time.
+    pub clock: Clock,
+    /// How it was read, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// How a recording counts time.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Clock {
+    /// The unit: `s`, `ms`, `us` or `ns`.
+    pub unit: String,
+    /// Whether it was inferred from the numbers.
+    pub inferred: bool,
+    /// The instant that is 0 s in this report, on the recording's clock \[ns\].
+    pub epoch_ns: i64,
+}
+
+/// What is taken to happen between two samples, and what that is worth.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Between {
+    /// In words, such as `straight between samples`.
+    pub motion: String,
+    /// How these words are known.
+    pub basis: Basis,
+}
+
+/// How it is known what happens between two samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// The recording says it: curves, or every step of an engine that moves vehicles straight.
+    Recorded,
+    /// A bound on every motion there can be.
+    Bounded,
+    /// It is taken for granted.
+    Assumed,
+}
+
+/// What a judgement of a recording rests on: the keys of a flight's `audit`, and how far it is a proof.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RecordedAudit {
+    /// The keys of a flight.
+    #[serde(flatten)]
+    pub flight: Audit,
+    /// Clear, and nothing was taken for granted of the time between samples.
+    pub proved: bool,
+    /// What was assumed of the motion between samples; none where the recording says it itself.
+    pub assumes: Option<String>,
+}
+
+/// The content of `tautline audit --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RecordedReport {
+    /// Version of the keys.
+    pub schema_version: u32,
+    /// The verdict.
+    pub status: Status,
+    /// What was read.
+    #[serde(flatten)]
+    pub source: Source,
+    /// `metres`, or `ellipsoids` where lengths are divided by the axes of the ellipsoid.
+    pub measure: &'static str,
+    /// What was taken to happen between samples.
+    pub motion: String,
+    /// Names of the vehicles; numbers of pairs count them from 1.
+    pub vehicles: Vec<String>,
+    /// How many of them were judged: asked for, and there.
+    pub judged: usize,
+    /// First and last instant judged \[s\].
+    pub span_s: Option<(f64, f64)>,
+    /// How close vehicles came.
+    pub separation: Separation<Option<f64>>,
+    /// What the judgement rests on.
+    pub audit: RecordedAudit,
+    /// Every violation, of pairs and of obstacles, in order of time.
+    pub violations: Vec<OfPair<Violation<ObjectPair>>>,
+    /// The ten closest pairs.
+    pub closest: Vec<OfPair<Approach>>,
+    /// What obstacles were in the way of.
+    pub obstacles: Obstacles,
+    /// When vehicles were not seen.
+    pub gaps: Vec<OfVehicle<Gap>>,
+    /// When it cannot be told whether two came too close.
+    pub undecided: Vec<OfPair<Undecided<ObjectPair>>>,
+    /// Where the recording contradicts the assumed bound on acceleration.
+    pub contradiction: Option<OfVehicle<Contradiction>>,
+}
+
+/// A finding on a pair, with their names.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfPair<T> {
+    /// Their names.
+    pub who: [String; 2],
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
+}
+
+/// A finding on a vehicle, with its name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfVehicle<T> {
+    /// Its name.
+    pub vehicle: String,
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
+}
+
+/// Obstacles and who came close to them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Obstacles {
+    /// The ten closest approaches.
+    pub closest: Vec<OfPair<Approach>>,
+    /// Every time that a vehicle was too close to one.
+    pub violations: Vec<OfPair<Violation<ObjectPair>>>,
+}
+
+impl RecordedReport {
+    /// The report on an outcome.
+    #[must_use]
+    pub fn new(outcome: &Outcome, settings: &Settings, source: Source, between: Between) -> Self {
+        let first = outcome.closest.first();
+        let scaled = settings.ellipsoid_m.is_some();
+        let min_m = first.and_then(|first| finite(first.certain_m()));
+        let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
+        let closest = |of: &[Approach]| of.iter().map(|a| OfPair { who: names(a.pair), finding: *a }).collect();
+        let violations: Vec<_> =
+            outcome.violations.iter().map(|v| OfPair { who: names(v.pair), finding: *v }).collect();
+        Self {
+            schema_version: SCHEMA_VERSION,
+            status: outcome.status,
+            source,
+            measure: if scaled { "ellipsoids" } else { "metres" },
+            motion: between.motion.clone(),
+            vehicles: outcome.vehicles.clone(),
+            judged: outcome.presence.iter().flatten().count(),
+            span_s: outcome.span_s,
+            separation: Separation {
+                delta_m: settings.delta_m.or(scaled.then_some(TOUCHING_ELLIPSOIDS)),
+                min_m,
+                min_at_s: first.and_then(|first| finite(first.time_s)),
+                min_pair: first.and_then(|first| first.pair.vehicles()).map(Pair::numbers),
+                certified_m: None,
+                certificate_void: Vec::new(),
+            },
+            audit: RecordedAudit {
+                flight: Audit {
+                    status: outcome.status,
+                    violations: outcome
+                        .violations
+                        .iter()
+                        .filter_map(|v| Some(flight::Violation::new(v.pair.vehicles()?, v)))
+                        .collect(),
+                    steps: outcome.segments,
+                    pairs_checked: outcome.swept,
+                    closed_form: ClosedForm { min_m },
+                    parry: Parry {
+                        min_toi_s: outcome.parry.min_toi_s.and_then(finite),
+                        disagreements: outcome.parry.disagreements,
+                    },
+                    rapier: Rapier { contact_pairs: None },
+                },
+                proved: outcome.status == Status::Clear && between.basis != Basis::Assumed,
+                assumes: (between.basis != Basis::Recorded).then_some(between.motion),
+            },
+            closest: closest(&outcome.closest),
+            obstacles: Obstacles {
+                closest: closest(&outcome.obstacles),
+                violations: violations.iter().filter(|v| v.finding.pair.vehicles().is_none()).cloned().collect(),
+            },
+            violations,
+            gaps: outcome
+                .gaps
+                .iter()
+                .map(|gap| OfVehicle { vehicle: outcome.name(gap.vehicle), finding: *gap })
+                .collect(),
+            undecided: outcome.undecided.iter().map(|u| OfPair { who: names(u.pair), finding: *u }).collect(),
+            contradiction: outcome
+                .contradiction
+                .map(|finding| OfVehicle { vehicle: outcome.name(finding.vehicle), finding }),
+        }
+    }
+
+    /// The report as indented JSON with a line end.
+    ///
+    /// # Errors
+    /// None in practice: every key is a string and every value has a JSON form.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+}
