@@ -4,7 +4,7 @@ use super::*;
 use crate::formation::Formation;
 use crate::law::EdgeTension;
 
-use crate::scenario::{Override, Precision, Source, Space};
+use crate::scenario::{Override, PlantSpec, Precision, Source, Space};
 
 /// Certified separations are printed with 6 digits.
 const PRINTED_M: f64 = 1e-6;

@@ -67,7 +67,7 @@ fn row(claim: &Claim) -> [Markup; 3] {
     [
         noted(claim.statement, &format!("{finding}{id}; {source}")),
         noted(&claim.measured, &judged),
-        Badge { tone, word: claim.outcome() }.render(),
+        Badge { tone, word: claim.outcome().to_owned() }.render(),
     ]
 }
 

@@ -14,7 +14,7 @@ fn hostile_page() -> Page {
     let text = || HOSTILE.to_owned();
     let figure = figures::paths(&RunHistory::new(), HOSTILE);
     let picture = Picture { description: text(), data_uri: text() };
-    let badge = Badge { word: HOSTILE, ..Badge::judged(false) };
+    let badge = Badge { word: HOSTILE.to_owned(), ..Badge::judged(false) };
     let content = [
         page::list(&[HOSTILE]),
         page::words(HOSTILE, &[HOSTILE; 2], [[HOSTILE; 2]]),

@@ -90,7 +90,17 @@ fn the_moments_that_are_looked_at_are_never_thinned_out() {
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s });
         let control = Rows::zeros(3);
         let (energy, channels) = (None, &[][..]);
-        timeline.take(&Sample { time_s, step: 0, swarm: &swarm, control: &control, separation, energy, channels });
+        let peaks = crate::record::Peaks::default();
+        timeline.take(&Sample {
+            time_s,
+            step: 0,
+            swarm: &swarm,
+            control: &control,
+            separation,
+            energy,
+            peaks,
+            channels,
+        });
     }
     assert!(timeline.keyframes().len() < 100 && timeline.every() >= 64, "{}", timeline.keyframes().len());
     let closest = timeline.at(7777.0).expect("a frame");

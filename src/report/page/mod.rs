@@ -34,12 +34,12 @@ pub struct Page {
 }
 
 /// A word that is good, bad or neither.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Badge {
     /// Its colour.
     pub tone: Tone,
     /// The word; it says what the colour says.
-    pub word: &'static str,
+    pub word: String,
 }
 
 /// How a word is meant.
@@ -67,7 +67,7 @@ impl Badge {
     #[must_use]
     pub fn judged(pass: bool) -> Self {
         let (tone, word) = if pass { (Tone::Good, "pass") } else { (Tone::Bad, "fail") };
-        Self { tone, word }
+        Self { tone, word: word.to_owned() }
     }
 }
 

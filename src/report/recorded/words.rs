@@ -192,7 +192,7 @@ impl RecordedReport {
         Page {
             title: self.source.recording.clone(),
             kind: "Audit of a recording",
-            badge: Badge { tone, word: &self.verdict() },
+            badge: Badge { tone, word: self.verdict() },
             verdict: self.finding(),
             reasons: Vec::new(),
             warnings: Vec::new(),
