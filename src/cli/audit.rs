@@ -28,7 +28,7 @@ const OPENING: usize = 65_536;
 const DRAWN: usize = 3;
 
 /// Arguments of `tautline audit`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = "\
 Exits with 0 where it is proved that nothing came too close, with 1 where something did or where it cannot be told \
 (unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
@@ -253,7 +253,34 @@ impl AuditArguments {
     }
 }
 
+/// Judges one recording after the other, or several files that are one.
 pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
+    let recordings = arguments.reading.recordings();
+    if recordings.len() == 1 {
+        return audit_one(arguments);
+    }
+    let of_one = [
+        ("--json", arguments.json),
+        ("--junit", arguments.junit.is_some()),
+        ("--events", arguments.events.is_some()),
+        ("--html", arguments.html.is_some()),
+    ];
+    if let Some((option, _)) = of_one.into_iter().find(|(_, given)| *given) {
+        let help = "give --join if each file holds a vehicle of one recording, or audit one at a time";
+        return Err(Failure::input(format!("{option} is of one recording, and several are given"), help));
+    }
+    let mut worst = Exit::Good;
+    for reading in recordings {
+        let console = Console { data_on_stdout: false, quiet: arguments.quiet };
+        console.say(&format!("{}:", reading.recording.display()));
+        if audit_one(&AuditArguments { reading, ..arguments.clone() })? != Exit::Good {
+            worst = Exit::Bad;
+        }
+    }
+    Ok(worst)
+}
+
+fn audit_one(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     arguments.check_outputs()?;
     let mut settings = arguments.settings()?;
