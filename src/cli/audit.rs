@@ -35,7 +35,7 @@ Exits with 0 where it is proved that nothing came too close, with 1 where someth
 below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
-    reading: ReadArguments,
+    pub(super) reading: ReadArguments,
     /// Format of the recording [default: recognised by its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
     format: Option<Format>,
@@ -80,19 +80,19 @@ pub(super) struct AuditArguments {
 
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long, help_heading = "Answer")]
-    json: bool,
+    pub(super) json: bool,
     /// Print no summary and no progress: the exit code says it.
     #[arg(long, help_heading = "Answer")]
-    quiet: bool,
+    pub(super) quiet: bool,
     /// Write the verdict as a `JUnit` file.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
-    junit: Option<PathBuf>,
+    pub(super) junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
-    events: Option<PathBuf>,
+    pub(super) events: Option<PathBuf>,
     /// Write a report for people, with figures.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
-    html: Option<PathBuf>,
+    pub(super) html: Option<PathBuf>,
     /// Exit with 0 where it cannot be told, too.
     #[arg(long, help_heading = "Answer")]
     allow_undecided: bool,
@@ -253,34 +253,7 @@ impl AuditArguments {
     }
 }
 
-/// Judges one recording after the other, or several files that are one.
 pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
-    let recordings = arguments.reading.recordings();
-    if recordings.len() == 1 {
-        return audit_one(arguments);
-    }
-    let of_one = [
-        ("--json", arguments.json),
-        ("--junit", arguments.junit.is_some()),
-        ("--events", arguments.events.is_some()),
-        ("--html", arguments.html.is_some()),
-    ];
-    if let Some((option, _)) = of_one.into_iter().find(|(_, given)| *given) {
-        let help = "give --join if each file holds a vehicle of one recording, or audit one at a time";
-        return Err(Failure::input(format!("{option} is of one recording, and several are given"), help));
-    }
-    let mut worst = Exit::Good;
-    for reading in recordings {
-        let console = Console { data_on_stdout: false, quiet: arguments.quiet };
-        console.say(&format!("{}:", reading.recording.display()));
-        if audit_one(&AuditArguments { reading, ..arguments.clone() })? != Exit::Good {
-            worst = Exit::Bad;
-        }
-    }
-    Ok(worst)
-}
-
-fn audit_one(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     arguments.check_outputs()?;
     let mut settings = arguments.settings()?;
