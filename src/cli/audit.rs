@@ -26,14 +26,14 @@ use crate::track::Item;
 const OPENING: usize = 65_536;
 
 /// Arguments of `tautline audit`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = "\
 Exits with 0 where nothing came too close, proved or as assumed between samples, with 1 where something did or where it \
 cannot be told (unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
 below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
-    reading: ReadArguments,
+    pub(super) reading: ReadArguments,
     /// Format of the recording [default: recognised by its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
     format: Option<Format>,
@@ -81,19 +81,19 @@ pub(super) struct AuditArguments {
 
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long, help_heading = "Answer")]
-    json: bool,
+    pub(super) json: bool,
     /// Print no summary and no progress: the exit code says it.
     #[arg(long, help_heading = "Answer")]
-    quiet: bool,
+    pub(super) quiet: bool,
     /// Write the verdict as a `JUnit` file.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
-    junit: Option<PathBuf>,
+    pub(super) junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
-    events: Option<PathBuf>,
+    pub(super) events: Option<PathBuf>,
     /// Write a report for people, with figures.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
-    html: Option<PathBuf>,
+    pub(super) html: Option<PathBuf>,
     /// Exit with 0 where it cannot be told, too.
     #[arg(long, help_heading = "Answer")]
     allow_undecided: bool,

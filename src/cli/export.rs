@@ -73,6 +73,10 @@ impl Tracks for Interruptible {
 }
 
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
+    if arguments.reading.recordings().len() > 1 {
+        let help = "give --join if each file holds a vehicle of one recording";
+        return Err(Failure::input("several recordings are given, and one is exported", help));
+    }
     let reading = arguments.reading.options(arguments.input_format)?;
     let path = &arguments.output;
     let by_extension = || {

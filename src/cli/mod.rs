@@ -4,6 +4,7 @@
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
 mod audit;
+mod audits;
 mod check;
 mod completions;
 mod console;
@@ -114,7 +115,7 @@ pub fn main() -> ExitCode {
     }
     let done = match command {
         Command::Run(arguments) => run::run(&arguments),
-        Command::Audit(arguments) => audit::audit(&arguments),
+        Command::Audit(arguments) => audits::audits(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Export(arguments) => export::export(&arguments),

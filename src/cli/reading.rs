@@ -9,13 +9,13 @@ use super::Failure;
 use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
 
 /// How a recording is read.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Reading")]
 pub(super) struct ReadArguments {
     /// The recording: a file, or a folder or archive with a file for each vehicle.
     #[arg(value_name = "RECORDING")]
     pub(super) recording: PathBuf,
-    /// More files of the recording, with --join.
+    /// More recordings, or with --join more files of the same one.
     #[arg(value_name = "MORE")]
     pub(super) more: Vec<PathBuf>,
     /// Several files are one recording, a vehicle in each.
@@ -62,12 +62,22 @@ impl ReadArguments {
         read::open_joined(&self.paths().collect::<Vec<_>>(), options)
     }
 
-    /// The only file or folder.
-    pub(super) fn only(&self) -> Result<&Path, Failure> {
+    /// The only file or folder, of what is `done` with one.
+    pub(super) fn only(&self, done: &str) -> Result<&Path, Failure> {
         if self.more.is_empty() {
             return Ok(&self.recording);
         }
-        Err(Failure::input("a picture is of one file or folder", "put the files into a folder, and give that"))
+        let help = "put the files into a folder if each holds a vehicle of one recording, and give that";
+        Err(Failure::input(format!("several recordings are given, and one is {done}"), help))
+    }
+
+    /// Each recording: all files are one with --join.
+    pub(super) fn recordings(&self) -> Vec<Self> {
+        if self.join {
+            return vec![self.clone()];
+        }
+        let alone = |path: &Path| Self { recording: path.to_owned(), more: Vec::new(), ..self.clone() };
+        self.paths().map(alone).collect()
     }
 
     /// All files.
@@ -80,10 +90,6 @@ impl ReadArguments {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             let message = format!("--scale is {}", self.scale);
             return Err(Failure::input(message, "give a positive number of metres, such as 0.001 for millimetres"));
-        }
-        if !self.more.is_empty() && !self.join {
-            let help = "give --join if each holds a vehicle of one recording, or give one at a time";
-            return Err(Failure::input("several recordings are given", help));
         }
         for (option, value) in [("--fps", self.fps), ("--time-scale", self.time_scale)] {
             if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {

@@ -104,7 +104,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
     let fps = arguments.fps.unwrap_or(FPS);
     let reading = arguments.reading.options(arguments.input_format)?;
-    let recording = arguments.reading.only()?;
+    let recording = arguments.reading.only("drawn")?;
     let timeline = drawing::timeline(recording, &reading, arguments.delta, console)?;
     let beside = || recording.parent().unwrap_or(Path::new("")).join("snapshots");
     let folder = arguments.out.clone().unwrap_or_else(beside);

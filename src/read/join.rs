@@ -93,18 +93,16 @@ impl Part {
             return Ok(());
         }
         for item in &mut items {
-            if item.vehicle() > 0 {
-                let fault = Fault::content("it holds several vehicles", "files that are joined hold one vehicle each");
-                return Err(ReadError::new(&self.path, fault));
-            }
-            match item {
-                Item::Sample(sample) => (sample.vehicle, sample.time_s) = (vehicle, sample.time_s + self.shift_s),
-                Item::Piece(piece) => {
-                    piece.vehicle = vehicle;
-                    piece.from_s += self.shift_s;
-                    piece.to_s += self.shift_s;
+            let problem = match item {
+                Item::Sample(sample) if sample.vehicle == 0 => {
+                    (sample.vehicle, sample.time_s) = (vehicle, sample.time_s + self.shift_s);
+                    continue;
                 }
-            }
+                Item::Sample(_) => "it holds several vehicles",
+                Item::Piece(_) => "it holds a curve, and the first of its files samples",
+            };
+            let remedy = "files that are joined hold the samples of one vehicle each";
+            return Err(ReadError::new(&self.path, Fault::content(problem, remedy)));
         }
         self.until_s = items.last().map_or(self.until_s, Item::time_s);
         self.waiting = items.into_iter().peekable();

@@ -190,10 +190,10 @@ impl<R: Rows> Ordered<R> {
         if row.vehicle >= self.last.len() {
             self.last.resize(row.vehicle + 1, None);
         }
-        if let Some((before_s, before)) = self.last[row.vehicle].replace((time_s, *row)) {
-            if before_s == time_s || before.radius.is_some() != row.radius.is_some() {
-                return Err(self.error(row, self.contradiction(before_s == time_s, time_s, &before, row)));
-            }
+        if let Some((before_s, before)) = self.last[row.vehicle].replace((time_s, *row))
+            && (before_s == time_s || before.radius.is_some() != row.radius.is_some())
+        {
+            return Err(self.error(row, self.contradiction(before_s == time_s, time_s, &before, row)));
         }
         let sample = Sample {
             vehicle: row.vehicle,

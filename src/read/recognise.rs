@@ -44,14 +44,14 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
     Ok(format)
 }
 
-/// Whether a file is a zip archive that holds neither NumPy arrays nor a show.
+/// Whether a file is a zip archive that holds neither `NumPy` arrays nor a show.
 pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
     let head = head_of(&Source::file(path))?;
     Ok(by_magic(&head) == Some(Format::Npz) && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
 }
 
 fn is_recording(entry: &str) -> bool {
-    entry == SHOW || entry.ends_with(".npy")
+    entry == SHOW || entry.rsplit('.').next() == Some("npy")
 }
 
 /// The first bytes, unpacked.

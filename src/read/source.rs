@@ -40,9 +40,10 @@ impl Source {
 
     /// What its only vehicle is called: the name of the file without what says the format.
     pub(super) fn stem(&self) -> String {
-        let path = self.shown().with_extension("");
-        let stem = if self.gzip { path.file_stem() } else { path.file_name() };
-        stem.unwrap_or_default().to_string_lossy().into_owned()
+        let path = self.shown();
+        let packed = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
+        let path = if packed { path.with_extension("") } else { path };
+        path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     /// The bytes of the file, unpacked.

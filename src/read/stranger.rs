@@ -5,7 +5,7 @@ use std::path::Path;
 use super::error::Fault;
 
 /// Beginnings of files, what they are, and what helps.
-const STRANGERS: [(&[u8], &str, &str); 15] = [
+const STRANGERS: [(&[u8], &str, &str); 11] = [
     (b"#ROSBAG V", "a ROS 1 bag", "convert it with `rosbags-convert` to a ROS 2 bag in MCAP, and give its .mcap file"),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
     (
@@ -24,10 +24,6 @@ const STRANGERS: [(&[u8], &str, &str); 15] = [
     ),
     (b"MATLAB 5.0", "a file of MATLAB", "write it with `writetable` as t,id,x,y,z"),
     (b"RRF2", "a recording of Rerun", "write its positions as a table t,id,x,y,z"),
-    (b"\xff\xd8\xff", "a picture", TABLE),
-    (b"\x89PNG", "a picture", TABLE),
-    (b"%PDF", "a document in PDF", TABLE),
-    (b"\xd0\xcf\x11\xe0", "an old Office document", "save the sheet as CSV"),
     (b"\x28\xb5\x2f\xfd", "packed by zstd", "unpack it first, with unzstd"),
 ];
 

@@ -6,6 +6,7 @@ mod program;
 mod audit;
 mod check;
 mod determinism;
+mod doors;
 mod exports;
 mod interruption;
 mod keys;

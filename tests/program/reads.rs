@@ -24,7 +24,7 @@ fn a_pipe_is_refused_because_its_beginning_would_be_lost() {
         let done = command.args(arguments).current_dir(folder.path()).write_stdin(input).output().expect("ran");
         (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
     };
-    assert_eq!(ran(&["audit", "flight.txt", "--delta", "1"], "").0, Some(1));
+    assert_eq!(ran(&["audit", "flight.txt", "--delta", "1", "--dimensions", "3"], "").0, Some(1));
     for arguments in [&["audit", "/dev/stdin", "--delta", "1"][..], &["export", "/dev/stdin", "-o", "out.npz"]] {
         let (exit, said) = ran(arguments, &text);
         assert_eq!(exit, Some(2), "{said}");

@@ -97,7 +97,7 @@ fn files_that_are_not_of_one_recording_are_refused() {
         (&[("a.csv", A), ("b.csv", "timestamp,x,y\n1700000000.5,1,2\n")], "the clock of `b` begins more than a month"),
         (&[("a.csv", A), ("a.txt", B)], "two of its files are called `a`"),
         (&[("a.csv", A), ("b.csv", "t,x,y\n0,one,2\n")], "b.csv, line 2: column `x` holds `one`"),
-        (&[("a.csv", A), ("b.csv", "duration,x^0,y^0,z^0\n1,0,0,0\n")], "b.csv"),
+        (&[("a.csv", A), ("b.csv", "duration,x^0,y^0,z^0\n1,0,0,0\n")], "b.csv: it holds a curve"),
         (&[("readme.md", "nothing")], "there is no table in the folder"),
     ] {
         let error = whole(folder(files).path()).expect_err(said);
