@@ -167,7 +167,7 @@ fn number_label(number: f64, step: f64) -> String {
     const MOST_DIGITS: usize = 3;
     let digits = decimals_of(step / 10.0_f64.powf(number.abs().log10().floor()), 17);
     let text = if number != 0.0 && (number.abs() >= 1e5 && digits <= MOST_DIGITS || step < 1e-4) {
-        format!("{number:.digits$e}")
+        format!("{number:.digits$e}").replace(".0e", "e")
     } else {
         let decimals = decimals_of(step, 4);
         format!("{number:.decimals$}")

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::figure::Figure;
-use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, TEXT};
+use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, TEXT, text_px};
 use super::thin::thinned;
 
 /// Width of a figure \[px\].
@@ -193,7 +193,8 @@ impl Chart {
     fn make_axes_equal(&mut self) -> f64 {
         let width = RIGHT - self.left;
         let (across, up) = (self.x.to - self.x.from, self.y.to - self.y.from);
-        let height = (width * up / across).clamp(LEAST_HEIGHT, MOST_HEIGHT).round();
+        let least = if self.inset.is_some() { HEIGHT } else { LEAST_HEIGHT };
+        let height = (width * up / across).clamp(least, MOST_HEIGHT).round();
         let unit = (across / width).max(up / height);
         let widen = |axis: &Axis, pixels: f64, tick_px: f64| {
             let (middle, half) = (axis.middle(), 0.5 * unit * pixels);
@@ -216,7 +217,9 @@ impl Chart {
             canvas.line(&[at, top], grid);
             ticks.push([at, (at.0, at.1 + TICK)]);
             if k.is_multiple_of(every) {
-                canvas.text((at.0, at.1 + TICK + BESIDE_TICK), Align::CENTRE_ABOVE, &self.x.tick_label(tick));
+                let label = self.x.tick_label(tick);
+                let x = at.0.min(WIDTH - 0.5 * text_px(&label));
+                canvas.text((x, at.1 + TICK + BESIDE_TICK), Align::CENTRE_ABOVE, &label);
             }
         }
         for &tick in &self.y.ticks {

@@ -86,7 +86,8 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
 pub fn smallest(distances: &[Option<(f64, f64)>], closest: &Encounter, title: &str) -> Figure {
     let Encounter { limit_m: limit, unit, .. } = *closest;
     let points: Vec<_> = distances.iter().map(|known| known.unwrap_or((f64::NAN, f64::NAN))).collect();
-    let (from_s, to_s) = extent(points.iter().map(|point| point.0)).unwrap_or((0.0, 0.0));
+    let times_s = points.iter().map(|point| point.0).chain(closest.distances.iter().map(|point| point.0));
+    let (from_s, to_s) = extent(times_s).unwrap_or((0.0, 0.0));
     let numbers: Vec<_> = points.iter().map(|point| point.1).chain([limit]).collect();
     let mut chart = Chart::new(Axis::time(from_s, to_s), Axis::distances(unit, &numbers, limit));
     let least = points.iter().copied().filter(|point| point.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));

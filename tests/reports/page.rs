@@ -141,7 +141,8 @@ fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_appro
     let figure = near.split("<svg xmlns").find(|figure| figure.contains("Smallest distance of all")).expect("a figure");
     assert!(figure.contains("closest 1.500000 m at 50.000 s, limit 1.0 m"), "{figure}");
     // It is that of all, and not of one pair: 8 m but around the pass.
-    let line = figure.split("<polyline ").filter(|line| line.contains("#0072B2")).max_by_key(|line| line.len());
+    let lines = figure.split("<polyline ").filter_map(|line| line.split('>').next());
+    let line = lines.filter(|line| line.contains("#0072B2")).max_by_key(|line| line.len());
     let corners: Vec<(f64, f64)> = line
         .and_then(|line| line.split('"').find(|text| text.contains(',')))
         .expect("a line")
@@ -150,7 +151,8 @@ fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_appro
         .collect();
     let lowest = corners.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");
     let [first, last] = [corners[0], corners[corners.len() - 1]];
-    assert!((lowest.0 - f64::midpoint(first.0, last.0)).abs() < 3.0 && first.1 == last.1, "{corners:?}");
+    // Of a time in which the distance stays as it is the line has the beginning alone.
+    assert!((lowest.0 - f64::midpoint(first.0, last.0)).abs() < 10.0 && first.1 == last.1, "{corners:?}");
     let insets = |page: &str| page.matches("<svg x=").count();
     assert_eq!((insets(&near), insets(&page(30.0))), (1, 0), "what is seen anyway has no inset");
 }

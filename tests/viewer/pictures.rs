@@ -106,6 +106,28 @@ fn balls_behind_the_camera_are_not_drawn() {
 }
 
 #[test]
+fn a_ball_is_left_out_only_where_all_of_it_is_beside_the_picture() {
+    let mut renderer = renderer();
+    let tangent = (35.0_f64 / 2.0).to_radians().tan();
+    let (across, up) = (10.0 * tangent * 301.0 / 201.0, 10.0 * tangent);
+    // Beyond the edge by less than the radius, and by more; beside the camera, where rays are steep, and far ahead.
+    for (beyond_m, is_seen) in [(0.4, true), (0.6, false)] {
+        for (y, z) in [(across + beyond_m, 0.0), (-across - beyond_m, 0.0), (0.0, up + beyond_m), (0.0, -up - beyond_m)]
+        {
+            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+            let ball = ball([0.0, y as f32, z as f32], 0.5, WHITE);
+            let mut solid = scene(None, &[ball]);
+            let mut shell = scene(None, &[]);
+            shell.shells.push(ball);
+            for picture in [&mut solid, &mut shell].map(|scene| renderer.paint(scene).expect("a picture")) {
+                let seen = picture.rgba.chunks_exact(4).any(|pixel| pixel != BACKGROUND.rgba);
+                assert_eq!(seen, is_seen, "{beyond_m} m beyond the edge at {y}, {z}");
+            }
+        }
+    }
+}
+
+#[test]
 fn of_two_lines_on_one_another_the_later_one_is_seen_whole() {
     let mut crossed = scene(None, &[]);
     // Along the line of sight's slant, so that their depths are alike only up to rounding.

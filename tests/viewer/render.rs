@@ -285,19 +285,22 @@ fn what_the_judge_refuses_is_drawn_and_said_to_be_not_judged() {
 
 #[test]
 fn trails_are_as_long_as_they_are_asked_to_be() {
-    let folder = flown("pentagon", &["--no-snapshots"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let side_by_side = |t: u32| format!("{t},a,{},0,1\n{t},b,{},4,1\n", 2 * t, 2 * t);
+    let table: String = (0..=10).map(side_by_side).collect();
+    fs::write(folder.path().join("ahead.csv"), format!("t,id,x,y,z\n{table}")).expect("written");
     let picture = |name: &str, more: &[&str]| {
-        let render = [&["render", "out/run.mcap", "--at", "end", "--size", "320x180", "--out", name], more].concat();
+        let render = [&["render", "ahead.csv", "--at", "end", "--size", "320x180", "--out", name], more].concat();
         let Ran { exit, err, .. } = ran(folder.path(), &render);
         assert_eq!(exit, GOOD, "{err}");
         pixels(&folder.path().join(name).join("end.png"))
     };
     let none = picture("none", &["--trail", "1e-6"]);
     let painted = |more: &[&str]| picture("some", more).iter().zip(&none).filter(|(with, none)| with != none).count();
-    let [whole, long, short] = [&[][..], &["--trail", "2"], &["--trail", "0.5"]].map(painted);
+    let [whole, long, short] = [&[][..], &["--trail", "5.5"], &["--trail", "2.5"]].map(painted);
     assert!(whole > long && long > short && short > 0, "{whole}, {long} and {short} pixels");
     for trail in ["0", "-1", "nan"] {
-        let Ran { exit, err, .. } = ran(folder.path(), &["render", "out/run.mcap", "--trail", trail]);
+        let Ran { exit, err, .. } = ran(folder.path(), &["render", "ahead.csv", "--trail", trail]);
         assert_eq!(exit, WRONG_INPUT, "{err}");
         assert!(err.contains("is not a positive number"), "{err}");
     }

@@ -86,8 +86,8 @@ fn the_moments_that_are_looked_at_are_never_thinned_out() {
         if k == 8103 {
             timeline.note(&Event::ViolationEnded { pair: others, time_s: time_s - 0.1, min_m: 0.5 });
         }
-        let separation_m = 10.0 - first;
-        let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s });
+        let (pair, separation_m) = if third < 30.0 { (others, 0.5) } else { (Pair::new(0, 1), 10.0 - first) };
+        let separation = Some(ClosestApproach { pair, separation_m, time_s });
         let control = Rows::zeros(3);
         let (energy, channels) = (None, &[][..]);
         let peaks = crate::record::Peaks::default();
