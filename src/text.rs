@@ -1,6 +1,8 @@
 //! Numbers as people read them.
 #![cfg_attr(not(feature = "program"), allow(dead_code, reason = "each feature says some of them"))]
 
+use std::fmt::Write as _;
+
 /// A number with so many decimals, or in powers of ten where that would fill a line.
 pub(crate) fn fixed(number: f64, decimals: usize) -> String {
     const LONG: f64 = 1e15;
@@ -61,7 +63,12 @@ pub(crate) fn bound(error: f64, allowed: f64) -> String {
 
 /// Names and what is said of each, a line each, as a table.
 pub(crate) fn table<const N: usize>(rows: [(&str, String); N]) -> String {
-    rows.iter().map(|(name, content)| format!("{name:<12} {content}\n")).collect()
+    let mut text = String::new();
+    for (name, content) in rows {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{name:<12} {content}");
+    }
+    text
 }
 
 /// So many of a thing.

@@ -86,13 +86,13 @@ impl Report {
         numbers(
             "Separation",
             [
-                row("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
-                row("Smallest distance", proved_m(separation.min_m), &closest),
-                row("Certified distance", proved_m(separation.certified_m), &certificate),
-                row("Audit", status.to_owned(), &sweep),
-                row("Violations", audit.violations.len().to_string(), "times that a pair was closer than δ"),
-                row("Disagreements", audit.parry.disagreements.to_string(), "of closed form and shape cast"),
-                row("Contacts seen by the engine", contacts, "pairs whose keep-out balls overlapped"),
+                ("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
+                ("Smallest distance", proved_m(separation.min_m), &closest),
+                ("Certified distance", proved_m(separation.certified_m), &certificate),
+                ("Audit", status.to_owned(), &sweep),
+                ("Violations", audit.violations.len().to_string(), "times that a pair was closer than δ"),
+                ("Disagreements", audit.parry.disagreements.to_string(), "of closed form and shape cast"),
+                ("Contacts seen by the engine", contacts, "pairs whose keep-out balls overlapped"),
             ],
         )
     }
@@ -103,11 +103,11 @@ impl Report {
         numbers(
             "Formation",
             [
-                row("Reached", reached, "and kept from then on to the end"),
-                row("Largest edge error", with_unit(formation.max_edge_error_m, "m"), "at the end"),
-                row("Position error", with_unit(formation.rms_position_error_m, "m"), "root mean square, at the end"),
-                row("Velocity disagreement", with_unit(velocity.disagreement_m_s, "m/s"), "at the end"),
-                row("Common velocity", with_unit(velocity.common_m_s, "m/s"), "at the end"),
+                ("Reached", reached, "and kept from then on to the end"),
+                ("Largest edge error", with_unit(formation.max_edge_error_m, "m"), "at the end"),
+                ("Position error", with_unit(formation.rms_position_error_m, "m"), "root mean square, at the end"),
+                ("Velocity disagreement", with_unit(velocity.disagreement_m_s, "m/s"), "at the end"),
+                ("Common velocity", with_unit(velocity.common_m_s, "m/s"), "at the end"),
             ],
         )
     }
@@ -117,11 +117,11 @@ impl Report {
         numbers(
             "Energy and control",
             [
-                row("Initial energy E(0)", with_unit(energy.initial, "m²/s²"), ""),
-                row("Final energy", with_unit(energy.at_end, "m²/s²"), ""),
-                row("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all samples"),
-                row("Peak control", with_unit(control.peak_m_s2, "m/s²"), "over all samples"),
-                row("Final control", with_unit(control.final_m_s2, "m/s²"), ""),
+                ("Initial energy E(0)", with_unit(energy.initial, "m²/s²"), ""),
+                ("Final energy", with_unit(energy.at_end, "m²/s²"), ""),
+                ("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all samples"),
+                ("Peak control", with_unit(control.peak_m_s2, "m/s²"), "over all samples"),
+                ("Final control", with_unit(control.final_m_s2, "m/s²"), ""),
             ],
         )
     }
@@ -131,10 +131,10 @@ impl Report {
         numbers(
             "Run",
             [
-                row("Vehicles", run.vehicles.to_string(), ""),
-                row("Duration", with_unit(Some(run.duration_s), "s"), ""),
-                row("Step", with_unit(Some(run.dt_s * 1e3), "ms"), ""),
-                row("Steps", run.steps.to_string(), ""),
+                ("Vehicles", run.vehicles.to_string(), ""),
+                ("Duration", with_unit(Some(run.duration_s), "s"), ""),
+                ("Step", with_unit(Some(run.dt_s * 1e3), "ms"), ""),
+                ("Steps", run.steps.to_string(), ""),
             ],
         )
     }
@@ -261,17 +261,17 @@ fn folded_scenario(toml: &str, sha256: &str) -> Markup {
 
 const NOT_KNOWN: &str = "–";
 
-fn numbers<const N: usize>(caption: &str, rows: [[Markup; 2]; N]) -> Markup {
-    page::numbers(caption, &["Quantity", "Value"], rows)
-}
-
-fn row(name: &str, value: String, remark: &str) -> [Markup; 2] {
-    let name = if remark.is_empty() {
-        html! { (name) }
-    } else {
-        noted(name, remark)
+/// A table of quantities: their names, their values, and remarks on them.
+fn numbers<const N: usize>(caption: &str, rows: [(&str, String, &str); N]) -> Markup {
+    let row = |(name, value, remark): (&str, String, &str)| {
+        let name = if remark.is_empty() {
+            html! { (name) }
+        } else {
+            noted(name, remark)
+        };
+        [name, html! { (value) }]
     };
-    [name, html! { (value) }]
+    page::numbers(caption, &["Quantity", "Value"], rows.map(row))
 }
 
 fn with_unit(number: Option<f64>, unit: &str) -> String {

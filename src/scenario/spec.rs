@@ -94,8 +94,8 @@ pub enum Precision {
 }
 
 impl Scenario {
-    /// A flight with every default of the scenario file: the edge-tension law on the complete graph, in the plane if
-    /// start and formation lie in it. Change the fields as needed, then [`Scenario::validate`].
+    /// A flight with the defaults of the scenario file: the edge-tension law on the complete graph, in the plane if start
+    /// and formation lie in it; in single precision, whatever it needs. Change the fields as needed, then [`Scenario::validate`].
     #[must_use]
     pub fn new(name: &str, start: Swarm, formation: Formation, delta_m: f64, duration_s: f64) -> Self {
         let count = start.count();

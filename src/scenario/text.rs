@@ -51,7 +51,9 @@ impl<'a> Text<'a> {
                     .with_help("start from a built-in scenario, such as `pentagon`")
                     .with_place(Place::new(self.name, self.toml, 0..0)));
             }
-            left.iter().for_each(|(table, key)| remove(&mut root, table, key));
+            for (table, key) in &left {
+                remove(&mut root, table, key);
+            }
             match Document::deserialize(Value::from(root)) {
                 Ok(document) => return Ok(document),
                 Err(error) => match self.left_behind(&error) {

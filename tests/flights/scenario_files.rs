@@ -553,7 +553,10 @@ fn the_schema_bounds_a_number_where_the_reader_does() {
                     Some(choice) => format!(", {other} = \"{choice}\""),
                     None => format!(", {other} = 3.0"),
                 });
-                let others: String = others.collect();
+                let mut others: String = others.collect();
+                if table == "start" && !others.contains("shape") {
+                    others += ", shape = \"line\", spacing_m = 4.0";
+                }
                 let refuses = |number: &str| {
                     let start = "start={shape=\"line\", spacing_m=4}".to_owned();
                     let set = format!("{table}={{{key} = {number}{others}}}");
