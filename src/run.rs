@@ -39,6 +39,9 @@ pub fn run_while(
     Ok(report(scenario, preflight, &flight, &metrics, state_hash.finish()))
 }
 
+/// Smallest separations that differ by this part of delta or less are the same.
+const SAME: f64 = 0.01;
+
 /// Flies the scenario of `report` again with every step half as long.
 ///
 /// # Errors
@@ -47,7 +50,19 @@ pub fn verify(scenario: &Scenario, report: &Report) -> Result<Verification, SimE
     let mut finer = scenario.clone();
     finer.time.dt_s *= 0.5;
     finer.time.max_rate_dt *= 0.5;
-    Ok(Verification::of(report, &run(&finer, &mut ())?))
+    let again = run(&finer, &mut ())?;
+    let same_distance = match (report.separation.min_m, again.separation.min_m) {
+        (Some(before_m), Some(after_m)) => (before_m - after_m).abs() <= SAME * scenario.delta_m,
+        (before_m, after_m) => before_m == after_m,
+    };
+    let same_verdict = report.verdict.pass == again.verdict.pass && report.audit.status == again.audit.status;
+    Ok(Verification {
+        dt_s: finer.time.dt_s,
+        pass: again.verdict.pass,
+        min_m: again.separation.min_m,
+        reached_at_s: again.formation.reached_at_s,
+        firm: same_distance && same_verdict,
+    })
 }
 
 /// Whether the energy is proved never to grow: relative velocities are damped, and nothing voids the proof but that it

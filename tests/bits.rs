@@ -46,8 +46,8 @@ fn the_pentagon_has_its_golden_bits() {
     let mut pentagon = Scenario::new("pentagon", start, Formation::pentagon(3.0), 2.0, 120.0);
     pentagon.a22_per_s = 0.1;
     let golden = [
-        "e6b7e3682089a8f146c886bd3336d892beedfb47e38743d3d76b8523c8810f6c",
-        "c092e5bea4a00f8fb74f2874f07dac2190f3d9648bf0662c7b349c5feefe4a0f",
+        "cb8600eeaf2d0bdf6cd1d145ef66db49c2f9082475d1cb470bc3ad9fb7f29241",
+        "f4af200271ac5fdbdebe91c01891c977d68f68f0ffa650bf4e412200b611e4f3",
     ];
     assert_eq!(hashes(&pentagon), golden);
 }
@@ -63,8 +63,8 @@ fn a_crowd_has_its_golden_bits() {
     crowd.a22_per_s = 0.1;
     crowd.arrival.hold_s = 0.1;
     let golden = [
-        "a92695c582e41e2869c26c3d1112df89486cd35c890a9f54ac2fafbb77da9f7a",
-        "afe2940afa42c41e8ff0ab45bc770a52a21f4b16590c588e86b3e30cd81e509d",
+        "7ded5f55f0653343b2984df32e3b6708f150b32cafe005f80ece4f735bceab73",
+        "e7b2327b0433eb1210ee42b545705cdcf6de322140e89169dcbd26c9110bdc05",
     ];
     assert_eq!(hashes(&crowd), golden);
 }

@@ -25,8 +25,8 @@ pub(super) struct ReadArguments {
     #[arg(long, value_name = "UNIT", value_parser = unit())]
     time_unit: Option<TimeUnit>,
     /// How many units of time of the recording make a second, where they are frames.
-    #[arg(long, value_name = "HZ", conflicts_with_all = ["time_unit", "time_scale"], allow_negative_numbers = true)]
-    fps: Option<f64>,
+    #[arg(long = "fps", value_name = "HZ", conflicts_with_all = ["time_unit", "time_scale"], allow_negative_numbers = true)]
+    frames_per_s: Option<f64>,
     /// How many seconds a unit of time of the recording lasts.
     #[arg(long, value_name = "SECONDS", conflicts_with = "time_unit", allow_negative_numbers = true)]
     time_scale: Option<f64>,
@@ -91,7 +91,7 @@ impl ReadArguments {
             let message = format!("--scale is {}", self.scale);
             return Err(Failure::input(message, "give a positive number of metres, such as 0.001 for millimetres"));
         }
-        for (option, value) in [("--fps", self.fps), ("--time-scale", self.time_scale)] {
+        for (option, value) in [("--fps", self.frames_per_s), ("--time-scale", self.time_scale)] {
             if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
                 return Err(Failure::input(format!("{option} is {value}"), "give a positive number"));
             }
@@ -103,7 +103,7 @@ impl ReadArguments {
         Ok(ReadOptions {
             format,
             time_unit: self.time_unit,
-            times_per_second: self.fps.or(self.time_scale.map(f64::recip)),
+            times_per_second: self.frames_per_s.or(self.time_scale.map(f64::recip)),
             scale: self.scale,
             dimensions: self.dimensions,
             one_vehicle: false,

@@ -30,6 +30,8 @@ const WAITING_BYTES: usize = 256 << 20;
 
 /// Arguments of `tautline render`.
 #[derive(Debug, Args)]
+// `--fps` is that of the film here.
+#[command(mut_arg("frames_per_s", |frames_per_s| frames_per_s.long("recording-fps")))]
 pub(super) struct RenderArguments {
     #[command(flatten)]
     reading: ReadArguments,

@@ -2,11 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::flight::Report;
 use crate::text::{at_least, seconds};
-
-/// Smallest separations that differ by this part of delta or less are the same.
-const SAME: f64 = 0.01;
 
 /// The same flight with every step half as long, and what that changed.
 ///
@@ -27,23 +23,6 @@ pub struct Verification {
 }
 
 impl Verification {
-    /// Compares a flight with the same at half the step.
-    #[must_use]
-    pub fn of(flight: &Report, again: &Report) -> Self {
-        let same_distance = match (flight.separation.min_m, again.separation.min_m) {
-            (Some(before_m), Some(after_m)) => (before_m - after_m).abs() <= SAME * flight.separation.delta_m,
-            (before_m, after_m) => before_m == after_m,
-        };
-        let same_verdict = flight.verdict.pass == again.verdict.pass && flight.audit.status == again.audit.status;
-        Self {
-            dt_s: again.run.dt_s,
-            pass: again.verdict.pass,
-            min_m: again.separation.min_m,
-            reached_at_s: again.formation.reached_at_s,
-            firm: same_distance && same_verdict,
-        }
-    }
-
     /// In one line.
     #[must_use]
     pub fn text(&self) -> String {

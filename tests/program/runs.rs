@@ -60,7 +60,7 @@ fn the_pentagon_as_json_is_the_reference_flight() {
         assert!((found - expected).abs() <= tolerance, "{pointer}: {found}, expected {expected}");
     };
     // The reference values, and how far a step of 1/240 s may be from them, are those of tests/flights/reference_flights.rs.
-    near("/separation/min_m", 2.460_353, 0.002);
+    near("/separation/min_m", 2.460_353, 1e-4);
     near("/separation/min_at_s", 2.151, 0.02);
     near("/separation/certified_m", 2.055_307, 1e-5);
     near("/energy/initial", 3.656_743, 1e-5);
@@ -73,7 +73,7 @@ fn the_pentagon_as_json_is_the_reference_flight() {
     assert_eq!(report["audit"]["parry"], json(r#"{"min_toi_s": null, "disagreements": 0}"#));
     assert_eq!(report["audit"]["pairs_checked"], 28_801 * 10);
     assert_eq!(report["formation"]["reached"], true);
-    assert!(number("/energy/max_over_initial") <= 1.0);
+    assert!(number("/energy/max_over_initial") <= 1.0 + 1e-6);
     assert_eq!(report["run"]["steps"], 28_800);
 }
 
@@ -90,7 +90,7 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
         "formation.reached formation.reached_at_s formation.held_s formation.fails formation.at_rest",
         "formation.max_edge_error_m formation.rms_position_error_m",
-        "energy.initial energy.final energy.max_over_initial",
+        "energy.initial energy.final energy.max_over_initial energy.rose",
         "control.peak_m_s2 control.final_m_s2",
         "velocity.disagreement_m_s velocity.common_m_s",
         "run.duration_s run.dt_s run.steps run.ended_early run.vehicles run.state_hash",
