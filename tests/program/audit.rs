@@ -344,7 +344,7 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
     let (exit, coarse) = fly("coarse", &stiff);
     assert_eq!((exit, &coarse["status"]), (Some(1), &"violation".into()));
     // What straight lines say of it, and the run knows better.
-    let (exit, apart) = fly("apart", &[&stiff[..], &["law.delta_m=0.3", "swarm.hull_radius_m=0.1"]].concat());
+    let (exit, apart) = fly("apart", &[&stiff[..], &["law.delta_m=0.05", "swarm.hull_radius_m=0.01"]].concat());
     assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &false.into()), "{apart}");
     assert_eq!(apart["audit"]["assumes"], "straight between samples");
     // Every step is recorded: proved.
