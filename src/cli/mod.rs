@@ -59,7 +59,7 @@ struct Arguments {
 enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),
-    /// Judge a recording of any origin: proved clear, a violation, or undecided at its sampling.
+    /// Judge a recording of any origin: clear, a violation, or undecided at its sampling.
     Audit(audit::AuditArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),

@@ -323,11 +323,20 @@ fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
 
 #[test]
 fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
-    let folder = folder(&[]);
-    let fly = |out: &str, sets: &[&str]| {
+    // Two change places on a wide arc, and are recorded where they begin and where they end.
+    let swap = r#"
+        start = { positions_m = [[-3, 0], [3, 0]], velocities_m_s = [[0, -4], [0, 4]] }
+        formation = { shape = "points", points_m = [[3, 0], [-3, 0]] }
+        law = { kind = "laplacian", delta_m = 1.0, f1_per_s2 = 1.0, f2_per_s = 1.0 }
+        arrival = { hold_s = 20 }
+        time = { duration_s = 20, record_hz = 0.05 }
+        name = "swap"
+    "#;
+    let folder = folder(&[("swap.toml", swap)]);
+    let fly = |scenario: &str, out: &str, sets: &[&str]| {
         let fixed = ["--out", out, "--no-snapshots", "--no-figures", "--quiet"];
         let sets = sets.iter().flat_map(|set| ["--set", set]);
-        let arguments: Vec<_> = ["run", "pentagon-laplacian"].into_iter().chain(fixed).chain(sets).collect();
+        let arguments: Vec<_> = ["run", scenario].into_iter().chain(fixed).chain(sets).collect();
         ran_by(TAUTLINE, folder.path(), &arguments);
         let report = fs::read_to_string(folder.path().join(out).join("report.json")).expect("a report");
         let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
@@ -341,14 +350,17 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
     };
     // Stiff, so that vehicles pass each other between two samples a second apart.
     let stiff = ["law.f1_per_s2=30", "law.f2_per_s=1", "time.record_hz=1", "time.duration_s=20"];
-    let (exit, coarse) = fly("coarse", &stiff);
+    let (exit, coarse) = fly("pentagon-laplacian", "coarse", &stiff);
     assert_eq!((exit, &coarse["status"]), (Some(1), &"violation".into()));
-    // What straight lines say of it, and the run knows better.
-    let (exit, apart) = fly("apart", &[&stiff[..], &["law.delta_m=0.05", "swarm.hull_radius_m=0.01"]].concat());
+    // What straight lines say of it is a violation, and the run knows better.
+    let (exit, apart) = fly("swap.toml", "apart", &[]);
     assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &false.into()), "{apart}");
     assert_eq!(apart["audit"]["assumes"], "straight between samples");
+    ran_by(TAUTLINE, folder.path(), &["export", "apart/run.mcap", "-o", "apart.csv"]);
+    let drawn = audit(folder.path(), &["apart.csv", "--delta", "1"]);
+    assert!(drawn.out.starts_with("VIOLATION: 1 and 2 came to 0.000 m"), "{drawn:?}");
     // Every step is recorded: proved.
-    let (exit, every) = fly("every", &["time.duration_s=2", "time.record_hz=240"]);
+    let (exit, every) = fly("pentagon-laplacian", "every", &["time.duration_s=2", "time.record_hz=240"]);
     assert_eq!((exit, &every["audit"]["proved"]), (Some(0), &true.into()), "{every}");
     assert_eq!(every["audit"]["assumes"], serde_json::Value::Null);
 }
