@@ -5,7 +5,7 @@ use super::chart::{Band, Chart, Inset, Mark};
 use super::figure::Figure;
 use super::svg::{INK, PALETTE, Stroke};
 
-/// Width of the inset of a closest approach, over the distance from above.
+/// Width of the inset of a closest approach, over the distance as it is seen from above.
 const NEAR: f64 = 4.0;
 
 /// Two over time.
@@ -99,8 +99,8 @@ pub fn smallest(distances: &[Option<(f64, f64)>], closest: &Encounter, title: &s
     chart.figure("smallest", title, &description)
 }
 
-/// The paths of two vehicles from above \[m\], and where both are when they are closest; an inset shows that from near,
-/// [`NEAR`] times their distance wide.
+/// The paths of two vehicles from above \[m\], and where both are when they are closest; an inset shows that from near, four
+/// times their distance wide.
 #[must_use]
 pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     let points = || encounter.paths_m.iter().flatten();

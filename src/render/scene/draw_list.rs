@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
-use super::camera::{Camera, CameraSpec};
-use super::colour::{Colour, Theme};
+use super::camera::Camera;
+use super::colour::Colour;
 
 /// A ball. A solid one is lit; a shell lets through what is within and behind it.
 #[repr(C)]
@@ -127,7 +127,9 @@ impl Scene {
     }
 
     /// A picture of nothing.
+    #[cfg(feature = "window")]
     pub(in crate::render) fn blank(size_px: [u32; 2]) -> Self {
+        use super::{camera::CameraSpec, colour::Theme};
         Self::empty(Camera::framing(&CameraSpec::Iso, &[], size_px), [0.1, 1.0], Theme::Dark.background())
     }
 }

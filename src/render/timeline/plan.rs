@@ -43,6 +43,7 @@ impl Plan {
 
     /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
     /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
+    #[cfg(feature = "window")]
     pub(in crate::render) fn pull_m_s2(&self, pair: Pair, distance_m: f64) -> Option<f64> {
         let vehicles = self.formation.slots_m.nrows() as f64;
         self.edge_tension(pair).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
