@@ -120,6 +120,11 @@ fn zero_sum(states: &[State]) -> Result<Claim, Untried> {
     })
 }
 
+/// A number relative to the size of the terms that it is a sum of; a swarm at rest has none.
+fn of_scale(number: f64, scale: f64) -> f64 {
+    if scale == 0.0 && number == 0.0 { 0.0 } else { number / scale }
+}
+
 fn energy_rate(states: &[State]) -> Result<Claim, Untried> {
     let words =
         |bound: &str| format!("largest relative error {bound} over {STATES} states with a22 of {A22_PER_S:?} 1/s");
@@ -128,7 +133,7 @@ fn energy_rate(states: &[State]) -> Result<Claim, Untried> {
             return Ok(0.0);
         }
         let (rate, scale) = state.energy_rate()?;
-        Ok((rate + relative_speed_squared(&state.swarm)).abs() / scale)
+        Ok(of_scale((rate + relative_speed_squared(&state.swarm)).abs(), scale))
     })
 }
 
@@ -138,7 +143,7 @@ fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, Untried> {
         let (rate, scale) = state.energy_rate()?;
         let (a22, connectivity) = (state.parameters.a22_per_s, state.graph.algebraic_connectivity());
         let margin = (1.0 + a22) * connectivity / state.swarm.count() as f64 - a22;
-        Ok(((rate + margin * relative_speed_squared(&state.swarm)) / scale).max(0.0))
+        Ok(of_scale((rate + margin * relative_speed_squared(&state.swarm)).max(0.0), scale))
     })
 }
 
