@@ -24,9 +24,14 @@ rm -rf "$out"
 mkdir -p "$out"
 cd "$scratch/tree"
 
-# Random order by a hash that the seed keys.
+mutants() {
+    cargo mutants --no-shuffle -f 'src/audit/**' -f 'src/law/**' -f 'src/sim/**' -f 'src/plant/**' "$@"
+}
+
+# Random order by a hash that the seed keys. A field left out of a struct is no part of it: cargo-mutants 27.1 would try
+# each of them, whatever names are asked for.
 yes "$seed" | head -c 64 > "$scratch/seed"
-cargo mutants --list --no-shuffle -f 'src/audit/**' -f 'src/law/**' -f 'src/sim/**' -f 'src/plant/**' |
+mutants --list | grep -v ': delete field ' |
     sort --random-sort --random-source="$scratch/seed" | head -n "$count" > "$out/sample.txt"
 
 # Each of the sample by its whole name.
@@ -36,7 +41,7 @@ while IFS= read -r name; do
 done < "$out/sample.txt"
 status=0
 # shellcheck disable=SC2086
-cargo mutants --in-place --no-shuffle --output "$out" "$@" -- $tests || status=$?
+mutants --in-place --output "$out" --exclude-re ': delete field ' "$@" -- $tests || status=$?
 mv "$out"/mutants.out/*.txt "$out"
 # The broken program must not be taken for this tree's.
 touch "$OLDPWD/src/lib.rs"
