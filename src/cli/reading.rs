@@ -13,10 +13,10 @@ use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, R
 #[command(next_help_heading = "Reading")]
 pub(super) struct ReadArguments {
     /// The recording: a file, or a folder or archive with a file for each vehicle.
-    #[arg(value_name = "RECORDING")]
+    #[arg(index = 1, value_name = "RECORDING")]
     pub(super) recording: PathBuf,
     /// More recordings, or with --join more files of the same one.
-    #[arg(value_name = "MORE")]
+    #[arg(index = 2, value_name = "MORE")]
     pub(super) more: Vec<PathBuf>,
     /// Several files are one recording, a vehicle in each.
     #[arg(long)]
