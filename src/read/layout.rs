@@ -66,7 +66,9 @@ impl Layout {
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
             columns.found.insert((String::new(), role), column);
             // A unit that is not known is the user's affair where the column is.
-            let unit = units::bracketed(name).1.filter(|unit| units::size_of(unit, is_velocity(role)).is_some());
+            let ending = || units::endings(name).find(|(_, _, velocity)| *velocity == is_velocity(role));
+            let unit = units::bracketed(name).1.or_else(|| ending().map(|(_, unit, _)| unit));
+            let unit = unit.filter(|unit| units::size_of(unit, is_velocity(role)).is_some());
             columns.units.extend(unit.map(|unit| (column, unit)));
         }
         let first = |is: fn(&str) -> bool| header.iter().position(|name| is(name));

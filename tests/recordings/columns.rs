@@ -71,6 +71,13 @@ fn units_that_are_not_known_or_contradict_each_other_are_refused() {
     ] {
         refused(&ones(header), options, said, remedy);
     }
+    // A column that the user names says its unit as well.
+    for (east, north) in [("east [mm]", "north (mm)"), ("east_mm", "north_mm")] {
+        let mut named = ReadOptions::default();
+        assert!(named.columns.set("x", east) && named.columns.set("y", north));
+        let whole = read_with("f.csv", &ones(&format!("t,id,{east},{north}")), &named).expect("read");
+        assert_eq!(whole.samples()[0].2, [0.001, 0.001, 0.0]);
+    }
     // Metres are what a scale scales.
     assert_eq!(read_with("f.csv", &ones("t,x [m],y"), &scaled).expect("read").samples()[0].2, [0.001, 0.001, 0.0]);
     // A column that nobody reads may be in any unit.
