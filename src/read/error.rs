@@ -19,7 +19,7 @@ const NOTHING_RECORDED: &str = "nothing was recorded: record again, or give anot
 #[derive(Debug, thiserror::Error)]
 #[error("{file}{}: {fault}", self.comma_place())]
 pub struct ReadError {
-    /// The file; empty until [`ReadError::of`] names it.
+    /// The file; empty until it is named.
     pub file: String,
     /// Where in the file, if in a certain place.
     pub place: Option<Place>,

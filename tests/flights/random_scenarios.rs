@@ -47,7 +47,8 @@ impl Numbers {
 /// at least 1.1 delta apart to a circle or a sphere.
 fn scenario(seed: u64) -> Scenario {
     let mut numbers = Numbers(seed.wrapping_mul(0xd134_2543_de82_ef95));
-    let count = 3 + (numbers.unit() * 6.0) as usize;
+    let sixth = 6.0 * numbers.unit();
+    let count = 3 + (1..6).filter(|&n| f64::from(n) <= sixth).count();
     let in_space = numbers.unit() < 0.5;
     let delta_m = numbers.over_decades(0.03, 30.0);
     let spacing_m = delta_m * numbers.between(1.2, 2.5);

@@ -306,7 +306,7 @@ fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
     for t in 0..20 {
         let seen = [t < 8, t < 7, t > 9 && t != 14].into_iter().zip(["alpha", "bravo", "charlie"]).zip([0, 9, 18]);
         for ((_, name), x) in seen.filter(|((is_seen, _), _)| *is_seen) {
-            let _ = writeln!(rows, "{}.5,{name},{x},0,0", t);
+            let _ = writeln!(rows, "{t}.5,{name},{x},0,0");
         }
     }
     let folder = folder(&[("late.csv", &rows), ("gap.csv", &rows.replace("\n3.5,bravo,9,0,0", ""))]);

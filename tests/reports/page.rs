@@ -1,6 +1,7 @@
 //! `report.html` escapes what it is given, refers to nothing outside itself, and is the same for every run of a scenario
 //! but for its performance.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -128,8 +129,8 @@ fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_appro
         let mut table = "t,id,x,y,z\n".to_owned();
         for t in 0..=100 {
             let x = f64::from(t);
-            table += &format!("{t},alpha,{x},0,0\n{t},bravo,{},{miss_m},0\n", 100.0 - x);
-            table += &format!("{t},charlie,{x},50,0\n{t},delta,{x},58,0\n");
+            let _ = writeln!(table, "{t},alpha,{x},0,0\n{t},bravo,{},{miss_m},0", 100.0 - x);
+            let _ = writeln!(table, "{t},charlie,{x},50,0\n{t},delta,{x},58,0");
         }
         fs::write(folder.path().join("pass.csv"), table).expect("written");
         let audit = ["audit", "pass.csv", "--delta", "1", "--html", "a.html"];
