@@ -63,6 +63,7 @@ impl ReadArguments {
     }
 
     /// The only file or folder, of what is `done` with one.
+    #[cfg(feature = "viewer")]
     pub(super) fn only(&self, done: &str) -> Result<&Path, Failure> {
         if self.more.is_empty() {
             return Ok(&self.recording);
