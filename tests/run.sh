@@ -1,7 +1,13 @@
 #!/bin/sh
-# All set-up that the tests need, and the tests. From anywhere: sh tests/run.sh
+# All set-up that the tests need, and the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
+# --long tries more cases where a test has more than a minute of them.
 set -eu
 cd "$(dirname "$0")/.."
+
+if [ "${1:-}" = --long ]; then
+    export TAUTLINE_LONG=1
+    shift
+fi
 
 sh tests/setup.sh
 

@@ -48,7 +48,7 @@ pub(super) struct ViewArguments {
 }
 
 pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
-    let path = &arguments.reading.recording;
+    let path = arguments.reading.only("shown")?;
     let reading = arguments.reading.options(arguments.input_format)?;
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");

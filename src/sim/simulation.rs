@@ -7,7 +7,7 @@ use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError
 use super::judge::Judge;
 use super::motion::Motion;
 use super::parts::Parts;
-use super::resolution;
+use super::resolution::Resolution;
 use crate::feedback::Feedback as _;
 use crate::law::{Certificate, Void};
 use crate::plant::Path;
@@ -43,6 +43,7 @@ const SIDE_BY_SIDE_FROM: usize = 512;
 #[derive(Clone)]
 pub struct Simulation {
     scenario: Scenario,
+    resolution: Resolution,
     controller: Controller,
     motion: Motion,
     certificate: Certificate,
@@ -118,6 +119,7 @@ impl Simulation {
             sample_is_due: false,
             ending: None,
             performance: Performance::default(),
+            resolution: Resolution::of(scenario),
             scenario: scenario.clone(),
         };
         let began = simulation.begin();
@@ -173,7 +175,7 @@ impl Simulation {
             return;
         }
         let step = self.steps + 1;
-        let flown = self.advance(step).and_then(|()| Ok(resolution::check(&self.state, &self.scenario, step)?));
+        let flown = self.advance(step).and_then(|()| Ok(self.resolution.check(&self.state, step)?));
         let completed = flown.is_ok() && step == self.scenario.time.steps();
         self.sample_is_due = flown.is_ok() && self.scenario.time.records(step);
         self.end_on(flown);

@@ -163,7 +163,8 @@ fn judge(seed: u64, tally: &mut Tally) {
 
 #[test]
 fn random_scenarios_are_the_same_flight_in_the_engine_and_in_continuous_time() {
-    let flights = std::env::var("TAUTLINE_RANDOM_FLIGHTS").map_or(40, |count| count.parse().expect("a number"));
+    let flights = if std::env::var_os("TAUTLINE_LONG").is_some() { 400 } else { 40 };
+    let flights = std::env::var("TAUTLINE_RANDOM_FLIGHTS").map_or(flights, |count| count.parse().expect("a number"));
     let mut tally = Tally::default();
     (0..flights).for_each(|seed| judge(seed, &mut tally));
     let Tally { flights, firm, hard, compared, worst, failures } = tally;
