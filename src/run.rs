@@ -9,7 +9,7 @@ use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash};
-use crate::report::{Findings, Performance, Report, Run, Verification};
+use crate::report::{Findings, Hulls, Performance, Report, Run, Verification};
 use crate::scenario::{PlantSpec, Scenario};
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 
@@ -88,6 +88,10 @@ fn report(
         ending => ending.reason(),
     };
     let wall_s = flight.performance.wall.as_secs_f64();
+    let hulls = match scenario.plant {
+        PlantSpec::Rapier(_) => Hulls::solid(&flight.bounces),
+        PlantSpec::Ideal => Hulls::of_points(&flight.audit, &scenario.hull_radius_m),
+    };
     Report::new(&Findings {
         scenario_name: &scenario.name,
         scenario_sha256: &scenario.sha256_hex(),
@@ -100,6 +104,7 @@ fn report(
         audit: &flight.audit,
         engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))
             .then_some(flight.engine_contacts.len() as u64),
+        hulls: &hulls,
         summary: &metrics.finish(),
         energy_falls: energy_falls(preflight, &flight.certificate),
         epsilon: scenario.plant.epsilon(),

@@ -7,18 +7,17 @@ use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 use nalgebra::Vector3;
 
+use super::Failure;
 use super::console::{self, Console};
 use super::encounters;
-use super::events;
 use super::obstacles;
 use super::outputs;
 use super::own::OwnRecording;
 use super::reading::{self, ReadArguments, one_of};
-use super::{Exit, Failure};
 use crate::audit::recorded::{Motion, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings};
 use crate::read::{self, Format, ReadOptions};
 use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
-use crate::report::{Status, write_atomically};
+use crate::report::write_atomically;
 use crate::text::counted;
 use crate::track::Item;
 
@@ -96,7 +95,7 @@ pub(super) struct AuditArguments {
     pub(super) html: Option<PathBuf>,
     /// Exit with 0 where it cannot be told, too.
     #[arg(long, help_heading = "Answer")]
-    allow_undecided: bool,
+    pub(super) allow_undecided: bool,
 }
 
 fn motion() -> impl TypedValueParser<Value = Motion> {
@@ -189,7 +188,7 @@ impl AuditArguments {
         })
     }
 
-    fn check_outputs(&self) -> Result<(), Failure> {
+    pub(super) fn check_outputs(&self) -> Result<(), Failure> {
         let mut inputs: Vec<_> = self.reading.paths().map(|path| ("the recording", path)).collect();
         inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--html", &self.html)];
@@ -271,9 +270,8 @@ impl AuditArguments {
     }
 }
 
-pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    arguments.check_outputs()?;
+/// Judges one recording and says so, with a page where one is asked for.
+pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<RecordedReport, Failure> {
     let mut settings = arguments.settings()?;
     let options = arguments.reading.options(arguments.format)?;
     let path = &arguments.reading.recording;
@@ -290,7 +288,7 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
     arguments.check_count(&outcome, &settings)?;
     let between = arguments.between(curves, own.as_ref());
-    notes.extend(own.as_ref().and_then(OwnRecording::note));
+    notes.extend(own.iter().flat_map(OwnRecording::notes));
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
     for note in &notes {
         console.warn(&format!("note: {note}"));
@@ -300,24 +298,11 @@ pub(super) fn audit(arguments: &AuditArguments) -> Result<Exit, Failure> {
 
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
-    if arguments.json {
-        console::json(&report)?;
-    }
-    if let Some(file) = &arguments.events {
-        write_atomically(file, &events::csv(&report)?)?;
-    }
-    if let Some(file) = &arguments.junit {
-        write_atomically(file, events::junit(&report, arguments.allow_undecided)?.as_bytes())?;
-    }
     if let Some(html) = &arguments.html {
         let figures = encounters::figures(&arguments.reading, &options, &settings, &outcome)?;
         write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
     }
-    Ok(match report.status {
-        Status::Clear => Exit::Good,
-        Status::Undecided if arguments.allow_undecided => Exit::Good,
-        Status::Violation | Status::Undecided => Exit::Bad,
-    })
+    Ok(report)
 }
 
 /// A recording after it was judged.

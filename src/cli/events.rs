@@ -9,8 +9,23 @@ use crate::report::recorded::{OfPair, OfVehicle, RecordedReport};
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
 
-/// Violations, undecided times and gaps, a row each, in order of time.
-pub(super) fn csv(report: &RecordedReport) -> Result<Vec<u8>, Failure> {
+/// Violations, undecided times and gaps, a row each, in order of time; of several recordings with the recording in front.
+pub(super) fn csv(reports: &[RecordedReport]) -> Result<Vec<u8>, Failure> {
+    let failed = |error: csv::Error| Failure::machine(format!("cannot write the events: {error}"));
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let named = reports.len() > 1;
+    writer.write_record(named.then_some("recording").into_iter().chain(COLUMNS)).map_err(failed)?;
+    for report in reports {
+        let recording = named.then(|| report.source.recording.clone());
+        for row in rows(report) {
+            writer.write_record(recording.iter().cloned().chain(row)).map_err(failed)?;
+        }
+    }
+    writer.into_inner().map_err(|error| Failure::machine(format!("cannot write the events: {error}")))
+}
+
+/// The rows of one recording.
+fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
     let violations = report.violations.iter().map(|OfPair { who: [first, second], finding: v }| {
         let numbers = [Some(v.min_m), Some(v.min_m), Some(v.min_at_s), Some(v.limit_m), None];
         ("violation", [first.as_str(), second], [v.from_s, v.to_s], numbers)
@@ -25,15 +40,11 @@ pub(super) fn csv(report: &RecordedReport) -> Result<Vec<u8>, Failure> {
         .map(|OfVehicle { vehicle, finding: gap }| ("gap", [vehicle.as_str(), ""], [gap.from_s, gap.to_s], [None; 5]));
     let mut rows: Vec<_> = violations.chain(undecided).chain(gaps).collect();
     rows.sort_by(|a, b| a.2[0].total_cmp(&b.2[0]));
-    let failed = |error: csv::Error| Failure::machine(format!("cannot write the events: {error}"));
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(COLUMNS).map_err(failed)?;
-    for (kind, who, span_s, numbers) in rows {
-        let numbers = span_s.map(Some).into_iter().chain(numbers).map(|x| x.map_or_else(String::new, number));
+    rows.into_iter().map(|(kind, who, span_s, numbers)| {
         let words = [kind].into_iter().chain(who).map(str::to_owned);
-        writer.write_record(words.chain(numbers)).map_err(failed)?;
-    }
-    writer.into_inner().map_err(|error| Failure::machine(format!("cannot write the events: {error}")))
+        let numbers = span_s.map(Some).into_iter().chain(numbers).map(|x| x.map_or_else(String::new, number));
+        words.chain(numbers).collect()
+    })
 }
 
 /// Every digit of a number, in powers of ten where it is very large or small.
@@ -41,9 +52,15 @@ fn number(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// A suite with a case for the verdict and one for each thing found. What is undecided fails, or is skipped where it is
-/// allowed.
-pub(super) fn junit(report: &RecordedReport, allow_undecided: bool) -> Result<String, Failure> {
+/// A suite for each recording. What is undecided fails, or is skipped where it is allowed.
+pub(super) fn junit(reports: &[RecordedReport], allow_undecided: bool) -> Result<String, Failure> {
+    let mut junit = Report::new("tautline audit");
+    junit.add_test_suites(reports.iter().map(|report| suite(report, allow_undecided)));
+    junit.to_string().map_err(|error| Failure::machine(format!("cannot write the JUnit report: {error}")))
+}
+
+/// A case for the verdict and one for each thing found.
+fn suite(report: &RecordedReport, allow_undecided: bool) -> TestSuite {
     let failed = |message: &str| {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
         status.set_message(message);
@@ -81,7 +98,5 @@ pub(super) fn junit(report: &RecordedReport, allow_undecided: bool) -> Result<St
     }
     let mut suite = TestSuite::new(report.source.recording.as_str());
     suite.add_test_cases(cases);
-    let mut junit = Report::new("tautline audit");
-    junit.add_test_suite(suite);
-    junit.to_string().map_err(|error| Failure::machine(format!("cannot write the JUnit report: {error}")))
+    suite
 }

@@ -17,6 +17,8 @@ pub(super) struct OwnRecording {
     pub(super) has_every_step: bool,
     /// Most steps between two of its samples.
     pub(super) most_steps: u64,
+    /// The law that was flown, where it is not the scenario's.
+    other_law: Option<String>,
 }
 
 impl OwnRecording {
@@ -29,7 +31,13 @@ impl OwnRecording {
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
         let is_straight =
             Scenario::read(&source, &[]).is_ok_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
-        let mut own = Self { delta_m: header.delta_m, told: Vec::new(), has_every_step: is_straight, most_steps: 0 };
+        let mut own = Self {
+            delta_m: header.delta_m,
+            told: Vec::new(),
+            has_every_step: is_straight,
+            most_steps: 0,
+            other_law: None,
+        };
         let mut before: Option<(u64, f64)> = None;
         for entry in recording {
             match entry.ok()? {
@@ -42,7 +50,9 @@ impl OwnRecording {
                     }));
                     before = Some((sample.step, sample.time_s));
                 }
-                Entry::Event(event) => own.has_every_step &= !matches!(event, Event::StepRefined { .. }),
+                Entry::Event(Event::StepRefined { .. }) => own.has_every_step = false,
+                Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
+                Entry::Event(_) => {}
             }
         }
         own.has_every_step &= own.most_steps <= 1;
@@ -52,13 +62,15 @@ impl OwnRecording {
         Some(own)
     }
 
-    /// What a person should know about how it is judged.
-    pub(super) fn note(&self) -> Option<String> {
+    /// What a person should know about how it was flown and is judged.
+    pub(super) fn notes(&self) -> impl Iterator<Item = String> {
         let steps = self.most_steps;
-        (!self.has_every_step).then(|| {
+        let between = (!self.has_every_step).then(|| {
             format!(
                 "up to {steps} steps were flown between two samples: the closest approach that the run saw there counts"
             )
-        })
+        });
+        let law = self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"));
+        law.into_iter().chain(between)
     }
 }

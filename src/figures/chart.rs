@@ -64,6 +64,11 @@ impl Mark {
     pub(super) fn ring(at: (f64, f64), colour: Colour, label: Option<String>) -> Self {
         Self { at, marker: Marker::Ring, colour, radius: 4.5, text: None, label }
     }
+
+    /// A cross, which the legend may explain.
+    pub(super) fn cross(at: (f64, f64), colour: Colour, label: Option<String>) -> Self {
+        Self { at, marker: Marker::Cross, colour, radius: 4.0, text: None, label }
+    }
 }
 
 /// A chart.

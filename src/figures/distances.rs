@@ -6,7 +6,7 @@ use super::figure::Figure;
 use super::history::{FEW_VEHICLES, RunHistory, Span, evenly, pairs};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
 use crate::swarm::{ClosestApproach, Pair, Rows, separation};
-use crate::text::at_least;
+use crate::text::{at_least, counted};
 
 /// Pairs whose distances are ranked at one instant: of more pairs, so many of them are.
 const RANKED_PAIRS: usize = 20_000;
@@ -14,6 +14,8 @@ const RANKED_PAIRS: usize = 20_000;
 const RANKED_INSTANTS: usize = 400;
 /// Pairs of a large swarm that are drawn one by one: those that come closest.
 const CLOSEST_PAIRS: usize = 5;
+/// Colour of what marks a hit.
+const HIT: usize = 1;
 /// More pairs than this are not told apart by colour.
 const TOLD_APART: usize = 15;
 
@@ -52,6 +54,13 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
         description.extend([" Closest: ", &words, "."]);
         let at = (closest.time_s, closest.separation_m);
         chart.marks.push(Mark::ring(at, INK, Some(format!("closest {words}"))));
+    }
+    for (k, at) in history.hits().enumerate() {
+        let label = (k == 0).then(|| format!("hulls hit, {}", counted(history.hit_count() as u64, "time", "times")));
+        chart.marks.push(Mark::cross(at, PALETTE[HIT], label));
+    }
+    if history.hit_count() > 0 {
+        description += &format!(" Hulls hit {}.", counted(history.hit_count() as u64, "time", "times"));
     }
     chart.figure("distances", title, &(description + &note))
 }

@@ -3,7 +3,7 @@
 use super::axis::{Axis, extent};
 use crate::record::mcap::Entry;
 use crate::record::{Event, RecordError, Sample, Sink};
-use crate::swarm::{ClosestApproach, Rows, row, separation};
+use crate::swarm::{ClosestApproach, Pair, Rows, row, separation};
 
 /// Most spans of time that are kept: some four for each pixel of a figure's width.
 const MOST_SPANS: usize = 2048;
@@ -13,6 +13,9 @@ const FEWEST_SPANS: usize = 64;
 const MEMORY_BYTES: usize = 32 * 1024 * 1024;
 /// Memory of one vehicle in one span \[bytes\]: a position and a control effort.
 const BYTES_PER_VEHICLE: usize = 32;
+
+/// Most hits of hulls that are marked one by one.
+const MOST_HITS: usize = 100;
 
 /// Up to this many vehicles every pair has a line of its own in a figure.
 pub(super) const FEW_VEHICLES: usize = 12;
@@ -36,6 +39,9 @@ pub struct RunHistory {
     last: Option<Span>,
     closest: Option<ClosestApproach>,
     energy_initial: Option<f64>,
+    /// The first times that hulls hit \[s\], and how often they did.
+    hits: Vec<(f64, Pair)>,
+    hit_count: usize,
 }
 
 /// A span of time.
@@ -71,8 +77,9 @@ impl RunHistory {
     pub fn read(recording: impl IntoIterator<Item = Result<Entry, RecordError>>) -> Result<Self, RecordError> {
         let mut history = Self::new();
         for entry in recording {
-            if let Entry::Sample(sample) = entry? {
-                history.observe(&sample.as_sample());
+            match entry? {
+                Entry::Sample(sample) => history.observe(&sample.as_sample()),
+                Entry::Event(event) => history.note(&event),
             }
         }
         Ok(history)
@@ -107,6 +114,15 @@ impl RunHistory {
             }
         }
         self.samples += 1;
+    }
+
+    fn note(&mut self, event: &Event) {
+        if let Event::HullsHit { pair, time_s, .. } = *event {
+            self.hit_count += 1;
+            if self.hits.len() < MOST_HITS {
+                self.hits.push((time_s, pair));
+            }
+        }
     }
 
     /// Merges every two spans into one.
@@ -151,6 +167,24 @@ impl RunHistory {
         self.energy_initial
     }
 
+    /// The first times that hulls hit \[s\], with the distance of the two centres by straight lines between spans \[m\].
+    pub(super) fn hits(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let apart =
+            |span: &Span, pair: Pair| row(&span.positions_m, pair.second()) - row(&span.positions_m, pair.first());
+        self.hits.iter().filter(|(_, pair)| pair.second() < self.vehicles).filter_map(move |&(time_s, pair)| {
+            let before = self.spans().take_while(|span| span.time_s <= time_s).last()?;
+            let after = self.spans().find(|span| span.time_s > time_s).unwrap_or(before);
+            let length_s = after.time_s - before.time_s;
+            let part = if length_s > 0.0 { (time_s - before.time_s) / length_s } else { 0.0 };
+            Some((time_s, apart(before, pair).lerp(&apart(after, pair), part).norm()))
+        })
+    }
+
+    /// How often hulls hit.
+    pub(super) fn hit_count(&self) -> usize {
+        self.hit_count
+    }
+
     /// All spans in order of time; the last is the last sample alone.
     pub(super) fn spans(&self) -> impl Iterator<Item = &Span> + Clone {
         self.spans.iter().chain(&self.last)
@@ -191,7 +225,8 @@ impl Sink for RunHistory {
         Ok(())
     }
 
-    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        self.note(event);
         Ok(())
     }
 }

@@ -46,11 +46,24 @@ pub trait Plant: DynClone + Send {
     /// order. A plant without one appends nothing.
     fn keep_out_contacts(&self, _pairs: &mut Vec<Pair>) {}
 
+    /// Appends the pairs whose solid hulls pushed each other apart in the last [`Plant::advance`]. A plant of points
+    /// appends nothing.
+    fn hull_contacts(&self, _contacts: &mut Vec<HullContact>) {}
+
     /// Begins its random numbers anew.
     fn reseed(&mut self, _seed: u64) {}
 }
 
 dyn_clone::clone_trait_object!(Plant);
+
+/// Two hulls that pushed each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HullContact {
+    /// Whose.
+    pub pair: Pair,
+    /// How fast their centres neared each other before \[m/s\].
+    pub closing_m_s: f64,
+}
 
 /// Why a plant could not carry out a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

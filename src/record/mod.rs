@@ -152,6 +152,13 @@ pub enum Event {
         /// Smallest separation within \[m\].
         min_m: f64,
     },
+    /// The flight is under another law than the scenario's. Told at its start.
+    OtherLaw {
+        /// When \[s\].
+        time_s: f64,
+        /// Name of the law that is flown.
+        name: String,
+    },
     /// A leg of the flight began; the first begins with the flight and is not told.
     LegBegan {
         /// The leg, from 0.
@@ -165,6 +172,15 @@ pub enum Event {
         pair: Pair,
         /// When \[s\].
         time_s: f64,
+    },
+    /// The hulls of two vehicles hit.
+    HullsHit {
+        /// The pair.
+        pair: Pair,
+        /// When the step began in which they did \[s\].
+        time_s: f64,
+        /// How fast their centres neared each other before \[m/s\].
+        closing_m_s: f64,
     },
     /// A step is flown in shorter ones, because it is too long for the law's fastest rate, took more than half of a
     /// clearance, or bent too far from the straight line that is audited. Told where their length changes.
@@ -190,8 +206,10 @@ impl Event {
         match *self {
             Self::ViolationBegan { time_s, .. }
             | Self::ViolationEnded { time_s, .. }
+            | Self::OtherLaw { time_s, .. }
             | Self::LegBegan { time_s, .. }
             | Self::EngineContact { time_s, .. }
+            | Self::HullsHit { time_s, .. }
             | Self::StepRefined { time_s, .. }
             | Self::EndedEarly { time_s, .. } => time_s,
         }

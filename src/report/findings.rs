@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::hulls::Hulls;
 use crate::audit::AuditOutcome;
 use crate::law::Certificate;
 use crate::metrics::Summary;
@@ -31,6 +32,8 @@ pub struct Findings<'a> {
     pub audit: &'a AuditOutcome,
     /// Pairs whose keep-out balls the engine's own collision detection saw overlap; none for a plant without one.
     pub engine_contact_pairs: Option<u64>,
+    /// What solid hulls did, or would have done.
+    pub hulls: &'a Hulls,
     /// Numbers of the samples.
     pub summary: &'a Summary,
     /// Whether the law's energy is proved never to grow in this flight.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
 use super::findings::{Findings, Performance, Run, finite};
+use super::hulls::Hulls;
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use crate::audit::{self, Status};
@@ -29,6 +30,9 @@ pub struct Report {
     pub separation: Separation,
     /// What the judgement rests on.
     pub audit: Audit,
+    /// What solid hulls did, or would have done.
+    #[serde(default)]
+    pub hulls: Hulls,
     /// How near the formation was at the end.
     pub formation: FormationNumbers,
     /// The law's energy.
@@ -234,6 +238,7 @@ impl Report {
                 },
                 rapier: Rapier { contact_pairs: findings.engine_contact_pairs },
             },
+            hulls: findings.hulls.clone(),
             formation: FormationNumbers {
                 reached: summary.reached_at_s.is_some(),
                 reached_at_s: summary.reached_at_s.and_then(finite),

@@ -8,10 +8,11 @@ use super::page::{self, Badge, Page, Picture, noted, section};
 use crate::audit::Status;
 use crate::figures::Figure;
 use crate::scenario::{PlantSpec, Precision, Scenario};
+use crate::sim::Bounce;
 use crate::text::{at_least, seconds, significant};
 
-/// Most violations that are listed one by one.
-const LISTED_VIOLATIONS: usize = 50;
+/// Most violations, or hits of hulls, that are listed one by one.
+const LISTED: usize = 50;
 
 /// Most bytes of a scenario on a page.
 const LONGEST_SCENARIO: usize = 100_000;
@@ -45,6 +46,9 @@ impl Report {
         let mut sections = vec![section("Numbers", &[html! { div.tables { @for table in tables { (table) } } }])];
         if !self.audit.violations.is_empty() {
             sections.push(section("Violations", &[self.violations()]));
+        }
+        if let Some(bounces) = self.hulls.bounces.as_deref().filter(|bounces| !bounces.is_empty()) {
+            sections.push(section("Hulls that hit", &[hits(bounces)]));
         }
         if !page.pictures.is_empty() {
             sections.push(section("Pictures", &[page::pictures(page.pictures)]));
@@ -119,8 +123,8 @@ impl Report {
             [
                 ("Initial energy E(0)", with_unit(energy.initial, "m²/s²"), ""),
                 ("Final energy", with_unit(energy.at_end, "m²/s²"), ""),
-                ("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all samples"),
-                ("Peak control", with_unit(control.peak_m_s2, "m/s²"), "over all samples"),
+                ("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all steps"),
+                ("Peak control", with_unit(control.peak_m_s2, "m/s²"), "over all steps"),
                 ("Final control", with_unit(control.final_m_s2, "m/s²"), ""),
             ],
         )
@@ -149,11 +153,9 @@ impl Report {
             (page::numbers(
                 "Times that a pair was closer than δ",
                 &["Vehicles", "From", "To", "Smallest", "At"],
-                violations.iter().take(LISTED_VIOLATIONS).map(row),
+                violations.iter().take(LISTED).map(row),
             ))
-            @if let Some(more @ 1..) = violations.len().checked_sub(LISTED_VIOLATIONS) {
-                p { (more) " more are in report.json." }
-            }
+            (more(violations.len()))
         }
     }
 
@@ -191,9 +193,10 @@ impl Report {
             certificate,
             plant,
             format!(
-                "Commands are computed once a step of {} ms and {command}. A step that would take more than half of a \
-                 pair's clearance is flown in halves, at most {} times halved.",
+                "Commands are computed once a step of {} ms and {command}. A step longer than {} over the law's fastest rate, or \
+                 that would take more than half of a pair's clearance, is flown in halves, at most {} times halved.",
                 short(time.dt_s * 1e3),
+                short(time.max_rate_dt),
                 time.max_halvings
             ),
             "The audit sweeps every pair over every whole step, so nothing passes between samples: the closed form of the \
@@ -207,8 +210,8 @@ impl Report {
                 judge.edge_error_m, judge.disagreement_m_s, judge.hold_s
             ),
             format!(
-                "Energy, control effort and errors are those of the recorded samples, at most {} a second; the smallest \
-                 distance is that of the whole run.",
+                "Errors are those of the recorded samples, at most {} a second; the smallest distance, the largest energy and \
+                 the peak control are those of the whole run.",
                 short(time.record_hz)
             ),
         ]
@@ -255,6 +258,29 @@ fn folded_scenario(toml: &str, sha256: &str) -> Markup {
         details {
             summary { "The resolved scenario, SHA-256 " (sha256) (part) }
             pre tabindex="0" { code { (toml[..end]) } }
+        }
+    }
+}
+
+/// The times that two hulls hit.
+fn hits(bounces: &[Bounce]) -> Markup {
+    let row =
+        |bounce: &Bounce| [bounce.pair.to_string(), seconds(bounce.time_s), with_unit(Some(bounce.closing_m_s), "m/s")];
+    html! {
+        (page::numbers(
+            "From the first on, a bounce is flown and not the law's motion",
+            &["Vehicles", "At", "Closing speed"],
+            bounces.iter().take(LISTED).map(row),
+        ))
+        (more(bounces.len()))
+    }
+}
+
+/// How many of a list are not on the page.
+fn more(all: usize) -> Markup {
+    html! {
+        @if let Some(more @ 1..) = all.checked_sub(LISTED) {
+            p { (more) " more are in report.json." }
         }
     }
 }

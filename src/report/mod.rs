@@ -10,6 +10,7 @@ mod energy;
 mod findings;
 mod flight;
 mod html;
+mod hulls;
 pub mod page;
 pub mod recorded;
 mod verdict;
@@ -24,6 +25,7 @@ pub use flight::{
     Separation, Tool, Velocity, Violation,
 };
 pub use html::RunPage;
+pub use hulls::{Hulls, PassedThrough};
 pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 

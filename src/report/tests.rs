@@ -76,6 +76,7 @@ impl Case {
             certificate: &self.certificate,
             audit: &self.audit,
             engine_contact_pairs: Some(0),
+            hulls: &Hulls::solid(&[]),
             summary: &self.summary,
             energy_falls: self.energy_falls,
             epsilon: f64::from(f32::EPSILON),
@@ -155,6 +156,9 @@ audit
     disagreements
   rapier
     contact_pairs
+hulls
+  bounces
+  passed_through
 formation
   reached
   reached_at_s

@@ -27,6 +27,7 @@ impl Verdict {
         let reasons: Vec<_> = [
             refused(findings),
             violation(findings),
+            findings.hulls.reason(),
             disagreement(findings),
             undecided(findings),
             broken_certificate(findings),
@@ -155,7 +156,9 @@ fn risen_energy(findings: &Findings<'_>) -> Option<String> {
     let allowed = highest_honest(summary, vehicles, findings.epsilon)?;
     (findings.energy_falls && most > allowed).then(|| {
         format!(
-            "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2,              where integration and rounding explain {allowed:.4e}: what was flown is not the motion of the law. Shorten              time.dt_s, raise time.max_halvings, or set plant.precision to double.",
+            "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2, \
+             where integration and rounding explain {allowed:.4e}: what was flown is not the motion of the law. Shorten \
+             time.dt_s, raise time.max_halvings, or set plant.precision to double.",
         )
     })
 }

@@ -18,7 +18,8 @@ impl Report {
             codes => format!("; refused before the first step: {}", codes.join(", ")),
         };
         let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
-        self.judged() + &ended.unwrap_or_default() + &refused
+        let hulls = self.hulls.brief().map(|hulls| format!("; {hulls}"));
+        self.judged() + &hulls.unwrap_or_default() + &ended.unwrap_or_default() + &refused
     }
 
     /// What was judged of what was flown.

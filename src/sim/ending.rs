@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use crate::audit::{AuditError, AuditOutcome};
 use crate::law::{Certificate, LawError, ParameterError};
 use crate::record::RecordError;
@@ -28,10 +30,23 @@ pub struct Flight {
     pub audit: AuditOutcome,
     /// Pairs whose keep-out balls the plant's own collision detection saw overlap, in index order.
     pub engine_contacts: Vec<Pair>,
+    /// Every time that two hulls hit, in order of time: from then on a bounce is flown and not the law's motion alone.
+    pub bounces: Vec<Bounce>,
     /// State at the end.
     pub last: Swarm,
     /// Wall-clock time by kind of work.
     pub performance: Performance,
+}
+
+/// Two hulls that hit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bounce {
+    /// Whose.
+    pub pair: Pair,
+    /// When the step began in which they hit \[s\].
+    pub time_s: f64,
+    /// How fast their centres neared each other before \[m/s\].
+    pub closing_m_s: f64,
 }
 
 /// How a flight ended.

@@ -3,11 +3,12 @@
 use crate::audit::{AuditError, AuditOutcome, Auditor, StepFinding, Violation, swept_separation_m};
 use crate::graph::Graph;
 use crate::law::Law;
-use crate::plant::Path;
+use crate::plant::{HullContact, Path};
 use crate::record::Event;
 use crate::space::NearPairs;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 
+use super::ending::Bounce;
 use super::motion::Motion;
 
 /// The auditor with what the loop asks of it from step to step.
@@ -22,6 +23,10 @@ pub(super) struct Judge {
     near: NearPairs,
     pub(super) engine_contacts: Vec<Pair>,
     contacts_now: Vec<Pair>,
+    pub(super) bounces: Vec<Bounce>,
+    /// Hulls that pushed each other in the last step, and in the one before.
+    hulls_now: Vec<HullContact>,
+    hulls_before: Vec<HullContact>,
 }
 
 impl Judge {
@@ -33,6 +38,9 @@ impl Judge {
             near: NearPairs::default(),
             engine_contacts: Vec::new(),
             contacts_now: Vec::new(),
+            bounces: Vec::new(),
+            hulls_now: Vec::new(),
+            hulls_before: Vec::new(),
         })
     }
 
@@ -87,8 +95,21 @@ impl Judge {
         }
     }
 
-    pub(super) fn finish(self) -> (AuditOutcome, Vec<Pair>) {
-        (self.auditor.finish(), self.engine_contacts)
+    /// Keeps the pairs whose hulls begin to push each other in the step that began at `from_s`, in index order.
+    pub(super) fn note_bounces(&mut self, motion: &Motion, from_s: f64, events: &mut Vec<Event>) {
+        std::mem::swap(&mut self.hulls_now, &mut self.hulls_before);
+        self.hulls_now.clear();
+        motion.hull_contacts(&mut self.hulls_now);
+        for &HullContact { pair, closing_m_s } in &self.hulls_now {
+            if self.hulls_before.binary_search_by_key(&pair, |before| before.pair).is_err() {
+                self.bounces.push(Bounce { pair, time_s: from_s, closing_m_s });
+                events.push(Event::HullsHit { pair, time_s: from_s, closing_m_s });
+            }
+        }
+    }
+
+    pub(super) fn finish(self) -> (AuditOutcome, Vec<Pair>, Vec<Bounce>) {
+        (self.auditor.finish(), self.engine_contacts, self.bounces)
     }
 }
 

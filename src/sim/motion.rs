@@ -6,7 +6,7 @@ use crate::continuous::{Continuous, IdealError};
 use crate::feedback::Feedback;
 #[cfg(feature = "ideal")]
 use crate::law::LawError;
-use crate::plant::{Path, Plant, PlantError, rapier};
+use crate::plant::{HullContact, Path, Plant, PlantError, rapier};
 use crate::scenario::{PlantSpec, Scenario};
 use crate::swarm::{Pair, Rows, Swarm};
 
@@ -135,6 +135,14 @@ impl Motion {
     pub(super) fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
         match self {
             Self::Sampled(plant) => plant.keep_out_contacts(pairs),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(_) => {}
+        }
+    }
+
+    pub(super) fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
+        match self {
+            Self::Sampled(plant) => plant.hull_contacts(contacts),
             #[cfg(feature = "ideal")]
             Self::Continuous(_) => {}
         }

@@ -99,6 +99,8 @@ impl Simulation {
             .void_where(scenario.time.control_hz.is_some(), Void::CommandsHeld);
         let mut state = scenario.start.clone();
         motion.observe(&mut state);
+        let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());
+        let other_law = flies_another.then(|| Event::OtherLaw { time_s: 0.0, name: law.name().to_owned() });
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
         let mut simulation = Self {
             controller: Controller::new(law, link, supervisor, target, scenario.graph.clone()),
@@ -112,7 +114,7 @@ impl Simulation {
             state,
             time_s: 0.0,
             steps: 0,
-            events: Vec::new(),
+            events: other_law.into_iter().collect(),
             shortest: 0,
             energy: None,
             peaks: Peaks::default(),
@@ -270,7 +272,7 @@ impl Simulation {
     /// What the flight left behind besides its recording. One that is under way counts as interrupted here.
     #[must_use]
     pub fn finish(self) -> Flight {
-        let (audit, engine_contacts) = self.judge.finish();
+        let (audit, engine_contacts, bounces) = self.judge.finish();
         Flight {
             law: self.controller.law.name().to_owned(),
             ending: self.ending.unwrap_or(Ending::Interrupted),
@@ -279,6 +281,7 @@ impl Simulation {
             certificate: self.certificate,
             audit,
             engine_contacts,
+            bounces,
             last: self.state,
             performance: self.performance,
         }
@@ -409,6 +412,7 @@ impl Simulation {
         let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
         judged.map_err(refused)?;
         self.judge.note_engine_contacts(&self.motion, self.time_s, &mut self.events);
+        self.judge.note_bounces(&self.motion, from_s, &mut self.events);
         commanded
     }
 

@@ -386,6 +386,37 @@ fn a_law_that_becomes_undefined_ends_the_run_with_what_was_recorded() {
     }
 }
 
+/// The scenario's law under a name that is made as the program runs.
+#[derive(Clone)]
+struct Named {
+    inner: Box<dyn Law>,
+    name: String,
+}
+
+impl Law for Named {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.inner.command(at, command)
+    }
+}
+
+#[test]
+fn a_law_of_ones_own_is_recorded_by_its_name_and_not_by_the_scenarios() {
+    let scenario = builtin("pentagon", &["time.duration_s=0.1"]);
+    let inner = scenario.law().expect("a law");
+    let law = Named { name: format!("{} of my own", inner.name()), inner };
+    let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
+    assert_eq!(flown.expect("a flight").law, "edge-tension of my own");
+    let told = Event::OtherLaw { time_s: 0.0, name: "edge-tension of my own".to_owned() };
+    assert_eq!(log.events, [told]);
+    // Nothing is told of the scenario's own.
+    let (flight, log) = fly(&scenario);
+    assert_eq!((flight.law.as_str(), &log.events[..]), ("edge-tension", &[][..]));
+}
+
 #[test]
 fn a_caller_that_breaks_off_gets_a_complete_flight_up_to_there() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);

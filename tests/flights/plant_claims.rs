@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use tautline::formation::Formation;
 use tautline::plant::{Path, Plant, rapier};
 use tautline::scenario::{PlantSpec, Precision, Scenario, Space};
-use tautline::swarm::{Rows, Swarm, row, separation, set_row};
+use tautline::swarm::{Pair, Rows, Swarm, row, separation, set_row};
 
 const DT_S: f64 = 1.0 / 240.0;
 const HULL_RADIUS_M: f64 = 0.25;
@@ -114,9 +114,11 @@ fn hulls_are_solid_and_bounce() {
         let scenario = scenario(precision, &[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
         let mut plant = bodies(&scenario);
         let mut nearest_m = f64::INFINITY;
+        let mut hits = Vec::new();
         for _ in 0..STEPS {
             step(plant.as_mut(), &Rows::zeros(2), DT_S);
             nearest_m = nearest_m.min(separation(&observed(plant.as_ref(), 2).positions_m, 0, 1));
+            plant.hull_contacts(&mut hits);
         }
         let rounding = f64::from(STEPS) * epsilon(precision);
         assert!((nearest_m - 2.0 * HULL_RADIUS_M).abs() <= rounding, "{nearest_m} m between the centres");
@@ -125,6 +127,9 @@ fn hulls_are_solid_and_bounce() {
             (left + 0.5).abs() <= rounding && (right - 0.5).abs() <= rounding,
             "half the speed is kept: {left}, {right}"
         );
+        let [hit] = hits[..] else { panic!("they hit once: {hits:?}") };
+        assert_eq!(hit.pair, Pair::new(0, 1));
+        assert!((hit.closing_m_s - 2.0).abs() <= rounding, "{} m/s", hit.closing_m_s);
     }
 }
 
@@ -137,6 +142,9 @@ fn hulls_that_pass_beside_each_other_do_not_touch() {
         step(plant.as_mut(), &Rows::zeros(2), DT_S);
     }
     assert_eq!(observed(plant.as_ref(), 2).velocities_m_s, Rows::from_row_slice(&[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]));
+    let mut hits = Vec::new();
+    plant.hull_contacts(&mut hits);
+    assert_eq!(hits, []);
 }
 
 #[test]

@@ -72,14 +72,16 @@ fn a_simulation_loaded_at_any_of_fifty_steps_ends_with_the_hash_of_one_that_was_
             (0..7).for_each(|_| other.step());
             other.load(&saved, None);
             finish(&mut other, &mut hash);
-            ends.push((hash.finish(), other.clone().finish().audit));
+            let ended = other.clone().finish();
+            ends.push((hash.finish(), ended.audit, ended.bounces));
             other.load(&saved, None);
         }
         finish(&mut whole.0, &mut whole.1);
         let flight = whole.0.finish();
         let bounces = name == "bouncing" || name == "double";
         assert_eq!(!flight.engine_contacts.is_empty(), bounces, "{name}: keep-out balls, and hulls within them, met");
-        let expected = (whole.1.finish(), flight.audit);
+        assert_eq!(!flight.bounces.is_empty(), bounces, "{name}: hulls hit");
+        let expected = (whole.1.finish(), flight.audit, flight.bounces);
         assert!(ends.iter().all(|end| *end == expected), "{name}");
     }
 }

@@ -89,8 +89,25 @@ fn files_of_a_vehicle_each_are_judged_as_one_recording() {
     assert_eq!(several.exit, Some(0), "{}", several.err);
     assert!(several.out.contains("pair.csv:") && several.out.contains("flight:"), "{}", several.out);
     assert_eq!(audit(folder.path(), &["flight", "pair.csv", "--delta", "2.1"]).exit, Some(1));
-    let json = audit(folder.path(), &["flight", "pair.csv", "--delta", "1.9", "--json"]);
-    assert!(json.exit == Some(2) && json.err.contains("--join"), "{}", json.err);
+    let answers = ["--json", "--junit", "a.xml", "--events", "a.csv"];
+    let told = audit(folder.path(), &[&["flight", "pair.csv", "--delta", "2.1"], &answers[..]].concat());
+    assert_eq!(told.exit, Some(1), "{}", told.err);
+    let reports: serde_json::Value = serde_json::from_str(&told.out).expect("JSON");
+    let recordings: Vec<_> =
+        reports.as_array().expect("a list").iter().map(|one| &one["source"]["recording"]).collect();
+    assert_eq!(recordings, ["flight", "pair.csv"]);
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("written");
+    let suites = read("a.xml");
+    assert!(suites.matches("<testsuite ").count() == 2 && suites.contains("name=\"pair.csv\""), "{suites}");
+    let events = read("a.csv");
+    assert!(events.starts_with("recording,kind,first,"), "{events}");
+    assert!(events.lines().any(|line| line.starts_with("flight,violation,a,b,")), "{events}");
+    let page = audit(folder.path(), &["flight", "pair.csv", "--delta", "1.9", "--html", "a.html"]);
+    assert!(page.exit == Some(2) && page.err.contains("--join"), "{}", page.err);
+    // One that cannot be read is an error, and the others are judged all the same.
+    let lost = audit(folder.path(), &["nowhere.csv", "pair.csv", "--delta", "1.9"]);
+    assert!(lost.exit == Some(2) && lost.err.contains("nowhere.csv"), "{}", lost.err);
+    assert!(lost.out.contains("pair.csv:\n") && lost.out.contains("CLEAR"), "{}", lost.out);
     let exported = ran_by(TAUTLINE, folder.path(), &["export", "flight", "-o", "both.csv"]);
     assert_eq!(exported.exit, Some(0), "{}", exported.err);
     assert_eq!(audit(folder.path(), &["both.csv", "--delta", "2.1"]).exit, Some(1));

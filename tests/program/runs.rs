@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 use serde_json::Value;
+use tautline::record::Event;
 use tautline::record::mcap::McapRecording;
 use tautline::scenario::builtin;
 use tempfile::TempDir;
@@ -88,6 +89,7 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "separation.certificate_void",
         "audit.status audit.violations audit.steps audit.pairs_checked audit.closed_form.min_m",
         "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
+        "hulls.bounces hulls.passed_through",
         "formation.reached formation.reached_at_s formation.held_s formation.fails formation.at_rest",
         "formation.max_edge_error_m formation.rms_position_error_m",
         "energy.initial energy.final energy.max_over_initial energy.rose",
@@ -159,6 +161,48 @@ fn the_baseline_ends_in_a_violation_and_the_line_in_no_formation() {
     assert!(collinear.out.contains("The start lies on a line"), "{}", collinear.out);
     let report = json(&fs::read_to_string(folder.path().join("out/report.json")).expect("a report"));
     assert!(report["verdict"]["reasons"].to_string().contains("on a line"), "{report}");
+}
+
+#[test]
+fn hulls_that_hit_end_what_was_to_be_judged_and_points_pass_through() {
+    let folder = folder();
+    let weak =
+        ["pentagon-laplacian", "--set", "law.f1_per_s2=30", "--set", "law.f2_per_s=1", "--no-snapshots", "--json"];
+    let solid = run(folder.path(), &weak);
+    let report = json(&solid.out);
+    let bounces = report["hulls"]["bounces"].as_array().expect("a list");
+    let first = &bounces[0];
+    assert!(first["closing_m_s"].as_f64().expect("a speed") > 0.0, "{first}");
+    assert_eq!(report["hulls"]["passed_through"], Value::Null);
+    assert!(solid.err.lines().next().is_some_and(|line| line.contains("; hulls hit ")), "{}", solid.err);
+    assert!(report["verdict"]["reasons"].to_string().contains("a bounce of the engine's, and not the law's motion"));
+    let page = fs::read_to_string(folder.path().join("out/report.html")).expect("a page");
+    assert!(page.contains("Hulls that hit") && page.contains("hulls hit, "), "a table, and marks in the figure");
+    let (_, events) = McapRecording::open(&folder.path().join("out/run.mcap"))
+        .and_then(McapRecording::read_all)
+        .expect("a recording");
+    let hits: Vec<_> = events
+        .iter()
+        .filter_map(|event| match *event {
+            Event::HullsHit { pair, time_s, closing_m_s } => Some((pair, time_s, closing_m_s)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(hits.len(), bounces.len());
+    assert_eq!((Some(hits[0].1), Some(hits[0].2)), (first["time_s"].as_f64(), first["closing_m_s"].as_f64()));
+
+    let points = run(folder.path(), &[&weak[..], &["--plant", "ideal", "--force"]].concat());
+    let report = json(&points.out);
+    assert_eq!(report["hulls"]["bounces"], Value::Null);
+    let through = &report["hulls"]["passed_through"];
+    assert!(through["min_m"].as_f64() < through["touching_m"].as_f64(), "{through}");
+    assert!(points.err.contains("passed through each other as points"), "{}", points.err);
+    assert!(report["verdict"]["reasons"].to_string().contains("solid ones fly otherwise"));
+
+    // Nothing of the kind is said of a flight without.
+    let clear = run(folder.path(), &["--json", "--force", "--no-snapshots"]);
+    assert_eq!(json(&clear.out)["hulls"]["bounces"], json("[]"));
+    assert!(!clear.err.contains("hulls"), "{}", clear.err);
 }
 
 #[test]

@@ -28,6 +28,9 @@ impl Run {
             Event::StepRefined { time_s: 0.0, dt_s: 1.0 / 480.0 },
             Event::ViolationBegan { pair, time_s: 0.25 },
             Event::EngineContact { pair, time_s: 0.26 },
+            Event::HullsHit { pair, time_s: 0.27, closing_m_s: 1.25 },
+            Event::OtherLaw { time_s: 0.0, name: "springs".to_owned() },
+            Event::LegBegan { leg: 2, time_s: 0.3 },
             Event::ViolationEnded { pair, time_s: 0.5, min_m: 1.5327 },
             Event::EndedEarly { time_s: 0.75, reason: "the law is undefined".to_owned() },
         ];

@@ -225,6 +225,7 @@ impl From<&Event> for EventMessage<&'static str> {
                 *min_m,
                 format!("vehicles {pair} are clear again after coming to {min_m} m"),
             ),
+            Event::OtherLaw { name, .. } => ("other-law", None, f64::NAN, name.clone()),
             Event::LegBegan { leg, .. } => {
                 ("leg-began", None, (leg + 1) as f64, format!("leg {} of the flight began", leg + 1))
             }
@@ -233,6 +234,12 @@ impl From<&Event> for EventMessage<&'static str> {
                 Some(*pair),
                 f64::NAN,
                 format!("the engine saw the keep-out balls of vehicles {pair} overlap"),
+            ),
+            Event::HullsHit { pair, closing_m_s, .. } => (
+                "hulls-hit",
+                Some(*pair),
+                *closing_m_s,
+                format!("the hulls of vehicles {pair} hit at {closing_m_s} m/s"),
             ),
             Event::StepRefined { dt_s, .. } => {
                 ("step-refined", None, *dt_s, format!("a step was flown in steps down to {dt_s} s"))
@@ -251,6 +258,8 @@ impl EventMessage<String> {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
             "engine-contact" => Event::EngineContact { pair: pair()?, time_s },
+            "hulls-hit" => Event::HullsHit { pair: pair()?, time_s, closing_m_s: self.value },
+            "other-law" => Event::OtherLaw { time_s, name: self.text },
             "leg-began" => Event::LegBegan { leg: self.leg()?, time_s },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },

@@ -112,7 +112,11 @@ impl SceneBuilder<'_> {
                     1 => format!("violated at {:.2} s", span.from_s),
                     many => format!("{many} violations, the first at {:.2} s", span.from_s),
                 };
-                let texts = vec![format!("{at} by {}", self.pair(span.pair)), at, "violated".to_owned()];
+                let mut texts = vec![format!("{at} by {}", self.pair(span.pair)), at, "violated".to_owned()];
+                if let Some((hit_s, pair, closing_m_s)) = self.timeline.hit.filter(|&(hit_s, ..)| hit_s <= now_s) {
+                    let hit = format!("hulls of {} hit at {hit_s:.2} s, {closing_m_s:.2} m/s", self.pair(pair));
+                    texts.splice(..0, [format!("{}; {hit}", texts[0]), hit, "violated, hulls hit".to_owned()]);
+                }
                 (texts, theme.alarm())
             }
         }

@@ -44,6 +44,8 @@ pub struct Timeline {
     pub(super) violations: Vec<Violation>,
     /// Index of the violation of every pair that is in one.
     open: BTreeMap<Pair, usize>,
+    /// When hulls hit first, whose, and how fast their centres neared each other \[m/s\].
+    pub(in crate::render) hit: Option<(f64, Pair, f64)>,
     /// From when on the judge cannot tell whether two were too close \[s\].
     pub(in crate::render) undecided_s: Option<f64>,
     /// The judge refused the motion.
@@ -71,6 +73,7 @@ impl Timeline {
             keyframes: Vec::new(),
             violations: Vec::new(),
             open: BTreeMap::new(),
+            hit: None,
             undecided_s: None,
             refused: false,
             moments_s: BTreeMap::new(),
@@ -255,6 +258,9 @@ impl Timeline {
                     }
                     (violation.to_s, violation.min_m) = (time_s, min_m);
                 }
+            }
+            Event::HullsHit { pair, time_s, closing_m_s } if self.has(pair) => {
+                self.hit = self.hit.or(Some((time_s, pair, closing_m_s)));
             }
             _ => {}
         }
