@@ -160,6 +160,17 @@ impl fmt::Display for Pair {
     }
 }
 
+/// Two hulls that hit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bounce {
+    /// Whose.
+    pub pair: Pair,
+    /// When the step began in which they hit \[s\].
+    pub time_s: f64,
+    /// How fast their centres neared each other before \[m/s\].
+    pub closing_m_s: f64,
+}
+
 /// The closest that a pair came, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestApproach {

@@ -8,7 +8,7 @@ use super::page::{self, Badge, Page, Picture, noted, section};
 use crate::audit::Status;
 use crate::figures::Figure;
 use crate::scenario::{PlantSpec, Precision, Scenario};
-use crate::sim::Bounce;
+use crate::swarm::Bounce;
 use crate::text::{at_least, seconds, significant};
 
 /// Most violations, or hits of hulls, that are listed one by one.

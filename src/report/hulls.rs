@@ -4,8 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::audit::AuditOutcome;
-use crate::sim::Bounce;
-use crate::swarm::Pair;
+use crate::swarm::{Bounce, Pair};
 use crate::text::{metres, metres_below, seconds};
 
 /// What the hulls did.
@@ -125,7 +124,10 @@ mod tests {
         let first = Bounce { pair: Pair::new(1, 2), time_s: 3.625, closing_m_s: 1.25 };
         assert_eq!(Hulls::solid(&[]).brief(), None);
         assert_eq!(Hulls::solid(&[]).reason(), None);
-        assert_eq!(Hulls::solid(&[first]).brief().as_deref(), Some("hulls hit once: vehicles 2-3 at 3.62 s with 1.250 m/s"));
+        assert_eq!(
+            Hulls::solid(&[first]).brief().as_deref(),
+            Some("hulls hit once: vehicles 2-3 at 3.62 s with 1.250 m/s")
+        );
         let reason = Hulls::solid(&[first, first]).reason().expect("a reason");
         assert!(reason.starts_with("Hulls hit 2 times, first vehicles 2-3 at 3.62 s with 1.250 m/s. What"), "{reason}");
     }

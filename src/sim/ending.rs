@@ -2,12 +2,10 @@
 
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
-
 use crate::audit::{AuditError, AuditOutcome};
 use crate::law::{Certificate, LawError, ParameterError};
 use crate::record::RecordError;
-use crate::swarm::{Pair, Swarm};
+use crate::swarm::{Bounce, Pair, Swarm};
 
 /// A path may bend away from the straight line that is swept by this much \[m\]; two vehicles by twice as much. A step
 /// that bends more is flown in halves.
@@ -36,17 +34,6 @@ pub struct Flight {
     pub last: Swarm,
     /// Wall-clock time by kind of work.
     pub performance: Performance,
-}
-
-/// Two hulls that hit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Bounce {
-    /// Whose.
-    pub pair: Pair,
-    /// When the step began in which they hit \[s\].
-    pub time_s: f64,
-    /// How fast their centres neared each other before \[m/s\].
-    pub closing_m_s: f64,
 }
 
 /// How a flight ended.

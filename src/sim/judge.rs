@@ -6,9 +6,8 @@ use crate::law::Law;
 use crate::plant::{HullContact, Path};
 use crate::record::Event;
 use crate::space::NearPairs;
-use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
+use crate::swarm::{Bounce, ClosestApproach, Pair, Rows, Swarm, row};
 
-use super::ending::Bounce;
 use super::motion::Motion;
 
 /// The auditor with what the loop asks of it from step to step.

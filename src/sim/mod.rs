@@ -16,7 +16,7 @@ mod simulation;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-pub use ending::{Bounce, Breakdown, Ending, Flight, Performance, SimError};
+pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub use motion::Motion;
 pub use parts::Parts;
 pub use simulation::{Saved, Simulation};

@@ -405,7 +405,7 @@ impl Law for Named {
 
 #[test]
 fn a_law_of_ones_own_is_recorded_by_its_name_and_not_by_the_scenarios() {
-    let scenario = builtin("pentagon", &["time.duration_s=0.1"]);
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
     let inner = scenario.law().expect("a law");
     let law = Named { name: format!("{} of my own", inner.name()), inner };
     let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));

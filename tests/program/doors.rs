@@ -93,8 +93,7 @@ fn files_of_a_vehicle_each_are_judged_as_one_recording() {
     let told = audit(folder.path(), &[&["flight", "pair.csv", "--delta", "2.1"], &answers[..]].concat());
     assert_eq!(told.exit, Some(1), "{}", told.err);
     let reports: serde_json::Value = serde_json::from_str(&told.out).expect("JSON");
-    let recordings: Vec<_> =
-        reports.as_array().expect("a list").iter().map(|one| &one["source"]["recording"]).collect();
+    let recordings: Vec<_> = reports.as_array().expect("a list").iter().map(|one| &one["recording"]).collect();
     assert_eq!(recordings, ["flight", "pair.csv"]);
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("written");
     let suites = read("a.xml");

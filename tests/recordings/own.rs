@@ -226,7 +226,7 @@ fn the_messages_are_those_of_the_mcap_crate_s_own_reader() {
         }
         *topics.entry(message.channel.topic.clone()).or_insert(0) += 1;
     }
-    let expected = [("/events", 5), ("/scenario", 1), ("/summary", 90), ("/swarm", 90)];
+    let expected = [("/events", 8), ("/scenario", 1), ("/summary", 90), ("/swarm", 90)];
     assert_eq!(topics, expected.map(|(topic, count)| (topic.to_owned(), count)).into());
     assert!(mcap::Summary::read(&bytes).expect("a readable index").is_some());
 }
