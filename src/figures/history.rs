@@ -167,7 +167,8 @@ impl RunHistory {
         self.energy_initial
     }
 
-    /// The first times that hulls hit \[s\], with the distance of the two centres by straight lines between spans \[m\].
+    /// The first times that hulls hit \[s\], with the distance of the two centres \[m\]: by straight lines between spans,
+    /// or the closest approach where that is theirs.
     pub(super) fn hits(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         let apart =
             |span: &Span, pair: Pair| row(&span.positions_m, pair.second()) - row(&span.positions_m, pair.first());
@@ -176,7 +177,9 @@ impl RunHistory {
             let after = self.spans().find(|span| span.time_s > time_s).unwrap_or(before);
             let length_s = after.time_s - before.time_s;
             let part = if length_s > 0.0 { (time_s - before.time_s) / length_s } else { 0.0 };
-            Some((time_s, apart(before, pair).lerp(&apart(after, pair), part).norm()))
+            let between_m = apart(before, pair).lerp(&apart(after, pair), part).norm();
+            let known_m = after.closest.filter(|closest| closest.pair == pair).map(|closest| closest.separation_m);
+            Some((time_s, known_m.unwrap_or(between_m).min(between_m)))
         })
     }
 

@@ -60,9 +60,10 @@ impl Scenario {
         Drift { speed_m_s: seed_m_s * grown.exp(), distance_m, spacing_m }
     }
 
-    /// The precision that tells positions apart to the end of the flight.
+    /// The precision that tells positions apart to the end of the flight, which a scenario file gets where it names none.
     #[cfg(feature = "files")]
-    pub(super) fn needed_precision(&self) -> Precision {
+    #[must_use]
+    pub fn needed_precision(&self) -> Precision {
         let spacing_m = self.drift_in(SINGLE, self.a22_per_s).spacing_m;
         if self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
             Precision::Single
