@@ -36,7 +36,7 @@ impl Folder {
         let names = Archive::open(path)?.names();
         for name in names.into_iter().filter(|name| is_table(Path::new(name)) && !name.starts_with("__MACOSX")) {
             let parent = name.rsplit_once('/').map_or("", |(parent, _)| parent).to_owned();
-            let source = Source { entry: Some(name), ..Source::file(path) };
+            let source = Source::entry(path, name);
             match folder.folders.iter_mut().find(|(known, _)| *known == parent) {
                 Some((_, files)) => files.push(source),
                 None => folder.folders.push((parent, vec![source])),

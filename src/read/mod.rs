@@ -67,13 +67,22 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     opened.map_err(|error| error.of(path))
 }
 
-/// Opens several files as one recording, a vehicle in each, called as the file is.
+/// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
 ///
 /// # Errors
 /// Those of [`open`], and where a file holds several vehicles or clocks cannot be those of one recording.
 pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, ReadError> {
-    let files = paths.iter().map(|path| Source::file(path)).collect();
-    let opened = open_folder(Folder { files, ..Folder::default() }, options);
+    let mut all = Folder::default();
+    for &path in paths {
+        match look(path).map_err(|error| error.of(path))? {
+            Some(folder) => {
+                all.files.extend(folder.files);
+                all.folders.extend(folder.folders);
+            }
+            None => all.files.push(Source::file(path)),
+        }
+    }
+    let opened = open_folder(all, options);
     opened.map_err(|error| error.of(paths.first().copied().unwrap_or(Path::new(""))))
 }
 
@@ -145,6 +154,9 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
     }
     let format = recognise(&mut source, options.format)?;
     options.refuse_needless(format)?;
+    if matches!(format, Format::Npz | Format::Parquet) {
+        source = source.seekable()?;
+    }
     let source = &source;
     match format {
         Format::Csv | Format::Text => csv::open(source, format, options),

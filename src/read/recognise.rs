@@ -35,8 +35,9 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
         Some(format) => format,
         None => format_of(&head)?,
     };
-    let (streamed, packed) = (matches!(format, Format::Csv | Format::Text), source.entry.is_some());
-    if (source.gzip || packed) && !streamed && !(packed && format == Format::Crazyflie) {
+    let packed = source.entry.is_some();
+    let unpacks = matches!(format, Format::Csv | Format::Text | Format::Npz | Format::Parquet);
+    if (source.gzip || packed) && !unpacks && !(packed && format == Format::Crazyflie) {
         let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
         let problem = format!("it is {} inside {within}", format.title());
         return Err(Fault::content(problem, format!("unpack it first, with {remedy}")).into());

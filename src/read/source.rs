@@ -3,8 +3,10 @@
 use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use flate2::read::MultiGzDecoder;
+use tempfile::TempPath;
 
 use super::archive::{Archive, Growing};
 use super::error::{Fault, Place, ReadError};
@@ -25,17 +27,39 @@ pub(super) struct Source {
     /// The entry of the archive that `path` then is.
     pub(super) entry: Option<String>,
     pub(super) gzip: bool,
+    /// Where what was an entry has been unpacked to, and what errors call it.
+    unpacked: Option<(Arc<TempPath>, PathBuf)>,
 }
 
 impl Source {
     /// A file of its own.
     pub(super) fn file(path: &Path) -> Self {
-        Self { path: path.to_owned(), entry: None, gzip: false }
+        Self { path: path.to_owned(), entry: None, gzip: false, unpacked: None }
+    }
+
+    /// An entry of an archive.
+    pub(super) fn entry(archive: &Path, name: String) -> Self {
+        Self { entry: Some(name), ..Self::file(archive) }
+    }
+
+    /// As a file of its own, whose bytes can be read in any order: an entry is unpacked, until the last copy of this is gone.
+    pub(super) fn seekable(self) -> Result<Self, ReadError> {
+        if self.entry.is_none() && !self.gzip {
+            return Ok(self);
+        }
+        let mut file = tempfile::NamedTempFile::new()?;
+        std::io::copy(&mut self.bytes()?, &mut file)?;
+        let unpacked = Arc::new(file.into_temp_path());
+        Ok(Self { path: unpacked.to_path_buf(), entry: None, gzip: false, unpacked: Some((unpacked, self.shown())) })
     }
 
     /// What errors call it.
     pub(super) fn shown(&self) -> PathBuf {
-        self.entry.as_ref().map_or_else(|| self.path.clone(), |entry| self.path.join(entry))
+        match (&self.unpacked, &self.entry) {
+            (Some((_, called)), _) => called.clone(),
+            (None, Some(entry)) => self.path.join(entry),
+            (None, None) => self.path.clone(),
+        }
     }
 
     /// What its only vehicle is called: the name of the file without what says the format.

@@ -12,7 +12,7 @@ use tautline::audit::recorded::{ObjectPair, Outcome, Settings, audit};
 use tautline::swarm::Pair;
 use tautline::track::{Item, Sample};
 
-/// Number of scenes, and of those of `sh tests/run.sh --long`.
+/// Number of scenes, and of those of `sh tests/run.sh --long`; `TAUTLINE_SCENES` sets another.
 const SCENES: u64 = 3000;
 const LONG_SCENES: u64 = 20_000;
 /// One of so many scenes is long enough for several windows.
@@ -309,6 +309,7 @@ fn compare(number: u64, tracks: &Tracks) -> bool {
 #[test]
 fn scenes_are_judged_as_brute_force_judges_them() {
     let scenes = if std::env::var_os("TAUTLINE_LONG").is_some() { LONG_SCENES } else { SCENES };
+    let scenes = std::env::var("TAUTLINE_SCENES").map_or(scenes, |count| count.parse().expect("a number"));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let misled: u64 = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads as u64)

@@ -22,11 +22,11 @@ fn folder(files: &[(&str, &str)]) -> TempDir {
     folder
 }
 
-fn zipped(files: &[(&str, &str)]) -> Vec<u8> {
+fn zipped<C: AsRef<[u8]>>(files: &[(&str, C)]) -> Vec<u8> {
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in files {
         zip.start_file(*name, SimpleFileOptions::default()).expect("an entry");
-        zip.write_all(content.as_bytes()).expect("written");
+        zip.write_all(content.as_ref()).expect("written");
     }
     zip.finish().expect("finished").into_inner()
 }
@@ -61,10 +61,46 @@ fn a_folder_or_archive_with_a_file_for_each_vehicle_is_one_recording() {
         assert_eq!(whole(&path).expect("read").samples(), BOTH, "{name}");
     }
     let (a, b) = (folder.path().join("cf2.csv"), folder.path().join("cf10.txt"));
-    let mut joined = read::open_joined(&[&b, &a], &ReadOptions::default()).expect("opened");
-    let mut items = Vec::new();
-    while joined.read(&mut items).expect("read") {}
-    assert_eq!((joined.vehicles(), items.len()), (&["cf10".to_owned(), "cf2".to_owned()][..], 5));
+    for paths in [&[&*b, &*a][..], &[folder.path()]] {
+        let mut joined = read::open_joined(paths, &ReadOptions::default()).expect("opened");
+        let mut items = Vec::new();
+        while joined.read(&mut items).expect("read") {}
+        assert_eq!((joined.vehicles().len(), items.len()), (2, 5), "{paths:?}");
+    }
+}
+
+#[test]
+fn tables_whose_bytes_are_read_in_any_order_may_be_packed() {
+    let folder = folder(&[("a.csv", A)]);
+    let source = folder.path().join("a.csv");
+    let expected = whole(&source).expect("read");
+    let expected = expected.samples();
+    let open = || read::open(&source, &ReadOptions::default());
+    for (name, format) in [("b.parquet", read::Format::Parquet), ("b.npz", read::Format::Npz)] {
+        let exported = folder.path().join(name);
+        let mut file = fs::File::create(&exported).expect("a file");
+        tautline::export::export(&open, format, &tautline::export::ExportOptions::default(), &mut file)
+            .expect("exported");
+        let bytes = fs::read(&exported).expect("read");
+        let archive = folder.path().join("flight.zip");
+        fs::write(&archive, zipped(&[("a.csv", A.as_bytes()), (name, &bytes)])).expect("written");
+        let found = whole(&archive).expect(name);
+        let samples = found.samples();
+        let of =
+            |vehicle: &'static str| samples.iter().filter(move |sample| sample.1 == vehicle).map(|&(t, _, x)| (t, x));
+        assert_eq!(samples.len(), 2 * expected.len(), "{name}");
+        assert!(of("a").eq(of("b")) && of("a").eq(expected.iter().map(|&(t, _, x)| (t, x))), "{name}");
+        let damaged = zipped(&[("a.csv", A.as_bytes()), (name, &bytes[..bytes.len() / 2])]);
+        fs::write(&archive, damaged).expect("written");
+        let refused = whole(&archive).expect_err("it breaks off").to_string();
+        assert!(refused.contains(name), "{refused}");
+
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        gzip.write_all(&bytes).expect("written");
+        let packed = folder.path().join(format!("{name}.gz"));
+        fs::write(&packed, gzip.finish().expect("finished")).expect("written");
+        assert_eq!(whole(&packed).expect(name).samples().len(), expected.len());
+    }
 }
 
 #[test]
