@@ -285,6 +285,7 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
         auditor = auditor.with_smallest();
     }
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
+    own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
     let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
     arguments.check_count(&outcome, &settings)?;
     let between = arguments.between(curves, own.as_ref());

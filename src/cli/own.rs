@@ -1,8 +1,9 @@
 //! What a recording of `tautline run` says of itself beside positions.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::audit::recorded::Told;
+use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::Event;
 use crate::record::mcap::{Entry, McapRecording};
 use crate::scenario::{self, PlantSpec, Scenario};
@@ -13,6 +14,8 @@ pub(super) struct OwnRecording {
     pub(super) delta_m: f64,
     /// What it says of the time between its samples, in order of time; nothing where it holds every step that was flown.
     pub(super) told: Vec<Told>,
+    /// The times that it says a pair was too close in, but for one that lasts to its end: its last sample shows that.
+    pub(super) violations: Vec<ToldViolation>,
     /// Whether it holds every step that was flown, and every step was straight.
     pub(super) has_every_step: bool,
     /// Most steps between two of its samples.
@@ -34,11 +37,13 @@ impl OwnRecording {
         let mut own = Self {
             delta_m: header.delta_m,
             told: Vec::new(),
+            violations: Vec::new(),
             has_every_step: is_straight,
             most_steps: 0,
             other_law: None,
         };
         let mut before: Option<(u64, f64)> = None;
+        let mut began_s = BTreeMap::new();
         for entry in recording {
             match entry.ok()? {
                 Entry::Sample(sample) => {
@@ -51,6 +56,11 @@ impl OwnRecording {
                     before = Some((sample.step, sample.time_s));
                 }
                 Entry::Event(Event::StepRefined { .. }) => own.has_every_step = false,
+                Entry::Event(Event::ViolationBegan { pair, time_s }) => _ = began_s.insert(pair, time_s),
+                Entry::Event(Event::ViolationEnded { pair, time_s, min_m }) => {
+                    let from_s = began_s.remove(&pair).unwrap_or(time_s);
+                    own.violations.push(ToldViolation { pair, from_s, to_s: time_s, min_m: min_m * scale });
+                }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
                 Entry::Event(_) => {}
             }
@@ -58,6 +68,7 @@ impl OwnRecording {
         own.has_every_step &= own.most_steps <= 1;
         if own.has_every_step {
             own.told.clear();
+            own.violations.clear();
         }
         Some(own)
     }

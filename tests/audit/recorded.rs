@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use tautline::audit::recorded::{
-    Approach, Motion, ObjectPair, Outcome, RecordedError, Settings, Told, TrackAuditor, VehicleSettings, WIDTH_M, audit,
+    Approach, Motion, ObjectPair, Outcome, RecordedError, Settings, Told, ToldViolation, TrackAuditor, VehicleSettings,
+    WIDTH_M, audit,
 };
 use tautline::audit::{Obstacle, Shape, Status};
 use tautline::swarm::{ClosestApproach, Pair};
@@ -674,6 +675,22 @@ fn what_a_recording_says_of_the_time_between_its_samples_goes_before_what_is_dra
     // Drawn too close, and nobody was.
     let missed = judged(&pass(1.0), told(2.5, 0.25), Settings::delta(2.0));
     assert_eq!((missed.status, missed.closest[0].lower_m), (Status::Clear, 2.5));
+    // Of pairs that were not the closest the recording tells when they were too close, once for what is drawn of it too.
+    let third = |y| [seen(2, 0.0, [-5.0, 9.0, 0.0]), seen(2, 1.0, [5.0, y, 0.0])];
+    for (only, drawn_y, expected) in [(None, 9.0, 1), (Some([1, 2]), 9.0, 1), (Some([0, 1]), 9.0, 0), (None, -4.0, 1)] {
+        let only = only.map(|pair: [usize; 2]| pair.iter().map(|k| names(3)[*k].clone()).collect());
+        let mut auditor = TrackAuditor::new(Settings { only, ..Settings::delta(2.0) }).expect("settings");
+        auditor.tell_violation(ToldViolation { pair: Pair::new(1, 2), from_s: 0.3, to_s: 0.9, min_m: 1.5 });
+        let mut items = [&pass(3.0)[..], &third(drawn_y)].concat();
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        auditor.push(&names(3), &items).expect("items");
+        let outcome = auditor.finish().expect("an outcome");
+        let found: Vec<_> =
+            outcome.violations.iter().filter(|v| v.pair == ObjectPair::Vehicles(Pair::new(1, 2))).collect();
+        assert_eq!(found.len(), expected, "{only:?}: {found:?}", only = outcome.vehicles);
+        assert!(found.iter().all(|v| (v.from_s, v.to_s, v.min_m) == (0.3, 0.9, 1.5)), "{found:?}");
+        assert_eq!(outcome.status == Status::Violation, expected > 0);
+    }
     // What is so at a sample no word takes back.
     let mut sampled = pass(3.0);
     sampled.extend([seen(0, 2.0, [0.0; 3]), seen(1, 2.0, [1.0, 0.0, 0.0])]);

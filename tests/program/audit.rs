@@ -346,6 +346,13 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
         assert_eq!(json["separation"]["min_m"], report["separation"]["min_m"], "{out}: {ran:?}");
         assert_eq!(json["separation"]["min_pair"], report["separation"]["min_pair"], "{out}");
         assert_eq!(json["status"], report["audit"]["status"], "{out}");
+        let [told, flown] = [&json, &report].map(|of| of["audit"]["violations"].as_array().expect("a list"));
+        let ended = flown.iter().filter(|v| v["to_s"].as_f64() < report["run"]["duration_s"].as_f64());
+        for violation in ended {
+            let same =
+                |v: &&serde_json::Value| ["pair", "from_s", "to_s", "min_m"].iter().all(|key| v[key] == violation[key]);
+            assert_eq!(told.iter().filter(same).count(), 1, "{out}: {violation} in {told:?}");
+        }
         (ran.exit, json)
     };
     // Stiff, so that vehicles pass each other between two samples a second apart.

@@ -1,7 +1,7 @@
 //! The audit of a recording, as it is read.
 
 use super::error::RecordedError;
-use super::outcome::{Gap, Outcome, Presence, Told};
+use super::outcome::{Gap, Outcome, Presence, Told, ToldViolation};
 use super::rates::Rates;
 use super::settings::{LARGEST, Settings};
 use super::smallest::Smallest;
@@ -110,10 +110,20 @@ impl TrackAuditor {
     /// Takes what the recording itself says of the time since the instant before; in order of time, and at any time before
     /// the end. It counts where distances are metres and no clock is set right.
     pub fn tell(&mut self, told: Told) {
-        let clocks_are_right = self.settings.vehicles.values().all(|of| of.offset_s == 0.0);
-        if self.settings.ellipsoid_m.is_none() && clocks_are_right {
+        if self.listens() {
             self.told.push(told);
         }
+    }
+
+    /// Takes what the recording itself says of two vehicles that were too close for a while, as [`TrackAuditor::tell`].
+    pub fn tell_violation(&mut self, told: ToldViolation) {
+        if self.listens() {
+            self.told.push_violation(told);
+        }
+    }
+
+    fn listens(&self) -> bool {
+        self.settings.ellipsoid_m.is_none() && self.settings.vehicles.values().all(|of| of.offset_s == 0.0)
     }
 
     #[inline]

@@ -19,7 +19,7 @@
 //! vehicle that is late or leaves early is judged while it is there. While a vehicle is not seen for longer than
 //! [`Settings::max_gap_s`], nothing is known of it. Where there never were two to keep apart nothing is clear.
 //!
-//! A run knows more than it records: what it says of the time between two instants ([`Told`]) goes before what is drawn
+//! A run knows more than it records: what it says of the time between two instants ([`Told`], [`ToldViolation`]) goes before what is drawn
 //! between them.
 //!
 //! ```
@@ -56,6 +56,6 @@ pub use super::limits::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use error::RecordedError;
-pub use outcome::{Contradiction, Gap, Outcome, Presence, Told};
+pub use outcome::{Contradiction, Gap, Outcome, Presence, Told, ToldViolation};
 pub use series::{PairSample, PairSeries};
 pub use settings::{Motion, Settings, VehicleSettings};

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
-use crate::swarm::ClosestApproach;
+use crate::swarm::{ClosestApproach, Pair};
 
 /// A time during which a vehicle was not seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -45,6 +45,19 @@ pub struct Told {
     pub to_s: f64,
     /// Who it was, how close \[m\] and when \[s\].
     pub closest: ClosestApproach,
+}
+
+/// A time during which two vehicles were too close, by what a recording itself says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToldViolation {
+    /// Which.
+    pub pair: Pair,
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// Their smallest distance within \[m\].
+    pub min_m: f64,
 }
 
 /// Where a recording contradicts the bound on acceleration that it is judged by.
