@@ -44,12 +44,12 @@ try() {
     done < "$file"
     status=0
     # shellcheck disable=SC2086
-    mutants --in-place --output "$results" --exclude-re ': delete field ' "$@" -- $tests || status=$?
+    mutants --in-place --timeout 60 --output "$results" --exclude-re ': delete field ' "$@" -- $tests || status=$?
     # Exit codes of cargo-mutants: 2 for something missed, 3 for something that no longer ended.
     case $status in 0 | 2 | 3) ;; *) exit "$status" ;; esac
 }
 
-TAUTLINE_SCENES=${TAUTLINE_SCENES:-150}
+TAUTLINE_SCENES=${TAUTLINE_SCENES:-60}
 export TAUTLINE_SCENES
 try "$out/sample.txt" "$scratch/quick" "$quick"
 cat "$scratch/quick/mutants.out/caught.txt" "$scratch/quick/mutants.out/timeout.txt" > "$out/caught.txt"

@@ -102,6 +102,11 @@ impl SceneBuilder<'_> {
         let began: Vec<_> = self.timeline.begun(now_s).collect();
         let undecided_s = self.timeline.undecided_s.filter(|from_s| *from_s <= now_s);
         match (began.first(), undecided_s) {
+            (None, None) if self.timeline.assumes_straight => {
+                let texts =
+                    ["clear so far, if straight between samples", "clear so far, if straight", "if straight: clear"];
+                (texts.map(str::to_owned).to_vec(), theme.good())
+            }
             (None, None) => (vec!["clear so far".to_owned()], theme.good()),
             (None, Some(from_s)) => {
                 let since = format!("undecided from {:.2} s on", from_s.max(self.timeline.range_s()[0]));

@@ -159,6 +159,10 @@ fn what_the_judge_cannot_tell_is_not_called_clear() {
     };
     let said = [1.9, 2.0, 4.5].map(verdict);
     assert_eq!(said, [Some("clear so far".to_owned()), Some("undecided from 2.00 s on".to_owned()), None]);
+    // What was assumed is said in the same line.
+    (timeline.undecided_s, timeline.assumes_straight) = (None, true);
+    let scene = scene(&timeline, 1.9, &View::default());
+    assert!(words(&scene).contains(&"clear so far, if straight between samples"), "{:?}", words(&scene));
 }
 
 #[test]

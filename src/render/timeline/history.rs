@@ -48,6 +48,10 @@ pub struct Timeline {
     pub(in crate::render) hit: Option<(f64, Pair, f64)>,
     /// From when on the judge cannot tell whether two were too close \[s\].
     pub(in crate::render) undecided_s: Option<f64>,
+    /// Every vehicle has a radius of its own in the recording, which is judged by where there is no delta.
+    pub(super) by_radii: bool,
+    /// What is judged was drawn straight between samples: nobody knows better.
+    pub(in crate::render) assumes_straight: bool,
     /// The judge refused the motion.
     pub(super) refused: bool,
     /// Times of the samples around the closest approach (0), and around the worst moment of the k-th violation (k).
@@ -75,6 +79,8 @@ impl Timeline {
             open: BTreeMap::new(),
             hit: None,
             undecided_s: None,
+            by_radii: false,
+            assumes_straight: false,
             refused: false,
             moments_s: BTreeMap::new(),
             every: 1,
@@ -172,9 +178,9 @@ impl Timeline {
     /// Why nothing is judged, where that is so.
     pub(in crate::render) fn unjudged(&self) -> Option<&'static str> {
         match self.delta_m {
-            None => Some("no delta"),
-            Some(_) if self.refused => Some("refused"),
-            Some(_) => None,
+            None if !self.by_radii => Some("no delta"),
+            _ if self.refused => Some("refused"),
+            _ => None,
         }
     }
 

@@ -66,7 +66,7 @@ impl Timeline {
             so_far = nearer(so_far, keyframe.closest);
             keyframe.so_far = so_far;
         }
-        if self.delta_m.is_some() {
+        if self.delta_m.is_some() || self.by_radii {
             let of_two = |violation: Violation<ObjectPair>| {
                 let Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = violation;
                 Some(Violation { pair: pair.vehicles()?, from_s, to_s, min_m, min_at_s, limit_m })

@@ -146,8 +146,8 @@ fn no_distance_is_shown_below_the_closest_so_far() {
     assert_eq!(timeline.at(0.5).expect("a frame").so_far, between);
 }
 
-/// Recorded motion: vehicle, time and place of every sample.
-struct Seen(Vec<(usize, f64, f64, f64)>, Vec<String>);
+/// Recorded motion: vehicle, time and place of every sample; names; a radius of all.
+struct Seen(Vec<(usize, f64, f64, f64)>, Vec<String>, Option<f64>);
 
 impl Tracks for Seen {
     type Error = Infallible;
@@ -158,9 +158,10 @@ impl Tracks for Seen {
 
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, Infallible> {
         let position = |x, y| Vector3::new(x, y, 0.0);
+        let radius_m = self.2;
         items.extend(self.0.drain(..).map(|(vehicle, time_s, x, y)| {
             let position_m = position(x, y);
-            Item::Sample(crate::track::Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
+            Item::Sample(crate::track::Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m })
         }));
         Ok(false)
     }
@@ -176,8 +177,21 @@ impl Tracks for Seen {
 }
 
 fn seen(samples: &[(usize, f64, f64, f64)], delta_m: f64) -> Timeline {
-    let mut tracks = Seen(samples.to_vec(), ["a", "b", "c", "d"].map(str::to_owned).to_vec());
+    let mut tracks = Seen(samples.to_vec(), ["a", "b", "c", "d"].map(str::to_owned).to_vec(), None);
     Timeline::from_tracks("seen", &mut tracks, Some(delta_m)).expect("it can be drawn")
+}
+
+#[test]
+fn radii_of_the_recording_are_judged_by_where_there_is_no_delta() {
+    let samples = vec![(0, 0.0, 0.0, 0.0), (1, 0.0, 5.0, 0.0), (0, 1.0, 0.0, 0.0), (1, 1.0, 1.5, 0.0)];
+    let drawn = |radius_m| {
+        let mut tracks = Seen(samples.clone(), ["a", "b"].map(str::to_owned).to_vec(), radius_m);
+        Timeline::from_tracks("seen", &mut tracks, None).expect("it can be drawn")
+    };
+    let [touching, apart, unknown] = [Some(1.0), Some(0.5), None].map(drawn);
+    assert_eq!([&touching, &apart, &unknown].map(Timeline::unjudged), [None, None, Some("no delta")]);
+    assert_eq!([&touching, &apart, &unknown].map(|drawn| drawn.violations().len()), [1, 0, 0]);
+    assert_eq!((touching.violations()[0].limit_m, touching.assumes_straight), (2.0, true));
 }
 
 #[test]
@@ -185,7 +199,7 @@ fn what_single_precision_cannot_draw_is_refused_with_vehicle_value_and_time() {
     let near = seen(&[(0, 0.0, -FARTHEST_M, 0.0), (1, 0.0, FARTHEST_M, 0.0)], 1.0);
     assert_eq!(near.closest().map(|closest| closest.separation_m), Some(2.0 * FARTHEST_M));
     let samples = vec![(0, 0.0, 0.0, 0.0), (1, 0.0, 1.0, 0.0), (1, 0.5, 1.0, -1e300)];
-    let mut tracks = Seen(samples, ["a", "b"].map(str::to_owned).to_vec());
+    let mut tracks = Seen(samples, ["a", "b"].map(str::to_owned).to_vec(), None);
     let error = Timeline::from_tracks("far", &mut tracks, None).expect_err("too far");
     assert_eq!(
         error.to_string(),

@@ -60,6 +60,8 @@ impl Timeline {
         if tracks.iter().any(|track| track.radius_m.is_none()) {
             timeline.notes.push(format!("vehicles of unknown radius are drawn with {UNKNOWN_RADIUS_M} m"));
         }
+        timeline.by_radii = !tracks.is_empty() && tracks.iter().all(|track| track.radius_m.is_some());
+        timeline.assumes_straight = tracks.iter().any(|track| !track.samples.is_empty());
         let mut places = vec![0; tracks.len()];
         let judged = judge.finish();
         for time_s in common_times(&tracks, &moments_s(&judged)) {
