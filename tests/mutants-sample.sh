@@ -49,7 +49,7 @@ try() {
     case $status in 0 | 2 | 3) ;; *) exit "$status" ;; esac
 }
 
-TAUTLINE_SCENES=${TAUTLINE_SCENES:-60}
+TAUTLINE_SCENES=${TAUTLINE_SCENES:-150}
 export TAUTLINE_SCENES
 try "$out/sample.txt" "$scratch/quick" "$quick"
 cat "$scratch/quick/mutants.out/caught.txt" "$scratch/quick/mutants.out/timeout.txt" > "$out/caught.txt"

@@ -3,6 +3,8 @@
 //! The laws sum over the neighbours j in `N_i` of vehicle i; what they promise depends on the graph's Laplacian `L_G`
 //! and on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
 
+mod spectrum;
+
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -252,24 +254,6 @@ impl Graph {
             laplacian[(j, j)] += w;
         }
         laplacian
-    }
-
-    /// The algebraic connectivity, the second smallest eigenvalue of `L_G`: positive exactly where the graph is
-    /// connected, and 0 for fewer than two vehicles.
-    ///
-    /// N in closed form for the complete graph and exactly 0 for a disconnected one; otherwise all eigenvalues are
-    /// computed, in O(N^3) time and 8 N^2 bytes.
-    #[must_use]
-    pub fn algebraic_connectivity(&self) -> f64 {
-        if self.count < 2 || !self.is_connected() {
-            return 0.0;
-        }
-        if self.is_complete() {
-            return self.count as f64;
-        }
-        let mut eigenvalues = self.laplacian().symmetric_eigenvalues().data.as_vec().clone();
-        eigenvalues.sort_unstable_by(f64::total_cmp);
-        eigenvalues[1]
     }
 }
 

@@ -66,6 +66,12 @@ pub enum ParameterError {
         /// Number of slots of the formation.
         formation: usize,
     },
+    /// No path of links joins a vehicle to the first one.
+    #[error("the graph is not connected: no path joins vehicle {} to vehicle 1", vehicle + 1)]
+    Disconnected {
+        /// The first such vehicle, from 0.
+        vehicle: usize,
+    },
     /// A gain is not a finite number.
     #[error("{name} is {value}; it must be a finite number")]
     NotFinite {

@@ -65,6 +65,11 @@ pub trait Law: DynClone + Send {
     /// Begins its random numbers anew.
     fn reseed(&mut self, _seed: u64) {}
 
+    /// What the law needs beside states over the links, in a few words each: a common compass, a sensor.
+    fn needs(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// What the law holds vehicles to.
     fn controls(&self) -> Controls {
         Controls::Displacements

@@ -103,6 +103,10 @@ impl Law for LaplacianLaw {
         "laplacian"
     }
 
+    fn needs(&self) -> &'static [&'static str] {
+        &["all share a compass"]
+    }
+
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         check_observation(self.graph.count(), at, command)?;
         command.fill(0.0);

@@ -6,6 +6,7 @@
 
 mod certificate;
 mod consensus;
+mod displacement;
 mod edge_tension;
 mod error;
 mod interface;
@@ -18,6 +19,7 @@ mod spec;
 mod tension;
 
 pub use certificate::{Certificate, Void};
+pub use displacement::{DisplacementKeys, DisplacementLaw};
 pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw, EdgeTensionParameters};
 pub use error::{LawError, ParameterError};
 pub use interface::{Controls, Law, VelocityMargin};

@@ -237,6 +237,10 @@ impl Law for PotentialLaw {
         Certificate { certified_m, energy_initial: energy, void }
     }
 
+    fn needs(&self) -> &'static [&'static str] {
+        &["all share a compass", "each sees who is nearer than slots are", "each knows its own velocity"]
+    }
+
     fn barrier_m(&self) -> Option<f64> {
         Some(self.delta_m)
     }

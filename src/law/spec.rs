@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::displacement::DisplacementKeys;
 use super::edge_tension::EdgeTensionKeys;
 use super::error::ParameterError;
 use super::interface::Law;
@@ -52,6 +53,8 @@ macro_rules! laws {
 laws! {
     /// Distances as springs with a barrier at delta: collision-free on the complete graph.
     EdgeTension(EdgeTensionKeys),
+    /// Consensus on the slots over any connected graph, and a tension between all who are near: collision-free.
+    Displacement(DisplacementKeys),
     /// The Laplacian baseline: converges from every start and avoids nothing.
     Laplacian(LaplacianKeys),
     /// A potential field: consensus on the slots, repulsion from whoever is near, each vehicle braking itself.

@@ -11,7 +11,6 @@ mod words;
 use serde::Serialize;
 
 use crate::formation::affine_dimension;
-use crate::graph::Graph;
 use crate::law::{Controls, Law, ParameterError, Void};
 use crate::scenario::{LARGEST, Scenario};
 use crate::space::closest_pair;
@@ -19,10 +18,6 @@ use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
 
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
-
-/// Most vehicles for which the algebraic connectivity of a graph that is not complete is computed, at O(N^3): a second or
-/// two.
-pub const MOST_CONNECTED: usize = 1000;
 
 /// A velocity margin up to this part of its two terms is rounding of eigenvalues, not damping.
 const MARGIN_ROUNDING: f64 = 1e-12;
@@ -41,9 +36,8 @@ pub struct Preflight {
     pub dimensions: usize,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
-    /// Second smallest eigenvalue lambda2 of the graph's Laplacian; null for a graph of more than [`MOST_CONNECTED`]
-    /// vehicles that is not complete.
-    pub algebraic_connectivity: Option<f64>,
+    /// Second smallest eigenvalue lambda2 of the graph's Laplacian.
+    pub algebraic_connectivity: f64,
     /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: for g >= 0 relative
     /// velocities are damped at least at this rate where it is positive, and grow where it is negative. For g < 0 the
     /// largest possible eigenvalue N takes the place of lambda2.
@@ -54,6 +48,8 @@ pub struct Preflight {
     pub energy_initial: Option<f64>,
     /// Separation below which no pair ever comes \[m\].
     pub certified_m: Option<f64>,
+    /// What the law needs beside the links, such as a sensor, in a few words each.
+    pub needs: Vec<&'static str>,
     /// Why nothing is certified, a sentence each.
     pub certificate_void: Vec<String>,
     /// Separation below which no pair joined by an edge ever comes \[m\], where the graph is not complete, so that no other
@@ -84,6 +80,8 @@ pub struct Preflight {
     pub warnings: Vec<Warning>,
     #[serde(skip)]
     controls_distances: bool,
+    #[serde(skip)]
+    links_all: bool,
 }
 
 /// Something that stands in the way of a flight.
@@ -146,7 +144,7 @@ impl Preflight {
             .void_where(scenario.legs.len() > 1, Void::TargetChanges)
             .void_where(scenario.time.control_hz.is_some(), Void::CommandsHeld);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
-        let connectivity = connectivity(&scenario.graph);
+        let connectivity = scenario.graph.algebraic_connectivity();
         let drift = scenario.drift(law.common_mode_rate_per_s(scenario.a22_per_s));
         let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
@@ -155,11 +153,11 @@ impl Preflight {
             dimensions: scenario.space.dimensions(),
             delta_m: scenario.delta_m,
             algebraic_connectivity: connectivity,
-            velocity_margin_per_s: connectivity
-                .and_then(|lambda2| Some(law.velocity_margin(lambda2, scenario.a22_per_s)?.per_s)),
+            velocity_margin_per_s: law.velocity_margin(connectivity, scenario.a22_per_s).map(|margin| margin.per_s),
             common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.a22_per_s),
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
+            needs: law.needs().to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             certified_edges_m: None,
             epsilon: scenario.plant.epsilon(),
@@ -176,6 +174,7 @@ impl Preflight {
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
             controls_distances: law.controls() == Controls::Distances,
+            links_all: scenario.graph.is_complete(),
         };
         let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
         if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {
@@ -209,11 +208,7 @@ impl Preflight {
     }
 
     fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<String> {
-        // Fiedler: lambda2 is at most N/(N - 1) times the smallest degree.
-        let count = self.vehicles as f64;
-        let most = || smallest_degree(&scenario.graph) as f64 * count / (count - 1.0).max(1.0);
-        let connectivity = self.algebraic_connectivity.unwrap_or_else(most);
-        let margin = law.velocity_margin(connectivity, scenario.a22_per_s)?;
+        let margin = law.velocity_margin(self.algebraic_connectivity, scenario.a22_per_s)?;
         (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
             let rate = numbers::rate(margin.per_s);
             format!(
@@ -346,19 +341,6 @@ impl Preflight {
     fn is_flat_in_space(&self) -> bool {
         self.dimensions == 3 && self.formation_dimension < 3.min(self.vehicles.saturating_sub(1))
     }
-}
-
-fn connectivity(graph: &Graph) -> Option<f64> {
-    (graph.is_complete() || graph.count() <= MOST_CONNECTED).then(|| graph.algebraic_connectivity())
-}
-
-fn smallest_degree(graph: &Graph) -> usize {
-    let mut degrees = vec![0_usize; graph.count()];
-    for (i, j) in graph.edges() {
-        degrees[i] += 1;
-        degrees[j] += 1;
-    }
-    degrees.into_iter().min().unwrap_or(0)
 }
 
 /// Dimension of the flat, moving with the swarm's mean velocity, that forces along the lines between vehicles never

@@ -59,6 +59,7 @@ impl Preflight {
         table([
             ("stability", self.stability_line()),
             ("certificate", self.certificate_line()),
+            ("needs", self.needs_line()),
             ("step", self.step_line()),
             ("start", self.start_line()),
             ("formation", self.formation_line()),
@@ -67,11 +68,11 @@ impl Preflight {
     }
 
     fn stability_line(&self) -> String {
-        let connectivity = self.algebraic_connectivity.map_or("unknown".to_owned(), |number| format!("{number:.6}"));
         let margin = self.velocity_margin_per_s.map_or("unknown".to_owned(), rate);
         format!(
-            "margin of relative velocities {margin} 1/s (algebraic connectivity {connectivity}), growth of the common \
+            "margin of relative velocities {margin} 1/s (algebraic connectivity {}), growth of the common \
              velocity {} 1/s",
+            eigenvalue(self.algebraic_connectivity),
             self.common_mode_rate_per_s
         )
     }
@@ -82,6 +83,12 @@ impl Preflight {
             Some(certified_m) => format!("{} m, from {energy}", at_least(certified_m, 6)),
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }
+    }
+
+    fn needs_line(&self) -> String {
+        let links =
+            if self.links_all { "everybody hears everybody" } else { "neighbours on the graph hear each other" };
+        std::iter::once(links).chain(self.needs.iter().copied()).collect::<Vec<_>>().join("; ")
     }
 
     fn step_line(&self) -> String {
@@ -135,6 +142,10 @@ impl Preflight {
             ", convergence perhaps slow"
         }
     }
+}
+
+fn eigenvalue(number: f64) -> String {
+    if number == 0.0 || number >= 1e-2 { format!("{number:.6}") } else { significant(number) }
 }
 
 fn flat(dimension: usize) -> &'static str {

@@ -3,6 +3,7 @@
 #[path = "../support/flight.rs"]
 mod flight;
 
+mod displacement;
 mod ideal_plant;
 mod law_properties;
 mod loop_claims;

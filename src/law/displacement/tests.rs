@@ -1,0 +1,135 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::swarm::Swarm;
+
+const DELTA_M: f64 = 1.0;
+const A22_PER_S: f64 = 0.3;
+const ZETA_PER_S: f64 = 0.8;
+
+fn keys() -> DisplacementKeys {
+    DisplacementKeys { k_per_s2: 0.7, zeta_per_s: ZETA_PER_S, alpha: 0.6 }
+}
+
+fn law(links: &Graph, formation: &Formation) -> DisplacementLaw {
+    let setting = Setting { links, formation, delta_m: DELTA_M, a22_per_s: A22_PER_S };
+    DisplacementLaw::new(&setting, keys()).expect("a law")
+}
+
+fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Result<Rows, LawError> {
+    let mut near = NearPairs::default();
+    near.update(&at.own.positions_m, law.sensing_range_m().expect("a range"));
+    let mut command = Rows::from_element(at.own.count(), f64::NAN);
+    law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
+}
+
+/// Seven vehicles on a grid of 1.6 m, disturbed by less than leaves them clear of delta, with slots 2 m apart.
+fn swarms() -> impl Strategy<Value = Swarm> {
+    prop::collection::vec(-0.25..0.25_f64, 42).prop_map(|noise| Swarm {
+        positions_m: Formation::grid(7, 1.6).slots_m + Rows::from_column_slice(&noise[..21]),
+        velocities_m_s: Rows::from_column_slice(&noise[21..]),
+    })
+}
+
+fn graphs() -> [Graph; 4] {
+    [Graph::complete(7), Graph::star(7), Graph::ring(7), Graph::path(7)]
+}
+
+proptest! {
+    #[test]
+    fn the_command_is_the_fall_of_the_potential_and_damps_velocities_over_links(swarm in swarms()) {
+        const STEP_M: f64 = 1e-6;
+        for links in graphs() {
+            let formation = Formation::grid(7, 2.0);
+            let mut law = law(&links, &formation);
+            let found = command(&mut law, &Observation::exact(&swarm, &links, &formation))?;
+            let damped = links.laplacian() * &swarm.velocities_m_s
+                * ((ZETA_PER_S + A22_PER_S) / links.algebraic_connectivity());
+            for i in 0..7 {
+                for axis in 0..3 {
+                    let energy = |by_m: f64| {
+                        let mut moved = swarm.clone();
+                        moved.positions_m[(i, axis)] += by_m;
+                        law.energy(&Observation::exact(&moved, &links, &formation)).expect("clear of delta")
+                    };
+                    let gradient = (energy(STEP_M) - energy(-STEP_M)) / (2.0 * STEP_M);
+                    let expected = -gradient - damped[(i, axis)];
+                    prop_assert!((found[(i, axis)] - expected).abs() < 1e-6 * (1.0 + expected.abs()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_energy_falls_at_least_at_the_promised_rate_on_every_graph(swarm in swarms()) {
+        for links in graphs() {
+            let formation = Formation::grid(7, 2.0);
+            let mut law = law(&links, &formation);
+            let u = command(&mut law, &Observation::exact(&swarm, &links, &formation))?;
+            // dE/dt = sum v~ . (a22 v + u) + sum grad_p E . v, with grad_p E = -(u + damping).
+            let mean = swarm.mean_velocity_m_s();
+            let sigma = 1.0 / links.algebraic_connectivity();
+            let damping = links.laplacian() * &swarm.velocities_m_s * (sigma * (ZETA_PER_S + A22_PER_S));
+            let (mut rate, mut relative) = (0.0, 0.0);
+            for i in 0..7 {
+                let v = row(&swarm.velocities_m_s, i);
+                rate += (v - mean).dot(&(A22_PER_S * v + row(&u, i))) - (row(&u, i) + row(&damping, i)).dot(&v);
+                relative += (v - mean).norm_squared();
+            }
+            prop_assert!(rate <= -ZETA_PER_S * relative + 1e-9 * (1.0 + relative), "{rate} {relative}");
+        }
+    }
+
+    #[test]
+    fn what_is_certified_is_where_one_pair_would_hold_all_the_energy(swarm in swarms()) {
+        for links in graphs() {
+            let formation = Formation::grid(7, 2.0);
+            let law = law(&links, &formation);
+            let Certificate { certified_m, energy_initial, void } =
+                law.certificate(&Observation::exact(&swarm, &links, &formation));
+            let (certified_m, energy) = (certified_m.expect("certified"), energy_initial.expect("an energy"));
+            prop_assert!(void.is_empty() && certified_m > DELTA_M && certified_m <= 2.0);
+            prop_assert!((law.tension.value(certified_m) - energy).abs() < 1e-9 * energy);
+        }
+    }
+
+    #[test]
+    fn the_centre_of_mass_is_not_moved(swarm in swarms()) {
+        for links in graphs() {
+            let formation = Formation::grid(7, 2.0);
+            let found = command(&mut law(&links, &formation), &Observation::exact(&swarm, &links, &formation))?;
+            prop_assert!(found.row_sum().norm() < 1e-12 * (1.0 + found.norm()));
+        }
+    }
+}
+
+#[test]
+fn slots_are_at_rest_wherever_the_swarm_is_and_touch_nothing() {
+    let formation = Formation::grid(7, 2.0);
+    let moved = Swarm::at_rest(Rows::from_fn(7, |i, axis| formation.slots_m[(i, axis)] + 10.0));
+    for links in graphs() {
+        let mut law = law(&links, &formation);
+        let at = Observation::exact(&moved, &links, &formation);
+        assert!(command(&mut law, &at).expect("a command").norm() < 1e-12);
+        assert!(law.energy(&at).expect("an energy") < 1e-24);
+    }
+}
+
+#[test]
+fn what_has_no_law_is_refused() {
+    let (links, formation) = (Graph::complete(2), Formation::line(2, 2.0));
+    let touching = Swarm::at_rest(Formation::line(2, DELTA_M).slots_m);
+    let at = Observation::exact(&touching, &links, &formation);
+    assert!(matches!(command(&mut law(&links, &formation), &at), Err(LawError::Collision { .. })));
+    assert!(matches!(law(&links, &formation).certificate(&at).void[..], [Void::StartRefused(_)]));
+
+    let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
+    let line = Formation::line(4, 2.0);
+    let setting = Setting { links: &apart, formation: &line, delta_m: DELTA_M, a22_per_s: 0.0 };
+    let refused = DisplacementLaw::new(&setting, keys()).expect_err("not connected");
+    assert_eq!(refused.to_string(), "the graph is not connected: no path joins vehicle 3 to vehicle 1");
+    let tight = Formation::line(4, DELTA_M);
+    let links = Graph::ring(4);
+    let setting = Setting { links: &links, formation: &tight, delta_m: DELTA_M, a22_per_s: 0.0 };
+    assert!(matches!(DisplacementLaw::new(&setting, keys()), Err(ParameterError::Tension { .. })));
+}
