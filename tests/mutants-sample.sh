@@ -9,8 +9,8 @@ set -eu
 cd "$(dirname "$0")/.."
 count=${1:-150}
 seed=${2:-1}
-quick="--no-default-features --features files --lib --test audit --test bits"
-slow="--test flights --test allocations --test program"
+quick="--no-default-features --features=files --lib --test=audit --test=bits"
+slow="--test=flights --test=allocations --test=program"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -42,9 +42,12 @@ try() {
     while IFS= read -r name; do
         set -- "$@" --re "^$(printf '%s' "$name" | sed 's/[][(){}.*+?|^$\\]/\\&/g')\$"
     done < "$file"
+    # For building and for testing alike.
+    for word in $tests; do
+        set -- "$@" -C "$word"
+    done
     status=0
-    # shellcheck disable=SC2086
-    mutants --in-place --timeout 60 --output "$results" --exclude-re ': delete field ' "$@" -- $tests || status=$?
+    mutants --in-place --timeout 100 --output "$results" --exclude-re ': delete field ' "$@" || status=$?
     # Exit codes of cargo-mutants: 2 for something missed, 3 for something that no longer ended.
     case $status in 0 | 2 | 3) ;; *) exit "$status" ;; esac
 }

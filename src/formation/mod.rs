@@ -3,6 +3,8 @@
 //! Laws that control distances reach a formation only up to a rotation, a reflection and a translation, so the errors
 //! here do not see those either.
 
+#[cfg(feature = "files")]
+mod assignment;
 mod fit;
 mod flat;
 
@@ -12,6 +14,8 @@ use crate::graph::Graph;
 use crate::space::closest_pair;
 use crate::swarm::{Pair, Rows, row, separation, set_row};
 
+#[cfg(feature = "files")]
+pub use assignment::{Freedom, MOST_ASSIGNED, optimal_slots};
 pub use fit::{RigidMotion, best_rigid_motion, procrustes_rms_m};
 pub use flat::affine_dimension;
 
@@ -26,6 +30,17 @@ impl Formation {
     /// Given slots \[m\].
     #[must_use]
     pub fn points(slots_m: Rows) -> Self {
+        Self { slots_m }
+    }
+
+    /// The same slots in another order: vehicle i gets slot `slots[i]`.
+    ///
+    /// # Panics
+    /// If there is no such slot.
+    #[must_use]
+    pub fn reordered(&self, slots: &[usize]) -> Self {
+        let mut slots_m = Rows::zeros(slots.len());
+        slots.iter().enumerate().for_each(|(i, &slot)| set_row(&mut slots_m, i, row(&self.slots_m, slot)));
         Self { slots_m }
     }
 

@@ -7,14 +7,16 @@
 use nalgebra::Vector3;
 
 use super::document::{
-    Document, Edge, FormationShape, GraphKind, PerVehicle, PlantKind, PlantTable, Point, StartShape, StartTable,
+    Assignment, Document, Edge, FormationShape, GraphKind, PerVehicle, PlantKind, PlantTable, Point, StartShape,
+    StartTable,
 };
 use super::error::ScenarioError;
 use super::limits::{check_count, check_lengths, check_memory, pair_count, positive};
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
-use crate::formation::Formation;
+use crate::formation::{Formation, Freedom, MOST_ASSIGNED, optimal_slots};
 use crate::graph::{Graph, GraphError};
+use crate::law::Controls;
 use crate::swarm::{Rows, Swarm, set_row};
 use crate::target::Leg;
 
@@ -29,7 +31,8 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     check_lists(&document, count)?;
     let space = space(&document)?;
     let (law, delta_m) = (document.law.kind.complete(document.swarm.a22_per_s), document.law.delta_m);
-    Ok(Scenario {
+    let assignment = document.formation.assignment;
+    let scenario = Scenario {
         start: start(&document.start, count, space, delta_m)?,
         mass_kg: per_vehicle(document.swarm.mass_kg, count),
         hull_radius_m: per_vehicle(document.swarm.hull_radius_m, count),
@@ -48,7 +51,34 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         space,
         law,
         delta_m,
-    })
+    };
+    match assignment {
+        Assignment::Given => Ok(scenario),
+        Assignment::Optimal => assigned(scenario),
+    }
+}
+
+/// Gives each vehicle the slot that makes the sum of squared ways least. A scenario without a law is left for
+/// [`super::validate`] to refuse.
+fn assigned(mut scenario: Scenario) -> Result<Scenario, ScenarioError> {
+    let Ok(law) = scenario.law() else { return Ok(scenario) };
+    let freedom = match law.controls() {
+        Controls::Distances => Freedom::RigidMotion,
+        Controls::Displacements => Freedom::Translation,
+    };
+    if scenario.count() > MOST_ASSIGNED {
+        return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
+            .with_help(format!("set formation.assignment to \"given\", or fly at most {MOST_ASSIGNED} vehicles"))
+            .at("formation.assignment")
+            .at("swarm.count"));
+    }
+    for leg in &mut scenario.legs {
+        // What is not finite is told by validation.
+        if let Some(slots) = optimal_slots(&scenario.start.positions_m, &leg.formation, freedom) {
+            leg.formation = leg.formation.reordered(&slots);
+        }
+    }
+    Ok(scenario)
 }
 
 /// Number of vehicles: as given, or else as many as there are points, start before formation.

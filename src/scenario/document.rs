@@ -130,8 +130,25 @@ pub(super) enum StartShape {
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FormationTable {
+    /// Who flies to which slot.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = "given")))]
+    pub(super) assignment: Assignment,
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) shape: FormationShape,
+}
+
+/// Who flies to which slot.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Assignment {
+    /// Each vehicle to the slot of its number.
+    #[default]
+    Given,
+    /// Vehicles are interchangeable: the sum of squared ways is least, once the formation is moved as the law leaves it free.
+    /// For up to 5000 vehicles.
+    Optimal,
 }
 
 /// A formation and its size.

@@ -7,8 +7,8 @@ use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
-    Document, Edge, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, PerVehicle, PlantKind, PlantTable,
-    Point, StartTable, SwarmTable,
+    Assignment, Document, Edge, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, PerVehicle, PlantKind,
+    PlantTable, Point, StartTable, SwarmTable,
 };
 use super::spec::{PlantSpec, Scenario, Space};
 use crate::swarm::Rows;
@@ -71,6 +71,7 @@ impl From<&Scenario> for Document {
                 shape: None,
             },
             formation: FormationTable {
+                assignment: Assignment::Given,
                 shape: FormationShape::Points { points_m: scenario.points(&scenario.formation().slots_m) },
             },
             law: LawTable { kind: law, delta_m: scenario.delta_m },

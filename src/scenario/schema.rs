@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn a_key_is_found_in_its_table_and_in_each_choice_that_has_it() {
         assert_eq!(tables_with("count"), ["[swarm]"]);
-        assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\""]);
+        assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
         assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
         assert_eq!(tables_with("spacing_m").len(), 4);
         assert_eq!(tables_with("nowhere"), [] as [&str; 0]);

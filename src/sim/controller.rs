@@ -5,7 +5,7 @@ use crate::graph::Graph;
 use crate::law::{Law, LawError};
 use crate::link::Link;
 use crate::observation::Observation;
-use crate::space::NearPairs;
+use crate::space::KeptPairs;
 use crate::swarm::{Rows, Swarm};
 use crate::target::{CurrentTarget, Supervisor};
 
@@ -17,7 +17,7 @@ pub(super) struct Controller {
     pub(super) supervisor: Box<dyn Supervisor>,
     pub(super) target: CurrentTarget,
     pub(super) links: Graph,
-    near: NearPairs,
+    near: KeptPairs,
 }
 
 impl Controller {
@@ -28,7 +28,7 @@ impl Controller {
         target: CurrentTarget,
         links: Graph,
     ) -> Self {
-        Self { law, link, supervisor, target, links, near: NearPairs::default() }
+        Self { law, link, supervisor, target, links, near: KeptPairs::default() }
     }
 
     /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the

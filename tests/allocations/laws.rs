@@ -3,7 +3,9 @@
 use stats_alloc::Region;
 use tautline::formation::{Formation, best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use tautline::graph::Graph;
-use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law};
+use tautline::law::{
+    DisplacementKeys, DisplacementLaw, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, Setting,
+};
 use tautline::observation::Observation;
 use tautline::swarm::{Rows, Swarm};
 
@@ -18,7 +20,9 @@ pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
         for graph in [Graph::complete(count), Graph::ring(count)] {
             let mut edge_tension = EdgeTensionLaw::new(&graph, &formation, parameters).expect("slots clear of delta");
             let mut laplacian = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
-            let laws: [&mut dyn Law; 2] = [&mut edge_tension, &mut laplacian];
+            let setting = Setting { links: &graph, formation: &formation, delta_m: 0.1, a22_per_s: 0.1 };
+            let mut displacement = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
+            let laws: [&mut dyn Law; 3] = [&mut edge_tension, &mut laplacian, &mut displacement];
             let at = Observation::exact(&swarm, &graph, &formation);
             let region = Region::new(ALLOCATOR);
             for law in laws {
