@@ -5,6 +5,7 @@
 
 use nalgebra::Vector3;
 
+use crate::formation::Freedom;
 use crate::graph::Graph;
 use crate::record::{Event, Peaks, RecordError, Sample, Sink};
 use crate::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
@@ -16,6 +17,7 @@ pub struct Metrics<'a> {
     legs: &'a [Leg],
     graph: &'a Graph,
     arrival: Arrival,
+    freedom: Freedom,
     /// The leg under way, from 0.
     leg: usize,
     /// Legs that have ended.
@@ -56,8 +58,8 @@ pub struct Summary {
     pub held_s: Option<f64>,
     /// Largest error of a desired distance over the graph's edges at the end \[m\].
     pub max_edge_error_m: f64,
-    /// Root mean square distance of the vehicles from the formation in its best place, turned and perhaps mirrored, at
-    /// the end \[m\].
+    /// Root mean square distance of the vehicles from the formation in its best place, turned and perhaps mirrored where it
+    /// is free to be, at the end \[m\].
     pub rms_position_error_m: f64,
     /// Largest speed relative to the swarm's mean velocity at the end \[m/s\].
     pub disagreement_m_s: f64,
@@ -98,6 +100,7 @@ impl<'a> Metrics<'a> {
             legs,
             graph,
             arrival,
+            freedom: Freedom::RigidMotion,
             leg: 0,
             ended: Vec::new(),
             samples: 0,
@@ -114,13 +117,20 @@ impl<'a> Metrics<'a> {
         }
     }
 
+    /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
+    #[must_use]
+    pub fn free_by(mut self, freedom: Freedom) -> Self {
+        self.freedom = freedom;
+        self
+    }
+
     /// Takes one sample: O(edges), and no allocation after the first.
     pub fn observe(&mut self, sample: &Sample<'_>) {
         self.samples += 1;
         self.last_s = sample.time_s;
         let leg = self.legs.get(self.leg);
-        self.distance =
-            leg.map_or_else(Distance::unknown, |leg| Distance::of(sample.swarm, &leg.formation, self.graph));
+        self.distance = leg
+            .map_or_else(Distance::unknown, |leg| Distance::of(sample.swarm, &leg.formation, self.graph, self.freedom));
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
         self.observe_energy(sample.energy);

@@ -32,10 +32,12 @@ pub fn run_while(
     sink: &mut dyn Sink,
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, SimError> {
-    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
+    let parts = Parts::of(scenario)?;
+    let freedom = parts.law.controls().freedom();
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(freedom);
     let mut state_hash = StateHash::new();
     let mut sinks = (sink, (&mut metrics, &mut state_hash));
-    let flight = sim::fly(scenario, Parts::of(scenario)?, &mut sinks, carry_on)?;
+    let flight = sim::fly(scenario, parts, &mut sinks, carry_on)?;
     Ok(report(scenario, preflight, &flight, &metrics, state_hash.finish()))
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Rotation3, Vector3};
 
-use super::{Formation, best_rigid_motion};
+use super::{Formation, Freedom, best_rigid_motion};
 use crate::swarm::{Rows, mean_row, row, set_row};
 
 /// Most vehicles that are assigned: the table of all distances takes 8 N^2 bytes, and assigning them O(N^3).
@@ -13,15 +13,6 @@ const TURNED_UP_TO: usize = 200;
 const TURNS: u32 = 8;
 /// Assignments and fits that follow each other: each lowers the sum, so few are needed.
 const MOST_ROUNDS: usize = 50;
-
-/// What a formation may be moved by before it counts as reached.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Freedom {
-    /// A translation.
-    Translation,
-    /// Any rigid motion, reflections among them.
-    RigidMotion,
-}
 
 /// For each vehicle the slot that it is given, so that the sum of squared distances from the positions to their slots, once
 /// the formation is moved as it may be, is least: exactly for translations. For rigid motions assignment and

@@ -175,3 +175,16 @@ fn shapes_have_the_distances_they_are_named_for() {
         [0; 3]
     );
 }
+
+#[test]
+fn what_is_free_to_be_turned_fits_turned_and_what_is_not_does_not() {
+    let formation = Formation::grid(6, 2.0);
+    let quarter = |x: f64, y: f64| [7.0 - y, x + 3.0, 0.0];
+    let turned: Vec<f64> = (0..6).flat_map(|i| quarter(formation.slots_m[(i, 0)], formation.slots_m[(i, 1)])).collect();
+    let moved = Rows::from_fn(6, |i, axis| formation.slots_m[(i, axis)] + 5.0);
+    let error_m = |positions_m: &Rows, freedom| rms_position_error_m(positions_m, &formation, freedom);
+    let turned = Rows::from_row_slice(&turned);
+    assert!(error_m(&turned, Freedom::RigidMotion) < 1e-12 && error_m(&turned, Freedom::Translation) > 1.0);
+    assert!(error_m(&moved, Freedom::RigidMotion) < 1e-12 && error_m(&moved, Freedom::Translation) < 1e-12);
+    assert!(rms_position_error_m(&Rows::zeros(5), &formation, Freedom::Translation).is_nan());
+}

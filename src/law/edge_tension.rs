@@ -256,6 +256,11 @@ impl Law for EdgeTensionLaw {
         self.try_energy(at.own).ok()
     }
 
+    fn promise(&self) -> &'static str {
+        "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on the control, no \
+         disturbance and continuous time: the law's energy never grows, so no pair's tension exceeds N E(0)."
+    }
+
     fn barrier_m(&self) -> Option<f64> {
         Some(self.parameters.delta_m)
     }

@@ -4,6 +4,7 @@ use dyn_clone::DynClone;
 
 use super::certificate::{Certificate, Void};
 use super::error::LawError;
+use crate::formation::Freedom;
 use crate::observation::Observation;
 use crate::swarm::Rows;
 use crate::target::Target;
@@ -41,6 +42,12 @@ pub trait Law: DynClone + Send {
     /// What the law promises about separation from this start on, before the first step.
     fn certificate(&self, _start: &Observation<'_>) -> Certificate {
         Certificate::void(Void::NoBarrier)
+    }
+
+    /// What the certified distance rests on, a sentence.
+    fn promise(&self) -> &'static str {
+        "The certified distance holds for exact states of all whom a vehicle hears and sees, no delay, no limit on the control, no \
+         disturbance and continuous time: the law's energy never grows, and no pair can hold more than all of it."
     }
 
     /// Distance below which no pair joined by a link comes for as long as the energy does not exceed that of this start
@@ -102,6 +109,17 @@ pub enum Controls {
     Distances,
     /// Differences of positions, in the directions of the common frame: a formation is reached up to translation.
     Displacements,
+}
+
+impl Controls {
+    /// What a formation may be moved by and count as reached.
+    #[must_use]
+    pub fn freedom(self) -> Freedom {
+        match self {
+            Self::Distances => Freedom::RigidMotion,
+            Self::Displacements => Freedom::Translation,
+        }
+    }
 }
 
 /// How fast relative velocities are damped: at least at this rate where it is positive, and perhaps growing where it is

@@ -7,6 +7,7 @@ use super::flight::{Report, Violation};
 use super::page::{self, Badge, Page, Picture, noted, section};
 use crate::audit::Status;
 use crate::figures::Figure;
+use crate::formation::Freedom;
 use crate::scenario::{PlantSpec, Precision, Scenario};
 use crate::swarm::Bounce;
 use crate::text::{at_least, seconds, significant};
@@ -161,11 +162,13 @@ impl Report {
 
     fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
         let certificate = if self.separation.certified_m.is_some() {
-            "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on the \
-             control, no disturbance and continuous time: the law's energy never grows, so no pair's tension exceeds N E(0)."
-                .to_owned()
+            scenario.law().map_or_else(|error| error.to_string(), |law| law.promise().to_owned())
         } else {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
+        };
+        let moved = match scenario.law().map(|law| law.controls().freedom()) {
+            Ok(Freedom::Translation) => "wherever it is",
+            _ => "wherever it is, turned and perhaps mirrored",
         };
         let (time, judge) = (&scenario.time, &scenario.arrival);
         let (plant, command) = match scenario.plant {
@@ -205,9 +208,9 @@ impl Report {
                 .to_owned(),
             format!(
                 "Reached means: no edge is wrong by more than {0} m, the vehicles are within {0} m (root mean square) of the \
-                 formation, turned and perhaps mirrored, and none differs from the mean velocity by more than {1} m/s, from \
+                 formation, {3}, and none differs from the mean velocity by more than {1} m/s, from \
                  then on to the end, for at least {2} s.",
-                judge.edge_error_m, judge.disagreement_m_s, judge.hold_s
+                judge.edge_error_m, judge.disagreement_m_s, judge.hold_s, moved
             ),
             format!(
                 "Errors are those of the recorded samples, at most {} a second; the smallest distance, the largest energy and \

@@ -193,8 +193,8 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
             judge.edge_error_m
         ),
         Fails::RmsPositionErrorM => format!(
-            "at the end every edge has its length and the shape is another one: vehicles are {} m (root mean square) \
-             from the formation, and {} m are allowed",
+            "at the end every edge has its length and the shape is another one, or turned where it may not be: vehicles \
+             are {} m (root mean square) from the formation, and {} m are allowed",
             metres(summary.rms_position_error_m),
             judge.edge_error_m
         ),

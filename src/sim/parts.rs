@@ -31,7 +31,8 @@ impl Parts {
     /// What the scenario asks for, under another law.
     #[must_use]
     pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
-        let supervisor = Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival);
+        let supervisor =
+            Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(law.controls().freedom());
         Self { law, motion: Motion::of(scenario), link: Box::new(Direct), supervisor: Box::new(supervisor) }
     }
 }

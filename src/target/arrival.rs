@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::formation::{Formation, largest_edge_error_m, procrustes_rms_m};
+use crate::formation::{Formation, Freedom, largest_edge_error_m, rms_position_error_m};
 use crate::graph::Graph;
 use crate::swarm::Swarm;
 
@@ -10,7 +10,8 @@ use crate::swarm::Swarm;
 const TIME_ROUNDING_S: f64 = 1e-9;
 
 /// What counts as a reached formation: to the end of the flight, and at least for `hold_s`, both limits hold, and the
-/// vehicles are no more than `edge_error_m` (root mean square) from the formation laid over them.
+/// vehicles are no more than `edge_error_m` (root mean square) from the formation laid over them: turned and perhaps mirrored
+/// under a law that holds distances, moved alone under one that holds displacements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -34,19 +35,20 @@ impl Default for Arrival {
 pub struct Distance {
     /// Largest error of a desired distance over the graph's edges \[m\].
     pub max_edge_error_m: f64,
-    /// Root mean square distance from the formation in its best place, turned and perhaps mirrored \[m\].
+    /// Root mean square distance from the formation in its best place \[m\]: turned and perhaps mirrored where it is free to
+    /// be.
     pub rms_position_error_m: f64,
     /// Largest speed relative to the mean velocity \[m/s\].
     pub disagreement_m_s: f64,
 }
 
 impl Distance {
-    /// Of a swarm from a formation: O(edges).
+    /// Of a swarm from a formation that is free to be moved so: O(edges).
     #[must_use]
-    pub fn of(swarm: &Swarm, formation: &Formation, graph: &Graph) -> Self {
+    pub fn of(swarm: &Swarm, formation: &Formation, graph: &Graph, freedom: Freedom) -> Self {
         Self {
             max_edge_error_m: largest_edge_error_m(&swarm.positions_m, formation, graph),
-            rms_position_error_m: procrustes_rms_m(&swarm.positions_m, formation),
+            rms_position_error_m: rms_position_error_m(&swarm.positions_m, formation, freedom),
             disagreement_m_s: swarm.disagreement_m_s(),
         }
     }

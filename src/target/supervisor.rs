@@ -3,6 +3,7 @@
 use dyn_clone::DynClone;
 
 use super::{Arrival, Begins, CurrentTarget, Distance, Leg};
+use crate::formation::Freedom;
 use crate::graph::Graph;
 use crate::swarm::Swarm;
 
@@ -30,6 +31,7 @@ pub struct Schedule {
     legs: Vec<Leg>,
     links: Graph,
     arrival: Arrival,
+    freedom: Freedom,
     /// Since when the present leg has been within the limits \[s\].
     within_since_s: Option<f64>,
 }
@@ -38,14 +40,22 @@ impl Schedule {
     /// The legs of a flight on this graph; the first is under way.
     #[must_use]
     pub fn new(legs: &[Leg], links: &Graph, arrival: Arrival) -> Self {
-        Self { legs: legs.to_vec(), links: links.clone(), arrival, within_since_s: None }
+        let freedom = Freedom::RigidMotion;
+        Self { legs: legs.to_vec(), links: links.clone(), arrival, freedom, within_since_s: None }
+    }
+
+    /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
+    #[must_use]
+    pub fn free_by(mut self, freedom: Freedom) -> Self {
+        self.freedom = freedom;
+        self
     }
 
     fn is_due(&mut self, begins: Begins, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
         match begins {
             Begins::At(from_s) => time_s >= from_s,
             Begins::Reached => {
-                let distance = Distance::of(sensed, target.view().formation, &self.links);
+                let distance = Distance::of(sensed, target.view().formation, &self.links, self.freedom);
                 let within = self.arrival.is_within(&distance);
                 self.within_since_s = within.then(|| self.within_since_s.unwrap_or(time_s));
                 self.within_since_s.is_some_and(|since_s| self.arrival.is_held(since_s, time_s))

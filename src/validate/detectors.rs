@@ -36,7 +36,8 @@ pub(super) struct Flights {
 
 fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, Untried> {
     let scenario = builtin(name)?;
-    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
+    let freedom = scenario.law()?.controls().freedom();
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(freedom);
     let mut history = RunHistory::new();
     let flight = engine(&scenario, |sample| {
         metrics.observe(sample);
