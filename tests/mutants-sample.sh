@@ -29,8 +29,8 @@ mutants() {
     cargo mutants --no-shuffle -f 'src/audit/**' -f 'src/law/**' -f 'src/sim/**' -f 'src/plant/**' "$@"
 }
 
-# Random order by a hash that the seed keys. A field left out of a struct is no part of it: cargo-mutants 27.1 would try
-# each of them, whatever names are asked for.
+# Random order by a hash that the seed keys. A field left out of a struct is no part of it: cargo-mutants 27.1 tries each of
+# them, whatever names are asked for, so they are taken from its answers again.
 yes "$seed" | head -c 64 > "$scratch/seed"
 mutants --list | grep -v ': delete field ' |
     sort --random-sort --random-source="$scratch/seed" | head -n "$count" > "$out/sample.txt"
@@ -52,16 +52,24 @@ try() {
     case $status in 0 | 2 | 3) ;; *) exit "$status" ;; esac
 }
 
+# Those of the sample among the mutants that are named in some files.
+sampled() {
+    cat "$@" | grep -v ': delete field ' || true
+}
+
 TAUTLINE_SCENES=${TAUTLINE_SCENES:-150}
 export TAUTLINE_SCENES
 try "$out/sample.txt" "$scratch/quick" "$quick"
-cat "$scratch/quick/mutants.out/caught.txt" "$scratch/quick/mutants.out/timeout.txt" > "$out/caught.txt"
-cp "$scratch/quick/mutants.out/unviable.txt" "$out/unviable.txt"
-: > "$out/missed.txt"
-if [ -s "$scratch/quick/mutants.out/missed.txt" ]; then
-    try "$scratch/quick/mutants.out/missed.txt" "$scratch/slow" "$slow"
-    cat "$scratch/slow/mutants.out/caught.txt" "$scratch/slow/mutants.out/timeout.txt" >> "$out/caught.txt"
-    cp "$scratch/slow/mutants.out/missed.txt" "$out/missed.txt"
+found=$scratch/quick/mutants.out
+sampled "$found/caught.txt" "$found/timeout.txt" > "$out/caught.txt"
+sampled "$found/unviable.txt" > "$out/unviable.txt"
+sampled "$found/missed.txt" > "$out/missed.txt"
+if [ -s "$out/missed.txt" ]; then
+    cp "$out/missed.txt" "$scratch/again.txt"
+    try "$scratch/again.txt" "$scratch/slow" "$slow"
+    found=$scratch/slow/mutants.out
+    sampled "$found/caught.txt" "$found/timeout.txt" >> "$out/caught.txt"
+    sampled "$found/missed.txt" > "$out/missed.txt"
 fi
 # The broken program must not be taken for this tree's.
 touch "$OLDPWD/src/lib.rs"

@@ -28,3 +28,6 @@ pub use potential::{PotentialKeys, PotentialLaw};
 pub use setting::{Gain, Setting};
 pub use spec::LawSpec;
 pub use tension::{EdgeTension, TensionError};
+
+#[cfg(test)]
+mod tests;

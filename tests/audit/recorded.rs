@@ -633,6 +633,25 @@ fn a_height_that_rounding_hides_ends_as_undecided_and_not_in_a_search_without_en
 }
 
 #[test]
+fn a_curve_that_dips_twice_has_a_violation_for_each_with_its_own_minimum() {
+    // x = 1 + 0.3 t + (t - 1)^2 (t - 3)^2 on 0..4, beside one at the origin.
+    let coefficients = [10.0, -23.7, 22.0, -8.0, 1.0].map(|c| Vector3::new(c, 0.0, 0.0)).to_vec();
+    let still = Item::Piece(Piece { vehicle: 0, from_s: 0.0, to_s: 4.0, coefficients: vec![Vector3::zeros()] });
+    let dips = Item::Piece(Piece { vehicle: 1, from_s: 0.0, to_s: 4.0, coefficients });
+    let outcome = asked(&[still, dips], Settings::delta(2.0));
+    let x = |t: f64| 1.0 + 0.3 * t + ((t - 1.0) * (t - 3.0)).powi(2);
+    let least = |from: f64| {
+        (0..200_000).map(|k| from + 1e-5 * f64::from(k)).min_by(|a, b| x(*a).total_cmp(&x(*b))).expect("times")
+    };
+    assert_eq!(outcome.violations.len(), 2);
+    for (violation, at_s) in outcome.violations.iter().zip([least(0.0), least(2.0)]) {
+        assert!((violation.min_m - x(at_s)).abs() < 1e-6, "{violation:?}, expected {} at {at_s}", x(at_s));
+        assert!((violation.min_at_s - at_s).abs() < 1e-2, "{violation:?}, expected at {at_s}");
+        assert!(violation.from_s < at_s && at_s < violation.to_s && (x(violation.from_s) - 2.0).abs() < 1e-4);
+    }
+}
+
+#[test]
 fn a_curve_with_more_coefficients_than_can_be_judged_is_refused() {
     let rises = |count: usize| rising(&vec![1e-3; count], 9.0);
     assert_eq!(status(&rises(64), Settings::delta(1.0)), Status::Clear);
