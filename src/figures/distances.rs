@@ -60,7 +60,7 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
         chart.marks.push(Mark::cross(at, PALETTE[HIT], label));
     }
     if history.hit_count() > 0 {
-        description += &format!(" Hulls hit {}.", counted(history.hit_count() as u64, "time", "times"));
+        description.extend([" Hulls hit ", &counted(history.hit_count() as u64, "time", "times"), "."]);
     }
     chart.figure("distances", title, &(description + &note))
 }

@@ -144,7 +144,9 @@ impl Graph {
 /// Takes the mean away.
 fn centre(x: &mut [f64]) {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-    x.iter_mut().for_each(|x| *x -= mean);
+    for x in x {
+        *x -= mean;
+    }
 }
 
 #[cfg(test)]
