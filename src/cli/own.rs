@@ -35,7 +35,7 @@ impl OwnRecording {
         let is_straight =
             Scenario::read(&source, &[]).is_ok_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
         let mut own = Self {
-            delta_m: header.delta_m,
+            delta_m: header.delta_m * scale,
             told: Vec::new(),
             violations: Vec::new(),
             has_every_step: is_straight,
@@ -59,7 +59,8 @@ impl OwnRecording {
                 Entry::Event(Event::ViolationBegan { pair, time_s }) => _ = began_s.insert(pair, time_s),
                 Entry::Event(Event::ViolationEnded { pair, time_s, min_m }) => {
                     let from_s = began_s.remove(&pair).unwrap_or(time_s);
-                    own.violations.push(ToldViolation { pair, from_s, to_s: time_s, min_m: min_m * scale });
+                    let (min_m, limit_m) = (min_m * scale, own.delta_m);
+                    own.violations.push(ToldViolation { pair, from_s, to_s: time_s, min_m, limit_m });
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
                 Entry::Event(_) => {}

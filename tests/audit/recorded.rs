@@ -699,7 +699,13 @@ fn what_a_recording_says_of_the_time_between_its_samples_goes_before_what_is_dra
     for (only, drawn_y, expected) in [(None, 9.0, 1), (Some([1, 2]), 9.0, 1), (Some([0, 1]), 9.0, 0), (None, -4.0, 1)] {
         let only = only.map(|pair: [usize; 2]| pair.iter().map(|k| names(3)[*k].clone()).collect());
         let mut auditor = TrackAuditor::new(Settings { only, ..Settings::delta(2.0) }).expect("settings");
-        auditor.tell_violation(ToldViolation { pair: Pair::new(1, 2), from_s: 0.3, to_s: 0.9, min_m: 1.5 });
+        auditor.tell_violation(ToldViolation {
+            pair: Pair::new(1, 2),
+            from_s: 0.3,
+            to_s: 0.9,
+            min_m: 1.5,
+            limit_m: 2.0,
+        });
         let mut items = [&pass(3.0)[..], &third(drawn_y)].concat();
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         auditor.push(&names(3), &items).expect("items");
@@ -709,6 +715,27 @@ fn what_a_recording_says_of_the_time_between_its_samples_goes_before_what_is_dra
         assert_eq!(found.len(), expected, "{only:?}: {found:?}", only = outcome.vehicles);
         assert!(found.iter().all(|v| (v.from_s, v.to_s, v.min_m) == (0.3, 0.9, 1.5)), "{found:?}");
         assert_eq!(outcome.status == Status::Violation, expected > 0);
+    }
+    // Of a part of it, and against other limits, no more is said than is known.
+    let cases = [
+        (2.0, [0.4, 0.6], Status::Violation, Some([0.4, 0.6])),
+        (1.8, [0.4, 0.6], Status::Undecided, None),
+        (1.4, [0.4, 0.6], Status::Clear, None),
+        (1.8, [0.0, 1.0], Status::Violation, Some([0.6, 0.6])),
+        (3.0, [0.0, 1.0], Status::Violation, Some([0.3, 0.9])),
+        (2.0, [0.92, 0.95], Status::Clear, None),
+    ];
+    for (delta_m, [from_s, to_s], expected, span) in cases {
+        let window = Settings { from_s: Some(from_s), to_s: Some(to_s), ..Settings::delta(delta_m) };
+        let mut auditor = TrackAuditor::new(window).expect("settings");
+        let pair = Pair::new(0, 1);
+        auditor.tell_violation(ToldViolation { pair, from_s: 0.3, to_s: 0.9, min_m: 1.5, limit_m: 2.0 });
+        auditor.push(&names(2), &pass(3.5)).expect("items");
+        let outcome = auditor.finish().expect("an outcome");
+        assert_eq!(outcome.status, expected, "{delta_m} {from_s} {to_s}: {outcome:?}");
+        assert_eq!(outcome.violations.first().map(|v| [v.from_s, v.to_s]), span, "{delta_m} {from_s} {to_s}");
+        let closest = outcome.closest[0];
+        assert_eq!(closest.lower_m, if to_s < 0.92 || from_s == 0.0 { 1.5 } else { closest.upper_m });
     }
     // What is so at a sample no word takes back.
     let mut sampled = pass(3.0);

@@ -117,7 +117,9 @@ impl TrackAuditor {
 
     /// Takes what the recording itself says of two vehicles that were too close for a while, as [`TrackAuditor::tell`].
     pub fn tell_violation(&mut self, told: ToldViolation) {
-        if self.listens() {
+        // A file may say anything.
+        let is_one = told.from_s <= told.to_s && told.min_m < told.limit_m;
+        if self.listens() && is_one {
             self.told.push_violation(told);
         }
     }

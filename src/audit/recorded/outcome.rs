@@ -58,6 +58,8 @@ pub struct ToldViolation {
     pub to_s: f64,
     /// Their smallest distance within \[m\].
     pub min_m: f64,
+    /// What they were nearer than all along \[m\].
+    pub limit_m: f64,
 }
 
 /// Where a recording contradicts the bound on acceleration that it is judged by.

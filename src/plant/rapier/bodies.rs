@@ -25,6 +25,8 @@ pub(super) struct Bodies {
     held: Rows,
     /// Velocities of the last drift, as they were before contacts changed them \[m/s\].
     drift_m_s: Rows,
+    /// Where it began, from the engine's origin \[m\].
+    began_m: Rows,
     /// Length of the drift that waits for the second half of its kick \[s\]; 0 for a completed state.
     drifted_s: f64,
     /// Where the engine's origin is: the middle of the start, so that single precision resolves the swarm's own extent
@@ -46,6 +48,7 @@ impl Bodies {
             handles,
             held: Rows::zeros(scenario.count()),
             drift_m_s: Rows::zeros(scenario.count()),
+            began_m: Rows::zeros(scenario.count()),
             drifted_s: 0.0,
             origin_m,
             mass_kg: scenario.mass_kg.clone(),
@@ -86,8 +89,8 @@ impl Clone for Bodies {
             ..PhysicsWorld::default()
         };
         let (handles, mass_kg) = (self.handles.clone(), self.mass_kg.clone());
-        let (held, drift_m_s) = (self.held.clone(), self.drift_m_s.clone());
-        Self { world, handles, held, drift_m_s, mass_kg, ..*self }
+        let (held, drift_m_s, began_m) = (self.held.clone(), self.drift_m_s.clone(), self.began_m.clone());
+        Self { world, handles, held, drift_m_s, began_m, mass_kg, ..*self }
     }
 }
 
@@ -106,6 +109,7 @@ impl Plant for Bodies {
             let velocity_m_s = (doubles(body.linvel()) + 0.5 * self.drifted_s * held_m_s2) * completing;
             let drift_m_s = velocity_m_s * half_decay + 0.5 * dt_s * held_m_s2;
             set_row(&mut self.drift_m_s, i, drift_m_s);
+            set_row(&mut self.began_m, i, doubles(body.translation()));
             body.set_linvel(reals(drift_m_s - dt_s * held_m_s2), true);
             body.reset_forces(false);
             body.add_force(reals(held_m_s2) * real(self.mass_kg[i]), true);
@@ -173,11 +177,6 @@ impl Plant for Bodies {
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
         let before = contacts.len();
-        // Where the engine began its step from: it has moved on a straight line since.
-        let begin_m = |i: usize| {
-            let body = &self.world.bodies[self.handles[i]];
-            doubles(body.translation()) - doubles(body.linvel()) * self.drifted_s
-        };
         for contact in self.world.narrow_phase.contact_pairs() {
             // Keep-out balls push nothing.
             let pushed = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.data.impulse > 0.0));
@@ -185,7 +184,7 @@ impl Plant for Bodies {
                 self.world.colliders.get(handle).and_then(|collider| usize::try_from(collider.user_data).ok())
             };
             if pushed && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
-                let apart = (begin_m(j) - begin_m(i)).normalize();
+                let apart = (row(&self.began_m, j) - row(&self.began_m, i)).normalize();
                 let closing_m_s = -(row(&self.drift_m_s, j) - row(&self.drift_m_s, i)).dot(&apart);
                 contacts.push(HullContact { pair: Pair::new(i, j), closing_m_s });
             }
