@@ -91,7 +91,9 @@ fn report(
     };
     let wall_s = flight.performance.wall.as_secs_f64();
     let hulls = match scenario.plant {
-        PlantSpec::Rapier(_) => Hulls::solid(&flight.bounces),
+        PlantSpec::Rapier(_) => {
+            Hulls::solid(&flight.bounces, &flight.audit, &scenario.hull_radius_m, scenario.time.dt_s)
+        }
         PlantSpec::Ideal => Hulls::of_points(&flight.audit, &scenario.hull_radius_m),
     };
     Report::new(&Findings {

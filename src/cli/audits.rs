@@ -27,16 +27,19 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
             Ok(report) => reports.push(report),
             Err(failure) => {
                 if !is_one {
-                    console.say("not judged");
+                    console.say(&format!("not judged: {}", failure.said));
                 }
                 failed = failed.or(Some(failure));
             }
         }
     }
+    // Programs get what could be judged; that something could not is the exit code.
+    if failed.is_none() || !reports.is_empty() {
+        answer(arguments, &reports, is_one)?;
+    }
     if let Some(failure) = failed {
         return Err(failure);
     }
-    answer(arguments, &reports)?;
     let is_good = |report: &RecordedReport| match report.status {
         Status::Clear => true,
         Status::Undecided => arguments.allow_undecided,
@@ -46,15 +49,15 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
 }
 
 /// What is for programs: of one recording by itself, of several as a list.
-fn answer(arguments: &AuditArguments, reports: &[RecordedReport]) -> Result<(), Failure> {
+fn answer(arguments: &AuditArguments, reports: &[RecordedReport], is_one: bool) -> Result<(), Failure> {
     if arguments.json {
         match reports {
-            [report] => console::json(report)?,
+            [report] if is_one => console::json(report)?,
             reports => console::json(&reports)?,
         }
     }
     if let Some(file) = &arguments.events {
-        write_atomically(file, &events::csv(reports)?)?;
+        write_atomically(file, &events::csv(reports, !is_one)?)?;
     }
     if let Some(file) = &arguments.junit {
         write_atomically(file, events::junit(reports, arguments.allow_undecided)?.as_bytes())?;

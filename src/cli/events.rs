@@ -9,11 +9,11 @@ use crate::report::recorded::{OfPair, OfVehicle, RecordedReport};
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
 
-/// Violations, undecided times and gaps, a row each, in order of time; of several recordings with the recording in front.
-pub(super) fn csv(reports: &[RecordedReport]) -> Result<Vec<u8>, Failure> {
+/// Violations, undecided times and gaps, a row each, in order of time; where several recordings are asked about `named` puts
+/// the recording in front.
+pub(super) fn csv(reports: &[RecordedReport], named: bool) -> Result<Vec<u8>, Failure> {
     let failed = |error: csv::Error| Failure::machine(format!("cannot write the events: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let named = reports.len() > 1;
     writer.write_record(named.then_some("recording").into_iter().chain(COLUMNS)).map_err(failed)?;
     for report in reports {
         let recording = named.then(|| report.source.recording.clone());

@@ -103,6 +103,8 @@ pub enum Code {
     StartOnLine,
     /// The start lies in a plane that the law never leaves, and the formation does not.
     StartInPlane,
+    /// Steps cannot be made as short as the law's links ask for.
+    StepTooLong,
     /// By the end the swarm has drifted so far that numbers do not tell its positions apart.
     DriftUnresolved,
     /// Nothing is certified about separations.
@@ -119,7 +121,14 @@ impl Code {
     /// Whether the flight cannot do what it is for: the formation is out of reach, or nothing may be called stable.
     #[must_use]
     pub fn refuses(self) -> bool {
-        matches!(self, Self::RelativeVelocityUnstable | Self::StartOnLine | Self::StartInPlane | Self::DriftUnresolved)
+        matches!(
+            self,
+            Self::RelativeVelocityUnstable
+                | Self::StartOnLine
+                | Self::StartInPlane
+                | Self::StepTooLong
+                | Self::DriftUnresolved
+        )
     }
 }
 
@@ -184,6 +193,7 @@ impl Preflight {
         let warnings = [
             (Code::RelativeVelocityUnstable, undamped),
             (trap, found.start_too_flat()),
+            (Code::StepTooLong, step_too_long(law.as_ref(), scenario)),
             (Code::DriftUnresolved, found.drift_unresolved(scenario)),
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
@@ -341,6 +351,23 @@ impl Preflight {
     fn is_flat_in_space(&self) -> bool {
         self.dimensions == 3 && self.formation_dimension < 3.min(self.vehicles.saturating_sub(1))
     }
+}
+
+/// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be
+/// shorter still.
+fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
+    let time = &scenario.time;
+    let halvings = i32::try_from(time.max_halvings).unwrap_or(i32::MAX);
+    let shortest_s = time.dt_s * 0.5_f64.powi(halvings);
+    let needed_s = time.max_rate_dt / law.fastest_rate_per_s(Some(f64::INFINITY), scenario.a22_per_s)?;
+    (scenario.plant.holds_commands() && shortest_s > needed_s).then(|| {
+        format!(
+            "The law's links ask for steps of {} s, and the shortest that time.dt_s and time.max_halvings allow are {} s: what would \
+             be flown is not the motion of the law. Shorten time.dt_s, add links, or lower the law's gains.",
+            numbers::significant(needed_s),
+            numbers::significant(shortest_s)
+        )
+    })
 }
 
 /// Dimension of the flat, moving with the swarm's mean velocity, that forces along the lines between vehicles never

@@ -325,6 +325,7 @@ fn the_json_has_the_promised_keys_and_codes() {
         Code::RelativeVelocityUnstable,
         Code::StartOnLine,
         Code::StartInPlane,
+        Code::StepTooLong,
         Code::DriftUnresolved,
         Code::NoCertificate,
         Code::NotRigid,
@@ -345,7 +346,7 @@ fn the_words_say_what_the_numbers_say() {
     let text = pentagon.text();
     for said in [
         "margin of relative velocities 1.000000 1/s",
-        "0.00417 s, flown in parts where the law asks",
+        "0.00417 s, flown in parts down to ",
         "rank 7: in the plane rigid",
     ] {
         assert!(text.contains(said), "{said:?} in\n{text}");
@@ -354,4 +355,17 @@ fn the_words_say_what_the_numbers_say() {
     assert_eq!(line.headline(), "REFUSED: start-on-line");
     assert!(line.warnings[0].to_string().starts_with("warning [start-on-line]: The start lies on a line"));
     assert_eq!([0.0, 0.3, 1.5, 2.5e-7].map(numbers::significant), ["0.00", "0.300", "1.50", "2.50e-7"]);
+}
+
+#[test]
+fn a_law_whose_links_are_too_fast_for_the_shortest_steps_is_refused() {
+    let stiff = ["law.kind=displacement", "law.zeta_per_s=1e5", "graph.kind=path"];
+    let refused = check(&scenario("pentagon", &stiff));
+    assert!(refused.refuses() && codes(&scenario("pentagon", &stiff)).contains(&Code::StepTooLong));
+    assert!(refused.headline().contains("step-too-long"), "{}", refused.headline());
+    for fine in
+        [&stiff[..1], &[&stiff[..], &["time.dt_s=1e-5"]].concat(), &[&stiff[..], &["plant.kind=ideal"]].concat()]
+    {
+        assert!(!codes(&scenario("pentagon", fine)).contains(&Code::StepTooLong), "{fine:?}");
+    }
 }

@@ -12,6 +12,7 @@ impl Code {
             Self::RelativeVelocityUnstable => "relative-velocity-unstable",
             Self::StartOnLine => "start-on-line",
             Self::StartInPlane => "start-in-plane",
+            Self::StepTooLong => "step-too-long",
             Self::DriftUnresolved => "drift-unresolved",
             Self::NoCertificate => "no-certificate",
             Self::NotRigid => "not-rigid",
@@ -94,7 +95,13 @@ impl Preflight {
     fn step_line(&self) -> String {
         let parts = match self.dt_max_s {
             Some(dt_max_s) if dt_max_s >= self.dt_s => "short enough for the law",
-            Some(_) => "flown in parts where the law asks for shorter ones",
+            Some(_) => {
+                return format!(
+                    "{} s, flown in parts down to {} s where the law asks for it",
+                    significant(self.dt_s),
+                    significant(self.dt_max_s.unwrap_or_default())
+                );
+            }
             None => "flown in parts where a clearance shrinks too fast",
         };
         format!("{} s, {parts}", significant(self.dt_s))

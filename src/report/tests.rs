@@ -76,7 +76,7 @@ impl Case {
             certificate: &self.certificate,
             audit: &self.audit,
             engine_contact_pairs: Some(0),
-            hulls: &Hulls::solid(&[]),
+            hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
             summary: &self.summary,
             energy_falls: self.energy_falls,
             epsilon: f64::from(f32::EPSILON),

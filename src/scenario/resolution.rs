@@ -30,6 +30,12 @@ pub struct Drift {
 }
 
 impl PlantSpec {
+    /// Whether the plant holds a command over a step; continuous time chooses its own steps.
+    #[must_use]
+    pub fn holds_commands(self) -> bool {
+        matches!(self, Self::Rapier(_))
+    }
+
     /// Relative distance between neighbouring numbers of those that positions are computed in.
     #[must_use]
     pub fn epsilon(self) -> f64 {

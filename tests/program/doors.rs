@@ -107,6 +107,9 @@ fn files_of_a_vehicle_each_are_judged_as_one_recording() {
     let lost = audit(folder.path(), &["nowhere.csv", "pair.csv", "--delta", "1.9"]);
     assert!(lost.exit == Some(2) && lost.err.contains("nowhere.csv"), "{}", lost.err);
     assert!(lost.out.contains("pair.csv:\n") && lost.out.contains("CLEAR"), "{}", lost.out);
+    assert!(lost.out.contains("not judged: "), "{}", lost.out);
+    let told = audit(folder.path(), &["nowhere.csv", "pair.csv", "--delta", "2.1", "--json"]);
+    assert!(told.exit == Some(2) && told.out.contains("pair.csv"), "{}", told.out);
     let exported = ran_by(TAUTLINE, folder.path(), &["export", "flight", "-o", "both.csv"]);
     assert_eq!(exported.exit, Some(0), "{}", exported.err);
     assert_eq!(audit(folder.path(), &["both.csv", "--delta", "2.1"]).exit, Some(1));

@@ -84,6 +84,7 @@ fn every_code_of_a_warning_is_on_its_page() {
         Code::RelativeVelocityUnstable,
         Code::StartOnLine,
         Code::StartInPlane,
+        Code::StepTooLong,
         Code::DriftUnresolved,
         Code::NoCertificate,
         Code::NotRigid,
