@@ -19,22 +19,33 @@ const TABLES: [&str; 8] = ["csv", "tsv", "txt", "dat", "tum", "parquet", "npz", 
 pub(super) struct Folder {
     pub(super) files: Vec<Source>,
     pub(super) folders: Vec<(String, Vec<Source>)>,
+    /// Names of what is no table, or is deeper.
+    pub(super) left_out: Vec<String>,
 }
 
 impl Folder {
     /// Looks into a folder.
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
-        let (files, folders) = entries(path)?;
-        let folders = folders.iter().map(|folder| Ok((folder.stem(), entries(&folder.path)?.0)));
-        let folders = if files.is_empty() { folders.collect::<Result<_, ReadError>>()? } else { Vec::new() };
-        Ok(Self { files, folders }.sorted())
+        let Entries { files, folders, mut left_out } = entries(path)?;
+        if !files.is_empty() {
+            left_out.extend(folders.iter().map(|folder| folder.stem() + "/"));
+            return Ok(Self { files, folders: Vec::new(), left_out }.sorted());
+        }
+        let folders = folders.iter().map(|folder| Ok((folder.stem(), entries(&folder.path)?.files)));
+        Ok(Self { files, folders: folders.collect::<Result<_, ReadError>>()?, left_out }.sorted())
     }
 
     /// Looks into an archive. One folder around everything is no folder.
     pub(super) fn of_archive(path: &Path) -> Result<Self, ReadError> {
         let mut folder = Self::default();
         let names = Archive::open(path)?.names();
-        for name in names.into_iter().filter(|name| is_table(Path::new(name)) && !name.starts_with("__MACOSX")) {
+        let is_file =
+            |name: &String| !(name.ends_with('/') || name.starts_with("__MACOSX") || is_hidden(Path::new(name)));
+        for name in names.into_iter().filter(is_file) {
+            if !is_table(Path::new(&name)) {
+                folder.left_out.push(name);
+                continue;
+            }
             let parent = name.rsplit_once('/').map_or("", |(parent, _)| parent).to_owned();
             let source = Source::entry(path, name);
             match folder.folders.iter_mut().find(|(known, _)| *known == parent) {
@@ -50,6 +61,7 @@ impl Folder {
     }
 
     fn sorted(mut self) -> Self {
+        self.left_out.sort();
         self.folders.retain(|(_, files)| !files.is_empty());
         self.folders.sort_by_cached_key(|(name, _)| (natural(name), name.clone()));
         for files in self.folders.iter_mut().map(|(_, files)| files).chain([&mut self.files]) {
@@ -63,16 +75,26 @@ impl Folder {
     }
 }
 
+fn is_hidden(path: &Path) -> bool {
+    path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'))
+}
+
 fn is_table(path: &Path) -> bool {
-    let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    !hidden && TABLES.contains(&&*extension)
+    !is_hidden(path) && TABLES.contains(&&*extension)
+}
+
+/// What is in a folder.
+struct Entries {
+    files: Vec<Source>,
+    folders: Vec<Source>,
+    left_out: Vec<String>,
 }
 
 /// Tables and folders of a folder.
-fn entries(folder: &Path) -> Result<(Vec<Source>, Vec<Source>), ReadError> {
+fn entries(folder: &Path) -> Result<Entries, ReadError> {
     let error = |source| ReadError::new(folder, Fault::System(source));
-    let (mut files, mut folders) = (Vec::new(), Vec::new());
+    let (mut files, mut folders, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).map_err(error)? {
         let path = entry.map_err(error)?.path();
         let (is_folder, is_table) = (path.is_dir(), is_table(&path));
@@ -81,9 +103,11 @@ fn entries(folder: &Path) -> Result<(Vec<Source>, Vec<Source>), ReadError> {
             folders.push(source);
         } else if is_table {
             files.push(source);
+        } else if !is_hidden(&path) {
+            left_out.push(path.file_name().unwrap_or_default().to_string_lossy().into_owned());
         }
     }
-    Ok((files, folders))
+    Ok(Entries { files, folders, left_out })
 }
 
 /// A key that puts `cf9` before `cf10`: all numbers are as long.

@@ -7,6 +7,9 @@ use super::order::Recording;
 use super::source::Source;
 use crate::track::{Clock, Item, Tracks};
 
+/// Most files that are named which were not read.
+const LISTED: usize = 5;
+
 /// Clocks that begin further apart than this are not the same \[ns\]: 30 days.
 const APART_NS: i64 = 30 * 86_400 * 1_000_000_000;
 
@@ -30,8 +33,8 @@ struct Joined {
     notes: Vec<String>,
 }
 
-/// One recording out of several with a vehicle each, which is called as its file.
-pub(super) fn join(parts: Vec<(PathBuf, Recording)>) -> Result<Recording, ReadError> {
+/// One recording out of several with a vehicle each, which is called as its file, beside others that are no tables.
+pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: &[String]) -> Result<Recording, ReadError> {
     let stem = |path: &PathBuf| Source::file(path).stem();
     let (vehicles, parts): (Vec<_>, Vec<_>) =
         parts.into_iter().map(|(path, tracks)| (stem(&path), (path, tracks))).unzip();
@@ -67,6 +70,11 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>) -> Result<Recording, ReadEr
         unit: clocks[0].unit,
     };
     let mut notes = vec![format!("a file is a vehicle: {}", vehicles.join(", "))];
+    if let Some((named, more)) = left_out.split_at_checked(LISTED.min(left_out.len())).filter(|_| !left_out.is_empty())
+    {
+        let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
+        notes.push(format!("not read, for their names are not those of tables: {}{more}", named.join(", ")));
+    }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
         for note in tracks.notes() {

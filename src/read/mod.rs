@@ -78,6 +78,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
             Some(folder) => {
                 all.files.extend(folder.files);
                 all.folders.extend(folder.folders);
+                all.left_out.extend(folder.left_out);
             }
             None => all.files.push(Source::file(path)),
         }
@@ -140,7 +141,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
         let shown = file.shown();
         Ok((shown.clone(), open_one(file, &options).map_err(|error| error.of(&shown))?))
     };
-    join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?)
+    join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, &folder.left_out)
 }
 
 fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, ReadError> {

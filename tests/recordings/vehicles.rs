@@ -53,6 +53,8 @@ fn a_folder_or_archive_with_a_file_for_each_vehicle_is_one_recording() {
     let found = whole(folder.path()).expect("read");
     assert_eq!((found.vehicles.clone(), found.samples()), (vec!["cf2".to_owned(), "cf10".to_owned()], BOTH.to_vec()));
     assert!(found.notes.iter().any(|note| note == "a file is a vehicle: cf2, cf10"), "{:?}", found.notes);
+    let not_read = "not read, for their names are not those of tables: readme.md";
+    assert!(found.notes.iter().any(|note| note == not_read), "{:?}", found.notes);
 
     for name in ["flight", "flight.zip"] {
         let path = folder.path().join(name);
