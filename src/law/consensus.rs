@@ -98,3 +98,22 @@ pub(super) fn add_heard(
     }
     Ok(())
 }
+
+/// Adds to the row of each vehicle what it makes of every other that is near, from where it sees itself apart \[m\]:
+/// `push(i, j, apart_m)` gives that and the potential of the pair. The sum of these over the near pairs is the result.
+pub(super) fn add_pushes(
+    at: &Observation<'_>,
+    sums: &mut Rows,
+    push: impl Fn(usize, usize, Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError>,
+) -> Result<f64, LawError> {
+    let mut potential = 0.0;
+    for &(a, b) in at.near {
+        for (i, j) in [(a, b), (b, a)] {
+            let (pushed, of_pair) = push(i, j, row(&at.own.positions_m, i) - at.seen(i, j).position_m)?;
+            let sum = row(sums, i) + pushed;
+            set_row(sums, i, sum);
+            potential += 0.5 * of_pair;
+        }
+    }
+    Ok(potential)
+}

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
 use super::consensus::{
-    add_heard, add_laplacian_product, check_count, check_observation, check_range, check_state,
+    add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state,
     relative_kinetic_energy, sum_of_squares_about_mean,
 };
 use super::error::{LawError, ParameterError};
@@ -18,7 +18,7 @@ use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::Observation;
 use crate::space::NearPairs;
-use crate::swarm::{Pair, Rows, row, set_row};
+use crate::swarm::{Pair, Rows, row};
 use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "displacement"`.
@@ -216,16 +216,7 @@ impl Law for DisplacementLaw {
                 Ok(gain * (k * error_m + c * (own.velocity_m_s - heard.velocity_m_s)))
             })?;
         }
-        let mut potential = 0.0;
-        for &(a, b) in at.near {
-            for (i, j) in [(a, b), (b, a)] {
-                let apart_m = row(&at.own.positions_m, i) - at.seen(i, j).position_m;
-                let (push_m_s2, of_pair) = self.push(i, j, apart_m)?;
-                let sum = row(command, i) + push_m_s2;
-                set_row(command, i, sum);
-                potential += 0.5 * of_pair;
-            }
-        }
+        let potential = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
         if let Some(swarm) = at.shared() {
             self.memo.keep(&swarm.positions_m, potential);
         }

@@ -4,7 +4,9 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
-use super::consensus::{add_heard, add_laplacian_product, check_count, check_observation, check_range, check_state};
+use super::consensus::{
+    add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state,
+};
 use super::error::{LawError, ParameterError};
 use super::interface::{Law, VelocityMargin};
 use super::memo::Memo;
@@ -13,7 +15,7 @@ use super::tension::TensionError;
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::Observation;
-use crate::swarm::{Pair, Rows, row, set_row};
+use crate::swarm::{Pair, Rows, row};
 use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "potential"`.
@@ -188,16 +190,7 @@ impl Law for PotentialLaw {
                 Ok(gain * ((own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j))))
             })?;
         }
-        let mut potential = 0.0;
-        for &(a, b) in at.near {
-            for (i, j) in [(a, b), (b, a)] {
-                let apart_m = row(&at.own.positions_m, i) - at.seen(i, j).position_m;
-                let (push_m_s2, of_pair) = self.repulsion(i, j, apart_m)?;
-                let sum = row(command, i) + push_m_s2;
-                set_row(command, i, sum);
-                potential += 0.5 * of_pair;
-            }
-        }
+        let potential = add_pushes(at, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
         if let Some(swarm) = at.shared() {
             self.memo.keep(&swarm.positions_m, potential);
         }
