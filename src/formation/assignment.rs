@@ -5,8 +5,15 @@ use nalgebra::{Rotation3, Vector3};
 use super::{Formation, Freedom, best_rigid_motion};
 use crate::swarm::{Rows, mean_row, row, set_row};
 
-/// Most vehicles that are assigned: the table of all distances takes 8 N^2 bytes, and assigning them O(N^3).
-pub const MOST_ASSIGNED: usize = 5000;
+/// Most vehicles that are assigned to a formation that is free to be moved so: the table of all distances takes 8 N^2 bytes,
+/// and assigning them O(N^3), dozens of times where the formation may be turned.
+#[must_use]
+pub const fn most_assigned(freedom: Freedom) -> usize {
+    match freedom {
+        Freedom::Translation => 5000,
+        Freedom::RigidMotion => 500,
+    }
+}
 /// Up to here a formation that may be turned is tried in [`TURNS`] directions, beyond in one.
 const TURNED_UP_TO: usize = 200;
 /// Directions in which it is tried first.
@@ -21,11 +28,11 @@ const MOST_ROUNDS: usize = 50;
 /// Straight lines to such slots keep their distance: `(p_i - p_j).(h_i - h_j) >= 0` for every pair (Turpin, Michael and
 /// Kumar 2014).
 ///
-/// `None` for different numbers of positions and slots, for more than [`MOST_ASSIGNED`], or where a number is not finite.
+/// `None` for different numbers of positions and slots, for more than [`most_assigned`], or where a number is not finite.
 #[must_use]
 pub fn optimal_slots(positions_m: &Rows, formation: &Formation, freedom: Freedom) -> Option<Vec<usize>> {
     let count = positions_m.nrows();
-    if count != formation.count() || count > MOST_ASSIGNED {
+    if count != formation.count() || count > most_assigned(freedom) {
         return None;
     }
     let (centre_m, slots_centre_m) = (mean_row(positions_m), mean_row(&formation.slots_m));
@@ -159,7 +166,9 @@ mod tests {
         let lost = Rows::from_element(3, f64::NAN);
         assert_eq!(optimal_slots(&lost, &formation, Freedom::Translation), None);
         assert_eq!(optimal_slots(&lost, &formation, Freedom::RigidMotion), None);
-        let many = Formation::line(MOST_ASSIGNED + 1, 1.0);
-        assert_eq!(optimal_slots(&many.slots_m, &many, Freedom::Translation), None);
+        for freedom in [Freedom::Translation, Freedom::RigidMotion] {
+            let many = Formation::line(most_assigned(freedom) + 1, 1.0);
+            assert_eq!(optimal_slots(&many.slots_m, &many, freedom), None);
+        }
     }
 }

@@ -15,7 +15,7 @@ use crate::space::closest_pair;
 use crate::swarm::{Pair, Rows, row, separation, set_row};
 
 #[cfg(feature = "files")]
-pub use assignment::{MOST_ASSIGNED, optimal_slots};
+pub use assignment::{most_assigned, optimal_slots};
 pub use fit::{Freedom, RigidMotion, best_rigid_motion, procrustes_rms_m, rms_position_error_m};
 pub use flat::affine_dimension;
 

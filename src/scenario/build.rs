@@ -14,7 +14,7 @@ use super::error::ScenarioError;
 use super::limits::{check_count, check_lengths, check_memory, pair_count, positive};
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
-use crate::formation::{Formation, MOST_ASSIGNED, optimal_slots};
+use crate::formation::{Formation, most_assigned, optimal_slots};
 use crate::graph::{Graph, GraphError};
 use crate::swarm::{Rows, Swarm, set_row};
 use crate::target::Leg;
@@ -62,9 +62,10 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
 fn assigned(mut scenario: Scenario) -> Result<Scenario, ScenarioError> {
     let Ok(law) = scenario.law() else { return Ok(scenario) };
     let freedom = law.controls().freedom();
-    if scenario.count() > MOST_ASSIGNED {
+    let most = most_assigned(freedom);
+    if scenario.count() > most {
         return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
-            .with_help(format!("set formation.assignment to \"given\", or fly at most {MOST_ASSIGNED} vehicles"))
+            .with_help(format!("set formation.assignment to \"given\", or fly at most {most} vehicles"))
             .at("formation.assignment")
             .at("swarm.count"));
     }
