@@ -32,6 +32,8 @@ pub enum Void {
     CommandsFromOutside,
     /// Each command is held for a period of its own.
     CommandsHeld,
+    /// What would be certified is so near delta that the plant's numbers do not tell the two apart.
+    Unresolved,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
     StartRefused(LawError),
 }
@@ -66,6 +68,7 @@ impl Void {
             Self::InexactLink => "inexact-link",
             Self::CommandsFromOutside => "commands-from-outside",
             Self::CommandsHeld => "commands-held",
+            Self::Unresolved => "certificate-unresolved",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
         }
@@ -90,6 +93,9 @@ impl fmt::Display for Void {
             Self::CommandsHeld => {
                 f.write_str("The vehicles hold each command while the swarm moves on (time.control_hz).")
             }
+            Self::Unresolved => f.write_str(
+                "The distance that the law certifies is nearer to delta than positions are told apart: there is too much energy.",
+            ),
             Self::StartRefused(fault) => write!(f, "The law has no answer for the start: {fault}."),
         }
     }
@@ -111,6 +117,7 @@ mod tests {
             Void::InexactLink,
             Void::CommandsFromOutside,
             Void::CommandsHeld,
+            Void::Unresolved,
             Void::StartRefused(collision),
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
         ];
@@ -123,6 +130,7 @@ mod tests {
             "inexact-link",
             "commands-from-outside",
             "commands-held",
+            "certificate-unresolved",
             "start-too-close",
             "start-refused",
         ];
@@ -132,7 +140,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[7].to_string(),
+            reasons[8].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

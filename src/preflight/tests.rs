@@ -369,3 +369,12 @@ fn a_law_whose_links_are_too_fast_for_the_shortest_steps_is_refused() {
         assert!(!codes(&scenario("pentagon", fine)).contains(&Code::StepTooLong), "{fine:?}");
     }
 }
+
+#[test]
+fn a_certificate_that_numbers_do_not_tell_from_delta_is_none() {
+    let faint = ["law.kind=displacement", "law.alpha=1e-9", "graph.kind=path"];
+    let found = check(&scenario("pentagon", &faint));
+    assert!(found.certified_m.is_none() && found.certificate_void[0].contains("nearer to delta"), "{found:?}");
+    assert!(found.energy_initial.is_some());
+    assert!(check(&scenario("pentagon", &faint[..1])).certified_m.is_some());
+}

@@ -78,6 +78,12 @@ impl Scenario {
         }
     }
 
+    /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.
+    #[must_use]
+    pub fn is_unresolved(&self, distance_m: f64) -> bool {
+        distance_m - self.delta_m <= self.plant.epsilon() * self.extent_m()
+    }
+
     /// Largest distance of a start or a slot from the middle of its swarm \[m\].
     fn extent_m(&self) -> f64 {
         let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
