@@ -1,5 +1,7 @@
 //! `tautline audit` of one recording or of several, and the answers for programs.
 
+use serde::Serialize;
+
 use super::audit::{AuditArguments, judge};
 use super::console::{self, Console};
 use super::{Exit, Failure, events};
@@ -16,11 +18,12 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
     }
     arguments.check_outputs()?;
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let (mut reports, mut failed) = (Vec::new(), None);
+    let (mut reports, mut failures) = (Vec::new(), Vec::new());
     for reading in recordings {
         if !is_one {
             console.say(&format!("{}:", reading.recording.display()));
         }
+        let name = reading.recording.display().to_string();
         let mut one = arguments.clone();
         one.reading = reading;
         match judge(&one, console) {
@@ -29,15 +32,14 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
                 if !is_one {
                     console.say(&format!("not judged: {}", failure.said));
                 }
-                failed = failed.or(Some(failure));
+                failures.push((name, failure));
             }
         }
     }
-    // Programs get what could be judged; that something could not is the exit code.
-    if failed.is_none() || !reports.is_empty() {
-        answer(arguments, &reports, is_one)?;
+    if !is_one || failures.is_empty() {
+        answer(arguments, &reports, &failures, is_one)?;
     }
-    if let Some(failure) = failed {
+    if let Some((_, failure)) = failures.into_iter().next() {
         return Err(failure);
     }
     let is_good = |report: &RecordedReport| match report.status {
@@ -48,19 +50,45 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
     Ok(if reports.iter().all(is_good) { Exit::Good } else { Exit::Bad })
 }
 
-/// What is for programs: of one recording by itself, of several as a list.
-fn answer(arguments: &AuditArguments, reports: &[RecordedReport], is_one: bool) -> Result<(), Failure> {
+/// What is for programs: of one recording by itself, of several as a list, with those that could not be judged and why.
+fn answer(
+    arguments: &AuditArguments,
+    reports: &[RecordedReport],
+    failures: &[(String, Failure)],
+    is_one: bool,
+) -> Result<(), Failure> {
     if arguments.json {
         match reports {
             [report] if is_one => console::json(report)?,
-            reports => console::json(&reports)?,
+            reports => console::json(&Answers::of(reports, failures))?,
         }
     }
     if let Some(file) = &arguments.events {
         write_atomically(file, &events::csv(reports, !is_one)?)?;
     }
     if let Some(file) = &arguments.junit {
-        write_atomically(file, events::junit(reports, arguments.allow_undecided)?.as_bytes())?;
+        write_atomically(file, events::junit(reports, failures, arguments.allow_undecided)?.as_bytes())?;
     }
     Ok(())
+}
+
+/// An answer for each of several recordings.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Answers<'a>(Vec<Answer<'a>>);
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Answer<'a> {
+    Judged(&'a RecordedReport),
+    NotJudged { recording: &'a str, error: String },
+}
+
+impl<'a> Answers<'a> {
+    fn of(reports: &'a [RecordedReport], failures: &'a [(String, Failure)]) -> Self {
+        let not_judged = failures
+            .iter()
+            .map(|(recording, failure)| Answer::NotJudged { recording, error: failure.said.to_string() });
+        Self(reports.iter().map(Answer::Judged).chain(not_judged).collect())
+    }
 }

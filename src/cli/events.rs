@@ -52,10 +52,24 @@ fn number(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// A suite for each recording. What is undecided fails, or is skipped where it is allowed.
-pub(super) fn junit(reports: &[RecordedReport], allow_undecided: bool) -> Result<String, Failure> {
+/// A suite for each recording, and an error for each that could not be judged. What is undecided fails, or is skipped where it
+/// is allowed.
+pub(super) fn junit(
+    reports: &[RecordedReport],
+    failures: &[(String, Failure)],
+    allow_undecided: bool,
+) -> Result<String, Failure> {
     let mut junit = Report::new("tautline audit");
     junit.add_test_suites(reports.iter().map(|report| suite(report, allow_undecided)));
+    junit.add_test_suites(failures.iter().map(|(recording, failure)| {
+        let mut error = TestCaseStatus::non_success(NonSuccessKind::Error);
+        error.set_message(failure.said.to_string());
+        let mut case = TestCase::new("separation", error);
+        case.set_classname("tautline.audit");
+        let mut suite = TestSuite::new(recording.as_str());
+        suite.add_test_case(case);
+        suite
+    }));
     junit.to_string().map_err(|error| Failure::machine(format!("cannot write the JUnit report: {error}")))
 }
 

@@ -148,12 +148,7 @@ impl Preflight {
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
         let law = scenario.law()?;
         let start = scenario.observation(&scenario.start);
-        let promised = law
-            .certificate(&start)
-            .void_where(scenario.legs.len() > 1, Void::TargetChanges)
-            .void_where(scenario.time.control_hz.is_some(), Void::CommandsHeld);
-        let unresolved = promised.certified_m.is_some_and(|certified_m| scenario.is_unresolved(certified_m));
-        let certificate = promised.void_where(unresolved, Void::Unresolved);
+        let certificate = scenario.certificate(law.as_ref());
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
         let drift = scenario.drift(law.common_mode_rate_per_s(scenario.a22_per_s));

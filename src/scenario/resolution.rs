@@ -6,6 +6,7 @@
 use super::error::ScenarioError;
 use super::limits::first_within;
 use super::spec::{PlantSpec, Precision, Scenario};
+use crate::law::{Certificate, Law, Void};
 use crate::swarm::{Rows, mean_row, row};
 
 /// Largest error of a22 by the engine's rounding, as a share of a22.
@@ -78,9 +79,20 @@ impl Scenario {
         }
     }
 
-    /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.
+    /// What a law promises from the start of this scenario, as far as the scenario itself lets it: with legs that change, commands
+    /// that are held, and numbers that do not tell the promise from delta, it promises nothing.
     #[must_use]
-    pub fn is_unresolved(&self, distance_m: f64) -> bool {
+    pub fn certificate(&self, law: &dyn Law) -> Certificate {
+        let promised = law
+            .certificate(&self.observation(&self.start))
+            .void_where(self.legs.len() > 1, Void::TargetChanges)
+            .void_where(self.time.control_hz.is_some(), Void::CommandsHeld);
+        let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
+        promised.void_where(unresolved, Void::Unresolved)
+    }
+
+    /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.
+    fn is_unresolved(&self, distance_m: f64) -> bool {
         distance_m - self.delta_m <= self.plant.epsilon() * self.extent_m()
     }
 

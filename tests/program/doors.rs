@@ -108,8 +108,15 @@ fn files_of_a_vehicle_each_are_judged_as_one_recording() {
     assert!(lost.exit == Some(2) && lost.err.contains("nowhere.csv"), "{}", lost.err);
     assert!(lost.out.contains("pair.csv:\n") && lost.out.contains("CLEAR"), "{}", lost.out);
     assert!(lost.out.contains("not judged: "), "{}", lost.out);
-    let told = audit(folder.path(), &["nowhere.csv", "pair.csv", "--delta", "2.1", "--json"]);
-    assert!(told.exit == Some(2) && told.out.contains("pair.csv"), "{}", told.out);
+    let told = audit(folder.path(), &["nowhere.csv", "pair.csv", "--delta", "2.1", "--json", "--junit", "l.xml"]);
+    let answers: serde_json::Value = serde_json::from_str(&told.out).expect("JSON");
+    assert_eq!(
+        (told.exit, &answers[0]["status"], &answers[1]["recording"]),
+        (Some(2), &"violation".into(), &"nowhere.csv".into())
+    );
+    assert!(answers[1]["error"].as_str().is_some_and(|error| error.contains("nowhere.csv")), "{answers}");
+    let suites = read("l.xml");
+    assert!(suites.contains("errors=\"1\"") && suites.contains("name=\"nowhere.csv\""), "{suites}");
     let exported = ran_by(TAUTLINE, folder.path(), &["export", "flight", "-o", "both.csv"]);
     assert_eq!(exported.exit, Some(0), "{}", exported.err);
     assert_eq!(audit(folder.path(), &["both.csv", "--delta", "2.1"]).exit, Some(1));
