@@ -118,6 +118,19 @@ pub enum Code {
 }
 
 impl Code {
+    /// Every code, the worst first.
+    pub const ALL: [Self; 9] = [
+        Self::RelativeVelocityUnstable,
+        Self::StartOnLine,
+        Self::StartInPlane,
+        Self::StepTooLong,
+        Self::DriftUnresolved,
+        Self::NoCertificate,
+        Self::NotRigid,
+        Self::FlatFormationInSpace,
+        Self::CommonModeUnstable,
+    ];
+
     /// Whether the flight cannot do what it is for: the formation is out of reach, or nothing may be called stable.
     #[must_use]
     pub fn refuses(self) -> bool {

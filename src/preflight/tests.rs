@@ -321,17 +321,7 @@ fn the_json_has_the_promised_keys_and_codes() {
     for warning in json["warnings"].as_array().expect("a list") {
         assert_eq!(warning.as_object().expect("a table").keys().collect::<Vec<_>>(), ["code", "message"]);
     }
-    for code in [
-        Code::RelativeVelocityUnstable,
-        Code::StartOnLine,
-        Code::StartInPlane,
-        Code::StepTooLong,
-        Code::DriftUnresolved,
-        Code::NoCertificate,
-        Code::NotRigid,
-        Code::FlatFormationInSpace,
-        Code::CommonModeUnstable,
-    ] {
+    for code in Code::ALL {
         assert_eq!(serde_json::to_value(code).expect("a name"), code.name());
     }
 }

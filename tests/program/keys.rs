@@ -80,17 +80,7 @@ fn every_key_of_the_check_is_on_its_page() {
 #[test]
 fn every_code_of_a_warning_is_on_its_page() {
     use tautline::preflight::Code;
-    for code in [
-        Code::RelativeVelocityUnstable,
-        Code::StartOnLine,
-        Code::StartInPlane,
-        Code::StepTooLong,
-        Code::DriftUnresolved,
-        Code::NoCertificate,
-        Code::NotRigid,
-        Code::FlatFormationInSpace,
-        Code::CommonModeUnstable,
-    ] {
+    for code in Code::ALL {
         assert!(PAGE.contains(&format!("`{}`", code.name())), "{}", code.name());
     }
 }
