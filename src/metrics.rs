@@ -9,13 +9,14 @@ use crate::formation::Freedom;
 use crate::graph::Graph;
 use crate::record::{Event, Peaks, RecordError, Sample, Sink};
 use crate::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
-use crate::target::{Arrival, Begins, Distance, Leg};
+use crate::target::{Arrival, Begins, Distance, Guidance, Leg, Reference};
 
 /// Folds samples, in the order of time, into a [`Summary`].
 #[derive(Clone, Debug)]
 pub struct Metrics<'a> {
     legs: &'a [Leg],
     graph: &'a Graph,
+    guidance: Option<&'a Guidance>,
     arrival: Arrival,
     freedom: Freedom,
     /// The leg under way, from 0.
@@ -61,7 +62,7 @@ pub struct Summary {
     /// Root mean square distance of the vehicles from the formation in its best place, turned and perhaps mirrored where it
     /// is free to be, at the end \[m\].
     pub rms_position_error_m: f64,
-    /// Largest speed relative to the swarm's mean velocity at the end \[m/s\].
+    /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, at the end \[m/s\].
     pub disagreement_m_s: f64,
     /// Speed of the mean velocity at the end \[m/s\].
     pub common_m_s: f64,
@@ -99,6 +100,7 @@ impl<'a> Metrics<'a> {
         Self {
             legs,
             graph,
+            guidance: None,
             arrival,
             freedom: Freedom::RigidMotion,
             leg: 0,
@@ -124,13 +126,22 @@ impl<'a> Metrics<'a> {
         self
     }
 
+    /// The same, with formations that a reference carries along.
+    #[must_use]
+    pub fn carried_by(mut self, guidance: Option<&'a Guidance>) -> Self {
+        self.guidance = guidance;
+        self
+    }
+
     /// Takes one sample: O(edges), and no allocation after the first.
     pub fn observe(&mut self, sample: &Sample<'_>) {
         self.samples += 1;
         self.last_s = sample.time_s;
         let leg = self.legs.get(self.leg);
-        self.distance = leg
-            .map_or_else(Distance::unknown, |leg| Distance::of(sample.swarm, &leg.formation, self.graph, self.freedom));
+        self.distance = leg.map_or_else(Distance::unknown, |leg| {
+            let reference = self.guidance.map_or_else(Reference::at_rest, |known| known.motion.at(sample.time_s));
+            Distance::of(sample.swarm, &leg.formation, &reference, self.graph, self.freedom)
+        });
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
         self.observe_energy(sample.energy);

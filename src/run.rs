@@ -34,7 +34,9 @@ pub fn run_while(
 ) -> Result<Report, SimError> {
     let parts = Parts::of(scenario)?;
     let freedom = parts.law.controls().freedom();
-    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(freedom);
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
+        .free_by(freedom)
+        .carried_by(scenario.reference.as_ref());
     let mut state_hash = StateHash::new();
     let mut sinks = (sink, (&mut metrics, &mut state_hash));
     let flight = sim::fly(scenario, parts, &mut sinks, carry_on)?;

@@ -10,7 +10,7 @@ use crate::swarm::{Rows, mean_row, row, set_row};
 #[must_use]
 pub const fn most_assigned(freedom: Freedom) -> usize {
     match freedom {
-        Freedom::Translation => 5000,
+        Freedom::Fixed | Freedom::Translation => 5000,
         Freedom::RigidMotion => 500,
     }
 }
@@ -22,7 +22,7 @@ const TURNS: u32 = 8;
 const MOST_ROUNDS: usize = 50;
 
 /// For each vehicle the slot that it is given, so that the sum of squared distances from the positions to their slots, once
-/// the formation is moved as it may be, is least: exactly for translations. For rigid motions assignment and
+/// the formation is moved as it may be, is least: exactly where it may not be turned. For rigid motions assignment and
 /// best fit take turns from several directions, which finds a sum that no single turn betters.
 ///
 /// Straight lines to such slots keep their distance: `(p_i - p_j).(h_i - h_j) >= 0` for every pair (Turpin, Michael and
@@ -34,6 +34,9 @@ pub fn optimal_slots(positions_m: &Rows, formation: &Formation, freedom: Freedom
     let count = positions_m.nrows();
     if count != formation.count() || count > most_assigned(freedom) {
         return None;
+    }
+    if freedom == Freedom::Fixed {
+        return assign(positions_m, &formation.slots_m).map(|(slots, _)| slots);
     }
     let (centre_m, slots_centre_m) = (mean_row(positions_m), mean_row(&formation.slots_m));
     let positions_m = about(positions_m, centre_m);

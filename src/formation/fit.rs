@@ -9,26 +9,27 @@ use crate::swarm::{Rows, row};
 /// What a formation may be moved by and still be the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
+    /// Nothing: every slot is a place.
+    Fixed,
     /// A translation.
     Translation,
     /// Any rigid motion, reflections among them.
     RigidMotion,
 }
 
-/// Root mean square distance \[m\] between the positions and the slots, moved as they are free to be so that it is least;
-/// NaN where there is none. Allocates nothing.
+/// Root mean square distance \[m\] between the positions and the slots, which are moved by `place_m` \[m\] and then as they
+/// are free to be so that it is least; NaN where there is none. Allocates nothing.
 #[must_use]
-pub fn rms_position_error_m(positions_m: &Rows, formation: &Formation, freedom: Freedom) -> f64 {
+pub fn rms_position_error_m(positions_m: &Rows, formation: &Formation, place_m: Vector3<f64>, freedom: Freedom) -> f64 {
     let (count, slots_m) = (positions_m.nrows(), &formation.slots_m);
-    match freedom {
-        Freedom::RigidMotion => procrustes_rms_m(positions_m, formation),
-        Freedom::Translation if count == 0 || slots_m.nrows() != count => f64::NAN,
-        Freedom::Translation => {
-            let offset_m = centre(positions_m) - centre(slots_m);
-            let square = |i: usize| (row(positions_m, i) - row(slots_m, i) - offset_m).norm_squared();
-            ((0..count).map(square).sum::<f64>() / count as f64).sqrt()
-        }
-    }
+    let offset_m = match freedom {
+        Freedom::RigidMotion => return procrustes_rms_m(positions_m, formation),
+        _ if count == 0 || slots_m.nrows() != count => return f64::NAN,
+        Freedom::Translation => centre(positions_m) - centre(slots_m),
+        Freedom::Fixed => place_m,
+    };
+    let square = |i: usize| (row(positions_m, i) - row(slots_m, i) - offset_m).norm_squared();
+    ((0..count).map(square).sum::<f64>() / count as f64).sqrt()
 }
 
 /// An isometry of space: x -> rotation x + translation.

@@ -182,9 +182,14 @@ fn what_is_free_to_be_turned_fits_turned_and_what_is_not_does_not() {
     let quarter = |x: f64, y: f64| [7.0 - y, x + 3.0, 0.0];
     let turned: Vec<f64> = (0..6).flat_map(|i| quarter(formation.slots_m[(i, 0)], formation.slots_m[(i, 1)])).collect();
     let moved = Rows::from_fn(6, |i, axis| formation.slots_m[(i, axis)] + 5.0);
-    let error_m = |positions_m: &Rows, freedom| rms_position_error_m(positions_m, &formation, freedom);
+    let place_m = Vector3::repeat(5.0);
+    let error_m = |positions_m: &Rows, freedom| rms_position_error_m(positions_m, &formation, place_m, freedom);
     let turned = Rows::from_row_slice(&turned);
     assert!(error_m(&turned, Freedom::RigidMotion) < 1e-12 && error_m(&turned, Freedom::Translation) > 1.0);
     assert!(error_m(&moved, Freedom::RigidMotion) < 1e-12 && error_m(&moved, Freedom::Translation) < 1e-12);
-    assert!(rms_position_error_m(&Rows::zeros(5), &formation, Freedom::Translation).is_nan());
+    let further = Rows::from_fn(6, |i, axis| moved[(i, axis)] + if axis == 0 { 2.0 } else { 0.0 });
+    assert!(error_m(&moved, Freedom::Fixed) < 1e-12 && (error_m(&further, Freedom::Fixed) - 2.0).abs() < 1e-12);
+    for freedom in [Freedom::Fixed, Freedom::Translation, Freedom::RigidMotion] {
+        assert!(error_m(&Rows::zeros(5), freedom).is_nan());
+    }
 }

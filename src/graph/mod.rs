@@ -3,13 +3,17 @@
 //! The laws sum over the neighbours j in `N_i` of vehicle i; what they promise depends on the graph's Laplacian `L_G`
 //! and on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
 
+mod pinning;
 mod spectrum;
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
 use crate::swarm::Pair;
+
+pub use pinning::Pinning;
 
 /// An undirected graph without self-loops on the vehicles 0..N.
 ///
@@ -19,7 +23,30 @@ use crate::swarm::Pair;
 pub struct Graph {
     count: usize,
     edges: Edges,
+    known: Known,
 }
+
+/// Eigenvalues that have been asked for; no part of what a graph is.
+#[derive(Clone, Debug)]
+struct Known {
+    algebraic: OnceLock<f64>,
+    /// Of the pinning that was asked for first.
+    pinned: OnceLock<(Pinning, f64)>,
+}
+
+impl Known {
+    const fn nothing() -> Self {
+        Self { algebraic: OnceLock::new(), pinned: OnceLock::new() }
+    }
+}
+
+impl PartialEq for Known {
+    fn eq(&self, _other: &Self) -> bool {
+        true
+    }
+}
+
+impl Eq for Known {}
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Edges {
@@ -90,7 +117,7 @@ impl Graph {
     /// Every vehicle senses every other.
     #[must_use]
     pub const fn complete(count: usize) -> Self {
-        Self { count, edges: Edges::All }
+        Self { count, edges: Edges::All, known: Known::nothing() }
     }
 
     /// The first vehicle senses all others and is sensed by them; they do not sense each other.
@@ -152,7 +179,7 @@ impl Graph {
         for i in 0..count {
             offsets[i + 1] += offsets[i];
         }
-        Self { count, edges: Edges::Listed { offsets, neighbours } }
+        Self { count, edges: Edges::Listed { offsets, neighbours }, known: Known::nothing() }
     }
 
     /// Number of vehicles N.

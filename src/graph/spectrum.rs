@@ -1,66 +1,131 @@
-//! The ends of a Laplacian's spectrum: in closed form where the graph has a name, without a matrix where it is large.
+//! The ends of the spectrum of a Laplacian, pinned or not: in closed form where the graph has a name, without a matrix
+//! where it is large.
 
 use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::Graph;
+use super::{Graph, Pinning};
 
 /// Up to here all eigenvalues are computed, in O(N^3).
 const DENSE_UP_TO: usize = 400;
 /// Vectors that are iterated together: the slower ones, which are close to each other, do not hold up the first.
 const BLOCK: usize = 6;
-/// Relative change of lambda2 from one iteration to the next at which it is known: what is left falls in proportion.
+/// Relative change of the least eigenvalue from one iteration to the next at which it is known: what is left falls in
+/// proportion.
 const SETTLED: f64 = 1e-12;
 const MOST_ITERATIONS: usize = 300;
 /// Residual of a linear system, relative to its right side.
 const SOLVED: f64 = 1e-6;
+/// Most visits of edges and vehicles: some seconds. Long thin graphs of tens of thousands of vehicles ask for more.
+const MOST_VISITS: u64 = 4_000_000_000;
 
 impl Graph {
     /// The algebraic connectivity lambda2, the second smallest eigenvalue of `L_G`: positive exactly where the graph is
-    /// connected, and 0 for fewer than two vehicles.
+    /// connected, and 0 for fewer than two vehicles. Computed once.
     ///
     /// In closed form for complete graphs, stars, rings and paths (N, 1, 2 - 2 cos(2 pi/N), 2 - 2 cos(pi/N)), however the
     /// graph was made, and exactly 0 for a disconnected one. Otherwise all eigenvalues are computed for up to 400 vehicles;
     /// beyond, inverse iteration on a block of vectors, with conjugate gradients in the place of a matrix. That ends at most
-    /// a few parts in 1e9 above lambda2.
+    /// a few parts in 1e9 above lambda2. Where it would take more than some seconds, the bound from below `4/(N (N - 1))`
+    /// stands in for lambda2.
     #[must_use]
     pub fn algebraic_connectivity(&self) -> f64 {
-        let count = self.count() as f64;
-        if self.count() < 2 || !self.is_connected() {
+        self.pinned_connectivity(&Pinning::Nobody)
+    }
+
+    /// The least eigenvalue of the pinned Laplacian M (see [`Pinning`]): positive exactly where the graph is connected and
+    /// somebody is pinned, with the algebraic connectivity in its place where nobody is. Computed once for each pinning that
+    /// is asked for first.
+    ///
+    /// In closed form where all are pinned (1), on the complete graph, and for a star led from its middle (1); otherwise as
+    /// [`Graph::algebraic_connectivity`], with `1/N^2` as the bound from below.
+    #[must_use]
+    pub fn pinned_connectivity(&self, pinning: &Pinning) -> f64 {
+        if *pinning == Pinning::Nobody {
+            return *self.known.algebraic.get_or_init(|| self.least_eigenvalue(pinning));
+        }
+        let (first, least) = self.known.pinned.get_or_init(|| (pinning.clone(), self.least_eigenvalue(pinning)));
+        if first == pinning { *least } else { self.least_eigenvalue(pinning) }
+    }
+
+    fn least_eigenvalue(&self, pinning: &Pinning) -> f64 {
+        let fewest = if *pinning == Pinning::Nobody { 2 } else { 1 };
+        if self.count() < fewest || !self.is_connected() {
             return 0.0;
         }
-        if self.is_complete() {
-            return count;
-        }
         let degrees = self.degrees();
+        if let Some(least) = self.in_closed_form(pinning, &degrees) {
+            return least;
+        }
+        if self.count() <= DENSE_UP_TO {
+            let mut eigenvalues = self.pinned_laplacian(pinning).symmetric_eigenvalues().data.as_vec().clone();
+            eigenvalues.sort_unstable_by(f64::total_cmp);
+            return eigenvalues[if *pinning == Pinning::Nobody { 1 } else { 0 }];
+        }
+        Operator::new(self, pinning, &degrees).inverse_iteration().unwrap_or_else(|| {
+            let count = self.count() as f64;
+            if *pinning == Pinning::Nobody { 4.0 / (count * (count - 1.0)) } else { 1.0 / (count * count) }
+        })
+    }
+
+    /// Of a connected graph.
+    fn in_closed_form(&self, pinning: &Pinning, degrees: &[usize]) -> Option<f64> {
+        let count = self.count() as f64;
         let most = degrees.iter().copied().max().unwrap_or_default();
-        match (self.edge_count(), most) {
-            (edges, most) if edges + 1 == self.count() && most == edges => 1.0,
-            (edges, 2) if edges == self.count() => 2.0 - 2.0 * libm::cos(2.0 * PI / count),
-            (_, 2) => 2.0 - 2.0 * libm::cos(PI / count),
-            _ if self.count() <= DENSE_UP_TO => {
-                let mut eigenvalues = self.laplacian().symmetric_eigenvalues().data.as_vec().clone();
-                eigenvalues.sort_unstable_by(f64::total_cmp);
-                eigenvalues[1]
+        let is_star = self.edge_count() + 1 == self.count() && most == self.edge_count();
+        match pinning {
+            Pinning::Nobody if self.is_complete() => Some(count),
+            Pinning::Nobody if is_star => Some(1.0),
+            Pinning::Nobody if most == 2 && self.edge_count() == self.count() => {
+                Some(2.0 - 2.0 * libm::cos(2.0 * PI / count))
             }
-            _ => self.inverse_iteration(&degrees),
+            Pinning::Nobody if most == 2 => Some(2.0 - 2.0 * libm::cos(PI / count)),
+            Pinning::Nobody => None,
+            Pinning::All => Some(1.0),
+            Pinning::Listed(listed) if listed.is_empty() => Some(0.0),
+            // The smaller root of x^2 - (N + 1) x + m, without cancellation.
+            Pinning::Listed(listed) if self.is_complete() => {
+                let (half, pinned) = (0.5 * (count + 1.0), listed.len() as f64);
+                Some(pinned / (half + (half * half - pinned).sqrt()))
+            }
+            // A leader alone has nobody to lead.
+            Pinning::Leader(_) if self.count() == 1 => Some(1.0),
+            Pinning::Leader(_) if self.is_complete() => Some(1.0),
+            &Pinning::Leader(leader) if is_star && degrees[leader] == most => Some(1.0),
+            Pinning::Listed(_) | Pinning::Leader(_) => None,
         }
     }
 
-    /// A bound on the largest eigenvalue of `L_G`: N where the graph is complete, otherwise the largest sum of the degrees
-    /// of two vehicles that are joined (Anderson and Morley 1985), which is exact for stars and for rings of even N.
+    /// M as a matrix, N x N; without the leader's row and column, N - 1 x N - 1, where there is one. Takes 8 N^2 bytes.
     #[must_use]
-    pub fn largest_eigenvalue_bound(&self) -> f64 {
+    pub fn pinned_laplacian(&self, pinning: &Pinning) -> DMatrix<f64> {
+        let mut matrix = self.laplacian();
+        if let &Pinning::Leader(leader) = pinning {
+            return matrix.remove_row(leader).remove_column(leader);
+        }
+        (0..self.count()).filter(|&i| pinning.pins(i)).for_each(|i| matrix[(i, i)] += 1.0);
+        matrix
+    }
+
+    /// A bound on the largest eigenvalue of M: for nobody pinned N where the graph is complete, otherwise the largest sum of
+    /// the degrees of two vehicles that are joined (Anderson and Morley 1985), which is exact for stars and for rings of even
+    /// N; one more where somebody is pinned. A leader takes none away from it.
+    #[must_use]
+    pub fn largest_eigenvalue_bound(&self, pinning: &Pinning) -> f64 {
+        let pinned = if matches!(pinning, Pinning::All | Pinning::Listed(_)) { 1.0 } else { 0.0 };
         if self.is_complete() {
-            return if self.count() < 2 { 0.0 } else { self.count() as f64 };
+            return if self.count() < 2 { pinned } else { self.count() as f64 + pinned };
         }
         let degrees = self.degrees();
-        self.edges().map(|(i, j)| degrees[i] + degrees[j]).max().unwrap_or_default() as f64
+        self.edges().map(|(i, j)| degrees[i] + degrees[j]).max().unwrap_or_default() as f64 + pinned
     }
 
     /// Number of neighbours of each vehicle.
     fn degrees(&self) -> Vec<usize> {
+        if self.is_complete() {
+            return vec![self.count().saturating_sub(1); self.count()];
+        }
         let mut degrees = vec![0; self.count()];
         for (i, j) in self.edges() {
             degrees[i] += 1;
@@ -68,19 +133,55 @@ impl Graph {
         }
         degrees
     }
+}
 
-    fn product(&self, x: &[f64], out: &mut [f64]) {
+/// M as a function of vectors, on those that it maps onto themselves: without a mean where nobody is pinned, and zero at a
+/// leader.
+struct Operator<'a> {
+    graph: &'a Graph,
+    pinning: &'a Pinning,
+    /// M's diagonal.
+    diagonal: Vec<f64>,
+    visits: u64,
+}
+
+impl<'a> Operator<'a> {
+    fn new(graph: &'a Graph, pinning: &'a Pinning, degrees: &[usize]) -> Self {
+        let adds = |i: usize| if pinning.pins(i) { 1.0 } else { 0.0 };
+        let diagonal = degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect();
+        Self { graph, pinning, diagonal, visits: 0 }
+    }
+
+    fn product(&mut self, x: &[f64], out: &mut [f64]) {
+        self.visits += (self.graph.edge_count() + x.len()) as u64;
         out.fill(0.0);
-        for (i, j) in self.edges() {
+        for (i, j) in self.graph.edges() {
             let difference = x[i] - x[j];
             out[i] += difference;
             out[j] -= difference;
         }
+        if matches!(self.pinning, Pinning::Listed(_)) {
+            (0..x.len()).filter(|&i| self.pinning.pins(i)).for_each(|i| out[i] += x[i]);
+        }
+        if let &Pinning::Leader(leader) = self.pinning {
+            out[leader] = 0.0;
+        }
     }
 
-    /// lambda2 of a connected graph, from above.
-    fn inverse_iteration(&self, degrees: &[usize]) -> f64 {
-        let count = self.count();
+    fn project(&self, x: &mut [f64]) {
+        match *self.pinning {
+            Pinning::Nobody => {
+                let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+                x.iter_mut().for_each(|x| *x -= mean);
+            }
+            Pinning::Leader(leader) => x[leader] = 0.0,
+            Pinning::All | Pinning::Listed(_) => {}
+        }
+    }
+
+    /// The least eigenvalue, from above; none where it takes too long.
+    fn inverse_iteration(&mut self) -> Option<f64> {
+        let count = self.graph.count();
         // Vectors that no symmetry of a graph is likely to share: the fractions of multiples of irrational numbers.
         let mut block = DMatrix::from_fn(count, BLOCK, |i, k| {
             let irrational = ((k + 2) as f64).sqrt() + 0.123_456_789;
@@ -88,7 +189,7 @@ impl Graph {
         });
         let (mut images, mut before) = (DMatrix::zeros(count, BLOCK), f64::INFINITY);
         for _ in 0..MOST_ITERATIONS {
-            block.column_iter_mut().for_each(|mut column| centre(column.as_mut_slice()));
+            block.column_iter_mut().for_each(|mut column| self.project(column.as_mut_slice()));
             block = block.qr().q();
             for (x, mut image) in block.column_iter().zip(images.column_iter_mut()) {
                 self.product(x.as_slice(), image.as_mut_slice());
@@ -96,56 +197,53 @@ impl Graph {
             let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(block.tr_mul(&images));
             let least = eigenvalues.min();
             if (before - least).abs() <= SETTLED * least {
-                return least;
+                return Some(least);
             }
             before = least;
             block *= eigenvectors;
             for (k, mut x) in block.column_iter_mut().enumerate() {
-                self.solve(degrees, eigenvalues[k], x.as_mut_slice());
+                self.solve(eigenvalues[k], x.as_mut_slice())?;
             }
         }
-        before
+        None
     }
 
-    /// Puts the solution y of L y = x, without its mean, in the place of x: conjugate gradients, scaled by the degrees, from
-    /// x over its Rayleigh quotient.
-    fn solve(&self, degrees: &[usize], quotient: f64, x: &mut [f64]) {
+    /// Puts the solution y of M y = x in the place of x: conjugate gradients, scaled by the diagonal, from x over its
+    /// Rayleigh quotient.
+    fn solve(&mut self, quotient: f64, x: &mut [f64]) -> Option<()> {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut y: Vec<f64> = x.iter().map(|x| x / quotient).collect();
         let mut image = vec![0.0; x.len()];
         self.product(&y, &mut image);
         let mut residual: Vec<f64> = x.iter().zip(&image).map(|(x, image)| x - image).collect();
-        let scaled = |residual: &[f64]| {
-            let mut scaled: Vec<f64> = residual.iter().zip(degrees).map(|(r, &degree)| r / degree as f64).collect();
-            centre(&mut scaled);
-            scaled
-        };
-        let mut z = scaled(&residual);
+        let mut z = self.scaled(&residual);
         let mut direction = z.clone();
         let (mut size, enough) = (dot(&residual, &z), (SOLVED * SOLVED) * dot(x, x));
         for _ in 0..10 * x.len() {
             if dot(&residual, &residual) <= enough {
                 break;
             }
+            if self.visits > MOST_VISITS {
+                return None;
+            }
             self.product(&direction, &mut image);
             let step = size / dot(&direction, &image);
             y.iter_mut().zip(&direction).for_each(|(y, d)| *y += step * d);
             residual.iter_mut().zip(&image).for_each(|(r, image)| *r -= step * image);
-            z = scaled(&residual);
+            z = self.scaled(&residual);
             let next = dot(&residual, &z);
             direction.iter_mut().zip(&z).for_each(|(d, z)| *d = z + next / size * *d);
             size = next;
         }
-        centre(&mut y);
+        self.project(&mut y);
         x.copy_from_slice(&y);
+        Some(())
     }
-}
 
-/// Takes the mean away.
-fn centre(x: &mut [f64]) {
-    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-    for x in x {
-        *x -= mean;
+    fn scaled(&self, residual: &[f64]) -> Vec<f64> {
+        let mut scaled: Vec<f64> = residual.iter().zip(&self.diagonal).map(|(r, diagonal)| r / diagonal).collect();
+        self.project(&mut scaled);
+        scaled
     }
 }
 
@@ -183,13 +281,13 @@ mod tests {
                 let eigenvalues = dense(&graph);
                 let found = graph.algebraic_connectivity();
                 assert!((found - eigenvalues[1]).abs() < 1e-13 * count as f64, "{count}: {found}, {}", eigenvalues[1]);
-                let (bound, largest) = (graph.largest_eigenvalue_bound(), eigenvalues[count - 1]);
+                let (bound, largest) = (graph.largest_eigenvalue_bound(&Pinning::Nobody), eigenvalues[count - 1]);
                 assert!(bound >= largest * (1.0 - 1e-12), "{count}: {bound}, {largest}");
             }
         }
         // A star by any other centre is one.
         let hub = Graph::from_edges(5, &[(2, 0), (2, 1), (2, 3), (2, 4)]).expect("a graph");
-        assert_eq!((hub.algebraic_connectivity(), hub.largest_eigenvalue_bound()), (1.0, 5.0));
+        assert_eq!((hub.algebraic_connectivity(), hub.largest_eigenvalue_bound(&Pinning::Nobody)), (1.0, 5.0));
         let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
         assert_eq!(apart.algebraic_connectivity(), 0.0);
     }
@@ -202,7 +300,61 @@ mod tests {
             let found = graph.algebraic_connectivity();
             let off = found / eigenvalues[1] - 1.0;
             assert!((-1e-9..1e-8).contains(&off), "{extra}: {found} instead of {}", eigenvalues[1]);
-            assert!(graph.largest_eigenvalue_bound() >= eigenvalues[count - 1]);
+            assert!(graph.largest_eigenvalue_bound(&Pinning::Nobody) >= eigenvalues[count - 1]);
         }
+    }
+
+    /// Nobody's second eigenvalue is left to the other tests.
+    fn pinnings(count: usize) -> Vec<Pinning> {
+        vec![
+            Pinning::All,
+            Pinning::Listed(vec![count / 2]),
+            Pinning::Listed(vec![0, count - 1]),
+            Pinning::Leader(0),
+            Pinning::Leader(count - 1),
+        ]
+    }
+
+    fn least(graph: &Graph, pinning: &Pinning) -> f64 {
+        graph.pinned_laplacian(pinning).symmetric_eigenvalues().min()
+    }
+
+    #[test]
+    fn pinned_graphs_have_the_least_eigenvalue_of_their_matrix() {
+        for count in 2..12 {
+            for graph in [Graph::complete(count), Graph::star(count), Graph::ring(count), Graph::path(count)] {
+                for pinning in pinnings(count) {
+                    let (found, expected) = (graph.pinned_connectivity(&pinning), least(&graph, &pinning));
+                    assert!(
+                        (found - expected).abs() < 1e-12 * count as f64,
+                        "{count} {pinning:?}: {found}, {expected}"
+                    );
+                    let largest = graph.pinned_laplacian(&pinning).symmetric_eigenvalues().max();
+                    assert!(graph.largest_eigenvalue_bound(&pinning) >= largest * (1.0 - 1e-12), "{count} {pinning:?}");
+                }
+            }
+        }
+        assert_eq!(Graph::ring(5).pinned_connectivity(&Pinning::Listed(Vec::new())), 0.0);
+        let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
+        assert_eq!(apart.pinned_connectivity(&Pinning::All), 0.0);
+    }
+
+    #[test]
+    fn large_pinned_graphs_without_a_name_have_the_eigenvalue_of_their_matrix() {
+        let graph = random(420, 60);
+        for pinning in [Pinning::Listed(vec![3, 200, 400]), Pinning::Leader(7)] {
+            let (found, expected) = (graph.pinned_connectivity(&pinning), least(&graph, &pinning));
+            let off = found / expected - 1.0;
+            assert!((-1e-9..1e-8).contains(&off), "{pinning:?}: {found} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn where_the_work_is_too_much_there_is_no_answer() {
+        let graph = random(450, 0);
+        let degrees = graph.degrees();
+        let mut operator = Operator::new(&graph, &Pinning::Nobody, &degrees);
+        operator.visits = MOST_VISITS;
+        assert_eq!(operator.inverse_iteration(), None);
     }
 }

@@ -13,6 +13,17 @@ pub struct Certificate {
     pub energy_initial: Option<f64>,
     /// Every reason why nothing is certified.
     pub void: Vec<Void>,
+    /// The same for each of several formations that are gone through, in their order: `certified_m` is the least of them.
+    pub legs: Vec<LegBound>,
+}
+
+/// What holds from the beginning of a leg to the beginning of the next, and for ever after the last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegBound {
+    /// The energy does not exceed this \[m^2/s^2\].
+    pub energy: f64,
+    /// No pair comes closer than this \[m\].
+    pub certified_m: Option<f64>,
 }
 
 /// Why a certificate is void.
@@ -32,6 +43,8 @@ pub enum Void {
     CommandsFromOutside,
     /// Each command is held for a period of its own.
     CommandsHeld,
+    /// The vehicles are not told how the reference that they follow moves.
+    ReferenceNotFed,
     /// What would be certified is so near delta that the plant's numbers do not tell the two apart.
     Unresolved,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
@@ -42,7 +55,7 @@ impl Certificate {
     /// A certificate that promises nothing, for one reason.
     #[must_use]
     pub fn void(reason: Void) -> Self {
-        Self { certified_m: None, energy_initial: None, void: vec![reason] }
+        Self { certified_m: None, energy_initial: None, void: vec![reason], legs: Vec::new() }
     }
 
     /// The same, promising nothing for one more reason where `breaks` says so.
@@ -50,6 +63,7 @@ impl Certificate {
     pub fn void_where(mut self, breaks: bool, reason: Void) -> Self {
         if breaks && !self.void.contains(&reason) {
             self.certified_m = None;
+            self.legs.clear();
             self.void.push(reason);
         }
         self
@@ -68,6 +82,7 @@ impl Void {
             Self::InexactLink => "inexact-link",
             Self::CommandsFromOutside => "commands-from-outside",
             Self::CommandsHeld => "commands-held",
+            Self::ReferenceNotFed => "reference-not-fed",
             Self::Unresolved => "certificate-unresolved",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
@@ -93,6 +108,9 @@ impl fmt::Display for Void {
             Self::CommandsHeld => {
                 f.write_str("The vehicles hold each command while the swarm moves on (time.control_hz).")
             }
+            Self::ReferenceNotFed => {
+                f.write_str("The vehicles are not told how their reference moves (reference.feed_forward).")
+            }
             Self::Unresolved => f.write_str(
                 "The distance that the law certifies is nearer to delta than positions are told apart: there is too much energy.",
             ),
@@ -117,6 +135,7 @@ mod tests {
             Void::InexactLink,
             Void::CommandsFromOutside,
             Void::CommandsHeld,
+            Void::ReferenceNotFed,
             Void::Unresolved,
             Void::StartRefused(collision),
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
@@ -130,6 +149,7 @@ mod tests {
             "inexact-link",
             "commands-from-outside",
             "commands-held",
+            "reference-not-fed",
             "certificate-unresolved",
             "start-too-close",
             "start-refused",
@@ -140,7 +160,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[8].to_string(),
+            reasons[9].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

@@ -4,22 +4,20 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, Void};
-use super::consensus::{
-    add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state,
-    relative_kinetic_energy, sum_of_squares_about_mean,
-};
+use super::certificate::{Certificate, LegBound, Void};
+use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
 use super::error::{LawError, ParameterError};
-use super::interface::{Law, VelocityMargin};
+use super::interface::{Controls, Law, VelocityMargin};
 use super::memo::Memo;
+use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
 use super::setting::{Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
-use crate::graph::Graph;
+use crate::graph::Pinning;
 use crate::observation::Observation;
 use crate::space::NearPairs;
-use crate::swarm::{Pair, Rows, row};
-use crate::target::Target;
+use crate::swarm::{Pair, Rows, row, set_row};
+use crate::target::{ReferenceMotion, Target};
 
 /// Keys of `[law]` with `kind = "displacement"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,13 +61,20 @@ impl DisplacementKeys {
 ///
 /// ```text
 /// u_i = -sigma sum_{j in N_i} [ k (e_i - e_j) + c (v_i - v_j) ] - sum_{j : l_ij < R} grad_i V_R(l_ij)
-/// sigma = 1/lambda2(L),   c = max(0, zeta + a22),   R = smallest distance of two slots
+/// sigma = 1/lambda2(L),   c = max(0, zeta + a22),   R = smallest distance of two slots on any leg
 /// ```
 ///
 /// where `V_R` is the [`EdgeTension`] with rest length R, used only while it pushes: its slope is continuous at R. The first
 /// sum goes over links, the second over near pairs, linked or not. The sum of all `u_i` is zero.
 ///
 /// On the complete graph sigma = 1/N, and the first sum is `N [k (e_i - mean e) + c (v_i - mean v)]`.
+///
+/// # Reference
+/// Where some vehicles know a [reference](crate::target::Guidance) r(t), the pinned Laplacian M takes the place of L
+/// ([`crate::graph::Pinning`]), sigma is the inverse of its least eigenvalue, `k (e_i - r) + c (v_i - r')` is added to the sum
+/// of those who know, and `r'' - a22 r'` is fed forward to all. A leader flies `r'' - a22 r' - k (e - r) - c (v - r')`,
+/// which no other vehicle changes. Energy and certificate are those below with v - r' for v~ and M for L; a leader's own
+/// place and velocity are the reference then.
 ///
 /// # Energy
 /// ```text
@@ -83,59 +88,78 @@ impl DisplacementKeys {
 /// `V_R(l_ij(t)) <= E(0)` for *every* pair, for ever, on *every* connected graph. It assumes exact knowledge of links and near
 /// pairs, a common compass, no delay, no saturation, no disturbance and continuous time.
 ///
+/// Where slots change by D, at once or along straight lines, `sqrt E` grows by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`:
+/// what holds through all legs is known before the first step.
+///
 /// # Cost
 /// O(links + near pairs) a step without allocation; O(N + near pairs) on the complete graph.
 #[derive(Clone, Debug)]
 pub struct DisplacementLaw {
-    graph: Graph,
+    pulls: PinnedConsensus,
     keys: DisplacementKeys,
     delta_m: f64,
     a22_per_s: f64,
-    /// lambda2, and a bound on the largest eigenvalue, of the graph's Laplacian.
+    /// Whether `r'' - a22 r'` is fed forward to those who follow.
+    is_fed: bool,
+    /// Whether nothing would have to be.
+    needs_no_feed: bool,
+    /// Least eigenvalue of the pinned Laplacian, and a bound on its largest.
     connectivity: f64,
     largest: f64,
     /// `V_R`.
     tension: EdgeTension,
+    /// R is at most this, for legs to come \[m\].
+    rest_at_most_m: f64,
     /// Whether there are two vehicles at all.
     has_pairs: bool,
     /// That of the target that R is taken from.
     revision: u64,
-    /// Scratch: `k e_i + c v_i`.
-    pulls: Rows,
     /// Sum of `V_R` over the near pairs.
     memo: Memo,
 }
 
 impl DisplacementLaw {
-    /// The law on these links, with the smallest distance of two slots as the range of its tension.
+    /// The law on these links, with the smallest distance of two slots on any leg as the range of its tension.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected, a
-    /// slot or a gain is not finite, or two slots are not more than delta apart.
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
+    /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
     pub fn new(setting: &Setting<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, delta_m, a22_per_s } = setting;
+        let &Setting { links, formation, later, guidance, delta_m, a22_per_s } = setting;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
-        ParameterError::check(links, formation, &gains)?;
+        for formation in std::iter::once(formation).chain(later.iter().map(|leg| &leg.formation)) {
+            ParameterError::check(links, formation, &gains)?;
+        }
         if let Some(&vehicle) = links.unreachable().first() {
             return Err(ParameterError::Disconnected { vehicle });
         }
-        let (pair, rest_m) = nearest_slots(formation, delta_m);
-        let tension =
-            EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })?;
-        let count = links.count();
+        let pulls = PinnedConsensus::new(links, setting.pinning());
+        let connectivity = pulls.connectivity();
+        if connectivity <= 0.0 {
+            return Err(ParameterError::NobodyKnowsTheReference);
+        }
+        let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, delta_m)?, f64::INFINITY);
+        for leg in later {
+            let of_leg = tension_between(&leg.formation, &keys, delta_m)?;
+            if of_leg.rest_m() < tension.rest_m() {
+                tension = of_leg;
+            }
+            rest_at_most_m = tension.rest_m();
+        }
         Ok(Self {
-            graph: links.clone(),
+            largest: links.largest_eigenvalue_bound(&pulls.pinning),
+            pulls,
             keys,
             delta_m,
             a22_per_s,
-            // A vehicle alone has no neighbour to be pulled by.
-            connectivity: if count > 1 { links.algebraic_connectivity() } else { 1.0 },
-            largest: links.largest_eigenvalue_bound(),
+            is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
+            needs_no_feed: guidance.is_none_or(|guidance| needs_no_feed(&guidance.motion, a22_per_s)),
+            connectivity,
             tension,
-            has_pairs: count > 1,
+            rest_at_most_m,
+            has_pairs: links.count() > 1,
             revision: 0,
-            pulls: Rows::zeros(count),
-            memo: Memo::new(count),
+            memo: Memo::new(links.count()),
         })
     }
 
@@ -147,6 +171,11 @@ impl DisplacementLaw {
     /// c \[1/s\].
     fn damping_per_s(&self) -> f64 {
         (self.keys.zeta_per_s + self.a22_per_s).max(0.0)
+    }
+
+    /// Whether somebody knows a reference.
+    fn is_guided(&self) -> bool {
+        self.pulls.pinning != Pinning::Nobody
     }
 
     /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and `V_R`.
@@ -170,22 +199,38 @@ impl DisplacementLaw {
         near.pairs().iter().map(of_pair).sum()
     }
 
-    /// Sum over links of `|e_i - e_j|^2` \[m^2\].
-    fn stretch_m2(&self, positions_m: &Rows, formation: &Formation) -> f64 {
-        let error_m = |i: usize| row(positions_m, i) - row(&formation.slots_m, i);
-        if self.graph.is_complete() {
-            return self.graph.count() as f64 * sum_of_squares_about_mean(self.graph.count(), error_m);
-        }
-        self.graph.edges().map(|(i, j)| (error_m(i) - error_m(j)).norm_squared()).sum()
+    /// `(sigma k/2) e' M e` \[m^2/s^2\].
+    fn stretch(&self, error_m: impl Fn(usize) -> Vector3<f64>) -> f64 {
+        0.5 * self.scale() * self.keys.k_per_s2 * self.pulls.stretch_m2(error_m)
     }
 
     fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
-        check_state(self.graph.count(), at.own)?;
-        let positions_m = &at.own.positions_m;
-        let stretch_m2 = self.stretch_m2(positions_m, at.target.formation);
+        check_state(self.pulls.graph.count(), at.own)?;
+        let (positions_m, Target { formation, reference, .. }) = (&at.own.positions_m, at.target);
+        let stretch = self.stretch(|i| error_m(positions_m, formation, reference.position_m, i));
         let pushes = self.memo.of(positions_m).map_or_else(|| self.potential(positions_m), Ok)?;
-        let energy = relative_kinetic_energy(at.own) + 0.5 * self.scale() * self.keys.k_per_s2 * stretch_m2 + pushes;
+        let energy = self.pulls.kinetic_energy(at.own, &reference) + stretch + pushes;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
+    }
+
+    /// What holds from a state of this energy on, and from each time that the slots become those of the next formation.
+    fn bounds(&self, energy: f64, now: &Formation, ahead: &[&Formation]) -> Vec<LegBound> {
+        let bound =
+            |energy: f64| LegBound { energy, certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)) };
+        let (mut before, mut root) = (now, energy.sqrt());
+        let mut bounds = vec![bound(energy)];
+        for &next in ahead {
+            root += self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt();
+            bounds.push(bound(root * root));
+            before = next;
+        }
+        bounds
+    }
+
+    /// R for these slots \[m\].
+    fn rest_for(&self, formation: &Formation) -> (Pair, f64) {
+        let (pair, distance_m) = nearest_slots(formation, self.delta_m);
+        (pair, distance_m.min(self.rest_at_most_m))
     }
 }
 
@@ -194,44 +239,58 @@ fn nearest_slots(formation: &Formation, delta_m: f64) -> (Pair, f64) {
     formation.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
 }
 
+fn tension_between(
+    formation: &Formation,
+    keys: &DisplacementKeys,
+    delta_m: f64,
+) -> Result<EdgeTension, ParameterError> {
+    let (pair, rest_m) = nearest_slots(formation, delta_m);
+    EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })
+}
+
+/// Whether a vehicle on the reference stays on it by itself.
+fn needs_no_feed(motion: &ReferenceMotion, a22_per_s: f64) -> bool {
+    motion.is_at_rest() || (motion.is_uniform() && a22_per_s == 0.0)
+}
+
 impl Law for DisplacementLaw {
     fn name(&self) -> &'static str {
         "displacement"
     }
 
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.graph.count(), at, command)?;
+        check_observation(self.pulls.graph.count(), at, command)?;
         command.fill(0.0);
-        let (slots_m, k, c) = (&at.target.formation.slots_m, self.keys.k_per_s2, self.damping_per_s());
-        let gain = -self.scale();
-        if let Some(swarm) = at.shared() {
-            self.pulls.copy_from(&swarm.positions_m);
-            self.pulls -= slots_m;
-            let pulls = self.pulls.as_mut_slice().iter_mut();
-            pulls.zip(swarm.velocities_m_s.as_slice()).for_each(|(pull, v)| *pull = k * *pull + c * v);
-            add_laplacian_product(&self.graph, &self.pulls, gain, command);
-        } else {
-            add_heard(at, command, |i, own, j, heard| {
-                let error_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));
-                Ok(gain * (k * error_m + c * (own.velocity_m_s - heard.velocity_m_s)))
-            })?;
-        }
+        let gains = Gains { position: self.keys.k_per_s2, velocity: self.damping_per_s() };
+        self.pulls.add_pulls(at, gains, -self.scale(), command)?;
         let potential = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
         if let Some(swarm) = at.shared() {
             self.memo.keep(&swarm.positions_m, potential);
+        }
+        if self.is_guided() {
+            if self.is_fed {
+                let fed = fed_forward(&at.target.reference, self.a22_per_s);
+                (0..command.nrows()).for_each(|i| {
+                    let sum = row(command, i) + fed;
+                    set_row(command, i, sum);
+                });
+            }
+            self.pulls.lead(at, gains, self.a22_per_s, command);
         }
         check_range(command)
     }
 
     fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
         if target.revision != self.revision {
-            check_count(self.graph.count(), target.formation.count())?;
-            let delta_m = self.delta_m;
-            let (pair, distance_m) = nearest_slots(target.formation, delta_m);
-            self.tension = EdgeTension::new(self.keys.alpha, delta_m, distance_m)
-                .map_err(|_: TensionError| LawError::Target { pair, distance_m, delta_m })?;
+            check_count(self.pulls.graph.count(), target.formation.count())?;
+            // Slots that are spread are farther apart than the leg's own.
+            if target.spread <= 1.0 {
+                let (delta_m, (pair, distance_m)) = (self.delta_m, self.rest_for(target.formation));
+                self.tension = EdgeTension::new(self.keys.alpha, delta_m, distance_m)
+                    .map_err(|_: TensionError| LawError::Target { pair, distance_m, delta_m })?;
+                self.memo.forget();
+            }
             self.revision = target.revision;
-            self.memo.forget();
         }
         Ok(())
     }
@@ -241,14 +300,29 @@ impl Law for DisplacementLaw {
     }
 
     fn certificate(&self, start: &Observation<'_>) -> Certificate {
-        match self.try_energy(start) {
-            Ok(energy) => Certificate {
-                certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)),
-                energy_initial: Some(energy),
-                void: Vec::new(),
-            },
-            Err(fault) => Certificate::void(Void::StartRefused(fault)),
-        }
+        self.certificate_through(start, &[])
+    }
+
+    fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        let energy = match self.try_energy(start) {
+            Ok(energy) => energy,
+            Err(fault) => return Certificate::void(Void::StartRefused(fault)),
+        };
+        let legs = self.bounds(energy, start.target.formation, ahead);
+        let certified_m = legs.last().and_then(|last| last.certified_m);
+        let legs = if ahead.is_empty() { Vec::new() } else { legs };
+        let closes_in = ahead.iter().any(|formation| self.rest_for(formation).1 < self.tension.rest_m());
+        Certificate { certified_m, energy_initial: Some(energy), void: Vec::new(), legs }
+            .void_where(closes_in, Void::TargetChanges)
+            .void_where(!self.is_fed && !self.needs_no_feed, Void::ReferenceNotFed)
+    }
+
+    fn controls(&self) -> Controls {
+        if self.is_guided() { Controls::Places } else { Controls::Displacements }
+    }
+
+    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
+        if self.is_guided() { a22_per_s - self.damping_per_s() } else { a22_per_s }
     }
 
     fn barrier_m(&self) -> Option<f64> {
@@ -278,7 +352,8 @@ impl Law for DisplacementLaw {
     }
 
     fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
-        let damping_per_s = self.damping_per_s() * (connectivity / self.connectivity);
+        let of_graph = if self.is_guided() { 1.0 } else { connectivity / self.connectivity };
+        let damping_per_s = self.damping_per_s() * of_graph;
         Some(VelocityMargin {
             per_s: damping_per_s - a22_per_s,
             terms_per_s: damping_per_s + a22_per_s.abs(),
@@ -287,5 +362,7 @@ impl Law for DisplacementLaw {
     }
 }
 
+#[cfg(test)]
+mod guided_tests;
 #[cfg(test)]
 mod tests;

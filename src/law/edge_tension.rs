@@ -51,7 +51,7 @@ impl EdgeTensionKeys {
     }
 
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<EdgeTensionLaw, ParameterError> {
-        let &Setting { links, formation, delta_m, a22_per_s } = setting;
+        let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
         EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })
     }
 }
@@ -307,7 +307,7 @@ impl Law for EdgeTensionLaw {
         }
         let energy_initial = energy.ok();
         let certified_m = if void.is_empty() { self.linked_separation_m(start) } else { None };
-        Certificate { certified_m, energy_initial, void }
+        Certificate { certified_m, energy_initial, void, legs: Vec::new() }
     }
 }
 

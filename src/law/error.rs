@@ -72,6 +72,9 @@ pub enum ParameterError {
         /// The first such vehicle, from 0.
         vehicle: usize,
     },
+    /// There is a reference, and no vehicle knows it.
+    #[error("no vehicle knows the reference")]
+    NobodyKnowsTheReference,
     /// A gain is not a finite number.
     #[error("{name} is {value}; it must be a finite number")]
     NotFinite {

@@ -4,7 +4,7 @@ use dyn_clone::DynClone;
 
 use super::certificate::{Certificate, Void};
 use super::error::LawError;
-use crate::formation::Freedom;
+use crate::formation::{Formation, Freedom};
 use crate::observation::Observation;
 use crate::swarm::Rows;
 use crate::target::Target;
@@ -42,6 +42,12 @@ pub trait Law: DynClone + Send {
     /// What the law promises about separation from this start on, before the first step.
     fn certificate(&self, _start: &Observation<'_>) -> Certificate {
         Certificate::void(Void::NoBarrier)
+    }
+
+    /// What the law promises from this state on if its target then goes through these formations, each taken up at once or
+    /// along the straight lines between slots, at any time.
+    fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        self.certificate(start).void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
     /// What the certified distance rests on, a sentence.
@@ -109,6 +115,8 @@ pub enum Controls {
     Distances,
     /// Differences of positions, in the directions of the common frame: a formation is reached up to translation.
     Displacements,
+    /// Places: slots are reached where the reference has carried them.
+    Places,
 }
 
 impl Controls {
@@ -118,6 +126,7 @@ impl Controls {
         match self {
             Self::Distances => Freedom::RigidMotion,
             Self::Displacements => Freedom::Translation,
+            Self::Places => Freedom::Fixed,
         }
     }
 }

@@ -13,12 +13,13 @@ mod interface;
 mod kernel;
 mod laplacian;
 mod memo;
+mod pinned;
 mod potential;
 mod setting;
 mod spec;
 mod tension;
 
-pub use certificate::{Certificate, Void};
+pub use certificate::{Certificate, LegBound, Void};
 pub use displacement::{DisplacementKeys, DisplacementLaw};
 pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw, EdgeTensionParameters};
 pub use error::{LawError, ParameterError};

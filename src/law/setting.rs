@@ -1,7 +1,8 @@
 //! What a law is built from, and what its keys must be.
 
 use crate::formation::Formation;
-use crate::graph::Graph;
+use crate::graph::{Graph, Pinning};
+use crate::target::{Guidance, Leg};
 
 /// What a law is built from beside its own keys.
 #[derive(Clone, Copy, Debug)]
@@ -10,10 +11,27 @@ pub struct Setting<'a> {
     pub links: &'a Graph,
     /// The formation of the first leg.
     pub formation: &'a Formation,
+    /// The legs after it.
+    pub later: &'a [Leg],
+    /// The motion that formations are carried along with, and who knows it.
+    pub guidance: Option<&'a Guidance>,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
     /// Velocity coefficient a22 of the vehicles \[1/s\].
     pub a22_per_s: f64,
+}
+
+impl<'a> Setting<'a> {
+    /// One formation, wherever it comes to be.
+    #[must_use]
+    pub fn new(links: &'a Graph, formation: &'a Formation, delta_m: f64, a22_per_s: f64) -> Self {
+        Self { links, formation, later: &[], guidance: None, delta_m, a22_per_s }
+    }
+
+    /// Who knows the reference.
+    pub(super) fn pinning(&self) -> Pinning {
+        self.guidance.map_or(Pinning::Nobody, |guidance| guidance.known_by.clone())
+    }
 }
 
 /// A number among a law's keys, and what it must be.

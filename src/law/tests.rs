@@ -21,7 +21,7 @@ fn swarm() -> Swarm {
 }
 
 fn built(spec: &LawSpec, links: &Graph, formation: &Formation) -> Box<dyn Law> {
-    let setting = Setting { links, formation, delta_m: 1.0, a22_per_s: 0.1 };
+    let setting = Setting::new(links, formation, 1.0, 0.1);
     spec.clone().complete(0.1).build(&setting).expect("a law")
 }
 

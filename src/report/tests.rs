@@ -52,7 +52,8 @@ struct Case {
 
 impl Case {
     fn good() -> Self {
-        let certificate = Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![] };
+        let certificate =
+            Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![], legs: vec![] };
         Self {
             audit: passing(2.4607),
             summary: REACHED,
@@ -259,7 +260,7 @@ fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
 #[test]
 fn rounding_breaks_no_certificate() {
     // A swarm that starts in its own formation certifies its own distances, and flies in single precision.
-    let certificate = Certificate { certified_m: Some(3.0), energy_initial: Some(0.0), void: vec![] };
+    let certificate = Certificate { certified_m: Some(3.0), energy_initial: Some(0.0), void: vec![], legs: vec![] };
     let case = Case { audit: passing(2.999_999_88), certificate: certificate.clone(), ..Case::good() };
     assert!(case.report().verdict.pass && !case.report().headline().contains("breaks"), "{:?}", case.report().verdict);
     let case = Case { audit: passing(2.998), certificate, ..Case::good() };
@@ -430,7 +431,8 @@ fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows()
 #[test]
 fn a_certificate_is_broken_by_a_share_of_its_clearance() {
     let report = |certified_m: f64, closest_m: f64| {
-        let certificate = Certificate { certified_m: Some(certified_m), energy_initial: Some(3.656), void: vec![] };
+        let certificate =
+            Certificate { certified_m: Some(certified_m), energy_initial: Some(3.656), void: vec![], legs: vec![] };
         Case { audit: passing(closest_m), certificate, ..Case::good() }.report().verdict
     };
     // A clearance of 1.451 mm of which a tenth is missing, and one of which nothing is but rounding.

@@ -4,23 +4,16 @@
 //! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
 //! it; [`super::validate`] judges the rest.
 
-use nalgebra::Vector3;
-
-use super::document::{
-    Assignment, Document, Edge, FormationShape, GraphKind, PerVehicle, PlantKind, PlantTable, Point, StartShape,
-    StartTable,
-};
+use super::document::{Document, FormationShape, GraphKind, PlantKind, PlantTable, StartShape, StartTable};
 use super::error::ScenarioError;
-use super::limits::{check_count, check_lengths, check_memory, pair_count, positive};
+use super::legs::{check_slots, legs, listed_slots};
+use super::limits::{check_count, check_lengths, check_memory, pair_count};
+use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
-use crate::formation::{Formation, most_assigned, optimal_slots};
+use super::values::{Edge, PerVehicle, Point, rows};
 use crate::graph::{Graph, GraphError};
 use crate::swarm::{Rows, Swarm, set_row};
-use crate::target::Leg;
-
-/// Slots of the pentagon.
-const PENTAGON_COUNT: usize = 5;
 
 /// Completes a scenario, in double precision where none is given. It still has to be validated.
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
@@ -30,13 +23,20 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     check_lists(&document, count)?;
     let space = space(&document)?;
     let (law, delta_m) = (document.law.kind.complete(document.swarm.a22_per_s), document.law.delta_m);
-    let assignment = document.formation.assignment;
-    let scenario = Scenario {
-        start: start(&document.start, count, space, delta_m)?,
+    let reference = document.reference.map(|table| table.guidance(count, document.time.duration_s)).transpose()?;
+    let mut start = start(&document.start, count, space, delta_m)?;
+    if let (Some(guidance), None) = (&reference, &document.start.velocities_m_s)
+        && let Some(leader) = guidance.known_by.leader()
+    {
+        set_row(&mut start.velocities_m_s, leader, guidance.motion.at(0.0).velocity_m_s);
+    }
+    let mut scenario = Scenario {
+        start,
         mass_kg: per_vehicle(document.swarm.mass_kg, count),
         hull_radius_m: per_vehicle(document.swarm.hull_radius_m, count),
         a22_per_s: document.swarm.a22_per_s,
-        legs: vec![Leg::first(formation(&document.formation.shape, count)?)],
+        legs: Vec::new(),
+        reference,
         graph: graph(&document.graph.kind, count)?,
         plant: match document.plant {
             PlantTable { kind: PlantKind::Rapier, precision } => {
@@ -51,30 +51,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         law,
         delta_m,
     };
-    match assignment {
-        Assignment::Given => Ok(scenario),
-        Assignment::Optimal => assigned(scenario),
-    }
-}
-
-/// Gives each vehicle the slot that makes the sum of squared ways least. A scenario without a law is left for
-/// [`super::validate`] to refuse.
-fn assigned(mut scenario: Scenario) -> Result<Scenario, ScenarioError> {
-    let Ok(law) = scenario.law() else { return Ok(scenario) };
-    let freedom = law.controls().freedom();
-    let most = most_assigned(freedom);
-    if scenario.count() > most {
-        return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
-            .with_help(format!("set formation.assignment to \"given\", or fly at most {most} vehicles"))
-            .at("formation.assignment")
-            .at("swarm.count"));
-    }
-    for leg in &mut scenario.legs {
-        // What is not finite is told by validation.
-        if let Some(slots) = optimal_slots(&scenario.start.positions_m, &leg.formation, freedom) {
-            leg.formation = leg.formation.reordered(&slots);
-        }
-    }
+    legs(&mut scenario, &document.formation, &document.leg)?;
     Ok(scenario)
 }
 
@@ -91,15 +68,6 @@ fn count(document: &Document) -> Result<usize, ScenarioError> {
     })
 }
 
-/// Number of slots of a shape that has its own.
-fn listed_slots(shape: &FormationShape) -> Option<usize> {
-    match shape {
-        FormationShape::Points { points_m } => Some(points_m.len()),
-        FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
-        _ => None,
-    }
-}
-
 /// Refuses lists that are not as long as there are vehicles.
 fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
     let per_vehicle = |numbers: &PerVehicle| match numbers {
@@ -107,6 +75,7 @@ fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
         PerVehicle::Each(list) => Some(list.len()),
     };
     let Document { swarm, start, formation, .. } = document;
+    check_slots(&document.leg, count)?;
     check_lengths(
         count,
         [
@@ -122,11 +91,16 @@ fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
 /// The space asked for, or else the plane if everything lies in it.
 fn space(document: &Document) -> Result<Space, ScenarioError> {
     let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
-    let formation_is_flat = match &document.formation.shape {
+    let shape_is_flat = |shape: &FormationShape| match shape {
         FormationShape::Points { points_m } => flat(points_m),
         FormationShape::Sphere { .. } => false,
         _ => true,
     };
+    let moved = document.leg.iter().filter_map(|leg| leg.move_m).chain(document.formation.move_m);
+    let shapes = document.leg.iter().filter_map(|leg| leg.shape.as_ref()).chain([&document.formation.shape]);
+    let reference_is_flat = document.reference.as_ref().is_none_or(ReferenceTable::is_flat);
+    let formation_is_flat =
+        reference_is_flat && moved.into_iter().all(|point| flat(&[point])) && shapes.into_iter().all(shape_is_flat);
     match document.swarm.dimensions {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),
@@ -163,19 +137,6 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
     start::jitter(&mut positions_m, table.jitter_m, space, &mut random)?;
     let velocities_m_s = table.velocities_m_s.as_deref().map_or_else(|| Rows::zeros(count), rows);
     Ok(Swarm { positions_m, velocities_m_s })
-}
-
-fn formation(shape: &FormationShape, count: usize) -> Result<Formation, ScenarioError> {
-    let radius = |radius_m| positive("formation.radius_m", "the radius", radius_m);
-    let spacing = |spacing_m| positive("formation.spacing_m", "the spacing", spacing_m);
-    Ok(match shape {
-        &FormationShape::Pentagon { side_m } => Formation::pentagon(positive("formation.side_m", "the side", side_m)?),
-        &FormationShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
-        &FormationShape::Line { spacing_m } => Formation::line(count, spacing(spacing_m)?),
-        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing(spacing_m)?),
-        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
-        FormationShape::Points { points_m } => Formation::points(rows(points_m)),
-    })
 }
 
 /// Number of edges, at most, without making them.
@@ -222,12 +183,4 @@ fn per_vehicle(numbers: PerVehicle, count: usize) -> Vec<f64> {
         PerVehicle::All(number) => vec![number; count],
         PerVehicle::Each(list) => list,
     }
-}
-
-fn rows(points: &[Point]) -> Rows {
-    let mut rows = Rows::zeros(points.len());
-    for (i, point) in points.iter().enumerate() {
-        set_row(&mut rows, i, Vector3::from(point.coordinates()));
-    }
-    rows
 }

@@ -3,15 +3,14 @@
 //! Read by `deserializer`, made into a flight by `build`; `resolved` makes it back from a flight and writes it. A table
 //! whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all choices.
 
-use std::fmt;
-
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
-use serde::de::{SeqAccess, Visitor, value::SeqAccessDeserializer};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
+use super::reference::ReferenceTable;
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time::TimeSpec;
+use super::values::{Edge, PerVehicle, Point};
 use crate::law::LawSpec;
 use crate::target::Arrival;
 
@@ -31,6 +30,12 @@ pub(super) struct Document {
     pub(super) start: StartTable,
     /// The slots that they shall reach.
     pub(super) formation: FormationTable,
+    /// The formations after it, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) leg: Vec<LegTable>,
+    /// A motion that the formations are carried along with; slots are places then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reference: Option<ReferenceTable>,
     /// The control law.
     pub(super) law: LawTable,
     /// Which vehicles sense each other: all of them unless given.
@@ -134,8 +139,46 @@ pub(super) struct FormationTable {
     #[serde(default, skip_serializing_if = "is_default")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = "given")))]
     pub(super) assignment: Assignment,
+    /// The slots are scaled by this about their centre.
+    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = 1.0)))]
+    pub(super) scale: f64,
+    /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
+    pub(super) yaw_deg: f64,
+    /// Then they are moved by this in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) move_m: Option<Point>,
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) shape: FormationShape,
+}
+
+/// A formation after the first: a `shape`, or the one before it, placed anew.
+#[derive(Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(super) struct LegTable {
+    /// Time at which it begins in s; once the one before it is reached unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) start_s: Option<f64>,
+    /// Who flies to which slot, from the slots before.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = "given")))]
+    pub(super) assignment: Assignment,
+    /// The slots are scaled by this about their centre.
+    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = 1.0)))]
+    pub(super) scale: f64,
+    /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
+    pub(super) yaw_deg: f64,
+    /// Then they are moved by this in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) move_m: Option<Point>,
+    #[cfg_attr(feature = "schema", schemars(flatten))]
+    pub(super) shape: Option<FormationShape>,
 }
 
 /// Who flies to which slot.
@@ -255,43 +298,6 @@ pub(super) enum PlantKind {
     Ideal,
 }
 
-/// One number for all vehicles or a list with one for each.
-#[derive(Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
-#[serde(untagged)]
-pub(super) enum PerVehicle {
-    /// The same for all.
-    All(f64),
-    /// One for each.
-    Each(Vec<f64>),
-}
-
-/// x, y and, unless it is 0, z.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3)))]
-#[serde(untagged)]
-pub(super) enum Point {
-    /// In the plane z = 0.
-    Plane([f64; 2]),
-    /// In space.
-    Space([f64; 3]),
-}
-
-/// Two vehicles, counted from 1.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(transparent))]
-pub(super) struct Edge(pub(super) [u64; 2]);
-
-impl Point {
-    /// x, y and z.
-    pub(super) fn coordinates(self) -> [f64; 3] {
-        match self {
-            Self::Plane([x, y]) => [x, y, 0.0],
-            Self::Space(coordinates) => coordinates,
-        }
-    }
-}
-
 impl Default for SwarmTable {
     fn default() -> Self {
         Self {
@@ -316,72 +322,15 @@ impl Default for PlantTable {
     }
 }
 
+fn unscaled() -> f64 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_unscaled(scale: &f64) -> bool {
+    *scale == 1.0
+}
+
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
-}
-
-impl<'de> Deserialize<'de> for PerVehicle {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct PerVehicleVisitor;
-
-        impl<'de> Visitor<'de> for PerVehicleVisitor {
-            type Value = PerVehicle;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, or a list with a number for each vehicle")
-            }
-
-            fn visit_f64<E>(self, number: f64) -> Result<PerVehicle, E> {
-                Ok(PerVehicle::All(number))
-            }
-
-            fn visit_i64<E>(self, number: i64) -> Result<PerVehicle, E> {
-                Ok(PerVehicle::All(number as f64))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<PerVehicle, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(list)).map(PerVehicle::Each)
-            }
-        }
-
-        deserializer.deserialize_any(PerVehicleVisitor)
-    }
-}
-
-impl<'de> Deserialize<'de> for Point {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let list = ShortList { expected: "a point: [x, y] or [x, y, z]", numbers: [0.0; 3] };
-        deserializer.deserialize_seq(list).map(Self::Space)
-    }
-}
-
-impl<'de> Deserialize<'de> for Edge {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(ShortList { expected: "an edge: two vehicle numbers", numbers: [0; 2] }).map(Self)
-    }
-}
-
-/// Reads a list of 2 to `N` numbers; those that are not there keep their value.
-struct ShortList<T, const N: usize> {
-    expected: &'static str,
-    numbers: [T; N],
-}
-
-impl<'de, T: Deserialize<'de>, const N: usize> Visitor<'de> for ShortList<T, N> {
-    type Value = [T; N];
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.expected)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<Self::Value, A::Error> {
-        let mut length = 0;
-        while let Some(number) = list.next_element()? {
-            if let Some(slot) = self.numbers.get_mut(length) {
-                *slot = number;
-            }
-            length += 1;
-        }
-        if (2..=N).contains(&length) { Ok(self.numbers) } else { Err(serde::de::Error::invalid_length(length, &self)) }
-    }
 }

@@ -19,13 +19,15 @@ pub struct ScenarioError {
 }
 
 /// A key of the scenario file, or one entry of the list that it holds. Shown as an override names it:
-/// `start.positions_m.2` is the position of vehicle 2.
+/// `start.positions_m.2` is the position of vehicle 2, and `leg.1.points_m.2` its slot in the first `[[leg]]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Dotted path of the key, such as `time.dt_s`.
     pub key: &'static str,
     /// Entry of a list, from 0.
     pub entry: Option<usize>,
+    /// The leg that has the key, from 0: the first is `[formation]`, the others are `[[leg]]`. 0 for keys of no leg.
+    pub leg: usize,
 }
 
 /// Where in a text an error stands.
@@ -56,13 +58,25 @@ impl ScenarioError {
     /// Names a key whose value is part of what is wrong. The first one named stands for the error, unless another was
     /// overridden.
     pub(super) fn at(mut self, key: &'static str) -> Self {
-        self.fields.push(Field { key, entry: None });
+        self.fields.push(Field { key, entry: None, leg: 0 });
         self
     }
 
     /// Like [`ScenarioError::at`], for an entry of a list.
     pub(super) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
-        self.fields.push(Field { key, entry: Some(entry) });
+        self.fields.push(Field { key, entry: Some(entry), leg: 0 });
+        self
+    }
+
+    /// Like [`ScenarioError::at`], for a key of `[formation]` or, for a leg after the first, of its `[[leg]]`.
+    pub(super) fn at_leg(mut self, leg: usize, key: &'static str) -> Self {
+        self.fields.push(Field { key, entry: None, leg });
+        self
+    }
+
+    /// Like [`ScenarioError::at_leg`], for an entry of a list.
+    pub(super) fn at_leg_entry(mut self, leg: usize, key: &'static str, entry: usize) -> Self {
+        self.fields.push(Field { key, entry: Some(entry), leg });
         self
     }
 
@@ -122,7 +136,10 @@ impl fmt::Display for ScenarioError {
 
 impl fmt::Display for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.key)?;
+        match (self.leg, self.key.strip_prefix("formation")) {
+            (1.., Some(key)) => write!(f, "leg.{}{key}", self.leg)?,
+            _ => f.write_str(self.key)?,
+        }
         self.entry.map_or(Ok(()), |entry| write!(f, ".{}", entry + 1))
     }
 }

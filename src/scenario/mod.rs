@@ -14,9 +14,13 @@ mod deserializer;
 #[cfg(feature = "files")]
 mod document;
 mod error;
+#[cfg(feature = "files")]
+mod legs;
 mod limits;
 #[cfg(feature = "files")]
 mod overrides;
+#[cfg(feature = "files")]
+mod reference;
 mod resolution;
 #[cfg(feature = "files")]
 mod resolved;
@@ -33,6 +37,8 @@ mod suggest;
 mod text;
 mod time;
 mod validate;
+#[cfg(feature = "files")]
+mod values;
 
 pub use error::{Field, Place, ScenarioError};
 pub use limits::{

@@ -52,7 +52,7 @@ impl PlantSpec {
 
 impl Scenario {
     /// What the mean velocity, and with it a rounding error of [`PlantSpec::epsilon`] m/s, comes to by the end of the flight
-    /// where it grows at this rate \[1/s\].
+    /// where it grows at this rate \[1/s\], and how far the reference goes.
     #[must_use]
     pub fn drift(&self, rate_per_s: f64) -> Drift {
         self.drift_in(self.plant, rate_per_s)
@@ -62,7 +62,8 @@ impl Scenario {
         let (epsilon, duration_s) = (plant.epsilon(), self.time.duration_s);
         let seed_m_s = self.start.mean_velocity_m_s().norm() + epsilon;
         let grown = rate_per_s * duration_s;
-        let distance_m = seed_m_s * if grown == 0.0 { duration_s } else { grown.exp_m1() / rate_per_s };
+        let carried_m = self.reference.as_ref().map_or(0.0, |guidance| guidance.motion.reach_m(duration_s));
+        let distance_m = carried_m + seed_m_s * if grown == 0.0 { duration_s } else { grown.exp_m1() / rate_per_s };
         let spacing_m = epsilon * (self.extent_m() + distance_m);
         Drift { speed_m_s: seed_m_s * grown.exp(), distance_m, spacing_m }
     }
@@ -79,13 +80,13 @@ impl Scenario {
         }
     }
 
-    /// What a law promises from the start of this scenario, as far as the scenario itself lets it: with legs that change, commands
-    /// that are held, and numbers that do not tell the promise from delta, it promises nothing.
+    /// What a law promises from the start of this scenario on through all of its legs, as far as the scenario itself lets it: with
+    /// commands that are held, and numbers that do not tell the promise from delta, it promises nothing.
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
+        let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
         let promised = law
-            .certificate(&self.observation(&self.start))
-            .void_where(self.legs.len() > 1, Void::TargetChanges)
+            .certificate_through(&self.observation(&self.start), &ahead)
             .void_where(self.time.control_hz.is_some(), Void::CommandsHeld);
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
         promised.void_where(unresolved, Void::Unresolved)

@@ -7,16 +7,19 @@ use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
-    Assignment, Document, Edge, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, PerVehicle, PlantKind,
-    PlantTable, Point, StartTable, SwarmTable,
+    Assignment, Document, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, LegTable, PlantKind,
+    PlantTable, StartTable, SwarmTable,
 };
+use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Scenario, Space};
+use super::values::{Edge, PerVehicle, Point};
 use crate::swarm::Rows;
+use crate::target::{Begins, Leg};
 
 impl Scenario {
     /// The scenario as TOML with every default written out; reading it gives an equal scenario, bit for bit.
     ///
-    /// Of several legs, which the file has no keys for, the first alone is written. Start and formation are lists of points, so the text depends on no random number, no shape and no version of
+    /// Start and formations are lists of points, so the text depends on no random number, no shape and no version of
     /// either. Equal scenarios have equal texts.
     #[must_use]
     pub fn resolved_toml(&self) -> String {
@@ -35,6 +38,20 @@ impl Scenario {
             let _ = write!(hex, "{byte:02x}");
             hex
         })
+    }
+
+    fn leg_table(&self, leg: &Leg) -> LegTable {
+        LegTable {
+            start_s: match leg.begins {
+                Begins::At(start_s) => Some(start_s),
+                Begins::Reached => None,
+            },
+            assignment: Assignment::Given,
+            scale: 1.0,
+            yaw_deg: 0.0,
+            move_m: None,
+            shape: Some(FormationShape::Points { points_m: self.points(&leg.formation.slots_m) }),
+        }
     }
 
     fn points(&self, rows: &Rows) -> Vec<Point> {
@@ -72,8 +89,13 @@ impl From<&Scenario> for Document {
             },
             formation: FormationTable {
                 assignment: Assignment::Given,
+                scale: 1.0,
+                yaw_deg: 0.0,
+                move_m: None,
                 shape: FormationShape::Points { points_m: scenario.points(&scenario.formation().slots_m) },
             },
+            leg: scenario.legs.iter().skip(1).map(|leg| scenario.leg_table(leg)).collect(),
+            reference: scenario.reference.as_ref().map(ReferenceTable::from),
             law: LawTable { kind: law, delta_m: scenario.delta_m },
             graph: GraphTable {
                 kind: if scenario.graph.is_complete() {
@@ -104,6 +126,12 @@ fn write_document(out: &mut String, document: &Table) -> fmt::Result {
             Value::Table(table) => {
                 writeln!(out, "\n[{key}]")?;
                 write_keys(out, table)?;
+            }
+            Value::Array(tables) => {
+                for table in tables.iter().filter_map(Value::as_table) {
+                    writeln!(out, "\n[[{key}]]")?;
+                    write_keys(out, table)?;
+                }
             }
             _ => writeln!(out, "{key} = {value}")?,
         }

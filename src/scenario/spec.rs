@@ -12,7 +12,7 @@ use crate::graph::Graph;
 use crate::law::{EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
 use crate::observation::Observation;
 use crate::swarm::{Rows, Swarm};
-use crate::target::{Arrival, Leg};
+use crate::target::{Arrival, Guidance, Leg, Reference, Target};
 
 /// Default mass of a vehicle \[kg\].
 pub const DEFAULT_MASS_KG: f64 = 1.0;
@@ -37,6 +37,9 @@ pub struct Scenario {
     /// The formations to be reached, one after the other and at least one, up to a rigid motion for laws that control
     /// distances only.
     pub legs: Vec<Leg>,
+    /// The motion that formations are carried along with, and who knows it; a formation without one is reached wherever it
+    /// comes to be.
+    pub reference: Option<Guidance>,
     /// Which vehicles sense each other.
     pub graph: Graph,
     /// The control law and its parameters.
@@ -115,6 +118,7 @@ impl Scenario {
             arrival: Arrival::default(),
             start,
             legs: vec![Leg::first(formation)],
+            reference: None,
         }
     }
 
@@ -137,13 +141,22 @@ impl Scenario {
     /// [`ParameterError`] when the law does not exist for these parameters, which a validated scenario rules out, or
     /// its memory cannot be had.
     pub fn law(&self) -> Result<Box<dyn Law>, ParameterError> {
-        let (links, formation) = (&self.graph, self.formation());
-        self.law.build(&Setting { links, formation, delta_m: self.delta_m, a22_per_s: self.a22_per_s })
+        let guidance = self.reference.as_ref();
+        let later = self.legs.get(1..).unwrap_or_default();
+        let setting = Setting::new(&self.graph, self.formation(), self.delta_m, self.a22_per_s);
+        self.law.build(&Setting { later, guidance, ..setting })
     }
 
-    /// What a law is told of a true state on the first leg, by sensors and radio without fault.
+    /// Where the reference is at a time of the flight \[s\]; at rest at the origin where there is none.
+    #[must_use]
+    pub fn reference_at(&self, time_s: f64) -> Reference {
+        self.reference.as_ref().map_or_else(Reference::at_rest, |guidance| guidance.motion.at(time_s))
+    }
+
+    /// What a law is told of a true state at the beginning of the first leg, by sensors and radio without fault.
     #[must_use]
     pub fn observation<'a>(&'a self, swarm: &'a Swarm) -> Observation<'a> {
-        Observation::exact(swarm, &self.graph, self.formation())
+        let exact = Observation::exact(swarm, &self.graph, self.formation());
+        Observation { target: Target { reference: self.reference_at(0.0), ..exact.target }, ..exact }
     }
 }

@@ -24,7 +24,10 @@ const ORIGINS: [(&str, &[&str]); 5] = [
         "start.positions_m",
         &["start.spacing_m", "start.radius_m", "start.min_separation_m", "start.half_extent_m", "start.shape"],
     ),
-    ("formation.points_m", &["formation.side_m", "formation.radius_m", "formation.spacing_m", "formation.shape"]),
+    (
+        "formation.points_m",
+        &["formation.side_m", "formation.radius_m", "formation.spacing_m", "formation.scale", "formation.shape"],
+    ),
     ("graph.edges", &["graph.kind"]),
     ("swarm.hull_radius_m", &["law.delta_m"]),
     ("swarm.count", &["start.positions_m", "formation.points_m", "formation.shape"]),
@@ -189,9 +192,16 @@ fn tables_with(_key: &str) -> Vec<String> {
 /// The span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its table
 /// if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
 fn find(root: &Spanned<DeValue<'_>>, field: Field, overridden: usize) -> Range<usize> {
-    let at = |path: &str| path.split('.').try_fold(root, |value, key| value.get_ref().get(key));
+    let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
+    let at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
+        (Some(leg), Some(key)) => leg.get_ref().get(key),
+        _ => path.split('.').try_fold(root, |value, key| value.get_ref().get(key)),
+    };
     let origins = ORIGINS.iter().find(|(key, _)| *key == field.key).map_or(&[][..], |(_, origins)| origins);
     let Some(value) = std::iter::once(&field.key).chain(origins).find_map(|key| at(key)) else {
+        if let Some(leg) = of_leg {
+            return leg.span();
+        }
         let table = field.key.split('.').next().unwrap_or_default();
         let tables = root.get_ref().as_table();
         return tables.and_then(|tables| tables.get_key_value(table)).map_or(0..0, |(key, _)| key.span());

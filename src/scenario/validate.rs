@@ -8,9 +8,9 @@ use super::limits::{
 use super::spec::{Scenario, Space};
 use super::time::TimeSpec;
 use crate::graph::Graph;
-use crate::law::Gain;
-use crate::swarm::Pair;
-use crate::target::Begins;
+use crate::law::{Controls, Gain};
+use crate::swarm::{Pair, row};
+use crate::target::{Begins, Guidance, Leg};
 
 /// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
 /// step.
@@ -42,6 +42,7 @@ impl Scenario {
         self.check_vehicles()?;
         self.check_motion()?;
         self.check_separations()?;
+        self.check_reference()?;
         self.check_hulls()?;
         check_connected(&self.graph)?;
         self.check_time()?;
@@ -74,24 +75,79 @@ impl Scenario {
         Ok(())
     }
 
-    /// The number of slots of the first leg that does not have one for each vehicle.
-    fn slots_of_a_wrong_leg(&self) -> Option<usize> {
-        self.legs.iter().map(|leg| leg.formation.count()).find(|&slots| slots != self.count())
+    fn check_legs(&self) -> Result<(), ScenarioError> {
+        if self.legs.is_empty() {
+            return Err(ScenarioError::new("there is no formation to fly to").with_help("give one").at("formation"));
+        }
+        let mut from_s = 0.0;
+        for (number, leg) in self.legs.iter().enumerate().skip(1) {
+            let slots = leg.formation.count();
+            if slots != self.count() {
+                return Err(ScenarioError::new(format!(
+                    "leg {} has {slots} slots for {} vehicles",
+                    number + 1,
+                    self.count()
+                ))
+                .with_help("every leg needs a slot for each vehicle")
+                .at_leg(number, "formation.points_m"));
+            }
+            let Begins::At(start_s) = leg.begins else { continue };
+            if !(start_s >= from_s && start_s < self.time.duration_s) {
+                return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
+                    .with_help(format!(
+                        "legs begin one after the other, from {from_s} s on and before the end of the flight at {} s",
+                        self.time.duration_s
+                    ))
+                    .at_leg(number, "formation.start_s")
+                    .at("time.duration_s"));
+            }
+            from_s = start_s;
+        }
+        Ok(())
     }
 
-    fn check_legs(&self) -> Result<(), ScenarioError> {
-        let times_s = self.legs.iter().filter_map(|leg| match leg.begins {
-            Begins::At(time_s) => Some(time_s),
-            Begins::Reached => None,
+    /// A reference that its law follows and that begins where its leader is.
+    fn check_reference(&self) -> Result<(), ScenarioError> {
+        let Some(guidance) = &self.reference else { return Ok(()) };
+        if let Ok(law) = self.law()
+            && law.controls() != Controls::Places
+        {
+            return Err(ScenarioError::new(format!("the law `{}` follows no reference", law.name()))
+                .with_help("set law.kind to \"displacement\", or leave out [reference]")
+                .at("reference.kind")
+                .at("law.kind"));
+        }
+        let start = guidance.motion.at(0.0);
+        if self.space == Space::Plane && self.leaves_the_plane(guidance) {
+            return Err(ScenarioError::new("the reference leaves the plane z = 0 that the swarm lives in")
+                .with_help("set its z to 0, or swarm.dimensions to 3")
+                .at("reference.kind")
+                .at("swarm.dimensions"));
+        }
+        let Some(leader) = guidance.known_by.leader() else { return Ok(()) };
+        let off_m_s = row(&self.start.velocities_m_s, leader) - start.velocity_m_s;
+        let off_m = self.legs.iter().map(|leg| {
+            let slot_m = row(&leg.formation.slots_m, leader) + start.position_m;
+            (row(&self.start.positions_m, leader) - slot_m).norm()
         });
-        let said = if self.legs.is_empty() {
-            "there is no formation to fly to"
-        } else if times_s.clone().any(|time_s| !(time_s >= 0.0 && time_s.is_finite())) || !times_s.is_sorted() {
-            "legs begin at finite times from 0, one after the other"
-        } else {
+        let off_m = off_m.fold(0.0, f64::max);
+        if off_m_s.norm() <= self.arrival.disagreement_m_s && off_m <= self.arrival.edge_error_m {
             return Ok(());
-        };
-        Err(ScenarioError::new(said).with_help("give at least one leg, in the order of time").at("formation"))
+        }
+        Err(ScenarioError::new(format!(
+            "vehicle {} leads, and does not start on the reference: {off_m} m and {} m/s off",
+            leader + 1,
+            off_m_s.norm()
+        ))
+        .with_help("leave out its start velocity: it then starts as the reference does")
+        .at_entry("start.velocities_m_s", leader)
+        .at("reference.leader"))
+    }
+
+    fn leaves_the_plane(&self, guidance: &Guidance) -> bool {
+        const LOOKS: u32 = 64;
+        let duration_s = self.time.duration_s;
+        (0..=LOOKS).any(|k| guidance.motion.at(duration_s * f64::from(k) / f64::from(LOOKS)).position_m.z != 0.0)
     }
 
     fn check_lengths(&self) -> Result<(), ScenarioError> {
@@ -99,7 +155,7 @@ impl Scenario {
             self.count(),
             [
                 ("start.velocities_m_s", "start velocities", Some(self.start.velocities_m_s.nrows())),
-                ("formation.points_m", "slots in the formation", self.slots_of_a_wrong_leg()),
+                ("formation.points_m", "slots in the formation", Some(self.formation().count())),
                 ("swarm.mass_kg", "masses", Some(self.mass_kg.len())),
                 ("swarm.hull_radius_m", "hull radii", Some(self.hull_radius_m.len())),
                 ("graph.edges", "vehicles in the graph", Some(self.graph.count())),
@@ -140,12 +196,13 @@ impl Scenario {
             ("start.velocities_m_s", "the start velocity", &self.start.velocities_m_s),
         ];
         let slots = self.legs.iter().map(|leg| ("formation.points_m", "the slot", &leg.formation.slots_m));
-        for (key, what, rows) in start.into_iter().chain(slots) {
+        let slots = slots.enumerate();
+        for (leg, (key, what, rows)) in start.into_iter().map(|rows| (0, rows)).chain(slots) {
             for i in 0..rows.nrows() {
                 for axis in 0..3 {
                     let name = ["x", "y", "z"][axis];
                     require_finite(format_args!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
-                        .map_err(|error| error.at_entry(key, i))?;
+                        .map_err(|error| error.at_leg_entry(leg, key, i))?;
                 }
                 if self.space == Space::Plane && rows[(i, 2)] != 0.0 {
                     let z = rows[(i, 2)];
@@ -154,7 +211,7 @@ impl Scenario {
                         i + 1
                     ))
                     .with_help("set z to 0, or swarm.dimensions to 3")
-                    .at_entry(key, i)
+                    .at_leg_entry(leg, key, i)
                     .at("swarm.dimensions"));
                 }
             }
@@ -164,11 +221,11 @@ impl Scenario {
 
     fn check_separations(&self) -> Result<(), ScenarioError> {
         let delta_m = self.delta_m;
-        let refuse = |said: String, help: &str, key: &'static str, pair: Pair| {
+        let refuse = |said: String, help: &str, (leg, key): (usize, &'static str), pair: Pair| {
             Err(ScenarioError::new(said)
                 .with_help(help)
-                .at_entry(key, pair.second())
-                .at_entry(key, pair.first())
+                .at_leg_entry(leg, key, pair.second())
+                .at_leg_entry(leg, key, pair.first())
                 .at("law.delta_m"))
         };
         if let Some((pair, separation_m)) = first_within(&self.start.positions_m, delta_m) {
@@ -178,11 +235,11 @@ impl Scenario {
                 format!("vehicles {pair} start {separation_m} m apart, not more than delta = {delta_m} m")
             };
             let help = "move one of them away, or reduce law.delta_m: starts must be more than delta apart";
-            return refuse(said, help, "start.positions_m", pair);
+            return refuse(said, help, (0, "start.positions_m"), pair);
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
-        if let Some((pair, distance_m)) = self.legs.iter().find_map(|leg| first_within(&leg.formation.slots_m, least_m))
-        {
+        let too_near = |(number, leg): (usize, &Leg)| Some((number, first_within(&leg.formation.slots_m, least_m)?));
+        if let Some((leg, (pair, distance_m))) = self.legs.iter().enumerate().find_map(too_near) {
             let [a, b] = pair.numbers();
             let said = if distance_m == 0.0 {
                 format!("the slots of vehicles {a} and {b} are the same point")
@@ -195,7 +252,7 @@ impl Scenario {
                 )
             };
             let help = "enlarge the formation, or reduce law.delta_m: slots must be more than delta apart";
-            return refuse(said, help, "formation.points_m", pair);
+            return refuse(said, help, (leg, "formation.points_m"), pair);
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use crate::link::Link;
 use crate::observation::Observation;
 use crate::space::KeptPairs;
 use crate::swarm::{Rows, Swarm};
-use crate::target::{CurrentTarget, Supervisor};
+use crate::target::{CurrentTarget, Guidance, Supervisor};
 
 /// Everything between the true state and the vehicles' actuators, with all of its memory.
 #[derive(Clone)]
@@ -16,6 +16,7 @@ pub(super) struct Controller {
     pub(super) link: Box<dyn Link>,
     pub(super) supervisor: Box<dyn Supervisor>,
     pub(super) target: CurrentTarget,
+    guidance: Option<Guidance>,
     pub(super) links: Graph,
     near: KeptPairs,
 }
@@ -26,9 +27,10 @@ impl Controller {
         link: Box<dyn Link>,
         supervisor: Box<dyn Supervisor>,
         target: CurrentTarget,
+        guidance: Option<Guidance>,
         links: Graph,
     ) -> Self {
-        Self { law, link, supervisor, target, links, near: KeptPairs::default() }
+        Self { law, link, supervisor, target, guidance, links, near: KeptPairs::default() }
     }
 
     /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
@@ -44,6 +46,9 @@ impl Controller {
         supervised: bool,
         command: Option<&mut Rows>,
     ) -> Result<(), LawError> {
+        if let Some(guidance) = &self.guidance {
+            self.target.set_reference(guidance.motion.at(time_s));
+        }
         let sensed = self.link.sense(time_s, truth);
         if supervised && !self.supervisor.is_idle() {
             self.supervisor.supervise(time_s, sensed.own, &mut self.target);
@@ -74,7 +79,7 @@ impl Controller {
         self.supervisor.reseed(seed);
     }
 
-    /// The law's energy of a true state.
+    /// The law's energy of a true state, against the target that was looked at last.
     pub(super) fn energy(&self, time_s: f64, truth: &Swarm) -> Option<f64> {
         let exact = Observation::exact(truth, &self.links, self.target.view().formation);
         self.law.energy(&Observation { time_s, target: self.target.view(), ..exact })

@@ -94,7 +94,7 @@ impl Simulation {
         }
         let certificate = scenario
             .certificate(law.as_ref())
-            .void_where(!supervisor.is_idle(), Void::TargetChanges)
+            .void_where(!supervisor.keeps_to(&scenario.legs), Void::TargetChanges)
             .void_where(!link.is_exact(), Void::InexactLink);
         let mut state = scenario.start.clone();
         motion.observe(&mut state);
@@ -102,7 +102,14 @@ impl Simulation {
         let other_law = flies_another.then(|| Event::OtherLaw { time_s: 0.0, name: law.name().to_owned() });
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
         let mut simulation = Self {
-            controller: Controller::new(law, link, supervisor, target, scenario.graph.clone()),
+            controller: Controller::new(
+                law,
+                link,
+                supervisor,
+                target,
+                scenario.reference.clone(),
+                scenario.graph.clone(),
+            ),
             motion,
             certificate,
             judge: Judge::new(count, scenario.delta_m)?,

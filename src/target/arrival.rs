@@ -2,23 +2,25 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Reference;
 use crate::formation::{Formation, Freedom, largest_edge_error_m, rms_position_error_m};
 use crate::graph::Graph;
-use crate::swarm::Swarm;
+use crate::swarm::{Swarm, row};
 
 /// Times are sums and products of steps: this much shorter than `hold_s` still counts as held \[s\].
 const TIME_ROUNDING_S: f64 = 1e-9;
 
 /// What counts as a reached formation: to the end of the flight, and at least for `hold_s`, both limits hold, and the
 /// vehicles are no more than `edge_error_m` (root mean square) from the formation laid over them: turned and perhaps mirrored
-/// under a law that holds distances, moved alone under one that holds displacements.
+/// under a law that holds distances, moved alone under one that holds displacements, where the reference has carried it under
+/// one that follows a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Arrival {
     /// Largest error of a desired distance over the edges of the graph in m.
     pub edge_error_m: f64,
-    /// Largest speed relative to the swarm's mean velocity in m/s.
+    /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, in m/s.
     pub disagreement_m_s: f64,
     /// Shortest time for which both must hold in s.
     pub hold_s: f64,
@@ -38,18 +40,23 @@ pub struct Distance {
     /// Root mean square distance from the formation in its best place \[m\]: turned and perhaps mirrored where it is free to
     /// be.
     pub rms_position_error_m: f64,
-    /// Largest speed relative to the mean velocity \[m/s\].
+    /// Largest speed relative to the mean velocity, or to the reference's where it is followed \[m/s\].
     pub disagreement_m_s: f64,
 }
 
 impl Distance {
-    /// Of a swarm from a formation that is free to be moved so: O(edges).
+    /// Of a swarm from a formation that is free to be moved so from where the reference has carried it: O(edges).
     #[must_use]
-    pub fn of(swarm: &Swarm, formation: &Formation, graph: &Graph, freedom: Freedom) -> Self {
+    pub fn of(swarm: &Swarm, formation: &Formation, reference: &Reference, graph: &Graph, freedom: Freedom) -> Self {
+        let (positions_m, velocities_m_s) = (&swarm.positions_m, &swarm.velocities_m_s);
+        let relative_m_s = |i: usize| (row(velocities_m_s, i) - reference.velocity_m_s).norm();
         Self {
-            max_edge_error_m: largest_edge_error_m(&swarm.positions_m, formation, graph),
-            rms_position_error_m: rms_position_error_m(&swarm.positions_m, formation, freedom),
-            disagreement_m_s: swarm.disagreement_m_s(),
+            max_edge_error_m: largest_edge_error_m(positions_m, formation, graph),
+            rms_position_error_m: rms_position_error_m(positions_m, formation, reference.position_m, freedom),
+            disagreement_m_s: match freedom {
+                Freedom::Fixed => (0..swarm.count()).map(relative_m_s).fold(0.0, f64::max),
+                Freedom::Translation | Freedom::RigidMotion => swarm.disagreement_m_s(),
+            },
         }
     }
 

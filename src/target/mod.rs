@@ -1,12 +1,15 @@
-//! Where the swarm shall go: timed legs of formations, and the one that is flown towards now.
+//! Where the swarm shall go: timed legs of formations, the motion that they are carried along with, and the leg that is
+//! flown towards now.
 //!
 //! A [`Leg`] is a formation and the event that begins it. A [`Target`] is what a law sees of the present leg. A
 //! [`Supervisor`] reads what the vehicles sense and may change it; [`Schedule`] is the one that goes from leg to leg.
 
 mod arrival;
+mod reference;
 mod supervisor;
 
 pub use arrival::{Arrival, Distance};
+pub use reference::{Guidance, Reference, ReferenceMotion, Spline};
 pub use supervisor::{Schedule, Supervisor};
 
 use nalgebra::{Rotation3, Vector3};
@@ -64,35 +67,17 @@ pub struct Target<'a> {
     pub revision: u64,
     /// The slots h.
     pub formation: &'a Formation,
+    /// They are those of the leg scaled by this about their centre; 1 for the leg as it was given.
+    pub spread: f64,
     /// The motion r(t) that the formation shall be carried along with.
     pub reference: Reference,
-}
-
-/// A reference motion at one instant, in the frame of the positions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference {
-    /// r \[m\].
-    pub position_m: Vector3<f64>,
-    /// r' \[m/s\].
-    pub velocity_m_s: Vector3<f64>,
-    /// r'' \[m/s^2\].
-    pub acceleration_m_s2: Vector3<f64>,
-}
-
-impl Reference {
-    /// At rest at the origin: slots are where they are given.
-    #[must_use]
-    pub fn at_rest() -> Self {
-        let zero = Vector3::zeros();
-        Self { position_m: zero, velocity_m_s: zero, acceleration_m_s2: zero }
-    }
 }
 
 impl<'a> Target<'a> {
     /// A formation at rest, as the first leg of a flight.
     #[must_use]
     pub fn at_rest(formation: &'a Formation) -> Self {
-        Self { leg: 0, revision: 0, formation, reference: Reference::at_rest() }
+        Self { leg: 0, revision: 0, formation, spread: 1.0, reference: Reference::at_rest() }
     }
 }
 
@@ -102,6 +87,7 @@ pub struct CurrentTarget {
     leg: usize,
     revision: u64,
     formation: Formation,
+    spread: f64,
     reference: Reference,
 }
 
@@ -110,13 +96,14 @@ impl CurrentTarget {
     #[must_use]
     pub fn first_of(legs: &[Leg]) -> Option<Self> {
         let formation = legs.first()?.formation.clone();
-        Some(Self { leg: 0, revision: 0, formation, reference: Reference::at_rest() })
+        Some(Self { leg: 0, revision: 0, formation, spread: 1.0, reference: Reference::at_rest() })
     }
 
     /// What a law sees.
     #[must_use]
     pub fn view(&self) -> Target<'_> {
-        Target { leg: self.leg, revision: self.revision, formation: &self.formation, reference: self.reference }
+        let &Self { leg, revision, ref formation, spread, reference } = self;
+        Target { leg, revision, formation, spread, reference }
     }
 
     /// Goes on to another leg.
@@ -127,11 +114,26 @@ impl CurrentTarget {
 
     /// Changes the slots within the leg.
     pub fn set_formation(&mut self, formation: &Formation) {
+        self.spread_formation(formation, 1.0);
+    }
+
+    /// Changes the slots within the leg to these, scaled by `spread` about their centre. Allocates nothing for as many slots
+    /// as before.
+    pub fn spread_formation(&mut self, formation: &Formation, spread: f64) {
         if self.formation.count() == formation.count() {
             self.formation.slots_m.copy_from(&formation.slots_m);
         } else {
             self.formation.clone_from(formation);
         }
+        if spread != 1.0 {
+            let slots_m = &mut self.formation.slots_m;
+            let centre_m = mean_row(slots_m);
+            for i in 0..slots_m.nrows() {
+                let slot_m = centre_m + (row(slots_m, i) - centre_m) * spread;
+                set_row(slots_m, i, slot_m);
+            }
+        }
+        self.spread = spread;
         self.revision += 1;
     }
 

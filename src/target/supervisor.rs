@@ -2,7 +2,7 @@
 
 use dyn_clone::DynClone;
 
-use super::{Arrival, Begins, CurrentTarget, Distance, Leg};
+use super::{Arrival, Begins, CurrentTarget, Distance, Leg, Target};
 use crate::formation::Freedom;
 use crate::graph::Graph;
 use crate::swarm::Swarm;
@@ -17,6 +17,12 @@ pub trait Supervisor: DynClone + Send {
     /// Whether it never changes anything: then it is not asked.
     fn is_idle(&self) -> bool {
         false
+    }
+
+    /// Whether the formations that it goes through are those of these legs, in their order: what a law promises for them
+    /// holds then.
+    fn keeps_to(&self, _legs: &[Leg]) -> bool {
+        self.is_idle()
     }
 
     /// Begins its random numbers anew.
@@ -55,7 +61,10 @@ impl Schedule {
         match begins {
             Begins::At(from_s) => time_s >= from_s,
             Begins::Reached => {
-                let distance = Distance::of(sensed, target.view().formation, &self.links, self.freedom);
+                let distance = {
+                    let Target { formation, ref reference, .. } = target.view();
+                    Distance::of(sensed, formation, reference, &self.links, self.freedom)
+                };
                 let within = self.arrival.is_within(&distance);
                 self.within_since_s = within.then(|| self.within_since_s.unwrap_or(time_s));
                 self.within_since_s.is_some_and(|since_s| self.arrival.is_held(since_s, time_s))
@@ -79,6 +88,10 @@ impl Supervisor for Schedule {
 
     fn is_idle(&self) -> bool {
         self.legs.len() < 2
+    }
+
+    fn keeps_to(&self, legs: &[Leg]) -> bool {
+        self.is_idle() || self.legs == legs
     }
 }
 

@@ -37,7 +37,9 @@ pub(super) struct Flights {
 fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, Untried> {
     let scenario = builtin(name)?;
     let freedom = scenario.law()?.controls().freedom();
-    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(freedom);
+    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
+        .free_by(freedom)
+        .carried_by(scenario.reference.as_ref());
     let mut history = RunHistory::new();
     let flight = engine(&scenario, |sample| {
         metrics.observe(sample);

@@ -20,7 +20,7 @@ pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
         for graph in [Graph::complete(count), Graph::ring(count)] {
             let mut edge_tension = EdgeTensionLaw::new(&graph, &formation, parameters).expect("slots clear of delta");
             let mut laplacian = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
-            let setting = Setting { links: &graph, formation: &formation, delta_m: 0.1, a22_per_s: 0.1 };
+            let setting = Setting::new(&graph, &formation, 0.1, 0.1);
             let mut displacement = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
             let laws: [&mut dyn Law; 3] = [&mut edge_tension, &mut laplacian, &mut displacement];
             let at = Observation::exact(&swarm, &graph, &formation);

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::graph::Graph;
 use crate::swarm::Swarm;
 
 const DELTA_M: f64 = 1.0;
@@ -12,7 +13,7 @@ fn keys() -> DisplacementKeys {
 }
 
 fn law(links: &Graph, formation: &Formation) -> DisplacementLaw {
-    let setting = Setting { links, formation, delta_m: DELTA_M, a22_per_s: A22_PER_S };
+    let setting = Setting::new(links, formation, DELTA_M, A22_PER_S);
     DisplacementLaw::new(&setting, keys()).expect("a law")
 }
 
@@ -85,7 +86,7 @@ proptest! {
         for links in graphs() {
             let formation = Formation::grid(7, 2.0);
             let law = law(&links, &formation);
-            let Certificate { certified_m, energy_initial, void } =
+            let Certificate { certified_m, energy_initial, void, .. } =
                 law.certificate(&Observation::exact(&swarm, &links, &formation));
             let (certified_m, energy) = (certified_m.expect("certified"), energy_initial.expect("an energy"));
             prop_assert!(void.is_empty() && certified_m > DELTA_M && certified_m <= 2.0);
@@ -125,11 +126,11 @@ fn what_has_no_law_is_refused() {
 
     let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
     let line = Formation::line(4, 2.0);
-    let setting = Setting { links: &apart, formation: &line, delta_m: DELTA_M, a22_per_s: 0.0 };
+    let setting = Setting::new(&apart, &line, DELTA_M, 0.0);
     let refused = DisplacementLaw::new(&setting, keys()).expect_err("not connected");
     assert_eq!(refused.to_string(), "the graph is not connected: no path joins vehicle 3 to vehicle 1");
     let tight = Formation::line(4, DELTA_M);
     let links = Graph::ring(4);
-    let setting = Setting { links: &links, formation: &tight, delta_m: DELTA_M, a22_per_s: 0.0 };
+    let setting = Setting::new(&links, &tight, DELTA_M, 0.0);
     assert!(matches!(DisplacementLaw::new(&setting, keys()), Err(ParameterError::Tension { .. })));
 }

@@ -9,7 +9,7 @@ const DELTA_M: f64 = 1.0;
 const A22_PER_S: f64 = 0.3;
 
 fn law(links: &Graph, formation: &Formation) -> PotentialLaw {
-    let setting = Setting { links, formation, delta_m: DELTA_M, a22_per_s: A22_PER_S };
+    let setting = Setting::new(links, formation, DELTA_M, A22_PER_S);
     PotentialLaw::new(&setting, PotentialKeys { k_per_s2: 0.7, c_per_s: 1.1, eta_m4_per_s2: 0.4 })
         .expect("finite gains")
 }
@@ -72,7 +72,7 @@ fn who_is_too_near_collides_and_who_feeds_in_more_than_is_braked_is_promised_not
     assert!(matches!(command(&mut law(&links, &formation), &at), Err(LawError::Collision { .. })));
     assert_eq!(law(&links, &formation).energy(&at), None);
 
-    let setting = Setting { links: &links, formation: &formation, delta_m: DELTA_M, a22_per_s: 3.0 };
+    let setting = Setting::new(&links, &formation, DELTA_M, 3.0);
     let fed = PotentialLaw::new(&setting, PotentialKeys::default()).expect("finite gains");
     let apart = Swarm::at_rest(formation.slots_m.clone());
     assert_eq!(fed.certificate(&Observation::exact(&apart, &links, &formation)).void, [Void::VelocityUndamped]);

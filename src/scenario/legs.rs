@@ -1,0 +1,142 @@
+//! `[formation]` and `[[leg]]` of the scenario file as legs: shapes into slots, placed and assigned one after the other.
+
+use nalgebra::Vector3;
+
+use super::document::{Assignment, FormationShape, FormationTable, LegTable};
+use super::error::ScenarioError;
+use super::limits::{positive, require_finite};
+use super::spec::Scenario;
+use super::values::{Point, rows};
+use crate::formation::{Formation, Freedom, most_assigned, optimal_slots};
+use crate::swarm::{Rows, row, set_row};
+use crate::target::{Begins, Leg};
+
+/// Slots of the pentagon.
+const PENTAGON_COUNT: usize = 5;
+
+/// How slots are placed.
+struct Placement {
+    scale: f64,
+    yaw_deg: f64,
+    move_m: Option<Point>,
+}
+
+/// Gives a scenario without legs those of its file. One without a law is left for [`super::validate`] to refuse.
+pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[LegTable]) -> Result<(), ScenarioError> {
+    let count = scenario.count();
+    let placement = Placement { scale: first.scale, yaw_deg: first.yaw_deg, move_m: first.move_m };
+    let leg = placed(Leg::first(formation(&first.shape, count)?), &placement, 0)?;
+    scenario.legs.push(leg);
+    let is_assigned =
+        first.assignment == Assignment::Optimal || later.iter().any(|leg| leg.assignment == Assignment::Optimal);
+    let freedom = if is_assigned { freedom(scenario)? } else { None };
+    let starts_m = scenario.start.positions_m.clone();
+    assign(&mut scenario.legs[0], first.assignment, &starts_m, freedom);
+    for (number, table) in later.iter().enumerate() {
+        let before = scenario.legs[number].formation.clone();
+        let formation = table.shape.as_ref().map_or_else(|| Ok(before.clone()), |shape| formation(shape, count))?;
+        let begins = table.start_s.map_or(Begins::Reached, Begins::At);
+        let placement = Placement { scale: table.scale, yaw_deg: table.yaw_deg, move_m: table.move_m };
+        let mut leg = placed(Leg { formation, begins }, &placement, number + 1)?;
+        assign(&mut leg, table.assignment, &before.slots_m, freedom);
+        scenario.legs.push(leg);
+    }
+    anchor(scenario);
+    Ok(())
+}
+
+/// How formations may be moved under the law of the scenario, where vehicles may be assigned to them.
+fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
+    let Ok(law) = scenario.law() else { return Ok(None) };
+    let leads = scenario.reference.as_ref().is_some_and(|guidance| guidance.known_by.leader().is_some());
+    // Wherever a leader is, slots are moved there.
+    let freedom = if leads { Freedom::Translation } else { law.controls().freedom() };
+    let most = most_assigned(freedom);
+    if scenario.count() > most {
+        return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
+            .with_help(format!("set assignment to \"given\", or fly at most {most} vehicles"))
+            .at("formation.assignment")
+            .at("swarm.count"));
+    }
+    Ok(Some(freedom))
+}
+
+/// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least.
+fn assign(leg: &mut Leg, assignment: Assignment, from_m: &Rows, freedom: Option<Freedom>) {
+    if let (Assignment::Optimal, Some(freedom)) = (assignment, freedom)
+        // What is not finite is told by validation.
+        && let Some(slots) = optimal_slots(from_m, &leg.formation, freedom)
+    {
+        leg.formation = leg.formation.reordered(&slots);
+    }
+}
+
+fn placed(leg: Leg, placement: &Placement, number: usize) -> Result<Leg, ScenarioError> {
+    let &Placement { scale, yaw_deg, move_m } = placement;
+    let offset_m = move_m.map_or_else(Vector3::zeros, |point| point.coordinates().into());
+    let at = |error: ScenarioError, key| error.at_leg(number, key);
+    positive("formation.scale", "the scale", scale).map_err(|error| at(error, "formation.scale"))?;
+    require_finite("the turn", yaw_deg).map_err(|error| at(error, "formation.yaw_deg"))?;
+    for x in offset_m.iter() {
+        require_finite("a coordinate of the move", *x).map_err(|error| at(error, "formation.move_m"))?;
+    }
+    if scale == 1.0 && yaw_deg == 0.0 && offset_m == Vector3::zeros() {
+        return Ok(leg);
+    }
+    Ok(leg.placed(scale, yaw_deg.to_radians(), offset_m))
+}
+
+/// Moves each leg so that a leader's slot is where the leader is on the reference: it listens to nobody, and so the swarm is
+/// formed around it.
+fn anchor(scenario: &mut Scenario) {
+    let Some(leader) = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader()) else { return };
+    let place_m = row(&scenario.start.positions_m, leader) - scenario.reference_at(0.0).position_m;
+    for leg in &mut scenario.legs {
+        let slots_m = &mut leg.formation.slots_m;
+        let move_m = place_m - row(slots_m, leader);
+        if move_m != Vector3::zeros() {
+            (0..slots_m.nrows()).for_each(|i| {
+                let slot_m = row(slots_m, i) + move_m;
+                set_row(slots_m, i, slot_m);
+            });
+            // Not a rounding beside it.
+            set_row(slots_m, leader, place_m);
+        }
+    }
+}
+
+/// Number of slots of a shape that has its own.
+pub(super) fn listed_slots(shape: &FormationShape) -> Option<usize> {
+    match shape {
+        FormationShape::Points { points_m } => Some(points_m.len()),
+        FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
+        _ => None,
+    }
+}
+
+/// Refuses a leg whose list of slots is not as long as there are vehicles.
+pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), ScenarioError> {
+    let listed = legs.iter().map(|leg| leg.shape.as_ref().and_then(listed_slots));
+    for (number, slots) in listed.enumerate() {
+        if let Some(slots) = slots.filter(|&slots| slots != count) {
+            return Err(ScenarioError::new(format!("leg {} has {slots} slots for {count} vehicles", number + 2))
+                .with_help("every leg needs a slot for each vehicle")
+                .at_leg(number + 1, "formation.points_m")
+                .at("swarm.count"));
+        }
+    }
+    Ok(())
+}
+
+fn formation(shape: &FormationShape, count: usize) -> Result<Formation, ScenarioError> {
+    let radius = |radius_m| positive("formation.radius_m", "the radius", radius_m);
+    let spacing = |spacing_m| positive("formation.spacing_m", "the spacing", spacing_m);
+    Ok(match shape {
+        &FormationShape::Pentagon { side_m } => Formation::pentagon(positive("formation.side_m", "the side", side_m)?),
+        &FormationShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
+        &FormationShape::Line { spacing_m } => Formation::line(count, spacing(spacing_m)?),
+        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing(spacing_m)?),
+        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
+        FormationShape::Points { points_m } => Formation::points(rows(points_m)),
+    })
+}
