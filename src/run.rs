@@ -112,6 +112,10 @@ fn report(
             .then_some(flight.engine_contacts.len() as u64),
         hulls: &hulls,
         summary: &metrics.finish(),
+        legs: scenario.legs.len(),
+        ended_legs: metrics.ended_legs(),
+        breaths: &flight.breaths,
+        energy_rise: flight.energy_rise,
         energy_falls: energy_falls(preflight, &flight.certificate),
         epsilon: scenario.plant.epsilon(),
         run: &Run {

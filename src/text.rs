@@ -62,7 +62,7 @@ pub(crate) fn bound(error: f64, allowed: f64) -> String {
 }
 
 /// Names and what is said of each, a line each, as a table.
-pub(crate) fn table<const N: usize>(rows: [(&str, String); N]) -> String {
+pub(crate) fn table<N: std::fmt::Display>(rows: impl IntoIterator<Item = (N, String)>) -> String {
     let mut text = String::new();
     for (name, content) in rows {
         // Writing to a string cannot fail.

@@ -58,6 +58,15 @@ impl Certificate {
         Self { certified_m: None, energy_initial: None, void: vec![reason], legs: Vec::new() }
     }
 
+    /// What holds of a flight for which this was promised first and another promise was made later: the least of both,
+    /// which is nothing where either is nothing.
+    pub fn renew(&mut self, later: &Self) {
+        if self.certified_m.is_some() {
+            self.certified_m = self.certified_m.zip(later.certified_m).map(|(before_m, now_m)| before_m.min(now_m));
+            self.void.clone_from(&later.void);
+        }
+    }
+
     /// The same, promising nothing for one more reason where `breaks` says so.
     #[must_use]
     pub fn void_where(mut self, breaks: bool, reason: Void) -> Self {
@@ -123,6 +132,27 @@ impl fmt::Display for Void {
 mod tests {
     use super::*;
     use crate::swarm::Pair;
+
+    #[test]
+    fn a_renewed_promise_is_never_more_than_the_one_before() {
+        let promised = |certified_m: Option<f64>| Certificate {
+            certified_m,
+            energy_initial: Some(1.0),
+            void: if certified_m.is_some() { Vec::new() } else { vec![Void::NoBarrier] },
+            legs: Vec::new(),
+        };
+        for (before, later, expected) in [
+            (Some(2.0), Some(1.5), Some(1.5)),
+            (Some(1.5), Some(2.0), Some(1.5)),
+            (None, Some(2.0), None),
+            (Some(2.0), None, None),
+        ] {
+            let mut certificate = promised(before);
+            certificate.renew(&promised(later));
+            assert_eq!(certificate.certified_m, expected);
+            assert_eq!(certificate.void.is_empty(), expected.is_some());
+        }
+    }
 
     #[test]
     fn every_reason_has_its_own_code_and_a_sentence() {

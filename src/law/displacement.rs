@@ -351,6 +351,10 @@ impl Law for DisplacementLaw {
         Some(omega.max(DAMPED * links * self.damping_per_s()))
     }
 
+    fn settling_rate_per_s(&self) -> Option<f64> {
+        Some(self.keys.k_per_s2.sqrt())
+    }
+
     fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
         let of_graph = if self.is_guided() { 1.0 } else { connectivity / self.connectivity };
         let damping_per_s = self.damping_per_s() * of_graph;

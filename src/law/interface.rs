@@ -94,6 +94,12 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Rate at which errors of position fall where nothing stands in their way \[1/s\], for a law that may be given slots that
+    /// are spread for a while ([`crate::target::Breathing`]) and renews its promise then. `None` for any other.
+    fn settling_rate_per_s(&self) -> Option<f64> {
+        None
+    }
+
     /// How fast relative velocities are damped at least, on a graph of this algebraic connectivity.
     fn velocity_margin(&self, _connectivity: f64, _a22_per_s: f64) -> Option<VelocityMargin> {
         None

@@ -11,6 +11,8 @@ pub use hash::{StateHash, sha256_hex};
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 /// Numbers of every vehicle beside its position and velocity at one instant, such as its attitude or the wind.
@@ -166,6 +168,13 @@ pub enum Event {
         /// When \[s\].
         time_s: f64,
     },
+    /// Slots were spread, since vehicles stood in each other's way; what the law promised is renewed.
+    Breath {
+        /// When \[s\].
+        time_s: f64,
+        /// They are scaled by this about their centre.
+        scale: f64,
+    },
     /// The engine's own collision detection saw two keep-out balls overlap for the first time.
     EngineContact {
         /// The pair.
@@ -199,6 +208,26 @@ pub enum Event {
     },
 }
 
+/// A time at which slots were spread.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Breath {
+    /// When \[s\].
+    pub time_s: f64,
+    /// They were scaled by this about their centre.
+    pub scale: f64,
+    /// No pair comes closer than this in the whole flight, as far as that was certified up to then \[m\].
+    pub certified_m: Option<f64>,
+}
+
+/// How far a law's energy rose while its target stayed as it was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnergyRise {
+    /// Energy when the target was last changed, or at the start \[m^2/s^2\].
+    pub from: f64,
+    /// The largest one from then until it changed again \[m^2/s^2\].
+    pub to: f64,
+}
+
 impl Event {
     /// When it happened \[s\].
     #[must_use]
@@ -208,6 +237,7 @@ impl Event {
             | Self::ViolationEnded { time_s, .. }
             | Self::OtherLaw { time_s, .. }
             | Self::LegBegan { time_s, .. }
+            | Self::Breath { time_s, .. }
             | Self::EngineContact { time_s, .. }
             | Self::HullsHit { time_s, .. }
             | Self::StepRefined { time_s, .. }

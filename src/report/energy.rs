@@ -5,16 +5,17 @@ use crate::metrics::Summary;
 /// Part of E(0) that the error of second-order integration at the honest step stays below.
 pub(super) const INTEGRATION: f64 = 1e-3;
 
-/// The largest energy \[m^2/s^2\] that a motion without gain may show in numbers that resolve a part `epsilon` of their size:
+/// The largest energy \[m^2/s^2\] that a motion without gain may show, from an energy `initial` on, in numbers that resolve a
+/// part `epsilon` of their size:
 ///
 /// ```text
 /// (1 + 1e-3) E(0) + N [ u r + (epsilon v)^2 ],    r = epsilon x
 /// ```
 ///
 /// with the largest command u, the fastest vehicle v and the largest distance x from where the swarm began. Rounding moves a
-/// vehicle by r against a force of u, and changes its velocity by epsilon v. `None` for a law without energy.
-pub(super) fn highest_honest(summary: &Summary, vehicles: usize, epsilon: f64) -> Option<f64> {
+/// vehicle by r against a force of u, and changes its velocity by epsilon v.
+pub(super) fn highest_honest(initial: f64, summary: &Summary, vehicles: usize, epsilon: f64) -> f64 {
     let resolution_m = epsilon * summary.extent_m;
     let rounding = summary.peak_control_m_s2 * resolution_m + (epsilon * summary.fastest_m_s).powi(2);
-    summary.energy_initial.map(|initial| (1.0 + INTEGRATION) * initial + vehicles as f64 * rounding)
+    (1.0 + INTEGRATION) * initial + vehicles as f64 * rounding
 }

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::hulls::Hulls;
 use crate::audit::AuditOutcome;
 use crate::law::Certificate;
-use crate::metrics::Summary;
+use crate::metrics::{LegSummary, Summary};
+use crate::record::{Breath, EnergyRise};
 use crate::target::Arrival;
 
 /// Everything that a report is made of.
@@ -36,6 +37,14 @@ pub struct Findings<'a> {
     pub hulls: &'a Hulls,
     /// Numbers of the samples.
     pub summary: &'a Summary,
+    /// Number of legs that were asked for.
+    pub legs: usize,
+    /// Those that another one followed.
+    pub ended_legs: &'a [LegSummary],
+    /// Every time that slots were spread.
+    pub breaths: &'a [Breath],
+    /// By how much the energy rose between two changes of the target, at most.
+    pub energy_rise: Option<EnergyRise>,
     /// Whether the law's energy is proved never to grow in this flight.
     pub energy_falls: bool,
     /// What part of their size the plant's numbers resolve.

@@ -7,9 +7,11 @@ use serde::{Deserialize, Serialize};
 use super::artefact::{ArtefactError, write_atomically};
 use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
+use super::legs::{self, LegNumbers};
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use crate::audit::{self, Status};
+use crate::record::Breath;
 use crate::swarm::Pair;
 
 /// Version of the keys: raised when one is renamed, removed or changes its meaning.
@@ -33,8 +35,14 @@ pub struct Report {
     /// What solid hulls did, or would have done.
     #[serde(default)]
     pub hulls: Hulls,
-    /// How near the formation was at the end.
+    /// How near the formation of the last leg that began was at the end.
     pub formation: FormationNumbers,
+    /// Each leg of a flight of several, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub legs: Vec<LegNumbers>,
+    /// Every time that slots were spread to let vehicles past each other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub breaths: Vec<Breath>,
     /// The law's energy.
     pub energy: Energy,
     /// Commanded accelerations.
@@ -180,7 +188,10 @@ pub struct Energy {
     pub at_end: Option<f64>,
     /// Largest over all steps, as a ratio to the initial one.
     pub max_over_initial: Option<f64>,
-    /// Whether it rose above its start by more than integration and rounding explain, where it is proved never to grow.
+    /// Largest over all steps, as a ratio to what it was when the target was last changed.
+    #[serde(default)]
+    pub max_over_leg_start: Option<f64>,
+    /// Whether it rose above its start, on any leg, by more than integration and rounding explain, where it is proved never to grow.
     #[serde(default)]
     pub rose: bool,
 }
@@ -248,10 +259,13 @@ impl Report {
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),
             },
+            legs: legs::legs(findings),
+            breaths: findings.breaths.to_vec(),
             energy: Energy {
                 initial: summary.energy_initial.and_then(finite),
                 at_end: summary.energy_final.and_then(finite),
                 max_over_initial: summary.energy_max_over_initial.and_then(finite),
+                max_over_leg_start: findings.energy_rise.and_then(|rise| finite(rise.to / rise.from)),
                 rose: rises(findings),
             },
             control: Control {

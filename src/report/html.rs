@@ -10,7 +10,7 @@ use crate::figures::Figure;
 use crate::formation::Freedom;
 use crate::scenario::{PlantSpec, Precision, Scenario};
 use crate::swarm::Bounce;
-use crate::text::{at_least, seconds, significant};
+use crate::text::{at_least, counted, seconds, significant};
 
 /// Most violations, or hits of hulls, that are listed one by one.
 const LISTED: usize = 50;
@@ -45,6 +45,9 @@ impl Report {
     fn page(&self, page: &RunPage<'_>) -> Page {
         let tables = [self.separation_table(), self.formation_table(), self.control_table(), self.run_table()];
         let mut sections = vec![section("Numbers", &[html! { div.tables { @for table in tables { (table) } } }])];
+        if !self.legs.is_empty() {
+            sections.push(section("Legs", &[super::legs::table(&self.legs)]));
+        }
         if !self.audit.violations.is_empty() {
             sections.push(section("Violations", &[self.violations()]));
         }
@@ -77,7 +80,10 @@ impl Report {
         let at = separation.min_at_s.map(|at_s| format!("at {}", seconds(at_s)));
         let closest = [pair, at].into_iter().flatten().collect::<Vec<_>>().join(" ");
         let certificate = if separation.certified_m.is_some() {
-            "promised before the first step".to_owned()
+            match self.breaths.len() {
+                0 => "promised before the first step".to_owned(),
+                n => format!("promised before the first step, and anew at {}", counted(n as u64, "breath", "breaths")),
+            }
         } else {
             separation.certificate_void.join(" ")
         };
@@ -167,6 +173,7 @@ impl Report {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
         };
         let moved = match scenario.law().map(|law| law.controls().freedom()) {
+            Ok(Freedom::Fixed) => "where the reference has carried it",
             Ok(Freedom::Translation) => "wherever it is",
             _ => "wherever it is, turned and perhaps mirrored",
         };

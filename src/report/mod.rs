@@ -11,6 +11,7 @@ mod findings;
 mod flight;
 mod html;
 mod hulls;
+mod legs;
 pub mod page;
 pub mod recorded;
 mod verdict;
@@ -26,6 +27,7 @@ pub use flight::{
 };
 pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
+pub use legs::LegNumbers;
 pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 

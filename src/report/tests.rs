@@ -3,7 +3,8 @@
 use super::*;
 use crate::audit::{self, AuditOutcome, Auditor};
 use crate::law::{Certificate, Void};
-use crate::metrics::Summary;
+use crate::metrics::{LegSummary, Summary};
+use crate::record::EnergyRise;
 use crate::swarm::{Pair, Rows};
 use crate::target::Arrival;
 
@@ -48,6 +49,9 @@ struct Case {
     refused: &'static [&'static str],
     certificate: Certificate,
     energy_falls: bool,
+    energy_rise: Option<EnergyRise>,
+    legs: usize,
+    ended_legs: Vec<LegSummary>,
 }
 
 impl Case {
@@ -62,6 +66,9 @@ impl Case {
             refused: &[],
             certificate,
             energy_falls: true,
+            energy_rise: Some(EnergyRise { from: 3.656_742_96, to: 3.656_742_96 }),
+            legs: 1,
+            ended_legs: Vec::new(),
         }
     }
 
@@ -79,6 +86,10 @@ impl Case {
             engine_contact_pairs: Some(0),
             hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
             summary: &self.summary,
+            legs: self.legs,
+            ended_legs: &self.ended_legs,
+            breaths: &[],
+            energy_rise: self.energy_rise,
             energy_falls: self.energy_falls,
             epsilon: f64::from(f32::EPSILON),
             run: &Run {
@@ -418,14 +429,45 @@ fn a_report_on_disk_is_the_report() {
 #[test]
 fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows() {
     let risen = |share: f64, energy_falls: bool| {
-        let energy_max = REACHED.energy_initial.map(|initial| (1.0 + share) * initial);
-        let case = Case { summary: Summary { energy_max, ..REACHED }, energy_falls, ..Case::good() };
+        let energy_rise = Some(EnergyRise { from: 3.656_742_96, to: 3.656_742_96 * (1.0 + share) });
+        let case = Case { energy_rise, energy_falls, ..Case::good() };
         case.report().verdict
     };
     assert!(risen(0.9e-3, true).pass, "the error of integration");
     let verdict = risen(0.77, true);
     assert!(!verdict.pass && verdict.reasons[0].contains("rose from 3.6567e0 to 6.4724e0"), "{verdict:?}");
     assert!(risen(0.77, false).pass, "nothing is proved there");
+}
+
+#[test]
+fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
+    let ended = |ended_at_s: f64, reached_at_s: Option<f64>| LegSummary { ended_at_s, reached_at_s };
+    let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
+        let bound = |energy: f64, certified_m: f64| crate::law::LegBound { energy, certified_m: Some(certified_m) };
+        let certificate = Certificate { legs: vec![bound(3.0, 2.1), bound(4.0, 2.06)], ..Case::good().certificate };
+        Case { legs, ended_legs, summary, certificate, ..Case::good() }.report()
+    };
+    assert!(report(1, Vec::new(), REACHED).legs.is_empty());
+    let good = report(2, vec![ended(20.0, Some(12.0))], REACHED);
+    assert!(good.verdict.pass && good.headline().contains("; 2 of 2 legs reached"), "{}", good.headline());
+    let numbers = |leg: usize| {
+        let LegNumbers { from_s, to_s, reached_at_s, certified_m, .. } = good.legs[leg];
+        [from_s, to_s, reached_at_s, certified_m]
+    };
+    assert_eq!(numbers(0), [Some(0.0), Some(20.0), Some(12.0), Some(2.1)]);
+    assert_eq!(numbers(1), [Some(20.0), Some(120.0), Some(36.5), Some(2.06)]);
+    assert!(
+        good.text().contains("leg 2        from 20.000 s, reached at 36.500 s, certified 2.060000 m\n"),
+        "{}",
+        good.text()
+    );
+
+    let hurried = report(2, vec![ended(20.0, None)], REACHED);
+    assert!(!hurried.verdict.pass && hurried.headline().contains("1 of 2 legs reached"));
+    assert_eq!(hurried.verdict.reasons, ["Leg 1 was not reached before leg 2 began at 20.000 s."]);
+    let stuck = report(3, vec![ended(20.0, Some(12.0))], NOT_REACHED);
+    assert_eq!(stuck.verdict.reasons.last().map(String::as_str), Some("Leg 3 never began: leg 2 was not reached."));
+    assert_eq!((stuck.legs[2].from_s, stuck.legs[1].reached_at_s), (None, None));
 }
 
 #[test]

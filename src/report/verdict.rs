@@ -4,8 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::energy::{INTEGRATION, highest_honest};
 use super::findings::Findings;
+use super::legs;
 use crate::audit::Status;
 use crate::metrics::Summary;
+use crate::record::EnergyRise;
 use crate::target::Arrival;
 use crate::text::{metres, metres_below, seconds};
 
@@ -34,6 +36,7 @@ impl Verdict {
             risen_energy(findings),
             ended_early(findings),
             not_reached(findings),
+            legs::reason(&legs::legs(findings)),
             too_flat(findings),
         ]
         .into_iter()
@@ -152,8 +155,8 @@ pub(super) fn rises(findings: &Findings<'_>) -> bool {
 
 fn risen_energy(findings: &Findings<'_>) -> Option<String> {
     let (summary, vehicles) = (findings.summary, findings.run.vehicles);
-    let (initial, most) = (summary.energy_initial?, summary.energy_max?);
-    let allowed = highest_honest(summary, vehicles, findings.epsilon)?;
+    let EnergyRise { from: initial, to: most } = findings.energy_rise?;
+    let allowed = highest_honest(initial, summary, vehicles, findings.epsilon);
     (findings.energy_falls && most > allowed).then(|| {
         format!(
             "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2, \

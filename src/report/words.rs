@@ -19,7 +19,17 @@ impl Report {
         };
         let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
         let hulls = self.hulls.brief().map(|hulls| format!("; {hulls}"));
-        self.judged() + &hulls.unwrap_or_default() + &ended.unwrap_or_default() + &refused
+        let legs = super::legs::brief(&self.legs).map(|legs| format!("; {legs}"));
+        let breaths = match self.breaths.len() {
+            0 => String::new(),
+            n => format!("; {}", counted(n as u64, "breath", "breaths")),
+        };
+        self.judged()
+            + &legs.unwrap_or_default()
+            + &breaths
+            + &hulls.unwrap_or_default()
+            + &ended.unwrap_or_default()
+            + &refused
     }
 
     /// What was judged of what was flown.
@@ -37,7 +47,7 @@ impl Report {
                     }
                     _ => String::new(),
                 };
-                let rose = match self.energy.max_over_initial.filter(|_| self.energy.rose) {
+                let rose = match self.energy.max_over_leg_start.filter(|_| self.energy.rose) {
                     Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
                     None => String::new(),
                 };
@@ -102,16 +112,19 @@ impl Report {
         let (control, velocity) = (&self.control, &self.velocity);
         let [peak, last] = [control.peak_m_s2, control.final_m_s2].map(or_dash);
         let [disagreement, common] = [velocity.disagreement_m_s, velocity.common_m_s].map(or_dash);
-        table([
-            ("separation", self.separation_line()),
-            ("audit", self.audit_line()),
+        let mut rows: Vec<(String, String)> =
+            vec![("separation".to_owned(), self.separation_line()), ("audit".to_owned(), self.audit_line())];
+        rows.extend(super::legs::lines(&self.legs));
+        let rest = [
             ("formation", self.formation_line()),
             ("energy", self.energy_line()),
             ("control", format!("peak {peak}, final {last} m/s^2")),
             ("velocity", format!("disagreement {disagreement}, common {common} m/s")),
             ("run", self.run_line()),
             ("performance", self.performance_line()),
-        ])
+        ];
+        rows.extend(rest.map(|(name, line)| (name.to_owned(), line)));
+        table(rows)
     }
 
     fn separation_line(&self) -> String {

@@ -46,6 +46,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         },
         time: document.time,
         arrival: document.arrival,
+        breathing: document.breathing,
         name: document.name.unwrap_or_default(),
         space,
         law,

@@ -12,7 +12,7 @@ use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time::TimeSpec;
 use super::values::{Edge, PerVehicle, Point};
 use crate::law::LawSpec;
-use crate::target::Arrival;
+use crate::target::{Arrival, Breathing};
 
 /// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
 /// entries of every list, are counted from 1.
@@ -49,6 +49,10 @@ pub(super) struct Document {
     /// What counts as a reached formation.
     #[serde(default, rename(serialize = "judge"))]
     pub(super) arrival: Arrival,
+    /// When slots are spread for a while, so that vehicles that stand in each other's way get past; under the displacement
+    /// law.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) breathing: Breathing,
 }
 
 /// The vehicles.

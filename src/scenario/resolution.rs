@@ -85,9 +85,9 @@ impl Scenario {
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
         let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
-        let promised = law
-            .certificate_through(&self.observation(&self.start), &ahead)
-            .void_where(self.time.control_hz.is_some(), Void::CommandsHeld);
+        let start = self.observation(&self.start);
+        let promised =
+            law.certificate_through(&start, &ahead).void_where(self.time.control_hz.is_some(), Void::CommandsHeld);
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
         promised.void_where(unresolved, Void::Unresolved)
     }

@@ -108,6 +108,7 @@ impl From<&Scenario> for Document {
             plant: PlantTable { kind, precision },
             time: scenario.time,
             arrival: scenario.arrival,
+            breathing: scenario.breathing,
         }
     }
 }

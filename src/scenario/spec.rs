@@ -12,7 +12,7 @@ use crate::graph::Graph;
 use crate::law::{EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
 use crate::observation::Observation;
 use crate::swarm::{Rows, Swarm};
-use crate::target::{Arrival, Guidance, Leg, Reference, Target};
+use crate::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
 
 /// Default mass of a vehicle \[kg\].
 pub const DEFAULT_MASS_KG: f64 = 1.0;
@@ -52,6 +52,8 @@ pub struct Scenario {
     pub time: TimeSpec,
     /// What counts as reached.
     pub arrival: Arrival,
+    /// When slots are spread to let vehicles past each other, under laws that allow it.
+    pub breathing: Breathing,
 }
 
 /// The space that a swarm lives in.
@@ -116,6 +118,7 @@ impl Scenario {
             plant: PlantSpec::Rapier(Precision::Single),
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
+            breathing: Breathing::default(),
             start,
             legs: vec![Leg::first(formation)],
             reference: None,

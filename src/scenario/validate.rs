@@ -47,7 +47,18 @@ impl Scenario {
         check_connected(&self.graph)?;
         self.check_time()?;
         self.check_arrival()?;
+        self.check_breathing()?;
         self.check_resolution()
+    }
+
+    fn check_breathing(&self) -> Result<(), ScenarioError> {
+        let scale = positive("breathing.scale", "the scale of a breath", self.breathing.scale)?;
+        if scale >= 1.0 {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!("a breath scales slots by {scale}, which brings them nearer to each other"))
+            .with_help("it must be at least 1; the default is 2")
+            .at("breathing.scale"))
     }
 
     fn check_arrival(&self) -> Result<(), ScenarioError> {

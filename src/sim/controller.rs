@@ -1,10 +1,12 @@
 //! From the true state to the accelerations that reach the vehicles: sense, supervise, command, actuate.
 
+use super::ending::SimError;
 use crate::feedback::Feedback;
 use crate::graph::Graph;
-use crate::law::{Law, LawError};
+use crate::law::{Certificate, Law, LawError};
 use crate::link::Link;
 use crate::observation::Observation;
+use crate::scenario::Scenario;
 use crate::space::KeptPairs;
 use crate::swarm::{Rows, Swarm};
 use crate::target::{CurrentTarget, Guidance, Supervisor};
@@ -23,14 +25,14 @@ pub(super) struct Controller {
 
 impl Controller {
     pub(super) fn new(
+        scenario: &Scenario,
         law: Box<dyn Law>,
         link: Box<dyn Link>,
         supervisor: Box<dyn Supervisor>,
-        target: CurrentTarget,
-        guidance: Option<Guidance>,
-        links: Graph,
-    ) -> Self {
-        Self { law, link, supervisor, target, guidance, links, near: KeptPairs::default() }
+    ) -> Result<Self, SimError> {
+        let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
+        let (guidance, links) = (scenario.reference.clone(), scenario.graph.clone());
+        Ok(Self { law, link, supervisor, target, guidance, links, near: KeptPairs::default() })
     }
 
     /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
@@ -70,6 +72,15 @@ impl Controller {
         self.law.command(&at, command)?;
         self.link.actuate(time_s, command);
         Ok(())
+    }
+
+    /// What the law promises anew from this true state on, where the supervisor has begun a breath, and its scale.
+    pub(super) fn breath(&mut self, time_s: f64, truth: &Swarm) -> Option<(f64, Certificate)> {
+        let scale = self.supervisor.take_breath()?;
+        let target = self.target.view();
+        let exact = Observation::exact(truth, &self.links, target.formation);
+        let ahead = self.supervisor.ahead(&target);
+        Some((scale, self.law.certificate_through(&Observation { time_s, target, ..exact }, &ahead)))
     }
 
     /// All random numbers begin anew.

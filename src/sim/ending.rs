@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::audit::{AuditError, AuditOutcome};
 use crate::law::{Certificate, LawError, ParameterError};
-use crate::record::RecordError;
+use crate::record::{Breath, EnergyRise, RecordError};
 use crate::swarm::{Bounce, Pair, Swarm};
 
 /// A path may bend away from the straight line that is swept by this much \[m\]; two vehicles by twice as much. A step
@@ -30,6 +30,11 @@ pub struct Flight {
     pub engine_contacts: Vec<Pair>,
     /// Every time that two hulls hit, in order of time: from then on a bounce is flown and not the law's motion alone.
     pub bounces: Vec<Bounce>,
+    /// By how much the law's energy rose between two changes of its target, at most: the largest ratio; none for a law
+    /// without energy.
+    pub energy_rise: Option<EnergyRise>,
+    /// Every time that slots were spread, in the order of time.
+    pub breaths: Vec<Breath>,
     /// State at the end.
     pub last: Swarm,
     /// Wall-clock time by kind of work.

@@ -12,6 +12,7 @@ mod motion;
 mod parts;
 mod resolution;
 mod simulation;
+mod watch;
 
 use std::ops::ControlFlow;
 use std::time::Instant;

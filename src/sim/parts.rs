@@ -33,6 +33,10 @@ impl Parts {
     pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
         let supervisor =
             Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(law.controls().freedom());
+        let supervisor = match law.settling_rate_per_s() {
+            Some(rate_per_s) => supervisor.breathing(scenario.breathing, rate_per_s),
+            None => supervisor,
+        };
         Self { law, motion: Motion::of(scenario), link: Box::new(Direct), supervisor: Box::new(supervisor) }
     }
 }

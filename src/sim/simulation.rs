@@ -8,13 +8,13 @@ use super::judge::Judge;
 use super::motion::Motion;
 use super::parts::Parts;
 use super::resolution::Resolution;
+use super::watch::Watch;
 use crate::feedback::Feedback as _;
 use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Peaks, Sample};
 use crate::scenario::{MAX_HALVINGS, Scenario};
 use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
-use crate::target::CurrentTarget;
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
@@ -61,6 +61,7 @@ pub struct Simulation {
     shortest: u64,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
+    watch: Watch,
     /// Since the last sample.
     peaks: Peaks,
     sample_is_due: bool,
@@ -100,16 +101,8 @@ impl Simulation {
         motion.observe(&mut state);
         let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());
         let other_law = flies_another.then(|| Event::OtherLaw { time_s: 0.0, name: law.name().to_owned() });
-        let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
         let mut simulation = Self {
-            controller: Controller::new(
-                law,
-                link,
-                supervisor,
-                target,
-                scenario.reference.clone(),
-                scenario.graph.clone(),
-            ),
+            controller: Controller::new(scenario, law, link, supervisor)?,
             motion,
             certificate,
             judge: Judge::new(count, scenario.delta_m)?,
@@ -123,6 +116,7 @@ impl Simulation {
             events: other_law.into_iter().collect(),
             shortest: 0,
             energy: None,
+            watch: Watch::default(),
             peaks: Peaks::default(),
             sample_is_due: false,
             ending: None,
@@ -288,6 +282,8 @@ impl Simulation {
             audit,
             engine_contacts,
             bounces,
+            energy_rise: self.watch.worst(),
+            breaths: self.watch.breaths,
             last: self.state,
             performance: self.performance,
         }
@@ -386,7 +382,6 @@ impl Simulation {
         }
         self.controller.accept(self.time_s, &self.state);
         self.controller.link.settle(self.time_s);
-        let leg = self.controller.target.view().leg;
         let time = &self.scenario.time;
         let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));
         if time.control_hz.is_some() {
@@ -411,10 +406,8 @@ impl Simulation {
         let ((judged, audit_time), (commanded, law_time)) =
             if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
         self.performance.audit += audit_time;
-        let now = self.controller.target.view().leg;
-        if now != leg {
-            self.events.push(Event::LegBegan { leg: now, time_s });
-        }
+        let Self { watch, controller, state, certificate, events, .. } = self;
+        watch.look(controller, (time_s, state), certificate, events);
         let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
         judged.map_err(refused)?;
         self.judge.note_engine_contacts(&self.motion, self.time_s, &mut self.events);
@@ -445,6 +438,7 @@ impl Simulation {
             return Err(Breakdown::StateNotFinite { step, vehicle }.into());
         }
         self.energy = self.controller.energy(self.time_s, &self.state);
+        self.watch.take(self.controller.target.view().revision, self.energy);
         self.peaks.take(largest_row_norm(&self.control), self.energy);
         Ok(())
     }

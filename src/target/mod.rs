@@ -5,10 +5,12 @@
 //! [`Supervisor`] reads what the vehicles sense and may change it; [`Schedule`] is the one that goes from leg to leg.
 
 mod arrival;
+mod breathing;
 mod reference;
 mod supervisor;
 
 pub use arrival::{Arrival, Distance};
+pub use breathing::{Breathing, BreathingMode};
 pub use reference::{Guidance, Reference, ReferenceMotion, Spline};
 pub use supervisor::{Schedule, Supervisor};
 

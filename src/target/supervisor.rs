@@ -2,8 +2,9 @@
 
 use dyn_clone::DynClone;
 
+use super::breathing::{Breather, Breathing, BreathingMode};
 use super::{Arrival, Begins, CurrentTarget, Distance, Leg, Target};
-use crate::formation::Freedom;
+use crate::formation::{Formation, Freedom};
 use crate::graph::Graph;
 use crate::swarm::Swarm;
 
@@ -25,13 +26,24 @@ pub trait Supervisor: DynClone + Send {
         self.is_idle()
     }
 
+    /// The scale of a breath that it began when it was asked last: what a law promised is renewed then. Told once.
+    fn take_breath(&mut self) -> Option<f64> {
+        None
+    }
+
+    /// The formations that are still to come after the present target's.
+    fn ahead(&self, _target: &Target<'_>) -> Vec<&Formation> {
+        Vec::new()
+    }
+
     /// Begins its random numbers anew.
     fn reseed(&mut self, _seed: u64) {}
 }
 
 dyn_clone::clone_trait_object!(Supervisor);
 
-/// Goes from leg to leg by time, or when the leg before has been reached and held.
+/// Goes from leg to leg by time, or when the leg before has been reached and held; and may spread the slots of a leg where
+/// the swarm is stalled ([`Breathing`]).
 #[derive(Clone, Debug)]
 pub struct Schedule {
     legs: Vec<Leg>,
@@ -40,6 +52,7 @@ pub struct Schedule {
     freedom: Freedom,
     /// Since when the present leg has been within the limits \[s\].
     within_since_s: Option<f64>,
+    breather: Option<Breather>,
 }
 
 impl Schedule {
@@ -47,7 +60,7 @@ impl Schedule {
     #[must_use]
     pub fn new(legs: &[Leg], links: &Graph, arrival: Arrival) -> Self {
         let freedom = Freedom::RigidMotion;
-        Self { legs: legs.to_vec(), links: links.clone(), arrival, freedom, within_since_s: None }
+        Self { legs: legs.to_vec(), links: links.clone(), arrival, freedom, within_since_s: None, breather: None }
     }
 
     /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
@@ -57,9 +70,19 @@ impl Schedule {
         self
     }
 
+    /// The same, spreading slots where the swarm is stalled under a law by which errors fall at a rate `rate_per_s` \[1/s\].
+    /// To be said after [`Schedule::free_by`].
+    #[must_use]
+    pub fn breathing(mut self, breathing: Breathing, rate_per_s: f64) -> Self {
+        let breathes = breathing.mode != BreathingMode::Off && breathing.most > 0;
+        self.breather = breathes.then(|| Breather::new(breathing, rate_per_s, self.arrival, self.freedom));
+        self
+    }
+
     fn is_due(&mut self, begins: Begins, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
         match begins {
             Begins::At(from_s) => time_s >= from_s,
+            Begins::Reached if self.breather.as_ref().is_some_and(|breather| !breather.is_closed()) => false,
             Begins::Reached => {
                 let distance = {
                     let Target { formation, ref reference, .. } = target.view();
@@ -78,27 +101,41 @@ impl Supervisor for Schedule {
         while let Some(next) = self.legs.get(target.view().leg + 1) {
             let begins = next.begins;
             if !self.is_due(begins, time_s, sensed, target) {
-                return;
+                break;
             }
             let leg = target.view().leg + 1;
             target.begin(leg, &self.legs[leg].formation);
             self.within_since_s = None;
+            if let Some(breather) = &mut self.breather {
+                breather.begin_leg();
+            }
+        }
+        if let (Some(breather), Some(leg)) = (&mut self.breather, self.legs.get(target.view().leg)) {
+            breather.supervise(time_s, sensed, leg, target);
         }
     }
 
     fn is_idle(&self) -> bool {
-        self.legs.len() < 2
+        self.legs.len() < 2 && self.breather.is_none()
     }
 
     fn keeps_to(&self, legs: &[Leg]) -> bool {
         self.is_idle() || self.legs == legs
+    }
+
+    fn take_breath(&mut self) -> Option<f64> {
+        self.breather.as_mut()?.take_begun()
+    }
+
+    fn ahead(&self, target: &Target<'_>) -> Vec<&Formation> {
+        let from = if target.spread == 1.0 { target.leg + 1 } else { target.leg };
+        self.legs.iter().skip(from).map(|leg| &leg.formation).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formation::Formation;
 
     fn legs(begins: [Begins; 2]) -> Vec<Leg> {
         let leg = |spacing_m, begins| Leg { formation: Formation::line(2, spacing_m), begins };

@@ -229,6 +229,9 @@ impl From<&Event> for EventMessage<&'static str> {
             Event::LegBegan { leg, .. } => {
                 ("leg-began", None, (leg + 1) as f64, format!("leg {} of the flight began", leg + 1))
             }
+            Event::Breath { scale, .. } => {
+                ("breath", None, *scale, format!("slots were scaled by {scale} to let vehicles past each other"))
+            }
             Event::EngineContact { pair, .. } => (
                 "engine-contact",
                 Some(*pair),
@@ -261,6 +264,7 @@ impl EventMessage<String> {
             "hulls-hit" => Event::HullsHit { pair: pair()?, time_s, closing_m_s: self.value },
             "other-law" => Event::OtherLaw { time_s, name: self.text },
             "leg-began" => Event::LegBegan { leg: self.leg()?, time_s },
+            "breath" => Event::Breath { time_s, scale: self.value },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },
             unknown => return Err(Own::Events.fault(format!("unknown kind {unknown:?}"))),

@@ -1,0 +1,89 @@
+//! What the target and the law's energy do from step to step.
+
+use super::controller::Controller;
+use crate::law::Certificate;
+use crate::record::{Breath, EnergyRise, Event};
+use crate::swarm::Swarm;
+
+/// What the energy did since the target changed, the worst that it ever did, and the changes themselves.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Watch {
+    /// That of the target \[m^2/s^2\], by its revision.
+    since: Option<(u64, f64)>,
+    worst: Option<EnergyRise>,
+    leg: usize,
+    pub(super) breaths: Vec<Breath>,
+}
+
+impl Watch {
+    /// Tells what the supervisor has changed at an instant, and renews what the law promised where it must.
+    pub(super) fn look(
+        &mut self,
+        controller: &mut Controller,
+        (time_s, state): (f64, &Swarm),
+        certificate: &mut Certificate,
+        events: &mut Vec<Event>,
+    ) {
+        let leg = controller.target.view().leg;
+        if leg != self.leg {
+            events.push(Event::LegBegan { leg, time_s });
+            self.leg = leg;
+        }
+        if let Some((scale, promise)) = controller.breath(time_s, state) {
+            certificate.renew(&promise);
+            self.breaths.push(Breath { time_s, scale, certified_m: certificate.certified_m });
+            events.push(Event::Breath { time_s, scale });
+        }
+    }
+
+    /// Takes the energy of the next instant, under the target of this revision.
+    pub(super) fn take(&mut self, revision: u64, energy: Option<f64>) {
+        let Some(energy) = energy else { return };
+        let from = match self.since {
+            Some((of, from)) if of == revision => from,
+            _ => {
+                self.since = Some((revision, energy));
+                energy
+            }
+        };
+        let rise = EnergyRise { from, to: energy };
+        // By ratio, without dividing by an energy that may be zero.
+        let is_worse = |worst: EnergyRise| rise.to * worst.from > worst.to * rise.from;
+        if self.worst.is_none_or(is_worse) {
+            self.worst = Some(rise);
+        }
+    }
+
+    pub(super) fn worst(&self) -> Option<EnergyRise> {
+        self.worst
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rise_is_told_within_a_target_and_not_from_one_to_the_next() {
+        let mut watch = Watch::default();
+        assert_eq!(watch.worst(), None);
+        watch.take(0, None);
+        for (revision, energy) in [(0, 4.0), (0, 3.0), (1, 9.0), (1, 8.0), (2, 2.0)] {
+            watch.take(revision, Some(energy));
+        }
+        assert_eq!(watch.worst(), Some(EnergyRise { from: 4.0, to: 4.0 }));
+        watch.take(2, Some(2.5));
+        watch.take(2, Some(2.2));
+        assert_eq!(watch.worst(), Some(EnergyRise { from: 2.0, to: 2.5 }));
+    }
+
+    #[test]
+    fn what_rises_from_nothing_is_the_worst() {
+        let mut watch = Watch::default();
+        watch.take(0, Some(0.0));
+        watch.take(0, Some(1e-3));
+        watch.take(1, Some(1.0));
+        watch.take(1, Some(5.0));
+        assert_eq!(watch.worst(), Some(EnergyRise { from: 0.0, to: 1e-3 }));
+    }
+}

@@ -1,0 +1,242 @@
+//! Breathing: slots that are spread for a while, so that vehicles that stand in each other's way get past.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Arrival, CurrentTarget, Leg, Target};
+use crate::formation::{Formation, Freedom};
+use crate::swarm::{Swarm, mean_row, row};
+
+/// When slots are spread.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum BreathingMode {
+    /// When the swarm is stalled, under a law whose promise is renewed then.
+    #[default]
+    Auto,
+    /// From the start of every leg, and when the swarm is stalled.
+    Start,
+    /// Never.
+    Off,
+}
+
+/// How slots are spread.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct Breathing {
+    /// When.
+    pub mode: BreathingMode,
+    /// By how much the first time, about their centre; each time by one more.
+    pub scale: f64,
+    /// How often on a leg, at most.
+    pub most: u32,
+}
+
+impl Default for Breathing {
+    fn default() -> Self {
+        Self { mode: BreathingMode::Auto, scale: 2.0, most: 8 }
+    }
+}
+
+/// The root mean square speed below this part of the error times the law's rate is no progress.
+const SLOW: f64 = 0.2;
+/// What is no progress for so long is a stall \[s\].
+const STALLED_S: f64 = 2.0;
+/// Errors of so many times what counts as reached are worth a breath.
+const WORTH: f64 = 2.0;
+/// Spread slots are held until no vehicle is farther from its own than this part of the distance of the slots.
+const SETTLED: f64 = 0.25;
+/// Slots then come together with this e-folding time \[s\].
+const FOLDING_S: f64 = 2.0;
+/// Spread by less than this they are those of the leg again.
+const CLOSED: f64 = 0.01;
+
+/// Where a breath is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// Slots are those of the leg; no progress has been made since this time \[s\].
+    Flying { idle_since_s: Option<f64> },
+    /// Slots are spread.
+    Spread { scale: f64 },
+    /// Slots come together since this time \[s\].
+    Closing { scale: f64, since_s: f64 },
+}
+
+/// Spreads the slots of a leg when the swarm is stalled.
+///
+/// Stalled is a swarm whose vehicles are more than twice the limit of arrival from their slots and for 2 s move slower, root
+/// mean square, than 0.2 of the law's rate times their root mean square error. Slots are then scaled about their centre, held
+/// until every vehicle is within a quarter of the smallest slot distance of its own, and come together with an e-folding time
+/// of 2 s.
+#[derive(Clone, Debug)]
+pub(super) struct Breather {
+    breathing: Breathing,
+    /// Rate at which errors fall by themselves, sqrt k \[1/s\].
+    rate_per_s: f64,
+    tolerance_m: f64,
+    freedom: Freedom,
+    phase: Phase,
+    breaths: u32,
+    begun: Option<f64>,
+}
+
+/// Errors and speeds relative to what the formation may be moved by.
+struct Errors {
+    rms_m: f64,
+    max_m: f64,
+    rms_m_s: f64,
+}
+
+impl Errors {
+    fn of(swarm: &Swarm, target: &Target<'_>, freedom: Freedom) -> Self {
+        let slots_m = &target.formation.slots_m;
+        let (place_m, velocity_m_s) = match freedom {
+            Freedom::Fixed => (target.reference.position_m, target.reference.velocity_m_s),
+            _ => (mean_row(&swarm.positions_m) - mean_row(slots_m), swarm.mean_velocity_m_s()),
+        };
+        let (mut squares, mut largest, mut speeds) = (0.0, 0.0, 0.0);
+        for i in 0..swarm.count() {
+            let error = (row(&swarm.positions_m, i) - row(slots_m, i) - place_m).norm_squared();
+            squares += error;
+            largest = f64::max(largest, error);
+            speeds += (row(&swarm.velocities_m_s, i) - velocity_m_s).norm_squared();
+        }
+        let count = swarm.count().max(1) as f64;
+        Self { rms_m: (squares / count).sqrt(), max_m: largest.sqrt(), rms_m_s: (speeds / count).sqrt() }
+    }
+}
+
+impl Breather {
+    pub(super) fn new(breathing: Breathing, rate_per_s: f64, arrival: Arrival, freedom: Freedom) -> Self {
+        let phase = Phase::Flying { idle_since_s: None };
+        let tolerance_m = WORTH * arrival.edge_error_m;
+        Self { breathing, rate_per_s, tolerance_m, freedom, phase, breaths: 0, begun: None }
+    }
+
+    /// A leg has begun with its slots as they are given.
+    pub(super) fn begin_leg(&mut self) {
+        self.phase = Phase::Flying { idle_since_s: None };
+        self.breaths = 0;
+    }
+
+    /// Whether slots are those of the leg.
+    pub(super) fn is_closed(&self) -> bool {
+        matches!(self.phase, Phase::Flying { .. })
+    }
+
+    /// The scale of a breath that has begun since this was asked.
+    pub(super) fn take_begun(&mut self) -> Option<f64> {
+        self.begun.take()
+    }
+
+    /// Looks at the swarm on its way to the slots of `leg` and may spread them.
+    pub(super) fn supervise(&mut self, time_s: f64, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) {
+        let errors = Errors::of(sensed, &target.view(), self.freedom);
+        match self.phase {
+            Phase::Flying { idle_since_s } => {
+                let first = self.breathing.mode == BreathingMode::Start && self.breaths == 0;
+                let idle = errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.rate_per_s * errors.rms_m;
+                let since_s = idle.then(|| idle_since_s.unwrap_or(time_s));
+                self.phase = Phase::Flying { idle_since_s: since_s };
+                let stalled = since_s.is_some_and(|since_s| time_s - since_s >= STALLED_S);
+                if (first || stalled) && self.breaths < self.breathing.most {
+                    let scale = self.breathing.scale + f64::from(self.breaths);
+                    self.breaths += 1;
+                    self.begun = Some(scale);
+                    self.phase = Phase::Spread { scale };
+                    target.spread_formation(&leg.formation, scale);
+                }
+            }
+            Phase::Spread { scale } => {
+                let slots_m = leg.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m);
+                if errors.max_m < SETTLED * slots_m {
+                    self.phase = Phase::Closing { scale, since_s: time_s };
+                }
+            }
+            Phase::Closing { scale, since_s } => {
+                let beyond = (scale - 1.0) * libm::exp((since_s - time_s) / FOLDING_S);
+                if beyond < CLOSED {
+                    self.phase = Phase::Flying { idle_since_s: None };
+                    target.set_formation(&leg.formation);
+                } else {
+                    target.spread_formation(&leg.formation, 1.0 + beyond);
+                }
+            }
+        }
+    }
+}
+
+impl Leg {
+    /// Its slots scaled about their centre.
+    #[must_use]
+    pub fn spread(&self, scale: f64) -> Formation {
+        self.clone().placed(scale, 0.0, nalgebra::Vector3::zeros()).formation
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ARRIVAL: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 };
+
+    /// The spread of the target at times 0, 0.5, 1, ... while vehicle 2 is `off(time)` m from its slot of the leg.
+    fn spreads(breathing: Breathing, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
+        let leg = Leg::first(Formation::line(2, 2.0));
+        let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
+        let mut breather = Breather::new(breathing, 1.0, ARRIVAL, Freedom::Fixed);
+        (0..steps)
+            .map(|k| {
+                let time_s = 0.5 * f64::from(k);
+                let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
+                swarm.positions_m[(1, 1)] = off_m(time_s);
+                breather.supervise(time_s, &swarm, &leg, &mut target);
+                target.view().spread
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_swarm_that_stands_elsewhere_breathes_once_it_has_for_long_enough() {
+        let found = spreads(Breathing::default(), |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 30);
+        assert_eq!(found[..13], [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]);
+        // Settled at 6 s: from then on 1 + exp(-t/2), until that is 1.01.
+        assert!((found[14] - (1.0 + libm::exp(-0.5))).abs() < 1e-15, "{found:?}");
+        assert!(found[15..].windows(2).all(|pair| pair[1] <= pair[0]) && found[29] == 1.0);
+    }
+
+    #[test]
+    fn the_next_breath_is_deeper_and_after_the_last_there_is_none() {
+        let breathing = Breathing { most: 2, ..Breathing::default() };
+        // Settles whenever slots are spread, and is off again when they are not.
+        let leg = Leg::first(Formation::line(2, 2.0));
+        let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
+        let mut breather = Breather::new(breathing, 1.0, ARRIVAL, Freedom::Translation);
+        let mut begun = Vec::new();
+        for k in 0..400 {
+            let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
+            swarm.positions_m[(1, 1)] += if breather.is_closed() { 0.5 } else { 0.0 };
+            breather.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
+            begun.extend(breather.take_begun());
+        }
+        assert_eq!(begun, [2.0, 3.0]);
+        assert_eq!(target.view().spread, 1.0);
+    }
+
+    #[test]
+    fn who_arrives_or_moves_or_is_not_to_breathe_does_not_and_who_begins_so_does() {
+        assert!(spreads(Breathing::default(), |_| 0.02, 20).iter().all(|&spread| spread == 1.0), "near enough");
+        let off = Breathing { mode: BreathingMode::Off, most: 0, ..Breathing::default() };
+        assert!(spreads(off, |_| 0.5, 20).iter().all(|&spread| spread == 1.0));
+        let start = Breathing { mode: BreathingMode::Start, ..Breathing::default() };
+        assert_eq!(spreads(start, |_| 0.0, 1), [2.0]);
+    }
+
+    #[test]
+    fn slots_are_spread_about_their_centre() {
+        let leg = Leg::first(Formation::line(3, 2.0));
+        let slots_m = leg.spread(2.0).slots_m;
+        assert_eq!([slots_m[(0, 0)], slots_m[(1, 0)], slots_m[(2, 0)]], [-2.0, 2.0, 6.0]);
+    }
+}
