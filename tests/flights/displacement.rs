@@ -8,6 +8,8 @@ use tautline::swarm::{Pair, row};
 use crate::flight::{Log, builtin, fly};
 
 const HUB_3: &str = "graph={kind=\"edges\", edges=[[3, 1], [3, 2], [3, 4], [3, 5]]}";
+/// At rest, moved by nobody.
+const LEADER_3: &str = "reference={kind=\"rest\", leader=3}";
 const DISPLACEMENT: &str = "law.kind=displacement";
 
 struct Reference {
@@ -22,7 +24,7 @@ struct Reference {
     within_s: f64,
 }
 
-fn references() -> [Reference; 3] {
+fn references() -> [Reference; 4] {
     [
         Reference {
             sets: &[DISPLACEMENT],
@@ -43,6 +45,16 @@ fn references() -> [Reference; 3] {
             closest_s: 2.9605,
             pair: Pair::new(3, 4),
             within_s: 11.337,
+        },
+        Reference {
+            sets: &[DISPLACEMENT, HUB_3, LEADER_3],
+            scenario: "pentagon",
+            energy: 35.490_384_76,
+            certified_m: 2.030_054_91,
+            closest_m: 2.419_307_17,
+            closest_s: 2.9605,
+            pair: Pair::new(3, 4),
+            within_s: 11.3605,
         },
         Reference {
             sets: &[DISPLACEMENT],

@@ -7,6 +7,7 @@ mod displacement;
 mod ideal_plant;
 mod law_properties;
 mod loop_claims;
+mod missions;
 mod plant_claims;
 mod random_scenarios;
 mod reference_flights;

@@ -13,6 +13,12 @@ pub(crate) fn builtin(name: &str, sets: &[&str]) -> Scenario {
     Scenario::read(&Source::Builtin(name.to_owned()), &overrides).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// A scenario of this text.
+pub(crate) fn read(toml: &str) -> Scenario {
+    let source = Source::Text { name: "test".to_owned(), text: toml.to_owned() };
+    Scenario::read(&source, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
 /// Keeps every sample and every event.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Log {
