@@ -11,10 +11,11 @@ mod words;
 use serde::Serialize;
 
 use crate::formation::affine_dimension;
-use crate::law::{Controls, Law, ParameterError, Void};
+use crate::law::{Controls, Law, LegBound, ParameterError, Void};
 use crate::scenario::{LARGEST, Scenario};
 use crate::space::closest_pair;
 use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::target::BreathingMode;
 use crate::text::at_least;
 
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
@@ -48,6 +49,11 @@ pub struct Preflight {
     pub energy_initial: Option<f64>,
     /// Separation below which no pair ever comes \[m\].
     pub certified_m: Option<f64>,
+    /// The same for each leg of a flight of several, in their order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub legs: Vec<LegPromise>,
+    /// Whether slots may be spread where the swarm is stalled, which renews what is certified.
+    pub breathes: bool,
     /// What the law needs beside the links, such as a sensor, in a few words each.
     pub needs: Vec<&'static str>,
     /// Why nothing is certified, a sentence each.
@@ -82,6 +88,15 @@ pub struct Preflight {
     controls_distances: bool,
     #[serde(skip)]
     links_all: bool,
+}
+
+/// What is certified from the beginning of a leg to the beginning of the next.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LegPromise {
+    /// No pair comes closer than this \[m\].
+    pub certified_m: Option<f64>,
+    /// The energy does not exceed this \[m^2/s^2\].
+    pub energy_bound: f64,
 }
 
 /// Something that stands in the way of a flight.
@@ -176,6 +191,12 @@ impl Preflight {
             common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.a22_per_s),
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
+            legs: certificate
+                .legs
+                .iter()
+                .map(|&LegBound { energy, certified_m }| LegPromise { certified_m, energy_bound: energy })
+                .collect(),
+            breathes: law.settling_rate_per_s().is_some() && scenario.breathing.mode != BreathingMode::Off,
             needs: law.needs().to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             certified_edges_m: None,
@@ -189,7 +210,7 @@ impl Preflight {
             start_dimension: motion_dimension(&scenario.start),
             start_margin_m: margin(&scenario.start.positions_m),
             formation_dimension,
-            formation_margin_m: margin(&scenario.formation().slots_m),
+            formation_margin_m: scenario.legs.iter().filter_map(|leg| margin(&leg.formation.slots_m)).reduce(f64::min),
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
             controls_distances: law.controls() == Controls::Distances,

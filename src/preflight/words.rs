@@ -1,7 +1,7 @@
 //! A pre-flight check in words: one line, and a table.
 
 use super::numbers::{rate, significant};
-use super::{Code, Preflight, Warning};
+use super::{Code, LegPromise, Preflight, Warning};
 use crate::text::{at_least, counted, table};
 
 impl Code {
@@ -57,15 +57,18 @@ impl Preflight {
     /// The numbers as a short table, a line each, with a line end.
     #[must_use]
     pub fn text(&self) -> String {
-        table([
-            ("stability", self.stability_line()),
-            ("certificate", self.certificate_line()),
+        let mut rows =
+            vec![("stability".to_owned(), self.stability_line()), ("certificate".to_owned(), self.certificate_line())];
+        rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
+        let rest = [
             ("needs", self.needs_line()),
             ("step", self.step_line()),
             ("start", self.start_line()),
             ("formation", self.formation_line()),
             ("rigidity", self.rigidity_line()),
-        ])
+        ];
+        rows.extend(rest.map(|(name, line)| (name.to_owned(), line)));
+        table(rows)
     }
 
     fn stability_line(&self) -> String {
@@ -81,7 +84,10 @@ impl Preflight {
     fn certificate_line(&self) -> String {
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
-            Some(certified_m) => format!("{} m, from {energy}", at_least(certified_m, 6)),
+            Some(certified_m) => {
+                let breath = if self.breathes { ", renewed where slots are spread (breathing.mode)" } else { "" };
+                format!("{} m, from {energy}{breath}", at_least(certified_m, 6))
+            }
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }
     }
@@ -148,6 +154,14 @@ impl Preflight {
         } else {
             ", convergence perhaps slow"
         }
+    }
+}
+
+fn leg_line(promise: &LegPromise) -> String {
+    let energy = format!("energy at most {:.6} m^2/s^2", promise.energy_bound);
+    match promise.certified_m {
+        Some(certified_m) => format!("{} m, {energy}", at_least(certified_m, 6)),
+        None => energy,
     }
 }
 
