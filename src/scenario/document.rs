@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::de::{SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::laws::Laws;
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time::TimeSpec;
 use crate::law::LawSpec;
@@ -33,6 +34,10 @@ pub(super) struct Document {
     pub(super) formation: FormationTable,
     /// The control law.
     pub(super) law: LawTable,
+    /// Laws that `tautline compare` flies by name: `[laws.NAME]` holds the keys of a law, where NAME is its kind or any other
+    /// name with a `kind` beside the keys.
+    #[serde(default, skip_serializing_if = "Laws::is_empty")]
+    pub(super) laws: Laws,
     /// Which vehicles sense each other: all of them unless given.
     #[serde(default)]
     pub(super) graph: GraphTable,

@@ -14,6 +14,8 @@ mod deserializer;
 #[cfg(feature = "files")]
 mod document;
 mod error;
+#[cfg(feature = "files")]
+mod laws;
 mod limits;
 #[cfg(feature = "files")]
 mod overrides;
@@ -29,6 +31,8 @@ mod spec;
 mod start;
 #[cfg(feature = "files")]
 mod suggest;
+#[cfg(feature = "files")]
+mod template;
 #[cfg(feature = "files")]
 mod text;
 mod time;
@@ -49,4 +53,6 @@ pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Scenario, Space};
 #[cfg(feature = "reports")]
 pub(crate) use start::{offset, random, scatter};
+#[cfg(feature = "files")]
+pub use template::{Draw, NamedLaw, Template};
 pub use time::TimeSpec;

@@ -10,6 +10,7 @@ use super::document::{
     Assignment, Document, Edge, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, PerVehicle, PlantKind,
     PlantTable, Point, StartTable, SwarmTable,
 };
+use super::laws::Laws;
 use super::spec::{PlantSpec, Scenario, Space};
 use crate::swarm::Rows;
 
@@ -75,6 +76,7 @@ impl From<&Scenario> for Document {
                 shape: FormationShape::Points { points_m: scenario.points(&scenario.formation().slots_m) },
             },
             law: LawTable { kind: law, delta_m: scenario.delta_m },
+            laws: Laws::new(),
             graph: GraphTable {
                 kind: if scenario.graph.is_complete() {
                     GraphKind::Complete {}
