@@ -1,6 +1,6 @@
 //! The comparison as a page.
 
-use super::measures::{Cell, Measure, NUMBERS, OUTCOMES};
+use super::measures::{ARRIVALS, COSTS, Cell, Measure, OUTCOMES};
 use super::result::{Comparison, LawRow};
 use crate::report::page::{self, Badge, Markup, Page, Picture, Render as _, Tone, noted, section};
 use crate::text::significant;
@@ -38,12 +38,13 @@ impl Comparison {
             "Laws side by side",
             &[
                 table("How flights ended, with 95 % intervals", &OUTCOMES, &self.laws),
-                table("What they measured, with 95 % intervals", &NUMBERS, &self.laws),
+                table("How soon they reached the formation, and how near two vehicles came", &ARRIVALS, &self.laws),
+                table("What it cost", &COSTS, &self.laws),
             ],
         )];
         let notes = self.notes();
         if !notes.is_empty() {
-            sections.push(section("To know", &[page::list(&notes)]));
+            sections.push(section("What to know", &[page::list(&notes)]));
         }
         match page.no_pictures {
             Some(why) => sections.push(section("The worst moment of each law", &[page::list(&[why])])),

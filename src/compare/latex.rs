@@ -1,16 +1,16 @@
-//! The comparison as LaTeX: two tables that need no package.
+//! The comparison as LaTeX: tables that need no package.
 
-use super::measures::{Measure, NUMBERS, OUTCOMES};
+use super::measures::{ARRIVALS, COSTS, Measure, OUTCOMES};
 use super::result::{Comparison, LawRow};
 
 impl Comparison {
-    /// How flights ended and what they measured, each a `tabular` with a row a law and the intervals below it. Two
+    /// How flights ended, how soon and how near, and what it cost, each a `tabular` with a row a law and the intervals below it. Two
     /// comparisons of the same give the same bytes.
     #[must_use]
     pub fn to_latex(&self) -> String {
         let said = std::iter::once(self.headline()).chain(self.notes());
         let comments: String = said.map(|line| format!("% {line}\n")).collect();
-        let tables = [&OUTCOMES[..], &NUMBERS].map(|measures| tabular(measures, &self.laws));
+        let tables = [&OUTCOMES[..], &ARRIVALS, &COSTS].map(|measures| tabular(measures, &self.laws));
         format!("{comments}% In brackets: 95 % intervals.\n{}", tables.join("\n"))
     }
 }

@@ -12,11 +12,16 @@ mod measures;
 mod parallel;
 mod plan;
 mod result;
+mod side_by_side;
 mod words;
 
 pub use effort::Effort;
 pub use flight::{FlightRow, Outcome, fly};
 pub use html::ComparePage;
 pub use parallel::in_parallel;
-pub use plan::{CompareError, Plan, Watch};
+pub use plan::{CompareError, Plan};
 pub use result::{Comparison, LawPerformance, LawRow, Performance, SCHEMA_VERSION};
+pub use side_by_side::Watch;
+
+#[cfg(test)]
+mod tests;

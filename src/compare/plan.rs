@@ -1,20 +1,10 @@
-//! What is flown, and flying it.
+//! What is flown.
 
-use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
-
-use super::flight::{FlightRow, fly};
-use super::parallel::in_parallel;
-use super::result::Comparison;
 use crate::scenario::{Draw, NamedLaw, Scenario, ScenarioError, Template};
 use crate::sim::SimError;
 
 /// A start without randomness is moved by up to this part of delta along each axis.
 pub(super) const JITTER: f64 = 0.05;
-
-/// Steps between two looks at the progress.
-const PROGRESS_EVERY: u64 = 64;
 
 /// Which laws are flown, from which starts.
 #[derive(Clone, Debug)]
@@ -24,15 +14,6 @@ pub struct Plan {
     runs: u64,
     seed: u64,
     jitter_m: Option<f64>,
-}
-
-/// Who looks on while flights are flown.
-#[derive(Clone, Copy)]
-pub struct Watch<'a> {
-    /// Told of steps as they are flown.
-    pub flown: &'a (dyn Fn(u64) + Sync),
-    /// Set from outside: flights under way end, and no other begins.
-    pub interrupted: &'a AtomicBool,
 }
 
 /// Why laws cannot be compared.
@@ -129,7 +110,7 @@ impl Plan {
         self.template.own().time.steps().saturating_mul(self.flights() as u64)
     }
 
-    fn flights(&self) -> usize {
+    pub(super) fn flights(&self) -> usize {
         usize::try_from(self.runs).unwrap_or(usize::MAX).saturating_mul(self.laws.len())
     }
 
@@ -145,49 +126,5 @@ impl Plan {
     fn check(&self, law: &NamedLaw, seed: u64) -> Result<(), CompareError> {
         let built = self.scenario(law, seed)?.law();
         built.map(drop).map_err(|error| CompareError::Flight { law: law.name.clone(), seed, error: error.into() })
-    }
-
-    /// Flies everything on so many threads. The result is the same for any number of them but for
-    /// [`Comparison::performance`].
-    ///
-    /// One that is interrupted is about the starts that were flown under every law, if there are any.
-    ///
-    /// # Errors
-    /// [`CompareError`] for the first flight that does not exist.
-    pub fn fly(&self, threads: usize, watch: Watch<'_>) -> Result<Comparison, CompareError> {
-        let began = Instant::now();
-        // All laws from one start before the next one: an interruption leaves few starts that cannot be compared.
-        let flown = in_parallel(self.flights(), threads, &|flight| self.one(flight, watch));
-        let mut flights = vec![Vec::new(); self.laws.len()];
-        let mut flown = flown.into_iter();
-        for _ in 0..self.runs {
-            let rows = flown.by_ref().take(self.laws.len()).collect::<Result<Option<Vec<_>>, _>>()?;
-            for (law, row) in rows.into_iter().flatten().enumerate() {
-                flights[law].push(row);
-            }
-        }
-        Ok(Comparison::new(self, flights, began.elapsed().as_secs_f64()))
-    }
-
-    /// A flight by its number; none where it was interrupted.
-    fn one(&self, flight: usize, watch: Watch<'_>) -> Result<Option<FlightRow>, CompareError> {
-        let stops = || watch.interrupted.load(Ordering::Relaxed);
-        if stops() {
-            return Ok(None);
-        }
-        let count = self.laws.len();
-        let (seed, law) = (self.seed((flight / count) as u64), &self.laws[flight % count]);
-        let scenario = self.scenario(law, seed)?;
-        let mut told = 0;
-        let mut carry_on = |step: u64| {
-            if step.is_multiple_of(PROGRESS_EVERY) {
-                (watch.flown)(step - told);
-                told = step;
-            }
-            if stops() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let row = fly(&scenario, seed, &mut carry_on);
-        (watch.flown)(scenario.time.steps() - told);
-        row.map_err(|error| CompareError::Flight { law: law.name.clone(), seed, error })
     }
 }

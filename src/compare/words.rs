@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use super::flight::Outcome;
-use super::measures::{Cell, NUMBERS, OUTCOMES};
+use super::measures::{ARRIVALS, COSTS, Cell, OUTCOMES};
 use super::plan::JITTER;
 use super::result::{Comparison, LawRow};
-use crate::text::{counted, significant};
+use crate::text::{counted, metres, significant};
 
 /// Most law names that a line of the table holds, each with a number and its interval.
 const SIDE_BY_SIDE: usize = 3;
@@ -36,7 +36,7 @@ impl Comparison {
         let jitter = self.jitter_m.map(|jitter_m| {
             format!(
                 "the start has no randomness: start.seed moves each coordinate by up to {} m ({} % of delta)",
-                significant(jitter_m, 3),
+                metres(jitter_m),
                 100.0 * JITTER
             )
         });
@@ -50,7 +50,7 @@ impl Comparison {
         let costs: Vec<_> = self.performance.laws.iter().map(|law| cost(law.law_step_s)).collect();
         for (laws, costs) in self.laws.chunks(SIDE_BY_SIDE).zip(costs.chunks(SIDE_BY_SIDE)) {
             let mut rows = vec![row("", "", laws.iter().map(|law| law.name.clone()))];
-            for measure in OUTCOMES.iter().chain(&NUMBERS) {
+            for measure in OUTCOMES.iter().chain(&ARRIVALS).chain(&COSTS) {
                 rows.push(row(measure.name, measure.unit, laws.iter().map(|law| on_one_line((measure.cell)(law)))));
             }
             rows.push(row("a step of the law, on this machine", "us", costs.iter().cloned()));
