@@ -9,7 +9,7 @@ impl Comparison {
     #[must_use]
     pub fn to_latex(&self) -> String {
         let said = std::iter::once(self.headline()).chain(self.notes());
-        let comments: String = said.map(|line| format!("% {line}\n")).collect();
+        let comments = said.fold(String::new(), |text, line| text + "% " + &line + "\n");
         let tables = [&OUTCOMES[..], &ARRIVALS, &COSTS].map(|measures| tabular(measures, &self.laws));
         format!("{comments}% In brackets: 95 % intervals.\n{}", tables.join("\n"))
     }
