@@ -38,6 +38,8 @@
 pub mod audit;
 #[cfg(feature = "program")]
 pub mod cli;
+#[cfg(feature = "reports")]
+pub mod compare;
 #[cfg(feature = "ideal")]
 pub mod continuous;
 #[cfg(feature = "recordings")]
@@ -65,6 +67,8 @@ pub mod run;
 pub mod scenario;
 pub mod sim;
 pub mod space;
+#[cfg(feature = "reports")]
+pub mod statistics;
 pub mod swarm;
 pub mod target;
 mod text;

@@ -71,6 +71,12 @@ impl Failure {
         self
     }
 
+    /// The same failure, with what it happened under.
+    pub(super) fn under(mut self, what: &str) -> Self {
+        self.said.message = harmless(&format!("{what}: {}", self.said.message));
+        self
+    }
+
     /// The same failure, said of a file.
     pub(super) fn of(mut self, file: &Path) -> Self {
         self.said.message = harmless(&format!("{}: {}", file.display(), self.said.message));
@@ -82,7 +88,6 @@ impl Failure {
     }
 
     /// What is wrong and what helps, on one line.
-    #[cfg(feature = "viewer")]
     pub(super) fn in_words(&self) -> String {
         let message = &self.said.message;
         self.said.help.as_ref().map_or_else(|| message.clone(), |help| format!("{message} ({help})"))

@@ -6,6 +6,7 @@
 mod audit;
 mod audits;
 mod check;
+mod compare;
 mod completions;
 mod console;
 mod diagnostic;
@@ -33,6 +34,8 @@ mod snapshots;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;
+#[cfg(feature = "viewer")]
+mod worst;
 
 use std::process::ExitCode;
 
@@ -65,6 +68,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Reproduce the paper and judge every claim, ours and the paper's.
     Validate(validate::ValidateArguments),
+    /// Fly the same starts under several laws and set them side by side.
+    Compare(compare::CompareArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
     Export(export::ExportArguments),
     /// Draw a recording: pictures, films and contact sheets, without a screen.
@@ -109,8 +114,11 @@ pub fn main() -> ExitCode {
     };
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::parse_from(["run"])));
     #[cfg(all(feature = "viewer", target_os = "linux"))]
-    if matches!(&command, Command::Run(run) if run.draws()) || matches!(command, Command::Render(_) | Command::View(_))
-    {
+    if match &command {
+        Command::Run(run) => run.draws(),
+        Command::Compare(compare) => compare.draws(),
+        other => matches!(other, Command::Render(_) | Command::View(_)),
+    } {
         driver::silence();
     }
     let done = match command {
@@ -118,6 +126,7 @@ pub fn main() -> ExitCode {
         Command::Audit(arguments) => audits::audits(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Compare(arguments) => compare::compare(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),

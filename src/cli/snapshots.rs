@@ -72,6 +72,12 @@ impl Sink for Watched {
     }
 }
 
+/// A picture as PNG, small enough for a page with so many.
+pub(super) fn on_page(picture: &render::Picture, count: usize) -> Result<Vec<u8>, Failure> {
+    let [_, small] = encoded(picture, PAGE_BYTES / count.max(1))?;
+    Ok(small)
+}
+
 /// A picture as PNG, and smaller where that takes more than its room on a page \[bytes\].
 fn encoded(picture: &render::Picture, room: usize) -> Result<[Vec<u8>; 2], Failure> {
     let png = picture.to_png()?;

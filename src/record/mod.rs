@@ -62,6 +62,17 @@ pub struct Sample<'a> {
     pub channels: &'a [Channel],
 }
 
+/// The end of one step, recorded or not; at first the start.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    /// Time since the start \[s\].
+    pub time_s: f64,
+    /// Positions \[m\] and velocities \[m/s\].
+    pub swarm: &'a Swarm,
+    /// Commanded accelerations u \[m/s^2\], N x 3, from here on; no rows where the law had no answer.
+    pub control: &'a Rows,
+}
+
 /// What was largest over some steps; nothing where nothing is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peaks {
@@ -259,6 +270,9 @@ pub trait Sink {
     /// # Errors
     /// [`RecordError`] when it cannot be kept.
     fn event(&mut self, event: &Event) -> Result<(), RecordError>;
+
+    /// Looks at the end of a step, for what is folded over all of them. One that ends a flight may be told twice.
+    fn step(&mut self, _step: &Step<'_>) {}
 }
 
 /// Keeps nothing.
@@ -280,6 +294,10 @@ impl<R: Sink + ?Sized> Sink for &mut R {
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         (**self).event(event)
     }
+
+    fn step(&mut self, step: &Step<'_>) {
+        (**self).step(step);
+    }
 }
 
 /// Gives everything to the first, then to the second; stops at the first error.
@@ -292,6 +310,11 @@ impl<A: Sink, B: Sink> Sink for (A, B) {
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         self.0.event(event)?;
         self.1.event(event)
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        self.0.step(step);
+        self.1.step(step);
     }
 }
 

@@ -7,6 +7,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::laws::Laws;
 use super::reference::ReferenceTable;
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time::TimeSpec;
@@ -38,6 +39,10 @@ pub(super) struct Document {
     pub(super) reference: Option<ReferenceTable>,
     /// The control law.
     pub(super) law: LawTable,
+    /// Laws that `tautline compare` flies by name: `[laws.NAME]` holds the keys of a law, where NAME is its kind or any other
+    /// name with a `kind` beside the keys.
+    #[serde(default, skip_serializing_if = "Laws::is_empty")]
+    pub(super) laws: Laws,
     /// Which vehicles sense each other: all of them unless given.
     #[serde(default)]
     pub(super) graph: GraphTable,

@@ -15,6 +15,8 @@ mod deserializer;
 mod document;
 mod error;
 #[cfg(feature = "files")]
+mod laws;
+#[cfg(feature = "files")]
 mod legs;
 mod limits;
 #[cfg(feature = "files")]
@@ -33,6 +35,8 @@ mod spec;
 mod start;
 #[cfg(feature = "files")]
 mod suggest;
+#[cfg(feature = "files")]
+mod template;
 #[cfg(feature = "files")]
 mod text;
 mod time;
@@ -55,4 +59,6 @@ pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Scenario, Space};
 #[cfg(feature = "reports")]
 pub(crate) use start::{offset, random, scatter};
+#[cfg(feature = "files")]
+pub use template::{Draw, NamedLaw, Template};
 pub use time::TimeSpec;

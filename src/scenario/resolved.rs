@@ -10,6 +10,7 @@ use super::document::{
     Assignment, Document, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, LegTable, PlantKind,
     PlantTable, StartTable, SwarmTable,
 };
+use super::laws::Laws;
 use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Scenario, Space};
 use super::values::{Edge, PerVehicle, Point};
@@ -97,6 +98,7 @@ impl From<&Scenario> for Document {
             leg: scenario.legs.iter().skip(1).map(|leg| scenario.leg_table(leg)).collect(),
             reference: scenario.reference.as_ref().map(ReferenceTable::from),
             law: LawTable { kind: law, delta_m: scenario.delta_m },
+            laws: Laws::new(),
             graph: GraphTable {
                 kind: if scenario.graph.is_complete() {
                     GraphKind::Complete {}

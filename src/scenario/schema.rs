@@ -41,6 +41,13 @@ pub fn schema() -> Value {
             law["required"] = json!([]);
         }
     }
+    // The name of `[laws.NAME]` stands for a kind that is not given.
+    if let Some(law) = schema["$defs"]["OtherLaw"].as_object_mut()
+        && let Some(mut kinds) = law.remove("oneOf")
+    {
+        kinds.as_array_mut().into_iter().flatten().for_each(|kind| kind["required"] = json!([]));
+        law.insert("anyOf".to_owned(), kinds);
+    }
     schema["not"] = json!({ "required": [ARRIVAL, OLD_ARRIVAL] });
     schema
 }

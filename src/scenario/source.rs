@@ -4,14 +4,14 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::document::{PlantKind, PlantTable};
+use super::document::{Document, PlantKind, PlantTable};
 use super::error::{Place, ScenarioError};
 use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
 use super::overrides::Override;
 use super::spec::{PlantSpec, Scenario};
 use super::suggest::suggest;
 use super::text::Text;
-use super::{build, builtin};
+use super::{build, builtin, laws};
 
 /// Largest scenario file that is read \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge
 /// each. Reading takes about 45 times the length of the file in memory.
@@ -58,7 +58,7 @@ impl Source {
     }
 
     /// What it is called and its text.
-    fn text(&self) -> Result<(String, String), ScenarioError> {
+    pub(super) fn text(&self) -> Result<(String, String), ScenarioError> {
         match self {
             Self::Builtin(name) => {
                 builtin::find(name).map(|b| (b.name.to_owned(), b.toml.to_owned())).ok_or_else(|| unknown_builtin(name))
@@ -80,17 +80,22 @@ impl Scenario {
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
         let text = Text { name: &name, toml: &text, overrides };
-        let mut document = text.decode()?;
-        let stem = || Path::new(&name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        document.name = document.name.or_else(|| Some(as_name(&stem())));
-        let precision_is_open = matches!(document.plant, PlantTable { kind: PlantKind::Rapier, precision: None });
-        let mut scenario = build::scenario(document).map_err(|error| text.place(error))?;
-        scenario.validate().map_err(|error| text.place(error))?;
-        if precision_is_open {
-            scenario.plant = PlantSpec::Rapier(scenario.needed_precision());
-        }
-        Ok(scenario)
+        finish(text.decode()?, &text)
     }
+}
+
+/// Completes and checks what was read from a text.
+pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario, ScenarioError> {
+    let stem = || Path::new(text.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    document.name = document.name.or_else(|| Some(as_name(&stem())));
+    let precision_is_open = matches!(document.plant, PlantTable { kind: PlantKind::Rapier, precision: None });
+    laws::check(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
+    let mut scenario = build::scenario(document).map_err(|error| text.place(error))?;
+    scenario.validate().map_err(|error| text.place(error))?;
+    if precision_is_open {
+        scenario.plant = PlantSpec::Rapier(scenario.needed_precision());
+    }
+    Ok(scenario)
 }
 
 fn unknown_builtin(name: &str) -> ScenarioError {

@@ -100,7 +100,23 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// The text as a tree, overrides applied, `[judge]` under its new name, a law without a kind under the default one.
+    /// Gives an error about a law of `[laws.NAME]` its place: at the key, or else at the law's table.
+    pub(super) fn place_in_law(&self, law: &str, error: ScenarioError) -> ScenarioError {
+        let Ok(root) = self.tree() else { return error };
+        let Some((name, keys)) = laws(&root).and_then(|laws| laws.get_key_value(law)) else { return error };
+        let key = error.field().map_or("", |field| field.key.trim_start_matches("law."));
+        let span = keys.get_ref().get(key).map_or_else(|| name.span(), Spanned::span);
+        error.with_place(self.locate(span))
+    }
+
+    /// Whether a kind is missing where a name that is no kind stands for it: in `[laws.NAME]`.
+    fn is_name_of_a_law(&self, span: Option<&Range<usize>>) -> bool {
+        let is_it = |root: Spanned<_>| laws(&root)?.keys().any(|name| Some(&name.span()) == span).then_some(());
+        self.tree().ok().and_then(is_it).is_some()
+    }
+
+    /// The text as a tree, overrides applied, `[judge]` under its new name, a law without a kind under the default one, one of
+    /// `[laws.NAME]` under its name.
     fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
             ScenarioError::new(format!("this is not TOML: {}", error.message()))
@@ -129,6 +145,16 @@ impl<'a> Text<'a> {
             if let DeValue::Table(keys) = law.get_mut() {
                 let kind = Spanned::new(span.clone(), DeValue::String(DEFAULT_LAW.into()));
                 keys.entry(Spanned::new(span, Cow::from("kind"))).or_insert(kind);
+            }
+        }
+        if let DeValue::Table(tables) = root.get_mut()
+            && let Some(DeValue::Table(laws)) = tables.get_mut("laws").map(Spanned::get_mut)
+        {
+            for (name, law) in laws {
+                if let DeValue::Table(keys) = law.get_mut() {
+                    let kind = Spanned::new(name.span(), DeValue::String(name.get_ref().clone()));
+                    keys.entry(Spanned::new(name.span(), Cow::from("kind"))).or_insert(kind);
+                }
             }
         }
         Ok(root)
@@ -163,7 +189,13 @@ impl<'a> Text<'a> {
                 (format!("unknown key `{}`", short(&name)), help)
             }
             Some(Unknown::Choice(name, known)) => {
-                (format!("unknown choice `{}`", short(&name)), suggest(&name, &known))
+                let help = suggest(&name, &known);
+                let help = if self.is_name_of_a_law(error.span.as_ref()) {
+                    format!("the name of a law is its kind, unless the table [laws.NAME] holds a `kind`: {help}")
+                } else {
+                    help
+                };
+                (format!("unknown choice `{}`", short(&name)), help)
             }
             None => (
                 error.message,
@@ -172,6 +204,11 @@ impl<'a> Text<'a> {
         };
         ScenarioError::new(said).with_help(help).with_place(self.locate(error.span.unwrap_or(0..0)))
     }
+}
+
+/// The tables `[laws.NAME]`.
+fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
+    root.get_ref().get("laws")?.get_ref().as_table()
 }
 
 /// Takes a key out of a table.

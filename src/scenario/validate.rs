@@ -8,7 +8,7 @@ use super::limits::{
 use super::spec::{Scenario, Space};
 use super::time::TimeSpec;
 use crate::graph::Graph;
-use crate::law::{Controls, Gain};
+use crate::law::{Controls, Gain, LawSpec};
 use crate::swarm::{Pair, row};
 use crate::target::{Begins, Guidance, Leg};
 
@@ -176,14 +176,7 @@ impl Scenario {
 
     fn check_law(&self) -> Result<(), ScenarioError> {
         positive("law.delta_m", "the safety distance delta", self.delta_m)?;
-        for Gain { key, name, value, may_be_zero } in self.law.gains() {
-            if may_be_zero {
-                at_least_zero(key, name, value)?
-            } else {
-                positive(key, name, value)?
-            };
-        }
-        Ok(())
+        check_gains(&self.law)
     }
 
     fn check_vehicles(&self) -> Result<(), ScenarioError> {
@@ -344,6 +337,18 @@ impl Scenario {
         }
         Ok(())
     }
+}
+
+/// Refuses numbers among a law's keys that it cannot have.
+pub(super) fn check_gains(law: &LawSpec) -> Result<(), ScenarioError> {
+    for Gain { key, name, value, may_be_zero } in law.gains() {
+        if may_be_zero {
+            at_least_zero(key, name, value)?
+        } else {
+            positive(key, name, value)?
+        };
+    }
+    Ok(())
 }
 
 fn check_name(name: &str) -> Result<(), ScenarioError> {

@@ -22,7 +22,7 @@ pub use motion::Motion;
 pub use parts::Parts;
 pub use simulation::{Saved, Simulation};
 
-use crate::record::{Event, RecordError, Sink};
+use crate::record::{Event, RecordError, Sink, Step};
 use crate::scenario::Scenario;
 
 /// Flies a scenario with these parts to its end and hands every recorded instant to `sink`.
@@ -59,9 +59,10 @@ pub fn fly(
     Ok(simulation.finish())
 }
 
-/// Gives what is to be recorded to the sink, in the order in which it happened.
+/// Gives what is to be recorded to the sink, in the order in which it happened, and shows it the step.
 fn hand_over(simulation: &mut Simulation, sink: &mut dyn Sink) -> Result<(), RecordError> {
     simulation.events().try_for_each(|event| sink.event(&event))?;
+    sink.step(&Step { time_s: simulation.time_s(), swarm: simulation.state(), control: simulation.control() });
     let began = Instant::now();
     if let Some(sample) = simulation.sample() {
         sink.sample(&sample)?;

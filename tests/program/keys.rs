@@ -1,4 +1,4 @@
-//! docs/report.md names every key that the program prints, with its unit, and no other.
+//! docs/report.md names every key that the program prints, with its unit, and no other; docs/compare.md those of `compare`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -7,10 +7,11 @@ use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
 
 const PAGE: &str = include_str!("../../docs/report.md");
+const COMPARE_PAGE: &str = include_str!("../../docs/compare.md");
 
-/// The keys of a section of the page, each with its unit.
-fn documented(section: &str) -> BTreeMap<&'static str, &'static str> {
-    let text = PAGE.split("\n## ").find(|text| text.starts_with(section)).expect("a section");
+/// The keys of a section of a page, each with what stands beside it: its unit.
+fn documented(page: &'static str, section: &str) -> BTreeMap<&'static str, &'static str> {
+    let text = page.split("\n## ").find(|text| text.starts_with(section)).expect("a section");
     let row = |line: &'static str| {
         let mut cells = line.trim_matches('|').split(" | ").map(str::trim);
         Some((cells.next()?.strip_prefix('`')?.strip_suffix('`')?, cells.next()?))
@@ -49,11 +50,14 @@ fn printed(commands: &[&[&str]]) -> BTreeSet<String> {
     found
 }
 
+/// Keys; a list of plain values is one.
+fn plain(documented: &BTreeMap<&str, &str>) -> BTreeSet<String> {
+    documented.keys().map(|key| key.trim_end_matches("[]").to_owned()).collect()
+}
+
 fn assert_documented(section: &str, commands: &[&[&str]]) {
-    let documented = documented(section);
-    // A list of plain values is one key.
-    let named: BTreeSet<_> = documented.keys().map(|key| key.trim_end_matches("[]").to_owned()).collect();
-    assert_eq!(named, printed(commands), "{section}");
+    let documented = documented(PAGE, section);
+    assert_eq!(plain(&documented), printed(commands), "{section}");
     for (key, unit) in documented {
         let units = [("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_per_s", "1/s"), ("_m", "m"), ("_s", "s")];
         match units.iter().find(|(suffix, _)| key.ends_with(suffix)) {
@@ -75,6 +79,12 @@ fn every_key_of_the_report_is_on_its_page() {
 #[test]
 fn every_key_of_the_check_is_on_its_page() {
     assert_documented("check --json", &[&["check", "--json"]]);
+}
+
+#[test]
+fn every_key_of_a_comparison_is_on_its_page() {
+    let quick = ["compare", "--laws", "edge-tension", "--runs", "1", "--json", "-", "--set", "time.duration_s=1.5"];
+    assert_eq!(plain(&documented(COMPARE_PAGE, "compare --json")), printed(&[&quick]));
 }
 
 #[test]

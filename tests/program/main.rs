@@ -5,6 +5,7 @@ mod program;
 
 mod audit;
 mod check;
+mod compare;
 mod determinism;
 mod doors;
 mod exports;

@@ -41,6 +41,22 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
+fn a_comparison_shows_each_law_at_its_worst_moment() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let what = ["compare", "pentagon", "--laws", "edge-tension,laplacian", "--runs", "2", "--set", "time.duration_s=6"];
+    let Ran { exit, err, .. } = ran(folder.path(), &[&what[..], &["--html", "c.html", "--quiet"]].concat());
+    assert_eq!((exit, err.as_str()), (GOOD, ""));
+    let page = fs::read_to_string(folder.path().join("c.html")).expect("a page");
+    let pictures: Vec<_> = page.split("data:image/png;base64,").skip(1).collect();
+    assert_eq!(pictures.len(), 2);
+    for (picture, said) in pictures.iter().zip(["edge-tension: 2.4", "laplacian: 1.5"]) {
+        let caption = picture.split("<figcaption>").nth(1).expect("a caption");
+        assert!(caption.starts_with(said) && caption.contains(", the closest of 2 flights (start.seed "), "{caption}");
+    }
+    assert!(page.len() < 1 << 20, "{} bytes", page.len());
+}
+
+#[test]
 fn a_run_leaves_pictures_and_its_page_shows_them() {
     let folder = flown("pentagon-laplacian", &[]);
     let out = folder.path().join("out");

@@ -1,0 +1,50 @@
+//! What is left of a comparison that is interrupted.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use super::{CompareError, Plan, Watch};
+use crate::scenario::{Override, Source, Template};
+
+fn plan(laws: &[&str], runs: u64) -> Result<Plan, CompareError> {
+    let short = Override::parse("time.duration_s=1.5").expect("an override");
+    let template = Template::read(&Source::Builtin("pentagon".to_owned()), &[short]).expect("a built-in");
+    Plan::new(template, laws, runs, 3)
+}
+
+/// The comparison that is interrupted once so many steps have been flown.
+fn interrupted_after(steps: u64, threads: usize) -> super::Comparison {
+    let (interrupted, flown) = (AtomicBool::new(false), AtomicU64::new(0));
+    let count = |more: u64| {
+        let now = flown.fetch_add(more, Ordering::Relaxed) + more;
+        interrupted.store(now >= steps, Ordering::Relaxed);
+    };
+    let plan = plan(&["edge-tension", "laplacian"], 3).expect("a plan");
+    plan.fly(threads, Watch { flown: &count, interrupted: &interrupted }).expect("a comparison")
+}
+
+#[test]
+fn an_interrupted_comparison_is_about_the_starts_that_were_flown_under_every_law() {
+    // 360 steps a flight: the third, of the second start, is under way.
+    let found = interrupted_after(360 * 2 + 100, 1);
+    assert_eq!((found.runs, found.runs_asked), (1, 3));
+    assert!(found.laws.iter().all(|law| law.flights.len() == 1 && law.flights[0].seed == 3));
+    assert!(found.laws.iter().all(|law| law.flights[0].steps == 360), "whole flights");
+    assert!(found.notes()[0].starts_with("interrupted: of 3 starts, 1 were flown"), "{:?}", found.notes());
+    let nothing = interrupted_after(100, 1);
+    assert!(nothing.runs == 0 && nothing.laws.iter().all(|law| law.flights.is_empty() && law.clear.share.is_none()));
+    // Two threads, each with a law of the second start: the law that is through with it stays with its start.
+    let paired = interrupted_after(360 * 3 + 200, 2);
+    assert!(paired.laws[0].flights.iter().zip(&paired.laws[1].flights).all(|(one, other)| one.seed == other.seed));
+    assert!(paired.laws.iter().all(|law| law.flights.len() as u64 == paired.runs && law.name == law.kind));
+    let whole = interrupted_after(u64::MAX, 2);
+    assert_eq!((whole.runs, whole.laws[1].flights.len()), (3, 3));
+    assert!(!whole.notes().iter().any(|note| note.starts_with("interrupted")));
+}
+
+#[test]
+fn a_plan_needs_laws_that_it_knows_once_each() {
+    assert!(matches!(plan(&[], 1), Err(CompareError::NoLaw)));
+    assert!(matches!(plan(&["laplacian", "laplacian"], 1), Err(CompareError::Twice(name)) if name == "laplacian"));
+    assert!(matches!(plan(&["none"], 1), Err(CompareError::Law(_))));
+    assert_eq!(plan(&["laplacian"], 4).expect("a plan").steps(), 4 * 360);
+}

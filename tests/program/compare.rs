@@ -1,0 +1,363 @@
+//! `tautline compare`: its numbers are those of `run`, the same for any number of threads; what is wrong is said first.
+
+use std::fs;
+use std::path::Path;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+use assert_cmd::Command;
+use serde_json::Value;
+use tautline::record::OwnedSample;
+use tautline::record::mcap::McapRecording;
+use tautline::swarm::row;
+
+/// A start that draws nothing, and is right.
+const PAIR: &str = r#"[start]
+positions_m = [[0.0, 0.0], [4.0, 0.0]]
+[formation]
+shape = "line"
+spacing_m = 3.0
+[law]
+delta_m = 2.0
+alpha = 0.5
+[time]
+duration_s = 1.5
+"#;
+/// A pentagon that is flown for long enough to cross.
+const CROSSING: [&str; 3] = ["pentagon", "--set", "time.duration_s=6"];
+/// Sums of some thousand rounded lengths.
+const ROUNDING: f64 = 1e-9;
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect(text)
+}
+
+/// The comparison of these laws, by its JSON, and what was said beside it.
+fn compared(folder: &Path, what: &[&str], more: &[&str]) -> (Value, String) {
+    let Ran { exit, out, err } = ran(folder, &[&["compare"], what, more, &["--json", "-"]].concat());
+    assert_eq!(exit, Some(0), "{err}");
+    (json(&out), err)
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+fn list(value: &Value) -> &Vec<Value> {
+    value.as_array().expect("a list")
+}
+
+fn file(folder: &Path, name: &str, text: &str) {
+    fs::write(folder.join(name), text).expect("a file");
+}
+
+/// The report of the flight of a law from a start, flown by `run`, and every step of it.
+fn flown(folder: &Path, law: &Value, flight: &Value, jitter_m: &Value) -> (Value, Vec<OwnedSample>) {
+    let sets = list(&law["overrides"]).iter().map(|set| set.as_str().expect("text").to_owned());
+    let start = [format!("start.seed={}", flight["seed"]), format!("start.jitter_m={jitter_m}")];
+    let sets: Vec<_> = sets.chain(start).flat_map(|set| ["--set".to_owned(), set]).collect();
+    let sets: Vec<_> = sets.iter().map(String::as_str).collect();
+    let quick = ["--no-figures", "--no-snapshots", "--json", "--force", "--out", "out"];
+    let plain = ran(folder, &[&["run"], &CROSSING[..], &sets, &quick].concat());
+    let every_step = [&sets[..], &["--set", "time.record_hz=240"]].concat();
+    ran(folder, &[&["run"], &CROSSING[..], &every_step, &quick].concat());
+    let recording = McapRecording::open(&folder.join("out/run.mcap")).and_then(McapRecording::read_all);
+    (json(&plain.out), recording.expect("a recording").0)
+}
+
+#[test]
+fn each_flight_has_the_bits_and_the_numbers_of_the_same_flight_by_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (found, err) = compared(folder.path(), &CROSSING, &["--laws=laplacian,edge-tension", "--runs=2", "--seed=5"]);
+    assert!(
+        err.contains("note: the start has no randomness: start.seed moves each coordinate by up to 0.100 m"),
+        "{err}"
+    );
+    let laws = list(&found["laws"]);
+    assert_eq!(
+        laws.iter().map(|law| law["name"].as_str().expect("a name")).collect::<Vec<_>>(),
+        ["laplacian", "edge-tension"]
+    );
+    for law in laws {
+        let flights = list(&law["flights"]);
+        assert_eq!(flights.iter().map(|flight| flight["seed"].as_u64()).collect::<Vec<_>>(), [Some(5), Some(6)]);
+        for flight in flights {
+            let (report, samples) = flown(folder.path(), law, flight, &found["jitter_m"]);
+            for (ours, theirs) in [
+                ("state_hash", "/run/state_hash"),
+                ("scenario_sha256", "/scenario/sha256"),
+                ("steps", "/run/steps"),
+                ("min_m", "/separation/min_m"),
+                ("min_at_s", "/separation/min_at_s"),
+                ("min_pair", "/separation/min_pair"),
+                ("certified_m", "/separation/certified_m"),
+                ("reached_at_s", "/formation/reached_at_s"),
+                ("peak_control_m_s2", "/control/peak_m_s2"),
+                ("energy_max_over_initial", "/energy/max_over_initial"),
+            ] {
+                assert_eq!(Some(&flight[ours]), report.pointer(theirs), "{ours}");
+            }
+            let (mut way_m, mut control_m_s) = (0.0, 0.0);
+            for two in samples.windows(2) {
+                let [before, after] = two else { panic!("two samples") };
+                for i in 0..5 {
+                    way_m += (row(&after.swarm.positions_m, i) - row(&before.swarm.positions_m, i)).norm();
+                    let command = row(&after.control, i).norm() + row(&before.control, i).norm();
+                    control_m_s += 0.5 * command * (after.time_s - before.time_s);
+                }
+            }
+            assert!((number(&flight["path_length_m"]) - way_m).abs() < ROUNDING, "{flight}: {way_m}");
+            assert!((number(&flight["total_control_m_s"]) - control_m_s).abs() < ROUNDING, "{flight}: {control_m_s}");
+        }
+        let smallest = flights.iter().map(|flight| number(&flight["min_m"])).fold(f64::INFINITY, f64::min);
+        assert_eq!(number(&law["min_smallest_m"]), smallest);
+        let mean = 0.5 * flights.iter().map(|flight| number(&flight["path_length_m"])).sum::<f64>();
+        assert!((number(&law["path_length_mean_m"]["value"]) - mean).abs() < ROUNDING);
+    }
+}
+
+#[test]
+fn on_a_crossing_start_the_baseline_violates_and_the_edge_tension_does_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (found, _) = compared(folder.path(), &CROSSING, &["--laws", "edge-tension,laplacian", "--runs", "6"]);
+    let [tension, laplacian] = &list(&found["laws"])[..] else { panic!("two laws") };
+    let counts = |law: &Value| ["clear", "violated"].map(|key| law[key]["count"].as_u64());
+    assert_eq!((counts(tension), counts(laplacian)), ([Some(6), Some(0)], [Some(0), Some(6)]));
+    // 0.025^(1/6) and its complement.
+    assert!((number(&tension["clear"]["low"]) - 0.540_7).abs() < 1e-3 && number(&tension["clear"]["high"]) == 1.0);
+    assert!((number(&laplacian["clear"]["high"]) - 0.459_3).abs() < 1e-3 && number(&laplacian["clear"]["low"]) == 0.0);
+    assert!(number(&tension["min_smallest_m"]) > 2.0 && number(&laplacian["min_smallest_m"]) < 1.6);
+    // Nobody is there after 6 s: that has no time.
+    assert_eq!((&tension["reached"]["count"], &tension["reached_median_s"]["value"]), (&0.into(), &Value::Null));
+    assert!(list(&laplacian["flights"]).iter().all(|flight| flight["outcome"] == "violated"));
+}
+
+/// The four files of a comparison by so many threads.
+fn files(folder: &Path, variable: &str, more: &[&str]) -> [String; 4] {
+    let names = ["c.json", "c.csv", "c.tex", "c.html"];
+    let mut command = Command::new(TAUTLINE);
+    command.arg("compare").args(CROSSING).args(["--laws=potential,edge-tension,laplacian", "--runs=3", "--quiet"]);
+    command.args(["--json", names[0], "--csv", names[1], "--latex", names[2], "--html", names[3]]);
+    command.args(["--adapter", "an adapter that is nowhere"]).args(more);
+    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).env("RAYON_NUM_THREADS", variable);
+    let done = command.output().expect("the program");
+    assert_eq!((done.status.code(), done.stdout.len()), (Some(0), 0), "{}", String::from_utf8_lossy(&done.stderr));
+    names.map(|name| fs::read_to_string(folder.join(name)).expect(name))
+}
+
+/// Without wall-clock times.
+fn timeless([report, csv, latex, html]: [String; 4]) -> (Value, String, String, String) {
+    let mut report = json(&report);
+    let performance = report.as_object_mut().and_then(|report| report.remove("performance")).expect("a performance");
+    assert!(number(&performance["laws"][0]["law_step_s"]) > 0.0, "{performance}");
+    let (html, _) = html.split_once("<h2>Performance</h2>").expect("a performance part");
+    (report, csv, latex, html.to_owned())
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_files_but_for_the_performance() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let one = timeless(files(folder.path(), "1", &[]));
+    assert!(one == timeless(files(folder.path(), "2", &[])), "RAYON_NUM_THREADS=2");
+    assert!(one == timeless(files(folder.path(), "1", &["--threads", "3"])), "--threads 3");
+    let other = timeless(files(folder.path(), "1", &["--seed", "1"]));
+    assert!(
+        one.0 != other.0 && one.1 != other.1 && one.2 != other.2 && one.3 != other.3,
+        "other starts, other numbers"
+    );
+}
+
+#[test]
+fn csv_latex_and_page_say_what_the_json_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [report, csv, latex, html] = files(folder.path(), "2", &[]);
+    let (report, names) = (json(&report), ["potential", "edge-tension", "laplacian"]);
+
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 4);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
+    for (row, (law, name)) in rows[1..].iter().zip(list(&report["laws"]).iter().zip(names)) {
+        assert_eq!((row[0], law["name"].as_str()), (name, Some(name)));
+        let cell = |column: &str| row[rows[0].iter().position(|&head| head == column).expect(column)];
+        for (column, key) in [
+            ("clear_low", "/clear/low"),
+            ("min_smallest_m", "/min_smallest_m"),
+            ("path_length_mean_high_m", "/path_length_mean_m/high"),
+            ("peak_control_largest_m_s2", "/peak_control_largest_m_s2"),
+        ] {
+            assert_eq!(cell(column).parse().ok(), law.pointer(key).and_then(Value::as_f64), "{column}");
+        }
+        assert_eq!(cell("reached_median_s"), "", "nobody reached it");
+        assert!(latex.contains(&format!("\n{name} & ")) && html.contains(&format!("<th scope=\"row\">{name}</th>")));
+    }
+
+    let tables: Vec<_> = latex.split("\\begin{tabular}").skip(1).collect();
+    assert_eq!((tables.len(), latex.matches("\\end{tabular}").count()), (3, 3));
+    for table in tables {
+        let columns = table.split(['{', '}']).nth(1).expect("columns").len();
+        let body = table.lines().skip(1).take_while(|line| !line.starts_with("\\end"));
+        let lines: Vec<_> = body.filter(|line| *line != "\\hline").collect();
+        assert_eq!(lines.len(), 2 + 2 * names.len(), "{table}");
+        for line in lines {
+            assert!(line.ends_with(" \\\\") && line.matches(" & ").count() + 1 == columns, "{line}");
+            assert_eq!(line.matches('{').count(), line.matches('}').count(), "{line}");
+            assert_eq!(line.matches('%').count(), line.matches("\\%").count(), "{line}");
+        }
+    }
+
+    assert!(html.contains("no pictures were taken: ") && !html.contains("<img"), "no adapter, no pictures");
+    assert!(html.contains("tautline compare pentagon --laws 'potential,edge-tension,laplacian' --runs 3 --seed 0"));
+    assert_eq!(html.matches("tautline run pentagon").count(), 3, "the worst flight of each law");
+    for part in ["</html>", "Clopper and Pearson", "the start has no randomness"] {
+        assert!(html.contains(part), "{part}");
+    }
+}
+
+#[test]
+fn laws_of_the_file_have_names_and_keys_and_change_nothing_of_what_run_flies() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let named =
+        format!("{PAIR}[laws.stiff]\nkind = \"edge-tension\"\nalpha = 4.0\n[laws.laplacian]\nf1_per_s2 = 2.0\n");
+    file(folder.path(), "pair.toml", &named);
+    let settings = |laws: &[&str]| {
+        let (found, _) = compared(folder.path(), &["pair.toml", "--runs", "1"], laws);
+        let of_law = |law: &Value| format!("{}: {}", law["name"], law["overrides"]);
+        list(&found["laws"]).iter().map(of_law).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        settings(&["--laws", "stiff,edge-tension,potential"]),
+        [
+            r#""stiff": ["law.kind=edge-tension","law.alpha=4.0"]"#,
+            // That of [law].
+            r#""edge-tension": ["law.kind=edge-tension","law.alpha=0.5"]"#,
+            r#""potential": ["law.kind=potential","law.k_per_s2=1.0","law.c_per_s=2.0","law.eta_m4_per_s2=1.0"]"#,
+        ]
+    );
+    let laplacian = r#""laplacian": ["law.kind=laplacian","law.f1_per_s2=2.0","law.f2_per_s=1.0"]"#;
+    let stiff = r#""stiff": ["law.kind=edge-tension","law.alpha=1.0"]"#;
+    assert_eq!(settings(&["--set", "laws.stiff.alpha=1"]), [laplacian, stiff], "without --laws, those of the file");
+
+    let flown = |text: &str, out: &str| {
+        file(folder.path(), "pair.toml", text);
+        let quick = ["run", "pair.toml", "--no-figures", "--no-snapshots", "--json", "--out", out];
+        let report = json(&ran(folder.path(), &quick).out);
+        (report["scenario"]["sha256"].clone(), report["run"]["state_hash"].clone())
+    };
+    assert_eq!(flown(PAIR, "plain"), flown(&named, "named"));
+}
+
+#[test]
+fn a_random_start_is_drawn_by_the_seed_and_a_jitter_of_its_own_is_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let random = ["pentagon", "--set", "start={shape=\"random\", half_extent_m=6.0}", "--set", "time.duration_s=1.5"];
+    let (found, err) = compared(folder.path(), &random, &["--laws=edge-tension,laplacian", "--runs=3", "--seed=7"]);
+    assert!(found["jitter_m"].is_null() && !err.contains("randomness"), "{err}");
+    let [tension, laplacian] = &list(&found["laws"])[..] else { panic!("two laws") };
+    let flights = list(&tension["flights"]);
+    assert!(
+        flights[0]["state_hash"] != flights[1]["state_hash"] && flights[1]["state_hash"] != flights[2]["state_hash"]
+    );
+    assert!(flights.iter().zip(list(&laplacian["flights"])).all(|(one, other)| one["seed"] == other["seed"]));
+    let jittered = ["pentagon", "--set", "start.jitter_m=0.2", "--set", "time.duration_s=1.5"];
+    let (found, err) = compared(folder.path(), &jittered, &["--laws=edge-tension", "--runs=1"]);
+    assert!(found["jitter_m"].is_null() && !err.contains("randomness"), "{err}");
+}
+
+#[test]
+fn what_is_refused_and_who_did_not_arrive_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    file(folder.path(), "pair.toml", &PAIR.replace("alpha = 0.5\n", "[laws.laplacian]\nf2_per_s = 0.1\n"));
+    let weak = ["pair.toml", "--set", "swarm.a22_per_s=0.5", "--set", "arrival.edge_error_m=0.97"];
+    let quick = ["--runs", "6", "--set", "arrival.hold_s=0.1", "--set", "arrival.disagreement_m_s=9"];
+    let (found, err) = compared(folder.path(), &[&weak[..], &quick].concat(), &["--laws", "laplacian,edge-tension"]);
+    assert!(
+        err.contains("note: laplacian: 6 of 6 flights are refused by `check` (relative-velocity-unstable)"),
+        "{err}"
+    );
+    let [laplacian, tension] = &list(&found["laws"])[..] else { panic!("two laws") };
+    assert_eq!((&laplacian["refused"], &tension["refused"]), (&6.into(), &0.into()));
+    assert_eq!(laplacian["flights"][0]["refused"][0], "relative-velocity-unstable");
+    assert_eq!(laplacian["clear"]["count"], 6, "flown all the same");
+
+    // So short that some starts are within the tolerance to the end and some are not.
+    let short = ["pair.toml", "--runs", "12", "--laws", "edge-tension", "--set", "time.duration_s=0.1"];
+    let tight =
+        ["--set", "arrival.edge_error_m=1.0", "--set", "arrival.disagreement_m_s=9", "--set", "arrival.hold_s=0.1"];
+    let (found, err) = compared(folder.path(), &[&short[..], &tight].concat(), &[]);
+    let reached = found["laws"][0]["reached"]["count"].as_u64().expect("a count");
+    assert!((1..12).contains(&reached), "{reached}");
+    assert!(err.contains(&format!("are over the {reached} of 12 flights that reached the formation, alone")), "{err}");
+}
+
+#[test]
+fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    file(at, "pair.toml", PAIR);
+    file(at, "near.toml", &PAIR.replace("[4.0, 0.0]", "[2.05, 0.0]"));
+    for (name, table) in [
+        ("key", "[laws.potential]\nalpha = 1.0"),
+        ("value", "[laws.edge-tension]\nalpha = -1.0"),
+        ("kind", "[laws.fast]\nalpha = 1.0"),
+        ("other", "[laws.laplacian]\nkind = \"edge-tension\""),
+        ("name", "[laws.\"a,b\"]\nkind = \"edge-tension\""),
+        ("table", "[laws]\nfast = 3"),
+    ] {
+        file(at, &format!("{name}.toml"), &format!("{PAIR}{table}\n"));
+    }
+    let before = fs::read_dir(at).expect("a folder").count();
+    let cases: &[(&[&str], &str, &str)] = &[
+        (&["pair.toml", "--laws", "laplacain"], "there is no law named `laplacain`", "did you mean `laplacian`?"),
+        (&["pair.toml", "--laws", "x"], "no law named `x`", "`displacement`"),
+        (&["pair.toml", "--laws", ""], "no law named ``", "[laws.NAME]"),
+        (&["pair.toml", "--laws", "laplacian,laplacian"], "the law `laplacian` is named twice", "[laws.NAME]"),
+        (&["near.toml", "--laws", "laplacian"], "under the law laplacian, start.seed = ", "start"),
+        (&["key.toml", "--laws", "laplacian"], "unknown key `alpha`", "key.toml:12:1"),
+        (&["value.toml", "--laws", "laplacian"], "is -1", "value.toml:12:9"),
+        (&["kind.toml", "--laws", "laplacian"], "unknown choice `fast`", "kind.toml:11:7"),
+        (&["kind.toml"], "unless the table [laws.NAME] holds a `kind`", "known here"),
+        (&["other.toml"], "the law named laplacian is of the kind edge-tension", "other.toml:12:8"),
+        (&["name.toml"], "the name of a law holds ','", "name.toml:11:7"),
+        (&["table.toml"], "expected a table", "table.toml:12:8"),
+        (&["pair.toml", "--runs", "0"], "0 is not in 1..=1000000", ""),
+        (&["pair.toml", "--seed", "-1"], "", ""),
+        (&["nowhere"], "neither a built-in scenario nor a file", ""),
+        (&["pair.toml", "--csv", "a.txt", "--json", "./a.txt"], "would overwrite", "another file"),
+        (&["pair.toml", "--csv", "pair.toml"], "would overwrite the scenario", "another file"),
+        (&["pair.toml", "--csv", "-", "--json", "-"], "both to go to standard output", "into a file"),
+    ];
+    for (arguments, said, remedy) in cases {
+        let Ran { exit, out, err } = ran(at, &[&["compare"], *arguments].concat());
+        assert_eq!((exit, out.as_str()), (Some(2), ""), "{arguments:?}: {err}");
+        let err = err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" ");
+        assert!(err.contains(said) && err.contains(remedy) && !err.contains("panicked"), "{arguments:?}: {err}");
+    }
+    // Such tables are looked at by every command.
+    assert_eq!(ran(at, &["check", "value.toml"]).exit, Some(2));
+    let nowhere = ran(at, &["compare", "pair.toml", "--json", "pair.toml/deep/c.json"]);
+    assert_eq!((nowhere.exit, nowhere.out.as_str()), (Some(3), ""), "{}", nowhere.err);
+    assert!(nowhere.err.contains("cannot write") && nowhere.err.contains("--json"), "{}", nowhere.err);
+    assert_eq!(fs::read_dir(at).expect("a folder").count(), before, "nothing is written");
+}
+
+#[test]
+fn a_person_reads_a_table_and_a_quiet_program_says_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    file(folder.path(), "pair.toml", PAIR);
+    let what = ["compare", "pair.toml", "--laws", "edge-tension,laplacian", "--runs", "6"];
+    let Ran { exit, out, err } = ran(folder.path(), &what);
+    assert_eq!(exit, Some(0), "{err}");
+    assert!(out.starts_with("pair: 2 laws from the same 6 starts (start.seed 0 to 5), delta 2 m\n"), "{out}");
+    for line in
+        ["proved clear ", "refused by check ", "smallest separation of all ", "a step of the law, on this machine"]
+    {
+        assert!(out.lines().any(|found| found.starts_with(line)), "{line}: {out}");
+    }
+    assert!(out.contains("100 [54.1, 100]") && !out.contains('\u{1b}'), "{out}");
+    let quiet = ran(folder.path(), &[&what[..], &["--quiet", "--csv", "c.csv"]].concat());
+    assert_eq!((quiet.exit, quiet.out.as_str(), quiet.err.as_str()), (Some(0), "", ""));
+    assert!(folder.path().join("c.csv").exists());
+}
