@@ -4,19 +4,18 @@
 //! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
 //! it; [`super::validate`] judges the rest.
 
-use nalgebra::Vector3;
-
 use super::document::{
     Assignment, Document, Edge, FormationShape, GraphKind, PerVehicle, PlantKind, PlantTable, Point, StartShape,
     StartTable,
 };
 use super::error::ScenarioError;
-use super::limits::{check_count, check_lengths, check_memory, pair_count, positive};
+use super::limits::{check_count, check_lengths, check_memory, pair_count};
+use super::slots::{formation, is_flat, rows};
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
-use crate::formation::{Formation, most_assigned, optimal_slots};
+use crate::formation::{most_assigned, optimal_slots};
 use crate::graph::{Graph, GraphError};
-use crate::swarm::{Rows, Swarm, set_row};
+use crate::swarm::{Rows, Swarm};
 use crate::target::Leg;
 
 /// Slots of the pentagon.
@@ -36,7 +35,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         mass_kg: per_vehicle(document.swarm.mass_kg, count),
         hull_radius_m: per_vehicle(document.swarm.hull_radius_m, count),
         a22_per_s: document.swarm.a22_per_s,
-        legs: vec![Leg::first(formation(&document.formation.shape, count)?)],
+        legs: vec![Leg::first(formation(&document.formation.shape, count, delta_m)?)],
         graph: graph(&document.graph.kind, count)?,
         plant: match document.plant {
             PlantTable { kind: PlantKind::Rapier, precision } => {
@@ -122,11 +121,7 @@ fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
 /// The space asked for, or else the plane if everything lies in it.
 fn space(document: &Document) -> Result<Space, ScenarioError> {
     let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
-    let formation_is_flat = match &document.formation.shape {
-        FormationShape::Points { points_m } => flat(points_m),
-        FormationShape::Sphere { .. } => false,
-        _ => true,
-    };
+    let formation_is_flat = is_flat(&document.formation.shape);
     match document.swarm.dimensions {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),
@@ -163,19 +158,6 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
     start::jitter(&mut positions_m, table.jitter_m, space, &mut random)?;
     let velocities_m_s = table.velocities_m_s.as_deref().map_or_else(|| Rows::zeros(count), rows);
     Ok(Swarm { positions_m, velocities_m_s })
-}
-
-fn formation(shape: &FormationShape, count: usize) -> Result<Formation, ScenarioError> {
-    let radius = |radius_m| positive("formation.radius_m", "the radius", radius_m);
-    let spacing = |spacing_m| positive("formation.spacing_m", "the spacing", spacing_m);
-    Ok(match shape {
-        &FormationShape::Pentagon { side_m } => Formation::pentagon(positive("formation.side_m", "the side", side_m)?),
-        &FormationShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
-        &FormationShape::Line { spacing_m } => Formation::line(count, spacing(spacing_m)?),
-        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing(spacing_m)?),
-        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
-        FormationShape::Points { points_m } => Formation::points(rows(points_m)),
-    })
 }
 
 /// Number of edges, at most, without making them.
@@ -222,12 +204,4 @@ fn per_vehicle(numbers: PerVehicle, count: usize) -> Vec<f64> {
         PerVehicle::All(number) => vec![number; count],
         PerVehicle::Each(list) => list,
     }
-}
-
-fn rows(points: &[Point]) -> Rows {
-    let mut rows = Rows::zeros(points.len());
-    for (i, point) in points.iter().enumerate() {
-        set_row(&mut rows, i, Vector3::from(point.coordinates()));
-    }
-    rows
 }

@@ -13,15 +13,25 @@ pub mod builtin;
 mod deserializer;
 #[cfg(feature = "files")]
 mod document;
+#[cfg(feature = "shapes")]
+mod drawn;
 mod error;
+#[cfg(feature = "shapes")]
+mod files;
 mod limits;
 #[cfg(feature = "files")]
 mod overrides;
+#[cfg(feature = "shapes")]
+mod points;
 mod resolution;
 #[cfg(feature = "files")]
 mod resolved;
 #[cfg(feature = "schema")]
 mod schema;
+#[cfg(feature = "files")]
+mod shapes;
+#[cfg(feature = "files")]
+mod slots;
 #[cfg(feature = "files")]
 mod source;
 mod spec;

@@ -83,6 +83,9 @@ impl Scenario {
         let mut document = text.decode()?;
         let stem = || Path::new(&name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         document.name = document.name.or_else(|| Some(as_name(&stem())));
+        #[cfg(feature = "shapes")]
+        super::slots::found_from(self::folder(source), &mut document.formation.shape)
+            .map_err(|error| text.place(error))?;
         let precision_is_open = matches!(document.plant, PlantTable { kind: PlantKind::Rapier, precision: None });
         let mut scenario = build::scenario(document).map_err(|error| text.place(error))?;
         scenario.validate().map_err(|error| text.place(error))?;
@@ -90,6 +93,15 @@ impl Scenario {
             scenario.plant = PlantSpec::Rapier(scenario.needed_precision());
         }
         Ok(scenario)
+    }
+}
+
+/// The folder that paths in a scenario count from: the file's own, or else where the program runs.
+#[cfg(feature = "shapes")]
+fn folder(source: &Source) -> &Path {
+    match source {
+        Source::File(path) => path.parent().unwrap_or(Path::new("")),
+        Source::Builtin(_) | Source::Text { .. } => Path::new(""),
     }
 }
 

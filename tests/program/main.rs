@@ -14,3 +14,4 @@ mod reads;
 mod refuses;
 mod runs;
 mod scenarios;
+mod shapes;
