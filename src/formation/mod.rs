@@ -5,8 +5,11 @@
 
 #[cfg(feature = "files")]
 mod assignment;
+#[cfg(feature = "shapes")]
+mod drawn;
 mod fit;
 mod flat;
+mod shapes;
 
 use nalgebra::Vector3;
 
@@ -16,8 +19,11 @@ use crate::swarm::{Pair, Rows, row, separation, set_row};
 
 #[cfg(feature = "files")]
 pub use assignment::{most_assigned, optimal_slots};
+#[cfg(feature = "shapes")]
+pub use drawn::{Drawing, DrawingError, Ink, MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
 pub use fit::{Freedom, RigidMotion, best_rigid_motion, procrustes_rms_m, rms_position_error_m};
 pub use flat::affine_dimension;
+pub use shapes::NARROWEST_V_RAD;
 
 /// The target shape: slot `h_i` for vehicle i.
 #[derive(Clone, Debug, PartialEq)]

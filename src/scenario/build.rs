@@ -4,11 +4,12 @@
 //! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
 //! it; [`super::validate`] judges the rest.
 
-use super::document::{Document, FormationShape, GraphKind, PlantKind, PlantTable, StartShape, StartTable};
+use super::document::{Document, GraphKind, PlantKind, PlantTable, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::legs::{check_slots, legs, listed_slots};
 use super::limits::{check_count, check_lengths, check_memory, pair_count};
 use super::reference::ReferenceTable;
+use super::slots::is_flat;
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
 use super::values::{Edge, PerVehicle, Point, rows};
@@ -92,16 +93,11 @@ fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
 /// The space asked for, or else the plane if everything lies in it.
 fn space(document: &Document) -> Result<Space, ScenarioError> {
     let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
-    let shape_is_flat = |shape: &FormationShape| match shape {
-        FormationShape::Points { points_m } => flat(points_m),
-        FormationShape::Sphere { .. } => false,
-        _ => true,
-    };
     let moved = document.leg.iter().filter_map(|leg| leg.move_m).chain(document.formation.move_m);
     let shapes = document.leg.iter().filter_map(|leg| leg.shape.as_ref()).chain([&document.formation.shape]);
     let reference_is_flat = document.reference.as_ref().is_none_or(ReferenceTable::is_flat);
     let formation_is_flat =
-        reference_is_flat && moved.into_iter().all(|point| flat(&[point])) && shapes.into_iter().all(shape_is_flat);
+        reference_is_flat && moved.into_iter().all(|point| flat(&[point])) && shapes.into_iter().all(is_flat);
     match document.swarm.dimensions {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::laws::Laws;
 use super::reference::ReferenceTable;
+#[cfg(feature = "shapes")]
+use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
+use super::shapes::{HelixKeys, SpacingKeys, VKeys};
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time::TimeSpec;
 use super::values::{Edge, PerVehicle, Point};
@@ -233,6 +236,28 @@ pub(super) enum FormationShape {
         /// Radius in m.
         radius_m: f64,
     },
+    /// Two arms that meet at the first slot, in the plane z = 0.
+    V(VKeys),
+    /// A filled triangle in the plane z = 0: rows of 1, 2, 3, ... slots.
+    Wedge(SpacingKeys),
+    /// Circles in the plane z = 0: 1, 6, 12, 18, ... slots.
+    Rings(SpacingKeys),
+    /// A screw about the z axis.
+    Helix(HelixKeys),
+    /// A cubic grid, as near to a cube as the number allows.
+    Cube(SpacingKeys),
+    /// Letters, in the plane z = 0.
+    #[cfg(feature = "shapes")]
+    Text(TextKeys),
+    /// An SVG drawing, in the plane z = 0.
+    #[cfg(feature = "shapes")]
+    Svg(SvgKeys),
+    /// The dark or opaque part of a picture, in the plane z = 0.
+    #[cfg(feature = "shapes")]
+    Image(ImageKeys),
+    /// A list of slots in a file.
+    #[cfg(feature = "shapes")]
+    File(FileKeys),
     /// A list of slots.
     Points {
         /// Slot of each vehicle in m.

@@ -74,6 +74,13 @@ impl ScenarioError {
         self
     }
 
+    /// Its keys of `[formation]` are those of a leg after the first.
+    #[cfg(feature = "files")]
+    pub(super) fn on_leg(mut self, leg: usize) -> Self {
+        self.fields.iter_mut().filter(|field| field.key.starts_with("formation")).for_each(|field| field.leg = leg);
+        self
+    }
+
     /// Like [`ScenarioError::at_leg`], for an entry of a list.
     pub(super) fn at_leg_entry(mut self, leg: usize, key: &'static str, entry: usize) -> Self {
         self.fields.push(Field { key, entry: Some(entry), leg });

@@ -5,9 +5,10 @@ use nalgebra::Vector3;
 use super::document::{Assignment, FormationShape, FormationTable, LegTable};
 use super::error::ScenarioError;
 use super::limits::{positive, require_finite};
+use super::slots::formation;
 use super::spec::Scenario;
-use super::values::{Point, rows};
-use crate::formation::{Formation, Freedom, most_assigned, optimal_slots};
+use super::values::Point;
+use crate::formation::{Freedom, most_assigned, optimal_slots};
 use crate::swarm::{Rows, row, set_row};
 use crate::target::{Begins, Leg};
 
@@ -23,9 +24,9 @@ struct Placement {
 
 /// Gives a scenario without legs those of its file. One without a law is left for [`super::validate`] to refuse.
 pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[LegTable]) -> Result<(), ScenarioError> {
-    let count = scenario.count();
+    let (count, delta_m) = (scenario.count(), scenario.delta_m);
     let placement = Placement { scale: first.scale, yaw_deg: first.yaw_deg, move_m: first.move_m };
-    let leg = placed(Leg::first(formation(&first.shape, count)?), &placement, 0)?;
+    let leg = placed(Leg::first(formation(&first.shape, count, delta_m)?), &placement, 0)?;
     scenario.legs.push(leg);
     let is_assigned =
         first.assignment == Assignment::Optimal || later.iter().any(|leg| leg.assignment == Assignment::Optimal);
@@ -34,7 +35,11 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
     assign(&mut scenario.legs[0], first.assignment, &starts_m, freedom);
     for (number, table) in later.iter().enumerate() {
         let before = scenario.legs[number].formation.clone();
-        let formation = table.shape.as_ref().map_or_else(|| Ok(before.clone()), |shape| formation(shape, count))?;
+        let formation = table
+            .shape
+            .as_ref()
+            .map_or_else(|| Ok(before.clone()), |shape| formation(shape, count, delta_m))
+            .map_err(|error| error.on_leg(number + 1))?;
         let begins = table.start_s.map_or(Begins::Reached, Begins::At);
         let placement = Placement { scale: table.scale, yaw_deg: table.yaw_deg, move_m: table.move_m };
         let mut leg = placed(Leg { formation, begins }, &placement, number + 1)?;
@@ -126,17 +131,4 @@ pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), Scenari
         }
     }
     Ok(())
-}
-
-fn formation(shape: &FormationShape, count: usize) -> Result<Formation, ScenarioError> {
-    let radius = |radius_m| positive("formation.radius_m", "the radius", radius_m);
-    let spacing = |spacing_m| positive("formation.spacing_m", "the spacing", spacing_m);
-    Ok(match shape {
-        &FormationShape::Pentagon { side_m } => Formation::pentagon(positive("formation.side_m", "the side", side_m)?),
-        &FormationShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
-        &FormationShape::Line { spacing_m } => Formation::line(count, spacing(spacing_m)?),
-        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing(spacing_m)?),
-        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
-        FormationShape::Points { points_m } => Formation::points(rows(points_m)),
-    })
 }

@@ -25,6 +25,10 @@ pub const MAX_HALVINGS: u32 = 20;
 /// touching while no pair is closer than delta.
 pub const CONTACT_PREDICTION_M: f64 = 0.02;
 
+/// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
+/// step.
+pub(super) const SLOT_MARGIN: f64 = 1e-9;
+
 /// Longest name \[characters\].
 pub const MAX_NAME_CHARS: usize = 64;
 

@@ -13,7 +13,11 @@ pub mod builtin;
 mod deserializer;
 #[cfg(feature = "files")]
 mod document;
+#[cfg(feature = "shapes")]
+mod drawn;
 mod error;
+#[cfg(feature = "shapes")]
+mod files;
 #[cfg(feature = "files")]
 mod laws;
 #[cfg(feature = "files")]
@@ -21,6 +25,8 @@ mod legs;
 mod limits;
 #[cfg(feature = "files")]
 mod overrides;
+#[cfg(feature = "shapes")]
+mod points;
 #[cfg(feature = "files")]
 mod reference;
 mod resolution;
@@ -28,6 +34,10 @@ mod resolution;
 mod resolved;
 #[cfg(feature = "schema")]
 mod schema;
+#[cfg(feature = "files")]
+mod shapes;
+#[cfg(feature = "files")]
+mod slots;
 #[cfg(feature = "files")]
 mod source;
 mod spec;

@@ -9,19 +9,23 @@ use super::overrides::{ARRIVAL, OLD_ARRIVAL};
 use crate::law::LawSpec;
 
 /// Keys, of any table, whose number is positive.
-const POSITIVE: [&str; 12] = [
+const POSITIVE: [&str; 16] = [
     "delta_m",
     "disagreement_m_s",
     "dt_s",
     "duration_s",
     "edge_error_m",
     "half_extent_m",
+    "height_m",
     "min_separation_m",
     "PerVehicle",
+    "pitch_m",
     "radius_m",
     "record_hz",
     "side_m",
     "spacing_m",
+    "turns",
+    "width_m",
 ];
 /// Keys, of any table, whose number is 0 or positive.
 const FROM_ZERO: [&str; 2] = ["hold_s", "jitter_m"];
@@ -130,7 +134,7 @@ mod tests {
         assert_eq!(tables_with("count"), ["[swarm]"]);
         assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
         assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
-        assert_eq!(tables_with("spacing_m").len(), 4);
+        assert_eq!(tables_with("spacing_m").len(), 4 + 5 + if cfg!(feature = "shapes") { 3 } else { 0 });
         assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
     }
 }

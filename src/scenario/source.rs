@@ -80,7 +80,11 @@ impl Scenario {
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
         let text = Text { name: &name, toml: &text, overrides };
-        finish(text.decode()?, &text)
+        #[cfg_attr(not(feature = "shapes"), expect(unused_mut, reason = "files are looked for"))]
+        let mut document = text.decode()?;
+        #[cfg(feature = "shapes")]
+        find_files(&mut document, folder(source)).map_err(|error| text.place(error))?;
+        finish(document, &text)
     }
 }
 
@@ -96,6 +100,27 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
         scenario.plant = PlantSpec::Rapier(scenario.needed_precision());
     }
     Ok(scenario)
+}
+
+/// Finds the files that shapes of the scenario name, from a folder.
+#[cfg(feature = "shapes")]
+fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioError> {
+    super::slots::found_from(folder, &mut document.formation.shape)?;
+    for (number, leg) in document.leg.iter_mut().enumerate() {
+        if let Some(shape) = &mut leg.shape {
+            super::slots::found_from(folder, shape).map_err(|error| error.on_leg(number + 1))?;
+        }
+    }
+    Ok(())
+}
+
+/// The folder that paths in a scenario count from: the file's own, or else where the program runs.
+#[cfg(feature = "shapes")]
+fn folder(source: &Source) -> &Path {
+    match source {
+        Source::File(path) => path.parent().unwrap_or(Path::new("")),
+        Source::Builtin(_) | Source::Text { .. } => Path::new(""),
+    }
 }
 
 fn unknown_builtin(name: &str) -> ScenarioError {

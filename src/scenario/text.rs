@@ -26,7 +26,16 @@ const ORIGINS: [(&str, &[&str]); 5] = [
     ),
     (
         "formation.points_m",
-        &["formation.side_m", "formation.radius_m", "formation.spacing_m", "formation.scale", "formation.shape"],
+        &[
+            "formation.file",
+            "formation.height_m",
+            "formation.width_m",
+            "formation.side_m",
+            "formation.radius_m",
+            "formation.spacing_m",
+            "formation.scale",
+            "formation.shape",
+        ],
     ),
     ("graph.edges", &["graph.kind"]),
     ("swarm.hull_radius_m", &["law.delta_m"]),

@@ -2,8 +2,9 @@
 
 use super::error::ScenarioError;
 use super::limits::{
-    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, at_least_zero, check_count, check_lengths,
-    check_memory, first_within, may_be_in_a_name, positive, require_finite, require_more_than_zero, require_positive,
+    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, at_least_zero, check_count,
+    check_lengths, check_memory, first_within, may_be_in_a_name, positive, require_finite, require_more_than_zero,
+    require_positive,
 };
 use super::spec::{Scenario, Space};
 use super::time::TimeSpec;
@@ -11,10 +12,6 @@ use crate::graph::Graph;
 use crate::law::{Controls, Gain, LawSpec};
 use crate::swarm::{Pair, row};
 use crate::target::{Begins, Guidance, Leg};
-
-/// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
-/// step.
-const SLOT_MARGIN: f64 = 1e-9;
 
 /// Vehicles that a message names before it counts the rest.
 const NAMED_VEHICLES: usize = 8;

@@ -12,4 +12,5 @@ mod plant_claims;
 mod random_scenarios;
 mod reference_flights;
 mod scenario_files;
+mod shapes;
 mod simulation;

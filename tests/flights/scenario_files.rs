@@ -551,6 +551,7 @@ fn the_schema_bounds_a_number_where_the_reader_does() {
                     .filter(|(other, value)| other != key && (required(other) || value["const"].is_string()));
                 let others = others.map(|(other, value)| match value["const"].as_str() {
                     Some(choice) => format!(", {other} = \"{choice}\""),
+                    None if value["type"] == "string" => format!(", {other} = \"A\""),
                     None => format!(", {other} = 3.0"),
                 });
                 let mut others: String = others.collect();

@@ -15,3 +15,4 @@ mod reads;
 mod refuses;
 mod runs;
 mod scenarios;
+mod shapes;
