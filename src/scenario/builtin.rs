@@ -11,7 +11,7 @@ pub struct Builtin {
     pub toml: &'static str,
 }
 
-const ALL: [Builtin; 4] = [
+const ALL: &[Builtin] = &[
     Builtin {
         name: "pentagon",
         summary: "five vehicles from a line to a pentagon under the edge-tension law: clear and reached",
@@ -32,12 +32,33 @@ const ALL: [Builtin; 4] = [
         summary: "the pentagon from an exactly straight line, which no force leaves: clear but never reached",
         toml: include_str!("../../assets/pentagon-collinear.toml"),
     },
+    Builtin {
+        name: "pentagon-leader",
+        summary: "the pentagon around a leader that listens to nobody, over a star: clear and reached",
+        toml: include_str!("../../assets/pentagon-leader.toml"),
+    },
+    Builtin {
+        name: "swap",
+        summary: "twelve vehicles change places across a circle under the displacement law: clear and reached",
+        toml: include_str!("../../assets/swap.toml"),
+    },
+    #[cfg(feature = "shapes")]
+    Builtin {
+        name: "show",
+        summary: "a hundred vehicles write two words and end in rings, certified through all legs: clear and reached",
+        toml: include_str!("../../assets/show.toml"),
+    },
+    Builtin {
+        name: "thousand",
+        summary: "a thousand vehicles draw together in space: clear and reached",
+        toml: include_str!("../../assets/thousand.toml"),
+    },
 ];
 
 /// All built-in scenarios, the default first.
 #[must_use]
 pub fn all() -> &'static [Builtin] {
-    &ALL
+    ALL
 }
 
 /// The built-in scenario of this name.
