@@ -42,7 +42,7 @@ impl Feedback for Exact<'_> {
             self.near.update(&truth.positions_m, range_m);
         }
         let near = self.near.pairs();
-        self.law.command(&Observation { time_s, near, ..self.scenario.observation(truth) }, command)
+        self.law.command(&Observation { near, ..self.scenario.observation_at(truth, time_s) }, command)
     }
 }
 

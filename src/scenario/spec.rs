@@ -159,7 +159,14 @@ impl Scenario {
     /// What a law is told of a true state at the beginning of the first leg, by sensors and radio without fault.
     #[must_use]
     pub fn observation<'a>(&'a self, swarm: &'a Swarm) -> Observation<'a> {
+        self.observation_at(swarm, 0.0)
+    }
+
+    /// The same at a time of the first leg \[s\].
+    #[must_use]
+    pub fn observation_at<'a>(&'a self, swarm: &'a Swarm, time_s: f64) -> Observation<'a> {
         let exact = Observation::exact(swarm, &self.graph, self.formation());
-        Observation { target: Target { reference: self.reference_at(0.0), ..exact.target }, ..exact }
+        let target = Target { reference: self.reference_at(time_s), ..exact.target };
+        Observation { time_s, target, ..exact }
     }
 }

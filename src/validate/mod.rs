@@ -11,6 +11,7 @@ mod certificate;
 mod claim;
 mod convergence;
 mod detectors;
+mod displacement;
 mod equilibria;
 mod experiments;
 mod figures;
@@ -37,13 +38,14 @@ use interface::{Judged, Progress, Untried};
 /// A file of claims: its name, its subject, the units of work that it counts, and its judgement.
 type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> Judged);
 
-const PARTS: [Part; 6] = [
+const PARTS: [Part; 7] = [
     ("tension", "The edge tension", 1, tension::judge),
     ("law", "The law at single instants", 1, law::judge),
     ("certificate", "Energy and certificate", certificate::STARTS as u64 + 1, certificate::judge),
     ("figures", "The paper's figures", 6, experiments::judge),
     ("equilibria", "Where the law comes to rest", equilibria::FLIGHTS, equilibria::judge),
     ("rates", "Rates near the formation", 5, rates::judge),
+    ("displacement", "The displacement law", displacement::WORK, displacement::judge),
 ];
 /// Convergence in both precisions, free motion, and three flights.
 const ENGINE_WORK: u64 = 2 * convergence::STEPS_HZ.len() as u64 + 1 + 3;
@@ -55,7 +57,7 @@ pub fn work() -> u64 {
 }
 
 /// Judges the claims of one group that needs no figure, by its name: `tension`, `law`, `certificate`, `figures`,
-/// `equilibria` or `rates`. None where there is no such group.
+/// `equilibria`, `rates` or `displacement`. None where there is no such group.
 #[must_use]
 pub fn judge(id: &str) -> Option<Group> {
     PARTS.iter().find(|part| part.0 == id).map(|&(id, title, _, judge)| group(id, title, judge(&|_| ())))
