@@ -14,7 +14,7 @@ pub(super) fn figures(scenario: &Scenario, history: &RunHistory, report: &Report
     let criteria = Criteria {
         delta_m: scenario.delta_m,
         certified_m: report.separation.certified_m,
-        shape: Some((scenario.formation(), &scenario.graph)),
+        shape: Some((&scenario.legs, &scenario.graph)),
         edge_error_m: Some(scenario.arrival.edge_error_m),
         disagreement_m_s: Some(scenario.arrival.disagreement_m_s),
     };

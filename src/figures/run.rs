@@ -5,8 +5,8 @@ use super::figure::Figure;
 use super::history::RunHistory;
 use super::paths::{paths, paths_in_space};
 use super::scalars::{control, disagreement, energy, shape_error};
-use crate::formation::Formation;
 use crate::graph::Graph;
+use crate::target::Leg;
 
 /// What the figures of a run are measured by.
 #[derive(Clone, Copy, Debug)]
@@ -15,8 +15,8 @@ pub struct Criteria<'a> {
     pub delta_m: f64,
     /// Distance that the law's certificate promised \[m\].
     pub certified_m: Option<f64>,
-    /// The formation, and the graph whose edges it is judged by.
-    pub shape: Option<(&'a Formation, &'a Graph)>,
+    /// The formations, one after the other, and the graph whose edges they are judged by.
+    pub shape: Option<(&'a [Leg], &'a Graph)>,
     /// Largest edge error that counts as reached \[m\].
     pub edge_error_m: Option<f64>,
     /// Largest velocity disagreement that counts as reached \[m/s\].
@@ -37,8 +37,8 @@ pub fn of_run(history: &RunHistory, criteria: &Criteria<'_>) -> Vec<Figure> {
     if history.energy_initial().is_some() {
         figures.push(energy(history, "Energy"));
     }
-    if let Some((formation, graph)) = criteria.shape {
-        figures.push(shape_error(history, formation, graph, criteria.edge_error_m, "Shape error"));
+    if let Some((legs, graph)) = criteria.shape {
+        figures.push(shape_error(history, legs, graph, criteria.edge_error_m, "Shape error"));
     }
     figures.push(disagreement(history, criteria.disagreement_m_s, "Velocity disagreement"));
     figures

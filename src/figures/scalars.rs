@@ -6,8 +6,9 @@ use super::distances::quantile;
 use super::figure::Figure;
 use super::history::{FEW_VEHICLES, RunHistory, Span};
 use super::svg::{INK, PALETTE, Stroke};
-use crate::formation::{Formation, largest_edge_error_m};
+use crate::formation::largest_edge_error_m;
 use crate::graph::Graph;
+use crate::target::Leg;
 
 /// Distances that are computed for the shape error, at most.
 const DISTANCES: usize = 16_000_000;
@@ -66,20 +67,19 @@ pub fn energy(history: &RunHistory, title: &str) -> Figure {
     chart.figure("energy", title, &format!("The law's energy over time.{comparison}"))
 }
 
-/// Largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\].
+/// Largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\]: of the formation
+/// of the leg that was under way.
 ///
 /// `allowed_m` is what counts as reached.
 #[must_use]
-pub fn shape_error(
-    history: &RunHistory,
-    formation: &Formation,
-    graph: &Graph,
-    allowed_m: Option<f64>,
-    title: &str,
-) -> Figure {
-    let fits = formation.count() == history.vehicles() && graph.count() == history.vehicles();
+pub fn shape_error(history: &RunHistory, legs: &[Leg], graph: &Graph, allowed_m: Option<f64>, title: &str) -> Figure {
+    let count = history.vehicles();
+    let fits = !legs.is_empty() && legs.iter().all(|leg| leg.formation.count() == count) && graph.count() == count;
     let instants = history.spread((DISTANCES / graph.edge_count().max(1)).max(FEWEST_INSTANTS));
-    let error = |span: &&Span| (span.time_s, largest_edge_error_m(&span.positions_m, formation, graph));
+    let error = |span: &&Span| {
+        let leg = history.leg_times.leg_at(span.time_s).min(legs.len() - 1);
+        (span.time_s, largest_edge_error_m(&span.positions_m, &legs[leg].formation, graph))
+    };
     let points = if fits { instants.iter().map(error).collect() } else { Vec::new() };
     decay(history, "shape-error", title, "largest edge error", "m", points, allowed_m)
 }

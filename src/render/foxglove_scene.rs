@@ -79,7 +79,7 @@ impl FoxgloveScene {
         };
         let few_edges = Some(&self.plan.graph).filter(|graph| graph.edge_count() <= MOST_EDGES);
         for (i, j) in few_edges.into_iter().flat_map(Graph::edges) {
-            let tension = self.plan.tension(Pair::new(i, j), separation(positions_m, i, j));
+            let tension = self.plan.tension(Pair::new(i, j), separation(positions_m, i, j), time_s);
             for place in [i, j].map(|k| row(positions_m, k)) {
                 lines.points.push(Point3 { x: place.x, y: place.y, z: place.z });
                 lines.colors.push(colour(theme.tension(tension).at(0.8)));
@@ -121,6 +121,7 @@ impl ExtraTopic for FoxgloveScene {
     }
 
     fn note(&mut self, event: &Event) {
+        self.plan.note(event);
         match *event {
             Event::ViolationBegan { pair, .. } => _ = self.violated.insert(pair),
             Event::ViolationEnded { pair, .. } => _ = self.violated.remove(&pair),

@@ -171,7 +171,7 @@ pub(super) struct FormationTable {
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct LegTable {
-    /// Time at which it begins in s; once the one before it is reached unless given.
+    /// Time at which it begins in s, or when the one before it begins if that is later; once that one is reached unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) start_s: Option<f64>,
     /// Who flies to which slot, from the slots before.

@@ -25,10 +25,8 @@ impl Watch {
         events: &mut Vec<Event>,
     ) {
         let leg = controller.target.view().leg;
-        if leg != self.leg {
-            events.push(Event::LegBegan { leg, time_s });
-            self.leg = leg;
-        }
+        events.extend((self.leg + 1..=leg).map(|leg| Event::LegBegan { leg, time_s }));
+        self.leg = leg;
         if let Some((scale, promise)) = controller.breath(time_s, state) {
             certificate.renew(&promise);
             self.breaths.push(Breath { time_s, scale, certified_m: certificate.certified_m });

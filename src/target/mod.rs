@@ -60,6 +60,23 @@ impl Leg {
     }
 }
 
+/// When the legs of a flight began, as it tells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LegTimes(Vec<(f64, usize)>);
+
+impl LegTimes {
+    /// A leg, from 0, began at a time \[s\] that is not before that of another.
+    pub fn begin(&mut self, leg: usize, time_s: f64) {
+        self.0.push((time_s, leg));
+    }
+
+    /// The leg that is under way at a time \[s\]; the first before another began.
+    #[must_use]
+    pub fn leg_at(&self, time_s: f64) -> usize {
+        self.0[..self.0.partition_point(|&(from_s, _)| from_s <= time_s)].last().map_or(0, |&(_, leg)| leg)
+    }
+}
+
 /// What the vehicles are told to reach, at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target<'a> {
@@ -158,6 +175,15 @@ mod tests {
         for (i, slot) in expected.into_iter().enumerate() {
             assert!((row(slots, i) - slot).norm() < 1e-14, "{slots}");
         }
+    }
+
+    #[test]
+    fn a_leg_is_under_way_from_its_beginning_to_that_of_the_next() {
+        let mut times = LegTimes::default();
+        times.begin(1, 2.0);
+        times.begin(2, 2.0);
+        times.begin(3, 5.0);
+        assert_eq!([0.0, 1.9, 2.0, 4.9, 5.0, 9.0].map(|time_s| times.leg_at(time_s)), [0, 0, 2, 2, 3, 3]);
     }
 
     #[test]

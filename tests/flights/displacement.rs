@@ -133,3 +133,12 @@ fn every_connected_graph_keeps_its_promise_to_every_pair() {
         assert!(within_s(&log, &scenario) < 20.0, "{graph}");
     }
 }
+
+#[test]
+fn every_claim_about_the_law_is_as_expected_and_its_negative_twins_fail() {
+    let group = tautline::validate::judge("displacement").expect("a group of claims");
+    assert_eq!(group.claims.len(), 5);
+    for claim in &group.claims {
+        assert!(claim.pass, "{}: {}", claim.id, claim.measured);
+    }
+}

@@ -8,6 +8,7 @@ use tautline::law::EdgeTension;
 use tautline::record::mcap::{Header, McapRecorder, McapRecording};
 use tautline::record::{Sample, Sink as _};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, separation, set_row};
+use tautline::target::Leg;
 
 /// Drawings count in tenths of a pixel.
 const PLACE: f64 = 0.2;
@@ -142,7 +143,7 @@ fn all_of(history: &RunHistory, delta_m: f64) -> Vec<Figure> {
     let criteria = Criteria {
         delta_m,
         certified_m: Some(CERTIFIED_M),
-        shape: Some((&formation, &graph)),
+        shape: Some((&[Leg::first(formation.clone())], &graph)),
         edge_error_m: Some(0.01),
         disagreement_m_s: Some(0.02),
     };
@@ -343,7 +344,7 @@ fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
     let criteria = Criteria {
         delta_m: DELTA_M,
         certified_m: None,
-        shape: Some((&formation, &graph)),
+        shape: Some((&[Leg::first(formation.clone())], &graph)),
         edge_error_m: None,
         disagreement_m_s: None,
     };

@@ -7,6 +7,7 @@ use super::draw_list::{Annotation, pixels};
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
 use crate::audit::Violation;
+use crate::render::timeline::Plan;
 use crate::swarm::Pair;
 use crate::text::at_least;
 
@@ -34,7 +35,10 @@ impl SceneBuilder<'_> {
         let (bottom, taken) = labels.placed();
         // What has no room is left out: first the closest approach, then the name, then the verdict, then the time.
         let large_px = 1.35 * size_px;
-        let time = format!("t = {:.2} s", self.frame.time_s);
+        let time = match self.timeline.plan.as_ref().map(|plan| plan.leg_at(self.frame.time_s)) {
+            Some((leg, legs)) if legs > 1 => format!("leg {} of {legs}, t = {:.2} s", leg + 1, self.frame.time_s),
+            _ => format!("t = {:.2} s", self.frame.time_s),
+        };
         let mut free_px = width_px - 2.0 * margin;
         if width(large_px, &time) > free_px {
             return;
@@ -184,6 +188,16 @@ impl SceneBuilder<'_> {
             labels.draw(ring(x + arm, 1.1 * arm, ink, width_px));
             x = write(labels, x + size_px, "goal slot");
         }
+        let has_reference = plan.is_some_and(|plan| plan.reference_at(self.frame.time_s).is_some());
+        if layers.marks && has_reference && fits(x + size_px, "reference") {
+            let middle_x = x + arm;
+            let corners = [[middle_x, middle - arm], [middle_x + arm, middle], [middle_x, middle + arm], [x, middle]];
+            for side in 0..4 {
+                let ends_px = [corners[side], corners[(side + 1) % 4]];
+                labels.draw(Annotation::Stroke { ends_px, colour: ink, width_px });
+            }
+            x = write(labels, x + size_px, "reference");
+        }
         let shell = "keep-out shell, radius delta/2";
         if layers.shells && self.timeline.delta_m.is_some() && fits(x + size_px, shell) {
             labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * width_px));
@@ -247,7 +261,8 @@ impl SceneBuilder<'_> {
             if is_hidden && !self.alarmed[k] {
                 continue;
             }
-            let name = shortened(&self.timeline.vehicles[k]);
+            let leads = self.timeline.plan.as_ref().and_then(Plan::leader) == Some(k);
+            let name = shortened(&self.timeline.vehicles[k]) + if leads { " leads" } else { "" };
             let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
             let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
             if fitting >= 8.0 && !is_hidden {

@@ -6,9 +6,8 @@ use super::builder::SceneBuilder;
 use super::camera::Lens;
 use super::colour::Theme;
 use super::draw_list::{Ball, Line, Scene, single};
-use crate::formation::best_rigid_motion;
 use crate::render::timeline::Plan;
-use crate::swarm::{Pair, row};
+use crate::swarm::Pair;
 
 /// Most edges that are drawn: more hide what they join.
 const MOST_EDGES: usize = 2100;
@@ -25,6 +24,8 @@ const RING: u32 = 28;
 const SLOT: f64 = 1.45;
 /// Most vehicles that have start marks and goal slots.
 const MOST_MARKS: usize = 2000;
+/// Half of the diamond at the reference in a picture 720 pixels high \[pixels\].
+const REFERENCE_PX: f32 = 7.0;
 /// Least radius of a vehicle, of the cross where it started and of its goal slot in a picture 720 pixels high \[pixels\].
 const LEAST_PX: [f32; 3] = [2.0, 3.0, 4.0];
 
@@ -89,7 +90,7 @@ impl SceneBuilder<'_> {
         let width_px = (2.2 - many / 200.0).clamp(1.0, 2.2) * self.view.unit_px();
         for pair in plan.graph.edges().map(|(i, j)| Pair::new(i, j)) {
             let Some([from, to]) = self.ends(pair) else { continue };
-            let tension = plan.tension(pair, (to - from).norm());
+            let tension = plan.tension(pair, (to - from).norm(), self.frame.time_s);
             // What acts is seen before what rests.
             let strength = opacity * (0.45 + 0.55 * tension.abs());
             lines.push(Line::new([from, to], self.view.theme.tension(tension).at(strength), width_px));
@@ -148,8 +149,8 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Crosses where the vehicles started and rings where they belong, the formation put on them by the rigid motion that
-    /// fits best.
+    /// Crosses where the vehicles started and rings where they belong at this time: the formation of the leg that is under
+    /// way, moved as the law leaves it free to be so that it fits best.
     pub(super) fn starts_and_goals(&self, lines: &mut Vec<Line>) {
         let count = self.timeline.count();
         let Some(first) = self.timeline.keyframes().first().filter(|_| count <= MOST_MARKS) else { return };
@@ -165,9 +166,9 @@ impl SceneBuilder<'_> {
             }
         }
         let Some(plan) = &self.timeline.plan else { return };
-        let Some(motion) = best_rigid_motion(&self.frame.positions_m, &plan.formation) else { return };
-        for k in 0..count {
-            let centre = motion.apply(row(&plan.formation.slots_m, k)) - self.extent.origin_m();
+        let Some(slots_m) = plan.slots_at(self.frame.time_s, &self.frame.positions_m) else { return };
+        for (k, slot_m) in slots_m.into_iter().enumerate().take(count) {
+            let centre = slot_m - self.extent.origin_m();
             let radius = self.at_least(centre, self.timeline.radius_m[k] * SLOT, LEAST_PX[2]);
             let corner = |n: u32| {
                 let (sin, cos) = (f64::from(n % RING) / f64::from(RING) * std::f64::consts::TAU).sin_cos();
@@ -176,5 +177,17 @@ impl SceneBuilder<'_> {
             let colour = self.colour(k).at(opacity);
             lines.extend((0..RING).map(|n| Line::new([corner(n), corner(n + 1)], colour, width_px)));
         }
+        if let Some(place_m) = plan.reference_at(self.frame.time_s) {
+            self.diamond(place_m - self.extent.origin_m(), width_px, lines);
+        }
+    }
+
+    /// Where the reference is.
+    fn diamond(&self, centre: Vector3<f64>, width_px: f32, lines: &mut Vec<Line>) {
+        let arm = self.at_least(centre, 0.0, REFERENCE_PX);
+        let [right, up] = [self.camera.right, self.camera.up].map(|axis| axis * arm);
+        let corners = [centre + up, centre + right, centre - up, centre - right];
+        let side = |k: usize| Line::new([corners[k], corners[(k + 1) % 4]], self.view.theme.ink(), width_px);
+        lines.extend((0..4).map(side));
     }
 }

@@ -6,7 +6,7 @@ use crate::graph::Graph;
 use crate::record::{Event, Sample};
 use crate::render::timeline::Timeline;
 use crate::scenario::Scenario;
-use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
+use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 
 /// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
 fn timeline() -> Timeline {
@@ -195,7 +195,7 @@ fn edges_push_below_their_rest_length_and_pull_beyond_it() {
     let timeline = timeline();
     let plan = timeline.plan.as_ref().expect("a plan");
     assert_eq!(plan.graph, Graph::complete(4));
-    let tension = |distance_m| plan.tension(Pair::new(0, 1), distance_m);
+    let tension = |distance_m| plan.tension(Pair::new(0, 1), distance_m, 0.0);
     assert!(tension(3.0).abs() < 1e-12 && tension(2.5) < 0.0 && tension(4.0) > 0.0);
     assert_eq!((tension(2.0), tension(2.001)), (-1.0, -1.0));
     assert!(tension(1e3) > 0.999_999);
@@ -399,4 +399,28 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
         }
     }
     assert!(dropped > 0, "shells cover numbers from some side");
+}
+
+/// A leg later, behind a reference that moves: goals are the slots of that leg where the reference has carried them.
+#[test]
+fn goals_are_those_of_the_leg_under_way_where_the_reference_is() {
+    use crate::target::{Begins, Guidance, Leg, ReferenceMotion};
+
+    let start = Swarm::at_rest(Formation::line(4, 3.0).slots_m);
+    let mut scenario = Scenario::new("legs", start.clone(), Formation { slots_m: start.positions_m }, 2.0, 10.0);
+    scenario.law = crate::law::LawSpec::Displacement(crate::law::DisplacementKeys::default());
+    let next = Leg { begins: Begins::At(1.0), ..Leg::first(Formation::grid(4, 5.0)) };
+    scenario.legs.push(next);
+    scenario.reference = Some(Guidance {
+        motion: ReferenceMotion::Velocity { from_m: Vector3::zeros(), velocity_m_s: Vector3::new(0.5, 0.0, 0.0) },
+        known_by: crate::graph::Pinning::Leader(2),
+        feed_forward: true,
+    });
+    let mut plan = crate::render::timeline::Plan::of(&scenario);
+    plan.note(&crate::record::Event::LegBegan { leg: 1, time_s: 1.0 });
+    let slot = |time_s: f64, k: usize| plan.slots_at(time_s, &Rows::zeros(4)).expect("slots")[k];
+    let first_m = row(&scenario.legs[0].formation.slots_m, 1);
+    assert_eq!(slot(0.5, 1), first_m + Vector3::new(0.25, 0.0, 0.0));
+    assert_eq!(slot(2.0, 1), Vector3::new(5.0 + 1.0, 0.0, 0.0));
+    assert_eq!((plan.leg_at(0.5), plan.leg_at(2.0), plan.leader()), ((0, 2), (1, 2), Some(2)));
 }

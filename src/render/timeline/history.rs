@@ -248,6 +248,9 @@ impl Timeline {
 
     /// Takes one event of the judge of the flight.
     pub fn note(&mut self, event: &Event) {
+        if let Some(plan) = &mut self.plan {
+            plan.note(event);
+        }
         match *event {
             Event::ViolationBegan { pair, time_s } if self.has(pair) => {
                 self.open.insert(pair, self.violations.len());

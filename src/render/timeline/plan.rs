@@ -1,16 +1,22 @@
-//! What a flight is after: its formation, and how hard an edge of its graph pulls.
+//! What a flight is after: its formations, where they are to be, and how hard an edge of its graph pulls.
 
-use crate::formation::Formation;
+use nalgebra::Vector3;
+
+use crate::formation::{Formation, Freedom, best_rigid_motion};
 use crate::graph::Graph;
 use crate::law::{EdgeTension, EdgeTensionKeys, LawSpec};
+use crate::record::Event;
 use crate::scenario::Scenario;
-use crate::swarm::Pair;
+use crate::swarm::{Pair, Rows, mean_row, row};
+use crate::target::{Guidance, Leg, LegTimes};
 
-/// Formation, graph and how hard an edge pulls.
+/// Formations, graph and how hard an edge pulls.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The slots to be reached.
-    pub formation: Formation,
+    legs: Vec<Leg>,
+    leg_times: LegTimes,
+    guidance: Option<Guidance>,
+    freedom: Freedom,
     /// Who senses whom.
     pub graph: Graph,
     law: LawSpec,
@@ -18,25 +24,79 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Formation, graph and law of a scenario.
+    /// Formations, graph and law of a scenario.
     pub(in crate::render) fn of(scenario: &Scenario) -> Self {
         Self {
-            formation: scenario.formation().clone(),
+            legs: scenario.legs.clone(),
+            leg_times: LegTimes::default(),
+            guidance: scenario.reference.clone(),
+            freedom: scenario.law().map_or(Freedom::RigidMotion, |law| law.controls().freedom()),
             graph: scenario.graph.clone(),
             law: scenario.law.clone(),
             delta_m: scenario.delta_m,
         }
     }
 
-    /// How hard the edge between two vehicles pulls (above 0) or pushes (below 0) at a distance \[m\], from -1 to 1.
+    /// Takes note of what happened.
+    pub(in crate::render) fn note(&mut self, event: &Event) {
+        if let &Event::LegBegan { leg, time_s } = event {
+            self.leg_times.begin(leg, time_s);
+        }
+    }
+
+    /// The leg that is under way at a time \[s\], from 0, and how many there are.
+    #[must_use]
+    pub fn leg_at(&self, time_s: f64) -> (usize, usize) {
+        (self.leg_times.leg_at(time_s).min(self.legs.len().saturating_sub(1)), self.legs.len())
+    }
+
+    /// The slots that are to be reached at a time \[s\].
+    #[must_use]
+    pub fn formation_at(&self, time_s: f64) -> &Formation {
+        &self.legs[self.leg_at(time_s).0].formation
+    }
+
+    /// Where the reference is at a time \[s\], where there is one \[m\].
+    #[must_use]
+    pub fn reference_at(&self, time_s: f64) -> Option<Vector3<f64>> {
+        self.guidance.as_ref().map(|guidance| guidance.motion.at(time_s).position_m)
+    }
+
+    /// The vehicle that listens to nobody, from 0.
+    #[must_use]
+    pub fn leader(&self) -> Option<usize> {
+        self.guidance.as_ref()?.known_by.leader()
+    }
+
+    /// Where the slots are at a time \[s\], moved as the law leaves them free to be so that they fit best \[m\]; none
+    /// where positions are not known.
+    pub(in crate::render) fn slots_at(&self, time_s: f64, positions_m: &Rows) -> Option<Vec<Vector3<f64>>> {
+        let formation = self.formation_at(time_s);
+        let (slots_m, count) = (&formation.slots_m, formation.count());
+        let moved = |by_m: Vector3<f64>| (0..count).map(|k| row(slots_m, k) + by_m).collect();
+        match self.freedom {
+            Freedom::Fixed => self.reference_at(time_s).map(moved),
+            Freedom::Translation if positions_m.nrows() == count => Some(mean_row(positions_m) - mean_row(slots_m))
+                .filter(|by_m| by_m.iter().all(|x| x.is_finite()))
+                .map(moved),
+            Freedom::Translation => None,
+            Freedom::RigidMotion => {
+                let motion = best_rigid_motion(positions_m, formation)?;
+                Some((0..count).map(|k| motion.apply(row(slots_m, k))).collect())
+            }
+        }
+    }
+
+    /// How hard the edge between two vehicles pulls (above 0) or pushes (below 0) at a distance \[m\] and a time \[s\], from
+    /// -1 to 1.
     ///
     /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
     /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: its elongation over the desired distance.
     #[expect(clippy::cast_possible_truncation, reason = "the share of a colour")]
-    pub(in crate::render) fn tension(&self, pair: Pair, distance_m: f64) -> f32 {
-        let tension = match self.edge_tension(pair) {
+    pub(in crate::render) fn tension(&self, pair: Pair, distance_m: f64, time_s: f64) -> f32 {
+        let tension = match self.edge_tension(pair, time_s) {
             Some((alpha, edge)) => edge.derivative(distance_m) * edge.k_m() / alpha,
-            None => self.elongation(pair, distance_m),
+            None => self.elongation(pair, distance_m, time_s),
         };
         tension.clamp(-1.0, 1.0) as f32
     }
@@ -44,21 +104,21 @@ impl Plan {
     /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
     /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
     #[cfg(feature = "window")]
-    pub(in crate::render) fn pull_m_s2(&self, pair: Pair, distance_m: f64) -> Option<f64> {
-        let vehicles = self.formation.slots_m.nrows() as f64;
-        self.edge_tension(pair).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
+    pub(in crate::render) fn pull_m_s2(&self, pair: Pair, distance_m: f64, time_s: f64) -> Option<f64> {
+        let vehicles = self.graph.count() as f64;
+        self.edge_tension(pair, time_s).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
     }
 
     /// How much longer a distance \[m\] is than the desired one, over that one.
-    pub(in crate::render) fn elongation(&self, pair: Pair, distance_m: f64) -> f64 {
-        let rest_m = self.formation.desired_distance(pair.first(), pair.second());
+    pub(in crate::render) fn elongation(&self, pair: Pair, distance_m: f64, time_s: f64) -> f64 {
+        let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
         (distance_m - rest_m) / rest_m
     }
 
     /// Alpha \[m^2/s^2\] and the tension of an edge, where the law has one.
-    fn edge_tension(&self, pair: Pair) -> Option<(f64, EdgeTension)> {
+    fn edge_tension(&self, pair: Pair, time_s: f64) -> Option<(f64, EdgeTension)> {
         let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = self.law else { return None };
-        let rest_m = self.formation.desired_distance(pair.first(), pair.second());
+        let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
         Some((alpha, EdgeTension::new(alpha, self.delta_m, rest_m).ok()?))
     }
 }

@@ -207,24 +207,25 @@ fn vehicle(ui: &mut Ui, player: &Player, frame: &Frame, k: usize) {
         };
         row(ui, ["to", "distance", "tension"]);
         for (distance_m, other) in others.into_iter().take(LISTED) {
-            let tension = timeline.plan.as_ref().map(|plan| in_words(plan, Pair::new(k, other), distance_m));
+            let tension =
+                timeline.plan.as_ref().map(|plan| in_words(plan, Pair::new(k, other), distance_m, frame.time_s));
             row(ui, [&timeline.vehicles[other], &metres(distance_m), &tension.unwrap_or_default()]);
         }
     });
 }
 
 /// How hard an edge pulls or pushes, or by how much it is too long where the law has no tension.
-fn in_words(plan: &Plan, pair: Pair, distance_m: f64) -> String {
+fn in_words(plan: &Plan, pair: Pair, distance_m: f64, time_s: f64) -> String {
     if plan.graph.later_neighbours(pair.first()).all(|other| other != pair.second()) {
         return "no edge".to_owned();
     }
-    match plan.pull_m_s2(pair, distance_m) {
+    match plan.pull_m_s2(pair, distance_m, time_s) {
         Some(pull) if pull == f64::NEG_INFINITY => "inside delta".to_owned(),
         Some(pull) if pull.abs() < 0.005 => "rest".to_owned(),
         Some(pull) if pull < 0.0 => format!("push {:.2} m/s\u{b2}", -pull),
         Some(pull) => format!("pull {pull:.2} m/s\u{b2}"),
         None => {
-            let elongation = plan.elongation(pair, distance_m);
+            let elongation = plan.elongation(pair, distance_m, time_s);
             format!("{:.0} % too {}", 100.0 * elongation.abs(), if elongation < 0.0 { "short" } else { "long" })
         }
     }
@@ -258,17 +259,17 @@ mod tests {
     #[test]
     fn the_table_gives_the_acceleration_of_an_edge_and_no_share_of_a_limit() {
         let (plan, pair) = (plan("pentagon"), Pair::new(0, 1));
-        let pushed = plan.pull_m_s2(pair, 2.001).expect("a tension");
+        let pushed = plan.pull_m_s2(pair, 2.001, 0.0).expect("a tension");
         assert!(
-            pushed < -10.0 && plan.tension(pair, 2.001) == -1.0,
+            pushed < -10.0 && plan.tension(pair, 2.001, 0.0) == -1.0,
             "{pushed} m/s^2, far below the limit of the colour"
         );
-        assert_eq!(in_words(&plan, pair, 2.001), format!("push {:.2} m/s\u{b2}", -pushed));
-        let pulled = plan.pull_m_s2(pair, 9.0).expect("a tension");
-        assert_eq!(in_words(&plan, pair, 9.0), format!("pull {pulled:.2} m/s\u{b2}"));
-        let rest_m = plan.formation.desired_distance(0, 1);
-        assert_eq!(in_words(&plan, pair, rest_m), "rest");
-        assert_eq!(in_words(&plan, pair, 2.0), "inside delta");
+        assert_eq!(in_words(&plan, pair, 2.001, 0.0), format!("push {:.2} m/s\u{b2}", -pushed));
+        let pulled = plan.pull_m_s2(pair, 9.0, 0.0).expect("a tension");
+        assert_eq!(in_words(&plan, pair, 9.0, 0.0), format!("pull {pulled:.2} m/s\u{b2}"));
+        let rest_m = plan.formation_at(0.0).desired_distance(0, 1);
+        assert_eq!(in_words(&plan, pair, rest_m, 0.0), "rest");
+        assert_eq!(in_words(&plan, pair, 2.0, 0.0), "inside delta");
     }
 
     #[test]
@@ -281,7 +282,7 @@ mod tests {
             let others = (0..swarm.count()).filter(|&j| j != i);
             let pulls = others.map(|j| {
                 let to_other = row(&swarm.positions_m, j) - row(&swarm.positions_m, i);
-                to_other.normalize() * plan.pull_m_s2(Pair::new(i, j), to_other.norm()).expect("a tension")
+                to_other.normalize() * plan.pull_m_s2(Pair::new(i, j), to_other.norm(), 0.0).expect("a tension")
             });
             assert!((pulls.sum::<Vector3<f64>>() - row(&control, i)).norm() < 1e-12, "vehicle {}", i + 1);
         }
@@ -291,9 +292,9 @@ mod tests {
     fn two_without_an_edge_have_no_tension_and_springs_are_long_or_short() {
         let mut ring = plan("pentagon");
         ring.graph = Graph::ring(5);
-        assert_eq!(in_words(&ring, Pair::new(0, 2), 3.0), "no edge");
+        assert_eq!(in_words(&ring, Pair::new(0, 2), 3.0, 0.0), "no edge");
         let springs = plan("pentagon-laplacian");
-        let rest_m = springs.formation.desired_distance(0, 1);
-        assert_eq!(in_words(&springs, Pair::new(0, 1), 1.5 * rest_m), "50 % too long");
+        let rest_m = springs.formation_at(0.0).desired_distance(0, 1);
+        assert_eq!(in_words(&springs, Pair::new(0, 1), 1.5 * rest_m, 0.0), "50 % too long");
     }
 }
