@@ -40,15 +40,15 @@ pub(super) const OUTCOMES: [Measure; 6] = [
 /// How soon the formation was reached, and how near two vehicles came.
 pub(super) const ARRIVALS: [Measure; 4] = [
     Measure { name: "time to reach, median", unit: "s", cell: |law| estimate(&law.reached_median_s) },
-    Measure { name: "time to reach, 95th percentile", unit: "s", cell: |law| estimate(&law.reached_p95_s) },
-    Measure { name: "smallest separation of all", unit: "m", cell: |law| smallest(law.min_smallest_m) },
-    Measure { name: "smallest separation, median", unit: "m", cell: |law| estimate(&law.min_median_m) },
+    Measure { name: "time to reach, 95 %", unit: "s", cell: |law| estimate(&law.reached_p95_s) },
+    Measure { name: "separation, smallest", unit: "m", cell: |law| smallest(law.min_smallest_m) },
+    Measure { name: "separation, median", unit: "m", cell: |law| estimate(&law.min_median_m) },
 ];
 
 /// What it cost.
 pub(super) const COSTS: [Measure; 4] = [
     Measure { name: "path length, mean", unit: "m", cell: |law| estimate(&law.path_length_mean_m) },
-    Measure { name: "peak control of all", unit: "m/s^2", cell: |law| plain(law.peak_control_largest_m_s2) },
+    Measure { name: "peak control, largest", unit: "m/s^2", cell: |law| plain(law.peak_control_largest_m_s2) },
     Measure { name: "peak control, median", unit: "m/s^2", cell: |law| estimate(&law.peak_control_median_m_s2) },
     Measure { name: "total control, mean", unit: "m/s", cell: |law| estimate(&law.total_control_mean_m_s) },
 ];

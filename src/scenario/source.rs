@@ -57,6 +57,14 @@ impl Source {
         Err(unknown_builtin(name_or_path))
     }
 
+    /// The folder that paths in a scenario count from: the file's own, or else where the program runs.
+    pub(super) fn folder(&self) -> &Path {
+        match self {
+            Self::File(path) => path.parent().unwrap_or(Path::new("")),
+            Self::Builtin(_) | Self::Text { .. } => Path::new(""),
+        }
+    }
+
     /// What it is called and its text.
     pub(super) fn text(&self) -> Result<(String, String), ScenarioError> {
         match self {
@@ -80,12 +88,18 @@ impl Scenario {
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
         let text = Text { name: &name, toml: &text, overrides };
-        #[cfg_attr(not(feature = "shapes"), expect(unused_mut, reason = "files are looked for"))]
-        let mut document = text.decode()?;
-        #[cfg(feature = "shapes")]
-        find_files(&mut document, folder(source)).map_err(|error| text.place(error))?;
-        finish(document, &text)
+        finish(decoded(&text, source.folder())?, &text)
     }
+}
+
+/// Reads the keys of a text, whose paths count from a folder.
+#[cfg_attr(not(feature = "shapes"), expect(unused_variables, reason = "no key is a path"))]
+pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, ScenarioError> {
+    #[cfg_attr(not(feature = "shapes"), expect(unused_mut, reason = "files are looked for"))]
+    let mut document = text.decode()?;
+    #[cfg(feature = "shapes")]
+    find_files(&mut document, folder).map_err(|error| text.place(error))?;
+    Ok(document)
 }
 
 /// Completes and checks what was read from a text.
@@ -112,15 +126,6 @@ fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioErro
         }
     }
     Ok(())
-}
-
-/// The folder that paths in a scenario count from: the file's own, or else where the program runs.
-#[cfg(feature = "shapes")]
-fn folder(source: &Source) -> &Path {
-    match source {
-        Source::File(path) => path.parent().unwrap_or(Path::new("")),
-        Source::Builtin(_) | Source::Text { .. } => Path::new(""),
-    }
 }
 
 fn unknown_builtin(name: &str) -> ScenarioError {

@@ -1,10 +1,12 @@
 //! A scenario file as the pattern of many flights: under other laws, from other starts.
 
+use std::path::PathBuf;
+
 use super::document::{Document, StartShape};
 use super::error::ScenarioError;
 use super::laws::{kind, law_overrides};
 use super::overrides::Override;
-use super::source::{Source, finish};
+use super::source::{Source, decoded, finish};
 use super::spec::Scenario;
 use super::suggest::suggest;
 use super::text::Text;
@@ -17,6 +19,7 @@ use crate::law::LawSpec;
 pub struct Template {
     name: String,
     toml: String,
+    folder: PathBuf,
     overrides: Vec<Override>,
     own: Scenario,
     start_is_random: bool,
@@ -63,13 +66,14 @@ impl Template {
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, toml) = source.text()?;
         let text = Text { name: &name, toml: &toml, overrides };
-        let document = text.decode()?;
+        let document = decoded(&text, source.folder())?;
         let a22_per_s = document.swarm.a22_per_s;
         let named = document.laws.iter().map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s)));
         let laws = named.collect();
         let start_is_random = is_random(&document);
         let own = finish(document, &text)?;
-        Ok(Self { own, start_is_random, laws, overrides: overrides.to_vec(), name, toml })
+        let folder = source.folder().to_owned();
+        Ok(Self { own, start_is_random, laws, overrides: overrides.to_vec(), folder, name, toml })
     }
 
     /// The scenario as the file has it.
@@ -125,7 +129,7 @@ impl Template {
     /// [`ScenarioError`] where that cannot be flown, such as a start of two vehicles too near each other.
     pub fn scenario(&self, law: &NamedLaw, draw: Draw) -> Result<Scenario, ScenarioError> {
         let text = Text { name: &self.name, toml: &self.toml, overrides: &self.overrides };
-        let mut document = text.decode()?;
+        let mut document = decoded(&text, &self.folder)?;
         document.law.kind = law.law.clone();
         document.start.seed = draw.seed;
         document.start.jitter_m = draw.jitter_m.unwrap_or(document.start.jitter_m);
