@@ -98,6 +98,8 @@ pub(super) struct ImageKeys {
     /// A PNG picture; relative to the folder of the scenario file.
     pub(super) file: PathBuf,
     /// Which pixels are drawn: the opaque ones of a picture that has others, or else the dark ones, unless given.
+    #[serde(default)]
+    #[cfg_attr(feature = "schema", schemars(with = "Ink"))]
     pub(super) ink: Option<Ink>,
     /// Height of what is drawn in m.
     pub(super) height_m: Option<f64>,
