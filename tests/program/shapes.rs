@@ -31,7 +31,7 @@ fn folder(formation: &str) -> tempfile::TempDir {
     let write = |name: &str, bytes: &[u8]| fs::write(below.join(name), bytes).expect("a file");
     write("show.toml", format!("{FRAME}{formation}").as_bytes());
     write("logo.svg", LOGO.as_bytes());
-    write("points.csv", (0..14).map(|i| format!("{},0\n", 3 * i)).collect::<String>().as_bytes());
+    write("points.csv", (0..14).map(|i| format!("{},0", 3 * i)).collect::<Vec<_>>().join("\n").as_bytes());
     write("mask.png", &mask());
     folder
 }
