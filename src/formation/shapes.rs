@@ -10,8 +10,8 @@ use super::Formation;
 pub const NARROWEST_V_RAD: f64 = PI / 3.0;
 
 impl Formation {
-    /// Two straight arms in the plane z = 0 that meet at the origin in this angle, the tip towards x: the first slot is the
-    /// tip, the others are on the left and the right arm in turn.
+    /// Two straight arms in the plane z = 0 that meet at the origin in this angle, the tip towards x: the first slot
+    /// is the tip, the others are on the left and the right arm in turn.
     ///
     /// No two slots are nearer than `spacing_m`, and neighbours on an arm are that far apart, for angles from
     /// [`NARROWEST_V_RAD`] to pi.
@@ -24,9 +24,9 @@ impl Formation {
         })
     }
 
-    /// A filled triangle in the plane z = 0, its tip at the origin and towards x: rows of 1, 2, 3, ... slots, each slot
-    /// `spacing_m` from its neighbours in its own and the next rows. A last row that is not full is in the middle, as far as
-    /// that leaves the pattern.
+    /// A filled triangle in the plane z = 0, its tip at the origin and towards x: rows of 1, 2, 3, ... slots, each
+    /// slot `spacing_m` from its neighbours in its own and the next rows. A last row that is not full is in the
+    /// middle, as far as that leaves the pattern.
     #[must_use]
     pub fn wedge(count: usize, spacing_m: f64) -> Self {
         let row_of = |i: usize| ((8 * i + 1).isqrt() - 1) / 2;
@@ -41,8 +41,8 @@ impl Formation {
         })
     }
 
-    /// On a screw about the z axis, upwards from (`radius_m`, 0, 0): from slot to slot a turn by `step_rad`, with every full
-    /// turn a rise by `pitch_m`.
+    /// On a screw about the z axis, upwards from (`radius_m`, 0, 0): from slot to slot a turn by `step_rad`, with
+    /// every full turn a rise by `pitch_m`.
     #[must_use]
     pub fn helix(count: usize, radius_m: f64, pitch_m: f64, step_rad: f64) -> Self {
         Self::from_fn(count, |i| {
@@ -52,8 +52,8 @@ impl Formation {
         })
     }
 
-    /// The turn \[rad\] from slot to slot that lays neighbours on a helix `spacing_m` apart; `None` where not even half a
-    /// turn does.
+    /// The turn \[rad\] from slot to slot that lays neighbours on a helix `spacing_m` apart; `None` where not even
+    /// half a turn does.
     #[must_use]
     pub fn helix_step_rad(radius_m: f64, pitch_m: f64, spacing_m: f64) -> Option<f64> {
         let reaches = |step_rad: f64| chord_m(radius_m, pitch_m, step_rad) >= spacing_m;
@@ -70,8 +70,8 @@ impl Formation {
         }
     }
 
-    /// Distance \[m\] of the nearest two of `count` slots of [`Formation::helix`]: how far two are apart depends on their
-    /// numbers' difference alone. Infinite for fewer than two.
+    /// Distance \[m\] of the nearest two of `count` slots of [`Formation::helix`]: how far two are apart depends on
+    /// their numbers' difference alone. Infinite for fewer than two.
     #[must_use]
     pub fn helix_nearest_m(count: usize, radius_m: f64, pitch_m: f64, step_rad: f64) -> f64 {
         let mut nearest_m = f64::INFINITY;
@@ -85,9 +85,9 @@ impl Formation {
         nearest_m
     }
 
-    /// Circles about the origin in the plane z = 0, one slot in the middle, then 6, 12, 18, ...: rings lie `spacing_m` apart,
-    /// the six of the first ring too, and slots of the others a little more (at most pi / 3 times that). The slots of a last
-    /// ring that is not full are spread evenly over it.
+    /// Circles about the origin in the plane z = 0, one slot in the middle, then 6, 12, 18, ...: rings lie `spacing_m`
+    /// apart, the six of the first ring too, and slots of the others a little more (at most pi / 3 times that). The
+    /// slots of a last ring that is not full are spread evenly over it.
     #[must_use]
     pub fn rings(count: usize, spacing_m: f64) -> Self {
         let inside = |ring: usize| if ring == 0 { 0 } else { 3 * ring * (ring - 1) + 1 };
@@ -100,8 +100,8 @@ impl Formation {
         })
     }
 
-    /// A cubic grid from the origin, rows along x, layer on layer: as near to a cube as the number allows, the last row and
-    /// layer perhaps not full.
+    /// A cubic grid from the origin, rows along x, layer on layer: as near to a cube as the number allows, the last
+    /// row and layer perhaps not full.
     #[must_use]
     pub fn cube(count: usize, spacing_m: f64) -> Self {
         let columns = (1..=count).find(|side| side.saturating_pow(3) >= count).unwrap_or(1);

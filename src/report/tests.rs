@@ -19,7 +19,7 @@ fn passing(miss_m: f64) -> AuditOutcome {
     auditor.finish()
 }
 
-const REACHED: Summary = Summary {
+pub(super) const REACHED: Summary = Summary {
     extent_m: 6.0,
     fastest_m_s: 1.0,
     samples: 7201,
@@ -38,24 +38,24 @@ const REACHED: Summary = Summary {
     energy_max_over_initial: Some(1.0),
 };
 
-const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: None, max_edge_error_m: 8.57, ..REACHED };
+pub(super) const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: None, max_edge_error_m: 8.57, ..REACHED };
 
 /// What a test changes about an otherwise good run.
-struct Case {
-    audit: AuditOutcome,
-    summary: Summary,
-    trap_dimension: Option<usize>,
-    ended_early: Option<&'static str>,
-    refused: &'static [&'static str],
-    certificate: Certificate,
-    energy_falls: bool,
-    energy_rise: Option<EnergyRise>,
-    legs: usize,
-    ended_legs: Vec<LegSummary>,
+pub(super) struct Case {
+    pub(super) audit: AuditOutcome,
+    pub(super) summary: Summary,
+    pub(super) trap_dimension: Option<usize>,
+    pub(super) ended_early: Option<&'static str>,
+    pub(super) refused: &'static [&'static str],
+    pub(super) certificate: Certificate,
+    pub(super) energy_falls: bool,
+    pub(super) energy_rise: Option<EnergyRise>,
+    pub(super) legs: usize,
+    pub(super) ended_legs: Vec<LegSummary>,
 }
 
 impl Case {
-    fn good() -> Self {
+    pub(super) fn good() -> Self {
         let certificate =
             Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![], legs: vec![] };
         Self {
@@ -72,7 +72,7 @@ impl Case {
         }
     }
 
-    fn report(&self) -> Report {
+    pub(super) fn report(&self) -> Report {
         Report::new(&Findings {
             scenario_name: "pentagon",
             scenario_sha256: "00ff",
@@ -437,37 +437,6 @@ fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows()
     let verdict = risen(0.77, true);
     assert!(!verdict.pass && verdict.reasons[0].contains("rose from 3.6567e0 to 6.4724e0"), "{verdict:?}");
     assert!(risen(0.77, false).pass, "nothing is proved there");
-}
-
-#[test]
-fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
-    let ended = |ended_at_s: f64, reached_at_s: Option<f64>| LegSummary { ended_at_s, reached_at_s };
-    let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
-        let bound = |energy: f64, certified_m: f64| crate::law::LegBound { energy, certified_m: Some(certified_m) };
-        let certificate = Certificate { legs: vec![bound(3.0, 2.1), bound(4.0, 2.06)], ..Case::good().certificate };
-        Case { legs, ended_legs, summary, certificate, ..Case::good() }.report()
-    };
-    assert!(report(1, Vec::new(), REACHED).legs.is_empty());
-    let good = report(2, vec![ended(20.0, Some(12.0))], REACHED);
-    assert!(good.verdict.pass && good.headline().contains("; 2 of 2 legs reached"), "{}", good.headline());
-    let numbers = |leg: usize| {
-        let LegNumbers { from_s, to_s, reached_at_s, certified_m, .. } = good.legs[leg];
-        [from_s, to_s, reached_at_s, certified_m]
-    };
-    assert_eq!(numbers(0), [Some(0.0), Some(20.0), Some(12.0), Some(2.1)]);
-    assert_eq!(numbers(1), [Some(20.0), Some(120.0), Some(36.5), Some(2.06)]);
-    assert!(
-        good.text().contains("leg 2        from 20.000 s, reached at 36.500 s, certified 2.060000 m\n"),
-        "{}",
-        good.text()
-    );
-
-    let hurried = report(2, vec![ended(20.0, None)], REACHED);
-    assert!(!hurried.verdict.pass && hurried.headline().contains("1 of 2 legs reached"));
-    assert_eq!(hurried.verdict.reasons, ["Leg 1 was not reached before leg 2 began at 20.000 s."]);
-    let stuck = report(3, vec![ended(20.0, Some(12.0))], NOT_REACHED);
-    assert_eq!(stuck.verdict.reasons.last().map(String::as_str), Some("Leg 3 never began: leg 2 was not reached."));
-    assert_eq!((stuck.legs[2].from_s, stuck.legs[1].reached_at_s), (None, None));
 }
 
 #[test]

@@ -119,8 +119,8 @@ fn sized(
 }
 
 impl Dimension {
-    /// What a drawing, whose nearest slots are this near, is enlarged by to have the dimension that is asked for, if its slots then
-    /// are more than delta apart.
+    /// What a drawing, whose nearest slots are this near, is enlarged by to have the dimension that is asked for, if
+    /// its slots then are more than delta apart.
     fn scale(
         self,
         drawing: &Drawing,
@@ -143,9 +143,13 @@ impl Dimension {
         }
         let enough_m = rounded_up(delta_m * (1.0 + SLOT_MARGIN) / nearest * drawn);
         Err(ScenarioError::new(format!(
-            "in a drawing {asked_m} m {name}, {count} vehicles come as near as {nearest_m:.3} m, not more than delta = {delta_m} m"
+            "in a drawing {asked_m} m {name}, {count} vehicles come as near as {nearest_m} m, not more than delta = \
+             {delta_m} m"
         ))
-        .with_help(format!("set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer"))
+        .with_help(format!(
+            "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
+             vehicles"
+        ))
         .at(key)
         .at("swarm.count")
         .at("law.delta_m"))

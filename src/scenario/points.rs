@@ -8,12 +8,16 @@ use super::error::ScenarioError;
 use super::files::{KEY, bytes};
 use super::values::Point;
 
-/// The points of a file of text: columns x, y and perhaps z in m, in this order or as a first line names them (`x`, `y_m`, ...), with
-/// commas, semicolons, tabs or blanks between. Empty lines, and those that begin with `#`, do not count.
+/// The points of a file of text: columns x, y and perhaps z in m, in this order or as a first line names them (`x`,
+/// `y_m`, ...), with commas, semicolons, tabs or blanks between. Empty lines, and those that begin with `#`, do not
+/// count.
 pub(super) fn read(path: &Path) -> Result<Vec<Point>, ScenarioError> {
     let refused = |line: u64, said: &str| {
         ScenarioError::new(format!("{}:{line}: {said}", path.display()))
-            .with_help("a line has the coordinates of a slot in m, such as 1.5,2.0 or 1.5,2.0,3.0; a first line may name the columns x, y, z")
+            .with_help(
+                "a line has the coordinates of a slot in m, such as 1.5,2.0 or 1.5,2.0,3.0; a first line may name the \
+                 columns x, y, z",
+            )
             .at(KEY)
     };
     let bytes = bytes(path)?;
@@ -27,7 +31,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Point>, ScenarioError> {
         .comment(Some(b'#'))
         .delimiter(delimiter)
         .from_reader(text.as_bytes());
-    let mut columns: Option<Vec<usize>> = None;
+    let mut columns: Vec<usize> = Vec::new();
     let mut points = Vec::new();
     for record in reader.records() {
         let record =
@@ -37,23 +41,17 @@ pub(super) fn read(path: &Path) -> Result<Vec<Point>, ScenarioError> {
         if fields.is_empty() {
             continue;
         }
-        let columns = match &columns {
-            Some(columns) => columns,
-            None => {
-                let named = named(&fields);
-                let is_heading = named.is_some();
-                let unnamed = || if fields.len() <= 3 { Ok((0..fields.len()).collect()) } else { Err(fields.len()) };
-                let found = named.map_or_else(unnamed, Ok);
-                let found =
-                    found.map_err(|count| refused(line, &format!("{count} columns without the names x and y")))?;
-                let columns = columns.insert(found);
-                if is_heading {
-                    continue;
-                }
-                columns
+        if columns.is_empty() {
+            let named = named(&fields);
+            let is_heading = named.is_some();
+            let unnamed = || if fields.len() <= 3 { Ok((0..fields.len()).collect()) } else { Err(fields.len()) };
+            let found = named.map_or_else(unnamed, Ok);
+            columns = found.map_err(|count| refused(line, &format!("{count} columns without the names x and y")))?;
+            if is_heading {
+                continue;
             }
-        };
-        points.push(point(&fields, columns).map_err(|said| refused(line, &said))?);
+        }
+        points.push(point(&fields, &columns).map_err(|said| refused(line, &said))?);
     }
     if points.is_empty() { Err(refused(1, "there is no point")) } else { Ok(points) }
 }

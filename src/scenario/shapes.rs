@@ -45,7 +45,8 @@ pub(super) struct HelixKeys {
     pub(super) radius_m: f64,
     /// Rise of a full turn in m.
     pub(super) pitch_m: f64,
-    /// Distance between neighbours in m, and of the nearest slots; 1.5 times `law.delta_m` unless this or `turns` is given.
+    /// Distance between neighbours in m, and of the nearest slots; 1.5 times `law.delta_m` unless this or `turns` is
+    /// given.
     pub(super) spacing_m: Option<f64>,
     /// Turns from the first slot to the last, in place of `spacing_m`.
     pub(super) turns: Option<f64>,
@@ -98,6 +99,8 @@ pub(super) struct ImageKeys {
     /// A PNG picture; relative to the folder of the scenario file.
     pub(super) file: PathBuf,
     /// Which pixels are drawn: the opaque ones of a picture that has others, or else the dark ones, unless given.
+    #[serde(default)]
+    #[cfg_attr(feature = "schema", schemars(with = "Ink"))]
     pub(super) ink: Option<Ink>,
     /// Height of what is drawn in m.
     pub(super) height_m: Option<f64>,
@@ -113,7 +116,7 @@ pub(super) struct ImageKeys {
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileKeys {
-    /// A text file with a line for each slot: x, y and, unless it is 0, z in m, with commas, semicolons, tabs or blanks between; relative
-    /// to the folder of the scenario file. A first line may name the columns.
+    /// A text file with a line for each slot: x, y and, unless it is 0, z in m, with commas, semicolons, tabs or
+    /// blanks between; relative to the folder of the scenario file. A first line may name the columns.
     pub(super) file: PathBuf,
 }

@@ -36,7 +36,8 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
     })
 }
 
-/// Makes a shape's file, named relative to a folder, one that can be opened from where the program runs, and a file of points a list of them.
+/// Makes a shape's file, named relative to a folder, one that can be opened from where the program runs, and a file of
+/// points a list of them.
 #[cfg(feature = "shapes")]
 pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
     match shape {

@@ -1,4 +1,5 @@
-//! Formations that have a shape of their own: their slots, where their files are looked for, and what is refused of them.
+//! Formations that have a shape of their own: their slots, where their files are looked for, and what is refused of
+//! them.
 
 use std::fs;
 use std::path::Path;
@@ -105,8 +106,8 @@ fn files_are_looked_for_beside_the_scenario() {
         "ring.svg",
         "<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'><circle cx='4' cy='4' r='4'/></svg>",
     );
-    let points: String = (0..50).map(|i| format!("{},0,{}\n", 3 * i, i % 2)).collect();
-    save("points.csv", &points);
+    let points: Vec<String> = (0..50).map(|i| format!("{},0,{}", 3 * i, i % 2)).collect();
+    save("points.csv", &points.join("\n"));
     let read = |formation: &str, sets: &[&str]| {
         let file = below.join("scenario.toml");
         fs::write(&file, format!("{FRAME}{formation}")).expect("a file");
@@ -162,7 +163,7 @@ fn a_file_of_points_may_name_its_columns_and_gives_the_number_of_vehicles() {
     ] {
         let error = read(wrong).expect_err(wrong);
         assert!(error.message().contains(said) && error.help().is_some(), "{wrong:?}: {error}");
-        assert!(error.to_string().contains(&format!("test.toml:{LINE}:8")), "{error}");
+        assert!(error.to_string().contains(&format!("test.toml:{}:8", LINE + 1)), "{error}");
     }
 }
 

@@ -31,7 +31,7 @@ fn folder(formation: &str) -> tempfile::TempDir {
     let write = |name: &str, bytes: &[u8]| fs::write(below.join(name), bytes).expect("a file");
     write("show.toml", format!("{FRAME}{formation}").as_bytes());
     write("logo.svg", LOGO.as_bytes());
-    write("points.csv", (0..14).map(|i| format!("{},0\n", 3 * i)).collect::<String>().as_bytes());
+    write("points.csv", (0..14).map(|i| format!("{},0", 3 * i)).collect::<Vec<_>>().join("\n").as_bytes());
     write("mask.png", &mask());
     folder
 }
@@ -81,6 +81,7 @@ fn letters_named_on_the_command_line_are_flown() {
     let sets = [
         "law.kind=displacement",
         "swarm.count=14",
+        "start={shape=\"grid\", spacing_m=2}",
         "formation.shape=text",
         "formation.text=HI",
         "formation.assignment=optimal",
@@ -109,10 +110,10 @@ fn what_cannot_be_a_formation_is_refused_with_place_and_remedy() {
             "in a drawing 1 m wide, 14 vehicles",
             at(4),
         ),
-        ("shape = \"file\"\nfile = \"logo.svg\"", "below/logo.svg:1: 4 columns without the names x and y", at(2)),
+        ("shape = \"file\"\nfile = \"logo.svg\"", "below/logo.svg:1: 13 columns without the names x and y", at(2)),
         ("shape = \"file\"\nfile = \"few.csv\"", "2 slots in the formation for 14 vehicles", at(2)),
         ("shape = \"v\"\nangle_deg = 20", "a V with an angle of 20 degrees", at(2)),
-        ("shape = \"helix\"\nradius_m = 8\npitch_m = 1", "turns 1 m above each other do not keep", at(3)),
+        ("shape = \"helix\"\nradius_m = 3\npitch_m = 1", "turns 1 m above each other do not keep", at(3)),
     ] {
         let folder = folder(formation);
         fs::write(folder.path().join("below/few.csv"), "0,0\n9,9\n").expect("a file");

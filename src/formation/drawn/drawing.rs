@@ -37,9 +37,8 @@ enum Drawn {
 impl Drawing {
     /// The inside of letters, lines of text below each other.
     ///
-    /// # Errors
-    /// [`DrawingError`] for a character that the font does not have, more than [`MAX_TEXT_CHARS`](super::MAX_TEXT_CHARS), or
-    /// blanks alone.
+    /// # Errors [`DrawingError`] for a character that the font does not have, more than
+    /// [`MAX_TEXT_CHARS`](super::MAX_TEXT_CHARS), or blanks alone.
     pub fn text(text: &str) -> Result<Self, DrawingError> {
         let letters = text::letters(text)?;
         Ok(Self { drawn: Drawn::Areas(regions(&letters, false)?), letters: letters.len() })
@@ -53,8 +52,8 @@ impl Drawing {
         Self::curves(&svg::path(data)?, filled)
     }
 
-    /// An SVG file: the lines of its visible shapes, or what they surround. What is written in letters or holds pixels is
-    /// not drawn, and nothing that the file refers to is read.
+    /// An SVG file: the lines of its visible shapes, or what they surround. What is written in letters or holds pixels
+    /// is not drawn, and nothing that the file refers to is read.
     ///
     /// # Errors
     /// [`DrawingError`] for bytes that are no SVG, or draw nothing.
@@ -62,8 +61,8 @@ impl Drawing {
         Self::curves(&svg::file(bytes)?, filled)
     }
 
-    /// The pixels of a PNG picture that have this ink; without one, those that are opaque where some are not, or else those
-    /// that are dark.
+    /// The pixels of a PNG picture that have this ink; without one, those that are opaque where some are not, or else
+    /// those that are dark.
     ///
     /// # Errors
     /// [`DrawingError`] for bytes that are no PNG, more than [`MAX_PIXELS`](super::MAX_PIXELS), or no such pixel.
@@ -88,11 +87,11 @@ impl Drawing {
         }
     }
 
-    /// Slots on the drawing in the plane z = 0, whose middle is the origin and whose longer side is 1 m: spread as evenly as the
-    /// drawing allows, always the same, near ones by near numbers.
+    /// Slots on the drawing in the plane z = 0, whose middle is the origin and whose longer side is 1 m: spread as
+    /// evenly as the drawing allows, always the same, near ones by near numbers.
     ///
-    /// # Errors
-    /// [`DrawingError`] for more than [`MAX_DRAWN_SLOTS`], fewer than there are letters, or lines and areas without extent.
+    /// # Errors [`DrawingError`] for more than [`MAX_DRAWN_SLOTS`], fewer than there are letters, or lines and areas
+    /// without extent.
     pub fn slots(&self, count: usize) -> Result<Formation, DrawingError> {
         if count > MAX_DRAWN_SLOTS {
             return Err(DrawingError::Slots(count));

@@ -1,7 +1,7 @@
 //! Formations that are drawn: slots on the lines or all over the inside of letters, SVG and pictures.
 //!
-//! `text`, `svg` and `picture` read what is drawn into polylines or a mask, `walk` lays sample points on them, one next to
-//! the other, and `spread` chooses slots among those that keep apart.
+//! `text`, `svg` and `picture` read what is drawn into polylines or a mask, `walk` lays sample points on them, one
+//! next to the other, and `spread` chooses slots among those that keep apart.
 
 mod drawing;
 mod error;

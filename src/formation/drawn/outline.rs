@@ -10,7 +10,8 @@ pub(super) type Point = [f64; 2];
 /// How far a polyline may lie from its curve.
 const TOLERANCE: f64 = 1e-5;
 
-/// Coordinates are rounded to this part of the drawing, so that slots do not hang on the last bits of a platform's sines.
+/// Coordinates are rounded to this part of the drawing, so that slots do not hang on the last bits of a platform's
+/// sines.
 const GRID: f64 = (1_u64 << 36) as f64;
 
 /// Longest side of a drawing in its own units, and shortest: squares of both are normal numbers.
@@ -21,7 +22,8 @@ const SIDES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 pub(super) struct Region {
     /// Polylines; as areas they are closed.
     pub(super) lines: Vec<Vec<Point>>,
-    /// Whether what an even number of lines surround is outside; else what they surround in sum no times, with their sense.
+    /// Whether what an even number of lines surround is outside; else what they surround in sum no times, with their
+    /// sense.
     pub(super) even_odd: bool,
 }
 
@@ -32,8 +34,8 @@ pub(super) struct Curves {
     pub(super) even_odd: bool,
 }
 
-/// Curves as polylines, moved and scaled so that all of it just fits within 1 x 1, from the origin; turned upside down where y counts
-/// downwards.
+/// Curves as polylines, moved and scaled so that all of it just fits within 1 x 1, from the origin; turned upside down
+/// where y counts downwards.
 pub(super) fn regions(curves: &[Curves], y_is_down: bool) -> Result<Vec<Region>, DrawingError> {
     let boxes =
         curves.iter().filter(|curves| curves.path.segments().next().is_some()).map(|curves| curves.path.bounding_box());

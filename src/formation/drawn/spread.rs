@@ -1,17 +1,19 @@
 //! Slots among samples of a drawing, as evenly as it allows.
 //!
-//! Slots begin at equal numbers of samples from each other in the order of their walk, then move to the middles of what is
-//! nearest to them (Lloyd 1982), never off the drawing. What still stands too near another one moves into a wider gap beside it.
+//! Slots begin at equal numbers of samples from each other in the order of their walk, then move to the middles of
+//! what is nearest to them (Lloyd 1982), never off the drawing. What still stands too near another one moves into a
+//! wider gap beside it.
 
 use super::outline::Point;
 
-/// Most rounds in a row in which all slots move to the middles of their parts.
-const ROUNDS: usize = 40;
+/// Rounds in a row in which all slots move to the middles of their parts: fewer, the more samples there are.
+const ROUNDS: [usize; 2] = [10, 40];
 /// A round that moves no slot by more than this part of a cell is the last.
 const SETTLED: f64 = 1e-3;
-/// How often slots move into gaps and settle again, and how many samples are looked at for that before it is done less often.
-const SPREADS: usize = 6;
-const SAMPLES_LOOKED_AT: usize = 100_000_000;
+/// How often slots move into gaps and settle again: less often, the more samples there are.
+const SPREADS: [usize; 2] = [1, 6];
+/// Samples that are looked at in all rounds, about, before rounds are fewer.
+const LOOKED_AT: usize = 40_000_000;
 /// Nearer to its neighbour than this part of what the median slot is, a slot moves into a gap before all settle again,
 const NEAR: f64 = 0.9;
 /// and than this part in the end, to stay there.
@@ -21,22 +23,24 @@ const GAP_ROUNDS: usize = 8;
 /// Cells are enlarged by this factor until they are not more than there are slots.
 const LARGER: f64 = 1.3;
 
-/// `count` places on the drawing, in the order of the samples where they begin. `step` is about the distance of neighbouring samples;
-/// a place may be off all samples by `off` at most.
+/// `count` places on the drawing, in the order of the samples where they begin. `step` is about the distance of
+/// neighbouring samples; a place may be off all samples by `off` at most.
 pub(super) fn spread(samples: &[Point], count: usize, step: f64, off: f64) -> Vec<Point> {
     if samples.is_empty() {
         return Vec::new();
     }
     let mut field = Field::new(samples, count, step);
-    for _ in 0..(SAMPLES_LOOKED_AT / (ROUNDS * samples.len())).clamp(1, SPREADS) {
-        field.settle(off);
-        if !field.into_gaps(NEAR) {
+    let few = |[least, most]: [usize; 2], samples: usize| (LOOKED_AT / samples).clamp(least, most);
+    let rounds = few(ROUNDS, samples.len());
+    for _ in 0..few(SPREADS, samples.len() * rounds) {
+        field.settle(rounds, off);
+        if !field.fill_gaps(NEAR) {
             break;
         }
     }
-    field.settle(off);
+    field.settle(rounds, off);
     for _ in 0..GAP_ROUNDS {
-        if !field.into_gaps(TOO_NEAR) {
+        if !field.fill_gaps(TOO_NEAR) {
             break;
         }
     }
@@ -103,18 +107,18 @@ impl Field {
         near.extend(members.map(|&i| (i, self.slots[i].place)));
     }
 
-    /// Moves all slots to the middles of their parts until none moves far.
-    fn settle(&mut self, off: f64) {
-        for _ in 0..ROUNDS {
-            if self.to_the_middles(off) <= SETTLED * self.side {
+    /// Moves all slots to the middles of their parts until none moves far, or for so many rounds.
+    fn settle(&mut self, rounds: usize, off: f64) {
+        for _ in 0..rounds {
+            if self.step_to_middles(off) <= SETTLED * self.side {
                 break;
             }
         }
     }
 
-    /// Moves every slot to the middle of the samples that it is the nearest slot of, or else, where that is off the drawing, to the one of
-    /// them that is nearest to there; the farthest move.
-    fn to_the_middles(&mut self, off: f64) -> f64 {
+    /// Moves every slot to the middle of the samples that it is the nearest slot of, or else, where that is off the
+    /// drawing, to the one of them that is nearest to there; the farthest move.
+    fn step_to_middles(&mut self, off: f64) -> f64 {
         let owners = self.owners();
         let mut sums = vec![([0.0, 0.0], 0.0); self.slots.len()];
         for (&owner, sample) in owners.iter().zip(&self.samples) {
@@ -125,13 +129,12 @@ impl Field {
         }
         let middles: Vec<Point> = sums.iter().map(|(sum, count)| sum.map(|x| x / count)).collect();
         let mut nearest: Vec<Option<(f64, Slot)>> = vec![None; self.slots.len()];
-        for cell in 0..self.around.len() {
-            for at in self.begins[cell]..self.begins[cell + 1] {
-                let Some(owner) = owners[at] else { continue };
-                let apart = square(self.samples[at], middles[owner]);
-                if nearest[owner].is_none_or(|(least, _)| apart < least) {
-                    nearest[owner] = Some((apart, Slot { place: self.samples[at], cell }));
-                }
+        let cells = self.begins.windows(2).enumerate().flat_map(|(cell, ends)| (ends[0]..ends[1]).map(move |_| cell));
+        for ((&owner, &place), cell) in owners.iter().zip(&self.samples).zip(cells) {
+            let Some(owner) = owner else { continue };
+            let apart = square(place, middles[owner]);
+            if nearest[owner].is_none_or(|(least, _)| apart < least) {
+                nearest[owner] = Some((apart, Slot { place, cell }));
             }
         }
         let mut farthest = 0.0_f64;
@@ -159,17 +162,17 @@ impl Field {
         owners
     }
 
-    /// Moves each slot that is nearer to another one than this part of what the median slot is to where, among the samples around it, it is farthest from all others; whether
-    /// any has moved. No slot comes nearer to another one than the one that moved was before.
-    fn into_gaps(&mut self, near_part: f64) -> bool {
+    /// Moves each slot that is nearer to another one than this part of what the median slot is: to where, among the
+    /// samples around it, it is farthest from all others. Whether any has moved; no slot comes nearer to another one
+    /// than the one that moved was before.
+    fn fill_gaps(&mut self, near_part: f64) -> bool {
         let mut near = Vec::new();
-        let mut apart: Vec<f64> = (0..self.slots.len()).map(|i| self.apart(self.slots[i], i, &mut near)).collect();
-        let order = apart.len() / 2;
-        let median =
-            if apart.is_empty() { 0.0 } else { *apart.clone().select_nth_unstable_by(order, f64::total_cmp).1 };
+        let mut apart: Vec<f64> = (0..self.slots.len()).map(|i| self.apart(i, &mut near)).collect();
+        let middle = apart.len() / 2;
+        let median = if apart.is_empty() { 0.0 } else { *apart.select_nth_unstable_by(middle, f64::total_cmp).1 };
         let mut moved = false;
         for i in 0..self.slots.len() {
-            let now = self.apart(self.slots[i], i, &mut near);
+            let now = self.apart(i, &mut near);
             if now >= near_part * near_part * median {
                 continue;
             }
@@ -179,15 +182,14 @@ impl Field {
                 self.members[left].retain(|&member| member != i);
                 self.members[place.cell].push(i);
                 self.slots[i] = place;
-                apart[i] = widest;
                 moved = true;
             }
         }
         moved
     }
 
-    /// The place among the samples around a slot that is farthest from the nearest other slot, if that is farther than `least`; and
-    /// the square of how far.
+    /// The place among the samples around a slot that is farthest from the nearest other slot, if that is farther than
+    /// `least`; and the square of how far.
     fn widest(&self, i: usize, least: f64, near: &mut Vec<(usize, Point)>) -> (f64, Slot) {
         let mut widest = (least, self.slots[i]);
         for &cell in &self.around[self.slots[i].cell] {
@@ -203,11 +205,11 @@ impl Field {
         widest
     }
 
-    /// Square of the distance to the nearest other slot; infinite where none is near.
-    fn apart(&self, slot: Slot, i: usize, near: &mut Vec<(usize, Point)>) -> f64 {
-        self.near(slot.cell, near);
+    /// Square of the distance of a slot to the nearest other one; infinite where none is near.
+    fn apart(&self, i: usize, near: &mut Vec<(usize, Point)>) -> f64 {
+        self.near(self.slots[i].cell, near);
         let others = near.iter().filter(|&&(other, _)| other != i);
-        others.map(|&(_, other)| square(slot.place, other)).fold(f64::INFINITY, f64::min)
+        others.map(|&(_, other)| square(self.slots[i].place, other)).fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -31,11 +31,11 @@ fn length([x0, y0]: Point, [x1, y1]: Point) -> f64 {
     libm::hypot(x1 - x0, y1 - y0)
 }
 
-/// Points inside what is drawn: `count` of the middles of its pixels, or of equal parts of them, the others evenly left out; with them
-/// the side of a part. None where nothing is drawn.
+/// Points inside what is drawn: `count` of the middles of its pixels, or of equal parts of them, the others evenly
+/// left out; with them the side of a part. None where nothing is drawn.
 pub(super) fn inside(mask: &Mask, count: usize) -> (Vec<Point>, f64) {
     let drawn = mask.count();
-    let parts = if drawn == 0 { 1 } else { (1..).find(|parts| drawn * parts * parts >= count).unwrap_or(1) };
+    let parts = (1..=count.isqrt() + 1).find(|parts| drawn * parts * parts >= count).unwrap_or(1);
     let mut places: Vec<[usize; 2]> = mask
         .pixels()
         .flat_map(|[x, y]| (0..parts * parts).map(move |part| [x * parts + part % parts, y * parts + part / parts]))

@@ -1,0 +1,37 @@
+//! Tests of flights of several legs.
+
+use super::tests::{Case, NOT_REACHED, REACHED};
+use super::*;
+use crate::law::Certificate;
+use crate::metrics::{LegSummary, Summary};
+
+#[test]
+fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
+    let ended = |ended_at_s: f64, reached_at_s: Option<f64>| LegSummary { ended_at_s, reached_at_s };
+    let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
+        let bound = |energy: f64, certified_m: f64| crate::law::LegBound { energy, certified_m: Some(certified_m) };
+        let certificate = Certificate { legs: vec![bound(3.0, 2.1), bound(4.0, 2.06)], ..Case::good().certificate };
+        Case { legs, ended_legs, summary, certificate, ..Case::good() }.report()
+    };
+    assert!(report(1, Vec::new(), REACHED).legs.is_empty());
+    let good = report(2, vec![ended(20.0, Some(12.0))], REACHED);
+    assert!(good.verdict.pass && good.headline().contains("; 2 of 2 legs reached"), "{}", good.headline());
+    let numbers = |leg: usize| {
+        let LegNumbers { from_s, to_s, reached_at_s, certified_m, .. } = good.legs[leg];
+        [from_s, to_s, reached_at_s, certified_m]
+    };
+    assert_eq!(numbers(0), [Some(0.0), Some(20.0), Some(12.0), Some(2.1)]);
+    assert_eq!(numbers(1), [Some(20.0), Some(120.0), Some(36.5), Some(2.06)]);
+    assert!(
+        good.text().contains("leg 2        from 20.000 s, reached at 36.500 s, certified 2.060000 m\n"),
+        "{}",
+        good.text()
+    );
+
+    let hurried = report(2, vec![ended(20.0, None)], REACHED);
+    assert!(!hurried.verdict.pass && hurried.headline().contains("1 of 2 legs reached"));
+    assert_eq!(hurried.verdict.reasons, ["Leg 1 was not reached before leg 2 began at 20.000 s."]);
+    let stuck = report(3, vec![ended(20.0, Some(12.0))], NOT_REACHED);
+    assert_eq!(stuck.verdict.reasons.last().map(String::as_str), Some("Leg 3 never began: leg 2 was not reached."));
+    assert_eq!((stuck.legs[2].from_s, stuck.legs[1].reached_at_s), (None, None));
+}
