@@ -61,7 +61,7 @@ impl Graph {
         if self.count() <= DENSE_UP_TO {
             let mut eigenvalues = self.pinned_laplacian(pinning).symmetric_eigenvalues().data.as_vec().clone();
             eigenvalues.sort_unstable_by(f64::total_cmp);
-            return eigenvalues[if *pinning == Pinning::Nobody { 1 } else { 0 }];
+            return eigenvalues[usize::from(*pinning == Pinning::Nobody)];
         }
         Operator::new(self, pinning, &degrees).inverse_iteration().unwrap_or_else(|| {
             let count = self.count() as f64;
@@ -81,7 +81,6 @@ impl Graph {
                 Some(2.0 - 2.0 * libm::cos(2.0 * PI / count))
             }
             Pinning::Nobody if most == 2 => Some(2.0 - 2.0 * libm::cos(PI / count)),
-            Pinning::Nobody => None,
             Pinning::All => Some(1.0),
             Pinning::Listed(listed) if listed.is_empty() => Some(0.0),
             // The smaller root of x^2 - (N + 1) x + m, without cancellation.
@@ -93,7 +92,7 @@ impl Graph {
             Pinning::Leader(_) if self.count() == 1 => Some(1.0),
             Pinning::Leader(_) if self.is_complete() => Some(1.0),
             &Pinning::Leader(leader) if is_star && degrees[leader] == most => Some(1.0),
-            Pinning::Listed(_) | Pinning::Leader(_) => None,
+            Pinning::Nobody | Pinning::Listed(_) | Pinning::Leader(_) => None,
         }
     }
 
@@ -172,7 +171,9 @@ impl<'a> Operator<'a> {
         match *self.pinning {
             Pinning::Nobody => {
                 let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-                x.iter_mut().for_each(|x| *x -= mean);
+                for x in x {
+                    *x -= mean;
+                }
             }
             Pinning::Leader(leader) => x[leader] = 0.0,
             Pinning::All | Pinning::Listed(_) => {}

@@ -11,7 +11,7 @@ fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
     let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
         let bound = |energy: f64, certified_m: f64| crate::law::LegBound { energy, certified_m: Some(certified_m) };
         let certificate = Certificate { legs: vec![bound(3.0, 2.1), bound(4.0, 2.06)], ..Case::good().certificate };
-        Case { legs, ended_legs, summary, certificate, ..Case::good() }.report()
+        Case { summary, certificate, legs, ended_legs, ..Case::good() }.report()
     };
     assert!(report(1, Vec::new(), REACHED).legs.is_empty());
     let good = report(2, vec![ended(20.0, Some(12.0))], REACHED);

@@ -178,7 +178,7 @@ fn on_a_ring() -> Result<Claim, Untried> {
 struct Flipped(Box<dyn Law>);
 
 impl Law for Flipped {
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "flipped"
     }
 

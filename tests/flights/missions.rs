@@ -218,7 +218,7 @@ fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_w
 }
 
 /// |r''| = 0.1 m/s^2 at a radius of 10 km.
-const RADIUS_PERIOD_S: f64 = 1986.917_653;
+const RADIUS_PERIOD_S: f64 = 1_986.917_653;
 
 #[test]
 fn a_reference_cures_the_drift_that_feeding_causes() {
