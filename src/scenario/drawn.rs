@@ -4,9 +4,8 @@ use std::path::Path;
 
 use super::error::ScenarioError;
 use super::files;
-use super::limits::{SLOT_MARGIN, positive};
+use super::limits::{DEFAULT_SPACING, SLOT_MARGIN, positive, rounded_up};
 use super::shapes::{ImageKeys, SvgKeys, TextKeys};
-use super::slots::{DEFAULT_SPACING, rounded_up};
 use crate::formation::{Drawing, DrawingError, Formation, MAX_DRAWN_SLOTS};
 use crate::swarm::Pair;
 

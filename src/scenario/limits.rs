@@ -29,6 +29,10 @@ pub const CONTACT_PREDICTION_M: f64 = 0.02;
 /// step.
 pub(super) const SLOT_MARGIN: f64 = 1e-9;
 
+/// Distance of the nearest slots unless given, as a multiple of delta.
+#[cfg(feature = "files")]
+pub(super) const DEFAULT_SPACING: f64 = 1.5;
+
 /// Longest name \[characters\].
 pub const MAX_NAME_CHARS: usize = 64;
 
@@ -97,6 +101,18 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
 pub(super) fn pair_count(count: usize) -> u128 {
     let count = count as u128;
     count * count.saturating_sub(1) / 2
+}
+
+/// The next number upwards with four digits, or itself where there is none.
+#[cfg(feature = "files")]
+pub(super) fn rounded_up(number: f64) -> f64 {
+    let unit = libm::pow(10.0, libm::floor(libm::log10(number)) - 3.0);
+    let digits = (number / unit).ceil();
+    [digits, digits + 1.0]
+        .map(|digits| format!("{:.3e}", digits * unit).parse().unwrap_or(number))
+        .into_iter()
+        .find(|&rounded| rounded >= number)
+        .unwrap_or(number)
 }
 
 /// The first vehicle, and the first before it, that are at most `distance_m` apart.

@@ -2,13 +2,10 @@
 
 use super::document::FormationShape;
 use super::error::ScenarioError;
-use super::limits::{positive, require_finite};
+use super::limits::{DEFAULT_SPACING, positive, require_finite, rounded_up};
 use super::shapes::{HelixKeys, VKeys};
 use super::values::rows;
 use crate::formation::{Formation, NARROWEST_V_RAD};
-
-/// Distance of the nearest slots unless given, as a multiple of delta.
-pub(super) const DEFAULT_SPACING: f64 = 1.5;
 
 /// The formation of a shape.
 pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
@@ -78,17 +75,6 @@ fn v(keys: &VKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioErro
     Ok(Formation::v(count, spacing(keys.spacing_m, delta_m)?, angle_rad))
 }
 
-/// The next number upwards with four digits, or itself where there is none.
-pub(super) fn rounded_up(number: f64) -> f64 {
-    let unit = libm::pow(10.0, libm::floor(libm::log10(number)) - 3.0);
-    let digits = (number / unit).ceil();
-    [digits, digits + 1.0]
-        .map(|digits| format!("{:.3e}", digits * unit).parse().unwrap_or(number))
-        .into_iter()
-        .find(|&rounded| rounded >= number)
-        .unwrap_or(number)
-}
-
 /// Part of the spacing by which rounding may bring slots of a helix nearer.
 const ROUNDING: f64 = 1e-12;
 
@@ -120,7 +106,9 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         Formation::helix_nearest_m(count, radius_m, pitch_m, step_rad) >= spacing_m * (1.0 - ROUNDING)
     };
     if !keeps(pitch_m, step_rad) {
-        let steeper = std::iter::successors(Some(pitch_m), |pitch_m| Some(pitch_m * STEEPER));
+        // With less, a slot is too near to the one above it wherever that is.
+        let flattest_m = pitch_m.max(0.5 * spacing_m);
+        let steeper = std::iter::successors(Some(flattest_m), |pitch_m| Some(pitch_m * STEEPER));
         let steeper = steeper.take_while(|&pitch_m| pitch_m <= 2.0 * spacing_m);
         let enough = |&pitch_m: &f64| {
             Formation::helix_step_rad(radius_m, pitch_m, spacing_m).is_some_and(|step_rad| keeps(pitch_m, step_rad))
