@@ -32,6 +32,6 @@ pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 
 #[cfg(test)]
-mod leg_tests;
+mod promise_tests;
 #[cfg(test)]
 mod tests;

@@ -45,15 +45,23 @@ impl Watch {
             }
         };
         let rise = EnergyRise { from, to: energy };
-        // By ratio, without dividing by an energy that may be zero.
-        let is_worse = |worst: EnergyRise| rise.to * worst.from > worst.to * rise.from;
-        if self.worst.is_none_or(is_worse) {
+        if self.worst.is_none_or(|worst| is_worse(rise, worst)) {
             self.worst = Some(rise);
         }
     }
 
     pub(super) fn worst(&self) -> Option<EnergyRise> {
         self.worst
+    }
+}
+
+/// Whether the energy rose by a larger ratio; from nothing to anything is the largest of all, and more of it larger still.
+fn is_worse(rise: EnergyRise, than: EnergyRise) -> bool {
+    let from_nothing = |rise: EnergyRise| rise.from <= 0.0 && rise.to > 0.0;
+    match (from_nothing(rise), from_nothing(than)) {
+        (true, true) => rise.to > than.to,
+        (one, other) if one != other => one,
+        _ => rise.to * than.from > than.to * rise.from,
     }
 }
 

@@ -1,6 +1,6 @@
-//! Tests of flights of several legs.
+//! Tests of what was promised before the first step, for one leg and several.
 
-use super::tests::{Case, NOT_REACHED, REACHED};
+use super::tests::{Case, NOT_REACHED, REACHED, passing};
 use super::*;
 use crate::law::Certificate;
 use crate::metrics::{LegSummary, Summary};
@@ -23,15 +23,27 @@ fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
     assert_eq!(numbers(0), [Some(0.0), Some(20.0), Some(12.0), Some(2.1)]);
     assert_eq!(numbers(1), [Some(20.0), Some(120.0), Some(36.5), Some(2.06)]);
     assert!(
-        good.text().contains("leg 2        from 20.000 s, reached at 36.500 s, certified 2.060000 m\n"),
+        good.text().contains("leg 2        from 20.00 s, reached at 36.50 s, certified 2.060000 m\n"),
         "{}",
         good.text()
     );
 
     let hurried = report(2, vec![ended(20.0, None)], REACHED);
     assert!(!hurried.verdict.pass && hurried.headline().contains("1 of 2 legs reached"));
-    assert_eq!(hurried.verdict.reasons, ["Leg 1 was not reached before leg 2 began at 20.000 s."]);
+    assert_eq!(hurried.verdict.reasons, ["Leg 1 was not reached before leg 2 began at 20.00 s."]);
     let stuck = report(3, vec![ended(20.0, Some(12.0))], NOT_REACHED);
     assert_eq!(stuck.verdict.reasons.last().map(String::as_str), Some("Leg 3 never began: leg 2 was not reached."));
     assert_eq!((stuck.legs[2].from_s, stuck.legs[1].reached_at_s), (None, None));
+}
+
+#[test]
+fn a_certificate_is_broken_by_a_share_of_its_clearance() {
+    let report = |certified_m: f64, closest_m: f64| {
+        let certificate =
+            Certificate { certified_m: Some(certified_m), energy_initial: Some(3.656), void: vec![], legs: vec![] };
+        Case { audit: passing(closest_m), certificate, ..Case::good() }.report().verdict
+    };
+    // A clearance of 1.451 mm of which a tenth is missing, and one of which nothing is but rounding.
+    assert!(!report(2.001_451, 2.001_314).pass);
+    assert!(report(2.001_451, 2.001_450_5).pass);
 }
