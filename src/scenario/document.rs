@@ -38,7 +38,8 @@ pub(super) struct Document {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) leg: Vec<LegTable>,
     /// A motion that the formations are carried along with; slots are places then.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "ReferenceTable"))]
     pub(super) reference: Option<ReferenceTable>,
     /// The control law.
     pub(super) law: LawTable,
@@ -160,7 +161,8 @@ pub(super) struct FormationTable {
     #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
     pub(super) yaw_deg: f64,
     /// Then they are moved by this in m.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Point"))]
     pub(super) move_m: Option<Point>,
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) shape: FormationShape,
@@ -187,7 +189,8 @@ pub(super) struct LegTable {
     #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
     pub(super) yaw_deg: f64,
     /// Then they are moved by this in m.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Point"))]
     pub(super) move_m: Option<Point>,
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) shape: Option<FormationShape>,

@@ -18,15 +18,15 @@ const PENTAGON_COUNT: usize = 5;
 /// How slots are placed.
 struct Placement {
     scale: f64,
-    yaw_deg: f64,
-    move_m: Option<Point>,
+    yaw_rad: f64,
+    offset_m: Vector3<f64>,
 }
 
 /// Gives a scenario without legs those of its file. One without a law is left for [`super::validate`] to refuse.
 pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[LegTable]) -> Result<(), ScenarioError> {
     let (count, delta_m) = (scenario.count(), scenario.delta_m);
-    let placement = Placement { scale: first.scale, yaw_deg: first.yaw_deg, move_m: first.move_m };
-    let leg = placed(Leg::first(formation(&first.shape, count, delta_m)?), &placement, 0)?;
+    let placement = Placement::of(0, (first.scale, first.yaw_deg, first.move_m))?;
+    let leg = placement.place(Leg::first(formation(&first.shape, count, delta_m)?));
     scenario.legs.push(leg);
     let is_assigned =
         first.assignment == Assignment::Optimal || later.iter().any(|leg| leg.assignment == Assignment::Optimal);
@@ -34,6 +34,7 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
     let starts_m = scenario.start.positions_m.clone();
     assign(&mut scenario.legs[0], first.assignment, &starts_m, freedom);
     for (number, table) in later.iter().enumerate() {
+        let placement = Placement::of(number + 1, (table.scale, table.yaw_deg, table.move_m))?;
         let before = scenario.legs[number].formation.clone();
         let formation = table
             .shape
@@ -41,8 +42,7 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
             .map_or_else(|| Ok(before.clone()), |shape| formation(shape, count, delta_m))
             .map_err(|error| error.on_leg(number + 1))?;
         let begins = table.start_s.map_or(Begins::Reached, Begins::At);
-        let placement = Placement { scale: table.scale, yaw_deg: table.yaw_deg, move_m: table.move_m };
-        let mut leg = placed(Leg { formation, begins }, &placement, number + 1)?;
+        let mut leg = placement.place(Leg { formation, begins });
         assign(&mut leg, table.assignment, &before.slots_m, freedom);
         scenario.legs.push(leg);
     }
@@ -76,19 +76,25 @@ fn assign(leg: &mut Leg, assignment: Assignment, from_m: &Rows, freedom: Option<
     }
 }
 
-fn placed(leg: Leg, placement: &Placement, number: usize) -> Result<Leg, ScenarioError> {
-    let &Placement { scale, yaw_deg, move_m } = placement;
-    let offset_m = move_m.map_or_else(Vector3::zeros, |point| point.coordinates().into());
-    let at = |error: ScenarioError, key| error.at_leg(number, key);
-    positive("formation.scale", "the scale", scale).map_err(|error| at(error, "formation.scale"))?;
-    require_finite("the turn", yaw_deg).map_err(|error| at(error, "formation.yaw_deg"))?;
-    for x in offset_m.iter() {
-        require_finite("a coordinate of the move", *x).map_err(|error| at(error, "formation.move_m"))?;
+impl Placement {
+    /// As leg `number`, from 0, has it.
+    fn of(number: usize, (scale, yaw_deg, move_m): (f64, f64, Option<Point>)) -> Result<Self, ScenarioError> {
+        let offset_m: Vector3<f64> = move_m.map_or_else(Vector3::zeros, |point| point.coordinates().into());
+        positive("formation.scale", "the scale", scale).map_err(|error| error.on_leg(number))?;
+        require_finite("the turn", yaw_deg).map_err(|error| error.at_leg(number, "formation.yaw_deg"))?;
+        for x in offset_m.iter() {
+            require_finite("a coordinate of the move", *x).map_err(|error| error.at_leg(number, "formation.move_m"))?;
+        }
+        Ok(Self { scale, yaw_rad: yaw_deg.to_radians(), offset_m })
     }
-    if scale == 1.0 && yaw_deg == 0.0 && offset_m == Vector3::zeros() {
-        return Ok(leg);
+
+    fn place(&self, leg: Leg) -> Leg {
+        let &Self { scale, yaw_rad, offset_m } = self;
+        if scale == 1.0 && yaw_rad == 0.0 && offset_m == Vector3::zeros() {
+            return leg;
+        }
+        leg.placed(scale, yaw_rad, offset_m)
     }
-    Ok(leg.placed(scale, yaw_deg.to_radians(), offset_m))
 }
 
 /// Moves each leg so that a leader's slot is where the leader is on the reference: it listens to nobody, and so the swarm is

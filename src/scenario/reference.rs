@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
-use super::limits::{at_least_zero, positive, require_finite};
+use super::limits::{SMALLEST, at_least_zero, positive, require_finite};
 use super::values::{All, Point, Vehicles};
 use crate::graph::Pinning;
 use crate::target::{Guidance, ReferenceMotion, Spline};
@@ -23,7 +23,8 @@ const JUMP: f64 = 10.0;
 #[serde(deny_unknown_fields)]
 pub(super) struct ReferenceTable {
     /// Who knows where the reference is: `"all"`, or a list of vehicles; all unless this or `leader` is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Vehicles"))]
     pub(super) known_by: Option<Vehicles>,
     /// A vehicle that flies the reference and listens to nobody: the others follow it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -156,7 +157,12 @@ impl ReferenceKind {
                 velocity_m_s: place("reference.velocity_m_s", velocity_m_s)?,
             },
             &Self::Circle { centre_m, radius_m, period_s } => {
-                positive("reference.period_s", "the time of a turn", period_s.abs())?;
+                require_finite("the time of a turn", period_s).map_err(|error| error.at("reference.period_s"))?;
+                if period_s.abs() < SMALLEST {
+                    return Err(ScenarioError::new(format!("one turn in {period_s} s is too fast to compute with"))
+                        .with_help(format!("a turn takes at least {SMALLEST:e} s; below zero it is clockwise"))
+                        .at("reference.period_s"));
+                }
                 ReferenceMotion::Circle {
                     centre_m: place("reference.centre_m", centre_m)?,
                     radius_m: positive("reference.radius_m", "the radius", radius_m)?,

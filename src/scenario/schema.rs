@@ -9,7 +9,7 @@ use super::overrides::{ARRIVAL, OLD_ARRIVAL};
 use crate::law::LawSpec;
 
 /// Keys, of any table, whose number is positive.
-const POSITIVE: [&str; 16] = [
+const POSITIVE: [&str; 17] = [
     "delta_m",
     "disagreement_m_s",
     "dt_s",
@@ -22,6 +22,7 @@ const POSITIVE: [&str; 16] = [
     "pitch_m",
     "radius_m",
     "record_hz",
+    "scale",
     "side_m",
     "spacing_m",
     "turns",
