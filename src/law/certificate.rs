@@ -24,6 +24,8 @@ pub enum Void {
     GraphNotComplete,
     /// Each vehicle is fed more than it is braked: the energy may grow.
     VelocityUndamped,
+    /// What a vehicle may command is limited, and what keeps two apart may be more.
+    CommandLimited,
     /// The target changes while the swarm flies.
     TargetChanges,
     /// What the vehicles know is not the true present state, or what they command does not arrive as given.
@@ -64,6 +66,7 @@ impl Void {
             Self::NoBarrier => "no-barrier",
             Self::GraphNotComplete => "graph-not-complete",
             Self::VelocityUndamped => "velocity-undamped",
+            Self::CommandLimited => "command-limited",
             Self::TargetChanges => "target-changes",
             Self::InexactLink => "inexact-link",
             Self::CommandsFromOutside => "commands-from-outside",
@@ -84,6 +87,9 @@ impl fmt::Display for Void {
             }
             Self::VelocityUndamped => {
                 f.write_str("The vehicles are fed more than the law brakes them: the energy may grow.")
+            }
+            Self::CommandLimited => {
+                f.write_str("The law limits what it commands: what keeps vehicles apart may be more than that.")
             }
             Self::TargetChanges => {
                 f.write_str("The target changes: what holds for the first leg need not for the next.")
@@ -113,6 +119,7 @@ mod tests {
             Void::NoBarrier,
             Void::GraphNotComplete,
             Void::VelocityUndamped,
+            Void::CommandLimited,
             Void::TargetChanges,
             Void::InexactLink,
             Void::CommandsFromOutside,
@@ -126,6 +133,7 @@ mod tests {
             "no-barrier",
             "graph-not-complete",
             "velocity-undamped",
+            "command-limited",
             "target-changes",
             "inexact-link",
             "commands-from-outside",
@@ -140,7 +148,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[8].to_string(),
+            reasons[9].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

@@ -9,7 +9,7 @@ use super::overrides::{ARRIVAL, OLD_ARRIVAL};
 use crate::law::LawSpec;
 
 /// Keys, of any table, whose number is positive.
-const POSITIVE: [&str; 12] = [
+const POSITIVE: [&str; 13] = [
     "delta_m",
     "disagreement_m_s",
     "dt_s",
@@ -19,12 +19,13 @@ const POSITIVE: [&str; 12] = [
     "min_separation_m",
     "PerVehicle",
     "radius_m",
+    "range_m",
     "record_hz",
     "side_m",
     "spacing_m",
 ];
 /// Keys, of any table, whose number is 0 or positive.
-const FROM_ZERO: [&str; 2] = ["hold_s", "jitter_m"];
+const FROM_ZERO: [&str; 3] = ["hold_s", "jitter_m", "margin_m"];
 
 /// The JSON Schema of the scenario file, with descriptions, units, bounds and defaults.
 #[must_use]
@@ -123,7 +124,7 @@ mod tests {
         assert_eq!(tables_with("count"), ["[swarm]"]);
         assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
         assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
-        assert_eq!(tables_with("spacing_m").len(), 4);
+        assert_eq!(tables_with("spacing_m").len(), 5);
         assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
     }
 }

@@ -10,5 +10,6 @@ mod loop_claims;
 mod plant_claims;
 mod random_scenarios;
 mod reference_flights;
+mod rivals;
 mod scenario_files;
 mod simulation;

@@ -15,9 +15,7 @@ fn half_space(normal: [f64; 3], offset: f64) -> HalfSpace {
 }
 
 fn nearest(given: &[HalfSpace], wish: Vector3<f64>, radius: f64) -> Nearest {
-    let mut half_spaces = HalfSpaces::default();
-    given.iter().for_each(|given| half_spaces.push(*given));
-    half_spaces.nearest(wish, radius)
+    HalfSpaces { given: given.to_vec(), ..HalfSpaces::default() }.nearest(wish, radius)
 }
 
 /// Minimises `1/2 curvature |x|^2 + linear . x` over x, whose first three components are in the ball, with `rows . x <= limits`;
