@@ -35,6 +35,8 @@ pub enum Void {
     GraphNotComplete,
     /// Each vehicle is fed more than it is braked: the energy may grow.
     VelocityUndamped,
+    /// What a vehicle may command is limited, and what keeps two apart may be more.
+    CommandLimited,
     /// The target changes while the swarm flies.
     TargetChanges,
     /// What the vehicles know is not the true present state, or what they command does not arrive as given.
@@ -87,6 +89,7 @@ impl Void {
             Self::NoBarrier => "no-barrier",
             Self::GraphNotComplete => "graph-not-complete",
             Self::VelocityUndamped => "velocity-undamped",
+            Self::CommandLimited => "command-limited",
             Self::TargetChanges => "target-changes",
             Self::InexactLink => "inexact-link",
             Self::CommandsFromOutside => "commands-from-outside",
@@ -108,6 +111,9 @@ impl fmt::Display for Void {
             }
             Self::VelocityUndamped => {
                 f.write_str("The vehicles are fed more than the law brakes them: the energy may grow.")
+            }
+            Self::CommandLimited => {
+                f.write_str("The law limits what it commands: what keeps vehicles apart may be more than that.")
             }
             Self::TargetChanges => {
                 f.write_str("The target changes: what holds for the first leg need not for the next.")
@@ -161,6 +167,7 @@ mod tests {
             Void::NoBarrier,
             Void::GraphNotComplete,
             Void::VelocityUndamped,
+            Void::CommandLimited,
             Void::TargetChanges,
             Void::InexactLink,
             Void::CommandsFromOutside,
@@ -175,6 +182,7 @@ mod tests {
             "no-barrier",
             "graph-not-complete",
             "velocity-undamped",
+            "command-limited",
             "target-changes",
             "inexact-link",
             "commands-from-outside",

@@ -4,27 +4,35 @@
 //! the laws that scenarios may name. A law of your own implements [`Law`] and is flown like the built-in ones
 //! (see `examples/own_law.rs`).
 
+mod cbf_qp;
 mod certificate;
 mod consensus;
 mod displacement;
 mod edge_tension;
 mod error;
+mod flocking;
+mod half_spaces;
 mod interface;
 mod kernel;
 mod laplacian;
 mod memo;
+mod near_lists;
+mod orca;
 mod pinned;
 mod potential;
 mod setting;
 mod spec;
 mod tension;
 
+pub use cbf_qp::{CbfQpKeys, CbfQpLaw};
 pub use certificate::{Certificate, LegBound, Void};
 pub use displacement::{DisplacementKeys, DisplacementLaw};
 pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw, EdgeTensionParameters};
 pub use error::{LawError, ParameterError};
+pub use flocking::{FlockingKeys, FlockingLaw};
 pub use interface::{Controls, Law, VelocityMargin};
 pub use laplacian::{LaplacianKeys, LaplacianLaw};
+pub use orca::{OrcaKeys, OrcaLaw};
 pub use potential::{PotentialKeys, PotentialLaw};
 pub use setting::{Gain, Setting};
 pub use spec::LawSpec;

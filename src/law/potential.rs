@@ -15,7 +15,7 @@ use super::tension::TensionError;
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::Observation;
-use crate::swarm::{Pair, Rows, row};
+use crate::swarm::{Pair, Rows, row, set_row};
 use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "potential"`.
@@ -29,11 +29,14 @@ pub struct PotentialKeys {
     pub c_per_s: f64,
     /// Scale of the repulsion in m^4/s^2.
     pub eta_m4_per_s2: f64,
+    /// Highest acceleration that is commanded in m/s^2; no limit unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_accel_m_s2: Option<f64>,
 }
 
 impl Default for PotentialKeys {
     fn default() -> Self {
-        Self { k_per_s2: 1.0, c_per_s: 2.0, eta_m4_per_s2: 1.0 }
+        Self { k_per_s2: 1.0, c_per_s: 2.0, eta_m4_per_s2: 1.0, max_accel_m_s2: None }
     }
 }
 
@@ -44,11 +47,14 @@ impl PotentialKeys {
     }
 
     pub(super) fn gains(&self) -> Vec<Gain> {
-        vec![
+        let gains = [
             Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
             Gain::positive("law.c_per_s", "the braking c", self.c_per_s),
             Gain::positive("law.eta_m4_per_s2", "the scale eta", self.eta_m4_per_s2),
-        ]
+        ];
+        let limit =
+            self.max_accel_m_s2.map(|limit| Gain::positive("law.max_accel_m_s2", "the highest acceleration", limit));
+        gains.into_iter().chain(limit).collect()
     }
 
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<PotentialLaw, ParameterError> {
@@ -64,7 +70,8 @@ impl PotentialKeys {
 /// U(l) = (eta/2) (1/rho - 1/rho_R)^2,    R = smallest distance of two slots,    rho_R = R - delta
 /// ```
 ///
-/// Vehicles repel each other while they are nearer than slots are, whether they are linked or not.
+/// Vehicles repel each other while they are nearer than slots are, whether they are linked or not. Where an acceleration is limited,
+/// longer ones are shortened to that, and nothing is certified.
 ///
 /// # Energy
 /// ```text
@@ -73,7 +80,7 @@ impl PotentialKeys {
 ///
 /// # Certificate
 /// For c >= a22 the energy never grows, so U(l) <= E(0) for *every* pair, on every graph. It assumes exact knowledge of
-/// links and near pairs, no saturation, no disturbance, continuous time.
+/// links and near pairs, no limit on the acceleration, no disturbance, continuous time.
 ///
 /// # Cost
 /// O(links + near pairs) a step without allocation, and so is its energy; that of any other state compares all pairs.
@@ -194,6 +201,9 @@ impl Law for PotentialLaw {
         if let Some(swarm) = at.shared() {
             self.memo.keep(&swarm.positions_m, potential);
         }
+        if let Some(limit) = self.keys.max_accel_m_s2 {
+            (0..command.nrows()).for_each(|i| set_row(command, i, row(command, i).cap_magnitude(limit)));
+        }
         check_range(command)
     }
 
@@ -220,6 +230,9 @@ impl Law for PotentialLaw {
         let mut void = Vec::new();
         if self.keys.c_per_s < self.a22_per_s {
             void.push(Void::VelocityUndamped);
+        }
+        if self.keys.max_accel_m_s2.is_some() {
+            void.push(Void::CommandLimited);
         }
         let energy = self.try_energy(start).map_err(|fault| void.push(Void::StartRefused(fault))).ok();
         let certified_m = energy.filter(|_| void.is_empty() && start.own.count() > 1).map(|energy| {

@@ -2,11 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::cbf_qp::CbfQpKeys;
 use super::displacement::DisplacementKeys;
 use super::edge_tension::EdgeTensionKeys;
 use super::error::ParameterError;
+use super::flocking::FlockingKeys;
 use super::interface::Law;
 use super::laplacian::LaplacianKeys;
+use super::orca::OrcaKeys;
 use super::potential::PotentialKeys;
 use super::setting::{Gain, Setting};
 
@@ -59,4 +62,10 @@ laws! {
     Laplacian(LaplacianKeys),
     /// A potential field: consensus on the slots, repulsion from whoever is near, each vehicle braking itself.
     Potential(PotentialKeys),
+    /// Velocities that are reciprocally free of collisions, tracked.
+    Orca(OrcaKeys),
+    /// A controller to the slot, overruled where two could no longer brake.
+    CbfQp(CbfQpKeys),
+    /// One distance to all who are near, bounded forces: a lattice, not given slots.
+    Flocking(FlockingKeys),
 }

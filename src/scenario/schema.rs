@@ -9,7 +9,7 @@ use super::overrides::{ARRIVAL, OLD_ARRIVAL};
 use crate::law::LawSpec;
 
 /// Keys, of any table, whose number is positive.
-const POSITIVE: [&str; 17] = [
+const POSITIVE: [&str; 18] = [
     "delta_m",
     "disagreement_m_s",
     "dt_s",
@@ -21,6 +21,7 @@ const POSITIVE: [&str; 17] = [
     "PerVehicle",
     "pitch_m",
     "radius_m",
+    "range_m",
     "record_hz",
     "scale",
     "side_m",
@@ -29,7 +30,7 @@ const POSITIVE: [&str; 17] = [
     "width_m",
 ];
 /// Keys, of any table, whose number is 0 or positive.
-const FROM_ZERO: [&str; 2] = ["hold_s", "jitter_m"];
+const FROM_ZERO: [&str; 3] = ["hold_s", "jitter_m", "margin_m"];
 
 /// The JSON Schema of the scenario file, with descriptions, units, bounds and defaults.
 #[must_use]
@@ -135,7 +136,7 @@ mod tests {
         assert_eq!(tables_with("count"), ["[swarm]"]);
         assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
         assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
-        assert_eq!(tables_with("spacing_m").len(), 4 + 5 + if cfg!(feature = "shapes") { 3 } else { 0 });
+        assert_eq!(tables_with("spacing_m").len(), 5 + 5 + if cfg!(feature = "shapes") { 3 } else { 0 });
         assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
     }
 }

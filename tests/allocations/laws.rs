@@ -4,9 +4,10 @@ use stats_alloc::Region;
 use tautline::formation::{Formation, best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use tautline::graph::Graph;
 use tautline::law::{
-    DisplacementKeys, DisplacementLaw, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, Setting,
+    DisplacementKeys, DisplacementLaw, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, LawSpec, Setting,
 };
 use tautline::observation::Observation;
+use tautline::space::NearPairs;
 use tautline::swarm::{Rows, Swarm};
 
 use crate::ALLOCATOR;
@@ -41,4 +42,22 @@ pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
     let region = Region::new(ALLOCATOR);
     std::hint::black_box(Graph::complete(40).laplacian());
     assert!(region.change().allocations > 0, "the counter sees what is allocated");
+}
+
+pub(crate) fn a_law_that_senses_allocates_nothing_once_its_lists_have_grown() {
+    let (links, formation) = (Graph::ring(30), Formation::sphere(30, 6.0));
+    let crowd = Swarm::at_rest(Formation::sphere(30, 3.0).slots_m);
+    let mut control = Rows::zeros(30);
+    for spec in LawSpec::all() {
+        let setting = Setting::new(&links, &formation, 0.8, 0.1);
+        let mut law = spec.complete(0.1).build(&setting).expect("a law");
+        let mut near = NearPairs::default();
+        near.update(&crowd.positions_m, law.sensing_range_m().unwrap_or(0.0));
+        let at = Observation { near: near.pairs(), ..Observation::exact(&crowd, &links, &formation) };
+        law.command(&at, &mut control).expect("a state clear of delta");
+        let region = Region::new(ALLOCATOR);
+        law.command(&at, &mut control).expect("a state clear of delta");
+        let change = region.change();
+        assert_eq!(change.allocations + change.reallocations, 0, "{}: {change:?}", law.name());
+    }
 }

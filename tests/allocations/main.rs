@@ -17,6 +17,7 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 #[test]
 fn a_step_allocates_nothing() {
     laws::control_energy_and_errors_of_the_shape_allocate_nothing();
+    laws::a_law_that_senses_allocates_nothing_once_its_lists_have_grown();
     space::a_search_of_near_pairs_that_has_grown_allocates_nothing();
     audit::a_step_of_a_warm_auditor_allocates_nothing();
     step_loop::the_loop_allocates_nothing_per_step();

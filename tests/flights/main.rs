@@ -11,6 +11,7 @@ mod missions;
 mod plant_claims;
 mod random_scenarios;
 mod reference_flights;
+mod rivals;
 mod scenario_files;
 mod shapes;
 mod simulation;

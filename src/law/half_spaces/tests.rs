@@ -1,0 +1,191 @@
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
+use proptest::prelude::*;
+
+use super::*;
+
+/// Clarabel's own tolerance is 1e-8: of a violation, and of the square of a distance.
+const CLOSE: f64 = 1e-6;
+/// How much wider a set that may have no inside is made, so that clarabel has an answer.
+const WIDER: f64 = 1e-3;
+
+fn half_space(normal: [f64; 3], offset: f64) -> HalfSpace {
+    HalfSpace { normal: Vector3::from(normal).normalize(), offset }
+}
+
+fn nearest(given: &[HalfSpace], wish: Vector3<f64>, radius: f64) -> Nearest {
+    HalfSpaces { given: given.to_vec(), ..HalfSpaces::default() }.nearest(wish, radius)
+}
+
+/// Minimises `1/2 curvature |x|^2 + linear . x` over x, whose first three components are in the ball, with `rows . x <= limits`;
+/// `None` where clarabel does not come to an end, as in one of some thousand sets that are nearly flat.
+fn clarabel<const N: usize>(
+    mut rows: Vec<[f64; N]>,
+    mut limits: Vec<f64>,
+    radius: f64,
+    curvature: f64,
+    linear: [f64; N],
+) -> Option<Vec<f64>> {
+    let cones = [NonnegativeConeT(rows.len()), SecondOrderConeT(4)];
+    // (radius, x).
+    rows.push([0.0; N]);
+    limits.push(radius);
+    for axis in 0..3 {
+        rows.push(std::array::from_fn(|column| if column == axis { -1.0 } else { 0.0 }));
+        limits.push(0.0);
+    }
+    let quadratic: [[f64; N]; N] =
+        std::array::from_fn(|row| std::array::from_fn(|column| if row == column { curvature } else { 0.0 }));
+    let settings = DefaultSettings { verbose: false, ..DefaultSettings::default() };
+    let (quadratic, rows) = (CscMatrix::from(&quadratic), CscMatrix::from(&rows));
+    let mut solver = DefaultSolver::new(&quadratic, &linear, &rows, &limits, &cones, settings).expect("a program");
+    solver.solve();
+    (solver.solution.status == SolverStatus::Solved).then(|| solver.solution.x.clone())
+}
+
+/// The least largest violation, by clarabel: a fourth variable t with `normal . x + t >= offset`, t >= 0.
+fn least_violation(given: &[HalfSpace], radius: f64) -> f64 {
+    let rows = given.iter().map(|given| [-given.normal.x, -given.normal.y, -given.normal.z, -1.0]);
+    let rows = rows.chain([[0.0, 0.0, 0.0, -1.0]]).collect();
+    let limits = given.iter().map(|given| -given.offset).chain([0.0]).collect();
+    clarabel(rows, limits, radius, 0.0, [0.0, 0.0, 0.0, 1.0]).expect("its set has an inside")[3]
+}
+
+/// The square of the wish's distance to the half-spaces, by clarabel.
+fn squared_distance(given: &[HalfSpace], wish: Vector3<f64>, radius: f64) -> Option<f64> {
+    let rows = given.iter().map(|given| [-given.normal.x, -given.normal.y, -given.normal.z]).collect();
+    let limits = given.iter().map(|given| -given.offset).collect();
+    let found = clarabel(rows, limits, radius, 1.0, [-wish.x, -wish.y, -wish.z])?;
+    Some((Vector3::new(found[0], found[1], found[2]) - wish).norm_squared())
+}
+
+fn shifted(given: &[HalfSpace], by: f64) -> Vec<HalfSpace> {
+    given.iter().map(|given| HalfSpace { offset: given.offset + by, ..*given }).collect()
+}
+
+/// Whether an answer is clarabel's: in the ball, with the least largest violation, and as near as any such point; where the set
+/// of these has no inside, no nearer than a wider set, in which the answer is clarabel's.
+fn check(given: &[HalfSpace], wish: Vector3<f64>, radius: f64, found: Nearest) -> Result<(), String> {
+    let expect = |holds: bool, said: &str| if holds { Ok(()) } else { Err(format!("{said}: {found:?}")) };
+    expect(found.point.norm() <= radius * (1.0 + 1e-12), "outside of the ball")?;
+    let outside = given.iter().map(|given| given.violation(&found.point)).fold(0.0, f64::max);
+    expect((outside - found.violation).abs() <= 1e-9, "the violation is another")?;
+    let least = least_violation(given, radius);
+    expect((found.violation - least).abs() <= CLOSE, &format!("the least violation is {least}"))?;
+    let wider = shifted(given, -least - WIDER);
+    let Some(expected) = squared_distance(&wider, wish, radius) else { return Ok(()) };
+    let distance = |nearest: Nearest| (nearest.point - wish).norm_squared();
+    expect(distance(found) >= expected - CLOSE, "nearer than can be")?;
+    let in_wider = distance(nearest(&wider, wish, radius));
+    expect((in_wider - expected).abs() <= CLOSE, &format!("in a wider set {in_wider} is not {expected}"))?;
+    if least_violation(&shifted(given, WIDER), radius) > CLOSE {
+        return Ok(());
+    }
+    let Some(expected) = squared_distance(given, wish, radius) else { return Ok(()) };
+    expect((distance(found) - expected).abs() <= CLOSE, &format!("the nearest is the root of {expected} away"))
+}
+
+fn normals() -> impl Strategy<Value = [f64; 3]> {
+    prop::array::uniform3(-1.0..1.0_f64).prop_filter("a direction", |v| Vector3::from(*v).norm() > 0.1)
+}
+
+/// Half-spaces whose planes are far from parallel, most of whose sets are neither empty nor thin.
+fn general() -> impl Strategy<Value = Vec<HalfSpace>> {
+    prop::collection::vec((normals(), -1.0..0.7_f64).prop_map(|(normal, offset)| half_space(normal, offset)), 0..9)
+}
+
+/// Planes along the axes and diagonals: parallel ones, opposite ones, the same one again; turned by up to one of these angles.
+fn degenerate(turned: &'static [f64]) -> impl Strategy<Value = Vec<HalfSpace>> {
+    let whole = prop::array::uniform3(-1..2_i32).prop_filter("a direction", |v| *v != [0; 3]);
+    let one = (whole, prop::sample::select(turned), -3..3_i32).prop_map(|(v, by, offset)| {
+        half_space([f64::from(v[0]) + by, f64::from(v[1]) - by, f64::from(v[2])], 0.25 * f64::from(offset))
+    });
+    prop::collection::vec(one, 0..9)
+}
+
+fn wishes() -> impl Strategy<Value = Vector3<f64>> {
+    prop::array::uniform3(-1.5..1.5_f64).prop_map(Vector3::from)
+}
+
+proptest! {
+    #[test]
+    fn the_answer_is_clarabels(given in general(), wish in wishes(), radius in 0.3..2.0_f64) {
+        check(&given, wish, radius, nearest(&given, wish, radius)).map_err(TestCaseError::fail)?;
+    }
+
+    #[test]
+    fn among_parallel_opposite_and_repeated_planes_it_is_clarabels_too(
+        given in degenerate(&[0.0]), wish in wishes(), radius in 0.3..2.0_f64,
+    ) {
+        // Where planes leave a point or a line, clarabel's answer is that of a wider set.
+        let wider = shifted(&given, -WIDER);
+        check(&wider, wish, radius, nearest(&wider, wish, radius)).map_err(TestCaseError::fail)?;
+        let (found, least) = (nearest(&given, wish, radius), least_violation(&given, radius));
+        prop_assert!((found.violation - least).abs() <= CLOSE, "{found:?} {least}");
+    }
+
+    #[test]
+    fn among_nearly_parallel_planes_it_violates_as_little_as_clarabels(
+        given in degenerate(&[0.0, 1e-3, 1e-6, 1e-9, 1e-10, 1e-12]), wish in wishes(), radius in 0.3..2.0_f64,
+    ) {
+        let found = nearest(&given, wish, radius);
+        prop_assert!(found.point.norm() <= radius * (1.0 + 1e-12));
+        let least = least_violation(&given, radius);
+        prop_assert!((found.violation - least).abs() <= CLOSE + 1e-6 * (radius + 0.5), "{found:?} {least}");
+    }
+
+    #[test]
+    fn a_problem_in_the_plane_is_answered_in_the_plane(
+        given in prop_oneof![general(), degenerate(&[0.0, 1e-9])], wish in wishes(), radius in 0.3..2.0_f64,
+    ) {
+        let flat: Vec<HalfSpace> = given
+            .iter()
+            .filter(|given| given.normal.xy().norm() > 1e-3)
+            .map(|given| half_space([given.normal.x, given.normal.y, 0.0], given.offset))
+            .collect();
+        let wish = Vector3::new(wish.x, wish.y, 0.0);
+        let found = nearest(&flat, wish, radius);
+        prop_assert_eq!(found.point.z, 0.0);
+        let least = least_violation(&flat, radius);
+        prop_assert!((found.violation - least).abs() <= CLOSE, "{found:?} {least}");
+    }
+
+    #[test]
+    fn an_answer_that_leaves_out_a_half_space_is_not_clarabels(mut given in general(), away in normals()) {
+        let wish = 2.0 * Vector3::from(away).normalize();
+        let wrong = nearest(&given, wish, 1.0);
+        let left_out = HalfSpace { normal: -0.5 * wish, offset: 0.3 };
+        prop_assume!(left_out.violation(&wrong.point) > 1e-3 + wrong.violation);
+        given.push(left_out);
+        prop_assert!(check(&given, wish, 1.0, wrong).is_err());
+    }
+}
+
+#[test]
+fn answers_known_by_hand() {
+    let wish = Vector3::new(2.0, 1.0, 0.0);
+    let is_at = |given: &[HalfSpace], radius: f64, point: [f64; 3], violation: f64| {
+        let found = nearest(given, wish, radius);
+        assert!((found.point - Vector3::from(point)).norm() < 1e-9, "{given:?}: {found:?}");
+        assert!((found.violation - violation).abs() < 1e-9, "{given:?}: {found:?}");
+    };
+    is_at(&[], 3.0, [2.0, 1.0, 0.0], 0.0);
+    is_at(&[], 1.0, [2.0 / 5.0_f64.sqrt(), 1.0 / 5.0_f64.sqrt(), 0.0], 0.0);
+    let left_of_1 = half_space([-1.0, 0.0, 0.0], -1.0);
+    let below_half = half_space([0.0, -1.0, 0.0], -0.5);
+    is_at(&[left_of_1], 3.0, [1.0, 1.0, 0.0], 0.0);
+    is_at(&[left_of_1, below_half], 3.0, [1.0, 0.5, 0.0], 0.0);
+    is_at(&[below_half, left_of_1, half_space([0.0, 0.0, 1.0], 0.25)], 3.0, [1.0, 0.5, 0.25], 0.0);
+    // Nobody is right of 2 and left of 1: halfway between, and there as near to the wish as can be.
+    is_at(&[left_of_1, half_space([1.0, 0.0, 0.0], 2.0)], 3.0, [1.5, 1.0, 0.0], 0.5);
+    // Beyond the ball: its nearest point.
+    is_at(&[half_space([1.0, 0.0, 0.0], 2.0)], 1.0, [1.0, 0.0, 0.0], 1.0);
+    // Three in the plane that leave nothing: the centre of the triangle.
+    let triangle = [0.0, 120.0, 240.0_f64].map(|degrees| {
+        let (sin, cos) = libm::sincos(degrees.to_radians());
+        half_space([cos, sin, 0.0], 1.0)
+    });
+    is_at(&triangle, 3.0, [0.0, 0.0, 0.0], 1.0);
+    is_at(&[triangle[0], triangle[0], triangle[1], triangle[2], triangle[0]], 3.0, [0.0, 0.0, 0.0], 1.0);
+}
