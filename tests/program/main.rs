@@ -3,6 +3,7 @@
 #[path = "../support/program.rs"]
 mod program;
 
+mod archives;
 mod audit;
 mod check;
 mod determinism;
@@ -14,3 +15,4 @@ mod reads;
 mod refuses;
 mod runs;
 mod scenarios;
+mod told;
