@@ -19,8 +19,29 @@ pub(crate) fn at_least(number: f64, decimals: u8) -> String {
     }
 }
 
-/// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller.
+/// Like [`fixed`], rounded up: what is said to be "at most" this is.
+pub(crate) fn at_most(number: f64, decimals: u8) -> String {
+    let places = usize::from(decimals);
+    let shown = fixed(number, places);
+    match shown.parse::<f64>() {
+        Ok(rounded) if rounded < number => fixed(rounded + 0.1_f64.powi(i32::from(decimals)), places),
+        _ => shown,
+    }
+}
+
+/// A limit with at least three decimals, and as many as it has: rounded it would be another one.
+pub(crate) fn exact(limit: f64) -> String {
+    let is_limit = |shown: &String| shown.parse() == Ok(limit);
+    (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
+}
+
+/// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller; by less than anybody
+/// reads it is just below.
 pub(crate) fn metres_below(number: f64, limit_m: f64) -> String {
+    const JUST: f64 = 1e-9;
+    if number >= limit_m * (1.0 - JUST) {
+        return format!("just below {}", exact(limit_m));
+    }
     let differs = |&decimals: &usize| fixed(number, decimals) != fixed(limit_m, decimals);
     (3..=17).find(differs).map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
 }
@@ -92,6 +113,25 @@ mod tests {
         }
         assert_eq!([2.46, 1.001, 1.999_999].map(|length_m| at_least(length_m, 3)), ["2.460", "1.001", "1.999"]);
         assert_eq!([1e300, f64::INFINITY].map(|length_m| at_least(length_m, 3)), ["1e300", "inf"]);
+    }
+
+    #[test]
+    fn a_bound_is_never_shown_smaller_than_it_is_and_a_length_below_a_limit_never_as_the_limit() {
+        for length_m in [1.999_999_9, 2.46, 1.001, 0.305_304_9, 0.1 + 0.2, 0.0, -0.5, 123_456.789_9] {
+            let shown: f64 = at_most(length_m, 6).parse().expect("a number");
+            assert!(shown >= length_m && shown - length_m < 1e-6 * (1.0 + 1e-9), "{length_m:?}: {shown}");
+        }
+        assert_eq!(at_most(f64::INFINITY, 6), "inf");
+        for (number, limit_m, said) in [
+            (1.5, 2.0, "1.500"),
+            (1.999_96, 2.0, "1.99996"),
+            (1.999_999_9, 2.0, "1.9999999"),
+            (2.0_f64.next_down(), 2.0, "just below 2.000"),
+            (0.3_f64.next_down(), 0.3, "just below 0.300"),
+            (5e-13, 1e-12, "0.0000000000005"),
+        ] {
+            assert_eq!(metres_below(number, limit_m), said);
+        }
     }
 
     #[test]

@@ -1,14 +1,20 @@
 #!/bin/sh
 # Breaks the program at random: a seeded sample of what cargo-mutants would change in audit, law, sim and plant, one change
 # at a time in a copy of the tree, and says which of them no test notices.
-# From anywhere: sh tests/mutants-sample.sh [COUNT [SEED]], by default 150 and 1. The same sources, count and seed give the
-# same sample. Most changes are noticed by the quick tests of the core; only what those miss is tried on the slow ones.
-# Leaves out/mutants/ with sample.txt, caught.txt (by what no longer ends, too), missed.txt and unviable.txt (does not
-# compile). Of what is missed a person says whether it changes behaviour or speed alone.
+# From anywhere: sh tests/mutants-sample.sh [COUNT [SEED [FROM TO]]], by default 150 and 1. The same sources, count and seed
+# give the same sample, of which FROM and TO choose a part: 61 150 leaves the first 60 out. Most changes are noticed by the
+# quick tests of the core; only what those miss is tried on the slow ones. TAUTLINE_MUTANT_TIMEOUT is how long the tests
+# of a change may take [s], by default 100: more on a machine that does other work beside.
+# Leaves out/mutants/ (of a part, out/mutants-FROM-TO/) with sample.txt, caught.txt (by what no longer ends, too),
+# missed.txt and unviable.txt (does not compile), and as it goes quick/ and slow/ as cargo-mutants writes them. Of what is
+# missed a person says whether it changes behaviour or speed alone.
 set -eu
 cd "$(dirname "$0")/.."
 count=${1:-150}
 seed=${2:-1}
+from=${3:-1}
+to=${4:-$count}
+timeout=${TAUTLINE_MUTANT_TIMEOUT:-100}
 quick="--no-default-features --features=files --lib --test=audit --test=bits"
 slow="--test=flights --test=allocations --test=program"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
@@ -20,7 +26,7 @@ cargo mutants --version >/dev/null 2>&1 || cargo install --locked cargo-mutants
 # In the copy, mutants are made in place: what was built of other crates is used again.
 mkdir "$scratch/tree"
 tar -cf - --exclude=./target --exclude=./out --exclude=./.git . | tar -xf - -C "$scratch/tree"
-out=$PWD/out/mutants
+out=$PWD/out/mutants${3:+-$from-$to}
 rm -rf "$out"
 mkdir -p "$out"
 cd "$scratch/tree"
@@ -33,7 +39,7 @@ mutants() {
 # them, whatever names are asked for, so they are taken from its answers again.
 yes "$seed" | head -c 64 > "$scratch/seed"
 mutants --list | grep -v ': delete field ' |
-    sort --random-sort --random-source="$scratch/seed" | head -n "$count" > "$out/sample.txt"
+    sort --random-sort --random-source="$scratch/seed" | head -n "$count" | sed -n "$from,${to}p" > "$out/sample.txt"
 
 # Tries the mutants whose whole names are in a file on some tests; results go to a folder.
 try() {
@@ -47,7 +53,7 @@ try() {
         set -- "$@" -C "$word"
     done
     status=0
-    mutants --in-place --timeout 100 --output "$results" --exclude-re ': delete field ' "$@" || status=$?
+    mutants --in-place --timeout "$timeout" --output "$results" --exclude-re ': delete field ' "$@" || status=$?
     # Exit codes of cargo-mutants: 2 for something missed, 3 for something that no longer ended.
     case $status in 0 | 2 | 3) ;; *) exit "$status" ;; esac
 }
@@ -59,15 +65,15 @@ sampled() {
 
 TAUTLINE_SCENES=${TAUTLINE_SCENES:-150}
 export TAUTLINE_SCENES
-try "$out/sample.txt" "$scratch/quick" "$quick"
-found=$scratch/quick/mutants.out
+try "$out/sample.txt" "$out/quick" "$quick"
+found=$out/quick/mutants.out
 sampled "$found/caught.txt" "$found/timeout.txt" > "$out/caught.txt"
 sampled "$found/unviable.txt" > "$out/unviable.txt"
 sampled "$found/missed.txt" > "$out/missed.txt"
 if [ -s "$out/missed.txt" ]; then
     cp "$out/missed.txt" "$scratch/again.txt"
-    try "$scratch/again.txt" "$scratch/slow" "$slow"
-    found=$scratch/slow/mutants.out
+    try "$scratch/again.txt" "$out/slow" "$slow"
+    found=$out/slow/mutants.out
     sampled "$found/caught.txt" "$found/timeout.txt" >> "$out/caught.txt"
     sampled "$found/missed.txt" > "$out/missed.txt"
 fi

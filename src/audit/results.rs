@@ -47,7 +47,9 @@ impl ClosestPairs {
             None if approach.lower_m < self.threshold => self.kept.push(approach),
             None => return,
         }
-        self.kept.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m).then(a.pair.cmp(&b.pair)));
+        self.kept.sort_by(|a, b| {
+            a.lower_m.total_cmp(&b.lower_m).then(a.upper_m.total_cmp(&b.upper_m)).then(a.pair.cmp(&b.pair))
+        });
         self.kept.truncate(KEPT);
         if let [.., last] = self.kept[..]
             && self.kept.len() == KEPT

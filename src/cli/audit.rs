@@ -1,7 +1,7 @@
 //! `tautline audit`: judge a recording, whoever made it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
@@ -199,13 +199,13 @@ impl AuditArguments {
 
     /// What a recording of ours says of itself.
     fn own(&self, scale: f64) -> Option<OwnRecording> {
-        let may_be_ours = self.format.is_none_or(|format| format == Format::Mcap);
+        let may_be_ours = self.reading.more.is_empty() && self.format.is_none_or(|format| format == Format::Mcap);
         may_be_ours.then(|| OwnRecording::read(&self.reading.recording, scale)).flatten()
     }
 
     /// Refuses to judge a vehicle alone, and another number of vehicles than is expected.
     fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
-        let path = self.reading.recording.display();
+        let path = self.reading.called();
         let judged = outcome.presence.iter().flatten().count();
         if let Some(expected) = self.expect_vehicles
             && judged != expected
@@ -243,7 +243,7 @@ impl AuditArguments {
             (!self.offset.is_empty(), "--offset"),
         ];
         let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
-        let path = self.reading.recording.display();
+        let path = self.reading.called();
         let message = format!(
             "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
         );
@@ -274,10 +274,10 @@ impl AuditArguments {
 pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<RecordedReport, Failure> {
     let mut settings = arguments.settings()?;
     let options = arguments.reading.options(arguments.format)?;
-    let path = &arguments.reading.recording;
     let own = arguments.own(options.scale);
     let is_silent = arguments.delta.is_none() && arguments.radius.is_empty() && arguments.ellipsoid.is_none();
-    let own_delta_m = own.as_ref().map(|own| own.delta_m).or_else(|| read::own_limit_m(path, &options));
+    let own_delta_m =
+        own.as_ref().map(|own| own.delta_m).or_else(|| read::own_limit_m(&arguments.reading.recording, &options));
     let own_delta_m = own_delta_m.filter(|_| is_silent);
     settings.delta_m = settings.delta_m.or(own_delta_m);
     let mut auditor = TrackAuditor::new(settings.clone())?;
@@ -289,12 +289,14 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
     arguments.check_count(&outcome, &settings)?;
     let between = arguments.between(curves, own.as_ref());
-    notes.extend(own.iter().flat_map(OwnRecording::notes));
+    let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
+    let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
+    notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
     for note in &notes {
         console.warn(&format!("note: {note}"));
     }
-    let source = Source { recording: path.display().to_string(), clock, notes };
+    let source = Source { recording: arguments.reading.called(), clock, notes };
     let report = RecordedReport::new(&outcome, &settings, source, between);
 
     // The verdict first: a file that cannot be written does not cost it.
@@ -321,9 +323,9 @@ fn judged(
     options: &ReadOptions,
     console: Console,
 ) -> Result<Judged, Failure> {
-    let path = &arguments.reading.recording;
+    let called = arguments.reading.called();
     let mut recording = arguments.reading.open(options)?;
-    let progress = console.counter(path.display().to_string());
+    let progress = console.counter(called.clone());
     let mut items = Vec::new();
     let (mut more, mut first, mut read, mut curves) = (true, true, 0, true);
     while more {
@@ -336,14 +338,14 @@ fn judged(
         }
         first = false;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
-        auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(path))?;
+        auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
         read += items.len() as u64;
         progress.set_position(read);
     }
     progress.finish_and_clear();
     let clock = recording.clock();
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
-    let outcome = auditor.finish().map_err(|error| Failure::from(error).of(path))?;
+    let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
     Ok(Judged { outcome, clock, notes: recording.notes().to_vec(), curves })
 }
 

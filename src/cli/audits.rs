@@ -21,9 +21,9 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let (mut reports, mut failures) = (Vec::new(), Vec::new());
     for reading in recordings {
         if !is_one {
-            console.say(&format!("{}:", reading.recording.display()));
+            console.say(&format!("{}:", reading.called()));
         }
-        let name = reading.recording.display().to_string();
+        let name = reading.called();
         let mut one = arguments.clone();
         one.reading = reading;
         match judge(&one, console) {

@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use crate::audit::recorded::{Told, ToldViolation};
-use crate::record::Event;
 use crate::record::mcap::{Entry, McapRecording};
+use crate::record::{Event, OwnedSample};
 use crate::scenario::{self, PlantSpec, Scenario};
+use crate::swarm::{ClosestApproach, Pair, row};
 
 /// A recording of ours.
 pub(super) struct OwnRecording {
@@ -14,7 +17,7 @@ pub(super) struct OwnRecording {
     pub(super) delta_m: f64,
     /// What it says of the time between its samples, in order of time; nothing where it holds every step that was flown.
     pub(super) told: Vec<Told>,
-    /// The times that it says a pair was too close in, but for one that lasts to its end: its last sample shows that.
+    /// The times that it says a pair was too close in.
     pub(super) violations: Vec<ToldViolation>,
     /// Whether it holds every step that was flown, and every step was straight.
     pub(super) has_every_step: bool,
@@ -42,29 +45,30 @@ impl OwnRecording {
             most_steps: 0,
             other_law: None,
         };
-        let mut before: Option<(u64, f64)> = None;
-        let mut began_s = BTreeMap::new();
+        let mut before: Option<OwnedSample> = None;
+        let mut near = Near::default();
         for entry in recording {
             match entry.ok()? {
-                Entry::Sample(sample) => {
-                    let (step, from_s) = before.unwrap_or((sample.step, sample.time_s));
-                    own.most_steps = own.most_steps.max(sample.step.saturating_sub(step));
-                    own.told.extend(sample.separation.map(|mut closest| {
-                        closest.separation_m *= scale;
-                        Told { from_s, to_s: sample.time_s, closest }
-                    }));
-                    before = Some((sample.step, sample.time_s));
+                Entry::Sample(mut sample) => {
+                    sample.swarm.positions_m *= scale;
+                    let last = before.as_ref().unwrap_or(&sample);
+                    own.most_steps = own.most_steps.max(sample.step.saturating_sub(last.step));
+                    own.told.extend(sample.separation.and_then(|closest| told(last, &sample, closest, scale)));
+                    own.violations.extend(near.pass(&sample));
+                    before = Some(sample);
                 }
                 Entry::Event(Event::StepRefined { .. }) => own.has_every_step = false,
-                Entry::Event(Event::ViolationBegan { pair, time_s }) => _ = began_s.insert(pair, time_s),
+                Entry::Event(Event::ViolationBegan { pair, time_s }) => near.begin(pair, time_s, before.as_ref()),
                 Entry::Event(Event::ViolationEnded { pair, time_s, min_m }) => {
-                    let from_s = began_s.remove(&pair).unwrap_or(time_s);
-                    let (min_m, limit_m) = (min_m * scale, own.delta_m);
-                    own.violations.push(ToldViolation { pair, from_s, to_s: time_s, min_m, limit_m });
+                    near.end(pair, time_s, min_m * scale, own.delta_m, before.as_ref());
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
                 Entry::Event(_) => {}
             }
+        }
+        own.violations.append(&mut near.ended);
+        if let Some(last) = &before {
+            own.violations.extend(near.to_the_end(last, own.delta_m, &own.told));
         }
         own.has_every_step &= own.most_steps <= 1;
         if own.has_every_step {
@@ -74,15 +78,102 @@ impl OwnRecording {
         Some(own)
     }
 
-    /// What a person should know about how it was flown and is judged.
-    pub(super) fn notes(&self) -> impl Iterator<Item = String> {
+    /// What a person should know about how it was flown and is judged, by clocks that were all set right alike or not.
+    pub(super) fn notes(&self, clocks_agree: bool) -> impl Iterator<Item = String> {
         let steps = self.most_steps;
         let between = (!self.has_every_step).then(|| {
+            let of = if clocks_agree { "" } else { ", for pairs whose clocks were set right alike" };
             format!(
-                "up to {steps} steps were flown between two samples: the closest approach that the run saw there counts"
+                "up to {steps} steps were flown between two samples: the closest approach that the run saw there \
+                 counts{of}"
             )
         });
         let law = self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"));
         law.into_iter().chain(between)
+    }
+}
+
+/// What a sample says of the time since the one before it; nothing where it names a vehicle that is not there.
+fn told(before: &OwnedSample, sample: &OwnedSample, mut closest: ClosestApproach, scale: f64) -> Option<Told> {
+    closest.separation_m *= scale;
+    let (from, to) = (apart(before, closest.pair)?, apart(sample, closest.pair)?);
+    let (from_s, to_s) = (before.time_s, sample.time_s);
+    let passed = if to_s > from_s { ((closest.time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0) } else { 1.0 };
+    let drawn_m = from.lerp(&to, passed).norm();
+    let heights = [height(before, closest.pair), height(sample, closest.pair)];
+    Some(Told { from_s, to_s, closest, drawn_m, height_m: around(heights) })
+}
+
+/// From the first to the second of a pair \[m\].
+fn apart(sample: &OwnedSample, pair: Pair) -> Option<Vector3<f64>> {
+    let at = &sample.swarm.positions_m;
+    (pair.second() < at.nrows()).then(|| row(at, pair.second()) - row(at, pair.first()))
+}
+
+/// How high the higher of a pair is \[m\]; as high as can be where one is not there.
+fn height(sample: &OwnedSample, pair: Pair) -> f64 {
+    let at = &sample.swarm.positions_m;
+    let of = |vehicle: usize| if vehicle < at.nrows() { at[(vehicle, 2)] } else { f64::INFINITY };
+    of(pair.first()).max(of(pair.second()))
+}
+
+fn around(heights: [f64; 2]) -> [f64; 2] {
+    [heights[0].min(heights[1]), heights[0].max(heights[1])]
+}
+
+/// Pairs that are too close, as far as a recording has been read.
+#[derive(Default)]
+struct Near {
+    /// Since when \[s\], and how high the higher of the two was at samples since \[m\].
+    since: BTreeMap<Pair, (f64, [f64; 2])>,
+    /// Those that ended after the last sample.
+    ended: Vec<ToldViolation>,
+}
+
+impl Near {
+    fn begin(&mut self, pair: Pair, time_s: f64, before: Option<&OwnedSample>) {
+        let height_m = before.map_or([f64::INFINITY, f64::NEG_INFINITY], |sample| [height(sample, pair); 2]);
+        self.since.insert(pair, (time_s, height_m));
+    }
+
+    fn end(&mut self, pair: Pair, to_s: f64, min_m: f64, limit_m: f64, before: Option<&OwnedSample>) {
+        if !self.since.contains_key(&pair) {
+            self.begin(pair, to_s, before);
+        }
+        self.ended.extend(self.since.remove(&pair).map(|(from_s, height_m)| ToldViolation {
+            pair,
+            from_s,
+            to_s,
+            least_m: min_m,
+            min_m,
+            limit_m,
+            height_m,
+        }));
+    }
+
+    /// Takes a sample, and gives those that ended before it.
+    fn pass(&mut self, sample: &OwnedSample) -> Vec<ToldViolation> {
+        let widen = |pair: Pair, [low_m, high_m]: &mut [f64; 2]| {
+            let at_m = height(sample, pair);
+            (*low_m, *high_m) = (low_m.min(at_m), high_m.max(at_m));
+        };
+        self.since.iter_mut().for_each(|(pair, (_, height_m))| widen(*pair, height_m));
+        self.ended.iter_mut().for_each(|told| widen(told.pair, &mut told.height_m));
+        std::mem::take(&mut self.ended)
+    }
+
+    /// Those that last to the last sample, which the recording does not tell the smallest distance of: nobody came closer
+    /// than it says of all, and at the last sample they are as far apart as it says.
+    fn to_the_end(self, last: &OwnedSample, limit_m: f64, all: &[Told]) -> Vec<ToldViolation> {
+        let told = self.since.into_iter().filter_map(|(pair, (from_s, height_m))| {
+            let to_s = last.time_s;
+            let within = all.iter().filter(|told| told.to_s >= from_s).map(|told| told.closest);
+            let least_m = within.clone().map(|of_all| of_all.separation_m).fold(f64::INFINITY, f64::min);
+            let own = within.filter(|of_all| of_all.pair == pair && of_all.time_s >= from_s);
+            let min_m = own.map(|own| own.separation_m).fold(apart(last, pair)?.norm(), f64::min);
+            let min_m = min_m.min(limit_m.next_down());
+            Some(ToldViolation { pair, from_s, to_s, least_m: least_m.min(min_m), min_m, limit_m, height_m })
+        });
+        told.collect()
     }
 }

@@ -3,20 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::Failure;
+use super::run::RECORDING;
 use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
 
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Reading")]
 pub(super) struct ReadArguments {
-    /// The recording: a file, or a folder or archive with a file for each vehicle.
-    #[arg(index = 1, value_name = "RECORDING")]
+    /// The recording: a file, the folder of a run, or a folder or archive with a file for each vehicle.
+    #[arg(index = 1, value_name = "RECORDING", value_parser = recording())]
     pub(super) recording: PathBuf,
     /// More recordings, or with --join more files of the same one.
-    #[arg(index = 2, value_name = "MORE")]
+    #[arg(index = 2, value_name = "MORE", value_parser = recording())]
     pub(super) more: Vec<PathBuf>,
     /// Several files are one recording, a vehicle in each.
     #[arg(long)]
@@ -81,6 +82,11 @@ impl ReadArguments {
         self.paths().map(alone).collect()
     }
 
+    /// What the recording is called.
+    pub(super) fn called(&self) -> String {
+        read::called(&self.paths().collect::<Vec<_>>())
+    }
+
     /// All files.
     pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
         std::iter::once(&self.recording).chain(&self.more).map(PathBuf::as_path)
@@ -115,6 +121,14 @@ impl ReadArguments {
             allow_unfinished: self.allow_unfinished,
         })
     }
+}
+
+/// A path; of the folder of a run, that of what was recorded.
+fn recording() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(|path| {
+        let recorded = path.join(RECORDING);
+        if recorded.is_file() { recorded } else { path }
+    })
 }
 
 fn column(text: &str) -> Result<(String, String), String> {

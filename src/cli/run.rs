@@ -26,7 +26,7 @@ use crate::scenario::Scenario;
 /// Exit code of a second Ctrl-C, as shells give it.
 const INTERRUPTED_TWICE: i32 = 130;
 /// The recording's name in the folder of a run.
-const RECORDING: &str = "run.mcap";
+pub(super) const RECORDING: &str = "run.mcap";
 /// Steps between two looks at the progress bar.
 const PROGRESS_EVERY: u64 = 64;
 /// Threads that a flight has work for: one for the law and one for the audit.

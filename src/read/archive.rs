@@ -1,5 +1,6 @@
 //! Zip archives, whose entries must not grow beyond all measure.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -8,7 +9,7 @@ use flate2::bufread::DeflateDecoder;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, Place, ReadError, quoted};
 
 /// Longest end of an archive: its last record with the longest comment \[bytes\].
 const END_LIMIT_BYTES: u64 = 22 + 65_535;
@@ -33,6 +34,12 @@ impl Archive {
             }
             other => zip_fault(other),
         })?;
+        if zip.has_duplicate_names()
+            && let Some(name) = repeated(path, zip.central_directory_start())?
+        {
+            let remedy = "unpack it, look which of the two is meant, and make the archive again with that one";
+            return Err(Fault::content(format!("two of its entries are called {}", quoted(&name)), remedy));
+        }
         Ok(Self { path: path.to_owned(), zip })
     }
 
@@ -98,6 +105,26 @@ fn has_end(path: &Path) -> bool {
         file.read_to_end(&mut tail).map(|_| tail)
     });
     tail.is_ok_and(|tail| memchr::memmem::find(&tail, b"PK\x05\x06").is_some())
+}
+
+/// The first name that two files of the directory of an archive have; it begins at this byte. Folders may come twice.
+fn repeated(path: &Path, directory: u64) -> io::Result<Option<String>> {
+    /// Bytes of an entry before its name, the first four of them.
+    const FIXED_BYTES: usize = 46;
+    const BEGIN: [u8; 4] = *b"PK\x01\x02";
+    let mut file = BufReader::new(File::open(path)?);
+    file.seek(SeekFrom::Start(directory))?;
+    let (mut fixed, mut known) = ([0; FIXED_BYTES], BTreeSet::new());
+    while file.read_exact(&mut fixed).is_ok() && fixed.starts_with(&BEGIN) {
+        let [name, extra, comment] = [28, 30, 32].map(|at| u16::from_le_bytes([fixed[at], fixed[at + 1]]));
+        let mut bytes = vec![0; usize::from(name)];
+        file.read_exact(&mut bytes)?;
+        file.seek_relative(i64::from(extra) + i64::from(comment))?;
+        if !bytes.ends_with(b"/") && !known.insert(bytes.clone()) {
+            return Ok(Some(String::from_utf8_lossy(&bytes).into_owned()));
+        }
+    }
+    Ok(None)
 }
 
 fn zip_fault(error: ZipError) -> Fault {

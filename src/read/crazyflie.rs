@@ -23,9 +23,15 @@ use crate::track::Item;
 /// Highest power that is read.
 const HIGHEST_POWER: usize = 15;
 
-/// Opens polynomials of these vehicles, each of which flies its files one after the other.
-pub(super) fn open(vehicles: Vec<(String, Vec<Source>)>, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let mut notes = Vec::new();
+/// Opens polynomials of these vehicles, each of which flies its files one after the other; `left_out` says what else there
+/// is.
+pub(super) fn open(
+    vehicles: Vec<(String, Vec<Source>)>,
+    left_out: Option<String>,
+    options: &ReadOptions,
+) -> Result<Recording, ReadError> {
+    let mut notes: Vec<String> = left_out.into_iter().collect();
+    let (several, mut said_to_follow) = (vehicles.len() > 1, false);
     let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
         let problem = format!("it has no vehicle {}, whose start is given", quoted(name));
@@ -34,10 +40,12 @@ pub(super) fn open(vehicles: Vec<(String, Vec<Source>)>, options: &ReadOptions) 
     for (name, files) in vehicles {
         let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.scale, items: Vec::new() };
         for file in &files {
-            curve.append(file).map_err(|fault| fault.of(&file.shown()))?;
+            let appended = curve.append(file).map_err(|fault| fault.of(&file.shown()));
+            appended.map_err(|fault| if several { fault.among_others() } else { fault })?;
         }
-        if files.len() > 1 && notes.is_empty() {
+        if files.len() > 1 && !said_to_follow {
             notes.push(format!("`{name}` and others fly the files of their folders one after the other"));
+            said_to_follow = true;
         }
         let start = options.starts.get(&name).copied().unwrap_or_default();
         for item in &mut curve.items {

@@ -40,6 +40,14 @@ impl ReadError {
         if self.file.is_empty() { Self { file: file.display().to_string(), ..self } } else { self }
     }
 
+    /// The same of one of several files, which may be none of the recording.
+    pub(super) fn among_others(mut self) -> Self {
+        if let Fault::Content { remedy, .. } = &mut self.fault {
+            remedy.push_str("; or take the file away, if it is none of the recording");
+        }
+        self
+    }
+
     /// What helps, as a sentence without a full stop.
     #[must_use]
     pub fn help(&self) -> String {

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::archive::Archive;
 use super::error::{Fault, ReadError};
+use super::recognise::is_prose;
 use super::source::Source;
 
 /// Longest number in a file's name that is put in order by its value \[digits\].
@@ -13,6 +14,18 @@ const LONGEST_NUMBER: usize = 20;
 
 /// Ends of the names of tables.
 const TABLES: [&str; 8] = ["csv", "tsv", "txt", "dat", "tum", "parquet", "npz", "gz"];
+
+/// Ends of the names of texts, be they tables or not.
+const TEXTS: [&str; 2] = ["txt", "dat"];
+
+/// Names of texts that are no tables, whatever numbers they hold.
+const NOTES: [&str; 6] = ["readme", "license", "licence", "copying", "changelog", "authors"];
+
+/// Ends of the names of recordings that are given alone, and of archives.
+const ALONE: [&str; 11] = ["mcap", "skyc", "zip", "tar", "tgz", "7z", "rar", "bag", "db3", "ulg", "ulog"];
+
+/// Most files or folders that are named.
+const LISTED: usize = 5;
 
 /// The tables of a folder or of an archive, and those of the folders in it by the names of these; in natural order.
 #[derive(Default)]
@@ -42,22 +55,66 @@ impl Folder {
         let is_file =
             |name: &String| !(name.ends_with('/') || name.starts_with("__MACOSX") || is_hidden(Path::new(name)));
         for name in names.into_iter().filter(is_file) {
-            if !is_table(Path::new(&name)) {
+            let source = Source::entry(path, name.clone());
+            if !is_table(Path::new(&name)) || is_note(&source) {
                 folder.left_out.push(name);
                 continue;
             }
             let parent = name.rsplit_once('/').map_or("", |(parent, _)| parent).to_owned();
-            let source = Source::entry(path, name);
             match folder.folders.iter_mut().find(|(known, _)| *known == parent) {
                 Some((_, files)) => files.push(source),
                 None => folder.folders.push((parent, vec![source])),
             }
         }
-        if let [(_, files)] = &mut folder.folders[..] {
-            folder.files = std::mem::take(files);
-            folder.folders.clear();
+        let around = |(name, _): &(String, _)| name.is_empty();
+        if let Some(top) = folder.folders.iter().position(around).or((folder.folders.len() == 1).then_some(0)) {
+            folder.files = folder.folders.swap_remove(top).1;
+            folder.left_out.extend(folder.folders.drain(..).map(|(name, _)| name + "/"));
         }
         Ok(folder.sorted())
+    }
+
+    /// A file of it, by which all others are read.
+    pub(super) fn first(&mut self) -> Option<&mut Source> {
+        self.files.first_mut().or_else(|| self.folders.first_mut()?.1.first_mut())
+    }
+
+    /// What a person should know about what was not read.
+    pub(super) fn note(&self) -> Option<String> {
+        (!self.left_out.is_empty()).then(|| format!("not read, being no tables: {}", listed(&self.left_out)))
+    }
+
+    /// That there is no table: in `what`.
+    pub(super) fn without_tables(&self, what: &str, remedy: &str) -> Fault {
+        let holds =
+            if self.left_out.is_empty() { String::new() } else { format!(": it holds {}", listed(&self.left_out)) };
+        let alone = self.left_out.iter().find(|name| ALONE.contains(&&*extension(Path::new(name))));
+        let remedy = match alone {
+            Some(name) if what == ARCHIVE => format!("unpack it, and give {name}"),
+            Some(name) => format!("give {name}, which lies in it"),
+            None => remedy.to_owned(),
+        };
+        Fault::content(format!("there is no table in the {what}{holds}"), remedy)
+    }
+
+    /// That tables lie in folders, which would be several recordings.
+    pub(super) fn of_folders(&self) -> Fault {
+        let counted = |(name, files): &(String, Vec<_>)| match files.len() {
+            1 => format!("{name}/ (1 table)"),
+            count => format!("{name}/ ({count} tables)"),
+        };
+        let folders: Vec<_> = self.folders.iter().map(counted).collect();
+        let file = self.folders.first().and_then(|(_, files)| files.first());
+        let folder = file.and_then(|file| Some(file.shown().parent()?.to_owned())).unwrap_or_default();
+        let remedy = match (file, self.folders.first()) {
+            (Some(Source { entry: Some(_), .. }), Some((name, _))) => {
+                format!("unpack it, and give a folder of it: {name}")
+            }
+            _ => format!("give one of them: {}", folder.display()),
+        };
+        let beside = if self.files.is_empty() { "" } else { "some of " };
+        let problem = format!("{beside}its tables lie in folders: {}", listed(&folders));
+        Fault::content(problem, format!("{remedy}; the tables of one recording lie side by side, one for each vehicle"))
     }
 
     fn sorted(mut self) -> Self {
@@ -75,13 +132,32 @@ impl Folder {
     }
 }
 
+/// What archives are called in errors.
+pub(super) const ARCHIVE: &str = "archive";
+
+/// The first of some names, and how many more there are.
+fn listed(names: &[String]) -> String {
+    let (first, more) = names.split_at(LISTED.min(names.len()));
+    let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
+    first.join(", ") + &more
+}
+
 fn is_hidden(path: &Path) -> bool {
     path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'))
 }
 
 fn is_table(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    !is_hidden(path) && TABLES.contains(&&*extension)
+    !is_hidden(path) && TABLES.contains(&&*extension(path))
+}
+
+/// Whether a file by the name of a table is a text that says something about others.
+fn is_note(source: &Source) -> bool {
+    let is_named = NOTES.contains(&&*source.stem().to_lowercase());
+    TEXTS.contains(&&*extension(&source.shown())) && (is_named || is_prose(source))
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// What is in a folder.
@@ -97,8 +173,8 @@ fn entries(folder: &Path) -> Result<Entries, ReadError> {
     let (mut files, mut folders, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).map_err(error)? {
         let path = entry.map_err(error)?.path();
-        let (is_folder, is_table) = (path.is_dir(), is_table(&path));
         let source = Source::file(&path);
+        let (is_folder, is_table) = (path.is_dir(), is_table(&path) && !is_note(&source));
         if is_folder {
             folders.push(source);
         } else if is_table {

@@ -183,6 +183,11 @@ fn time_and_unit(name: &str) -> (String, Option<String>) {
     (stem.to_owned(), unit.map(str::to_owned))
 }
 
+/// Whether a column says when, in whatever way.
+pub(super) fn is_clock(name: &str) -> bool {
+    is_time(name) || is_frame(name) || name.eq_ignore_ascii_case("duration")
+}
+
 pub(super) fn is_time(name: &str) -> bool {
     matches!(time_and_unit(name).0.as_str(), "t" | "time" | "timestamp" | "stamp")
 }

@@ -1,14 +1,12 @@
 //! Files of one vehicle each as one recording.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::error::{Fault, ReadError, quoted};
 use super::order::Recording;
 use super::source::Source;
 use crate::track::{Clock, Item, Tracks};
-
-/// Most files that are named which were not read.
-const LISTED: usize = 5;
 
 /// Clocks that begin further apart than this are not the same \[ns\]: 30 days.
 const APART_NS: i64 = 30 * 86_400 * 1_000_000_000;
@@ -33,21 +31,23 @@ struct Joined {
     notes: Vec<String>,
 }
 
-/// One recording out of several with a vehicle each, which is called as its file, beside others that are no tables.
-pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: &[String]) -> Result<Recording, ReadError> {
+/// One recording out of several with a vehicle each, which is called as its file; `left_out` says what else there is.
+pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -> Result<Recording, ReadError> {
     let stem = |path: &PathBuf| Source::file(path).stem();
     let (vehicles, parts): (Vec<_>, Vec<_>) =
         parts.into_iter().map(|(path, tracks)| (stem(&path), (path, tracks))).unzip();
     let (paths, recordings): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-    let mut sorted: Vec<_> = vehicles.iter().collect();
-    sorted.sort();
-    if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        let problem = format!("two of its files are called {}", quoted(pair[0]));
-        return Err(Fault::content(problem, "vehicles are called as their files: give each file another name").into());
+    let mut known = BTreeMap::new();
+    for (name, path) in vehicles.iter().zip(&paths) {
+        if let Some(first) = known.insert(name, path) {
+            let problem = format!("the vehicle of {} is called {} too", first.display(), quoted(name));
+            let remedy = "vehicles are called as their files: give each file another name";
+            return Err(ReadError::new(path, Fault::content(problem, remedy)));
+        }
     }
     let clocks: Vec<Clock> = recordings.iter().map(|tracks| tracks.clock().clone()).collect();
     let Some(first) = clocks.iter().min_by_key(|clock| clock.epoch_ns) else { return Err(Fault::Empty.into()) };
-    for (name, clock) in vehicles.iter().zip(&clocks) {
+    for ((name, path), clock) in vehicles.iter().zip(&paths).zip(&clocks) {
         let guessed = clock.inferred || clocks[0].inferred;
         let problem = if clock.unit != clocks[0].unit && guessed {
             let (unit, other) = (clock.unit, clocks[0].unit);
@@ -61,7 +61,8 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: &[String]) -> Res
         } else {
             continue;
         };
-        return Err(Fault::content(problem, "say the unit with --time-unit, and write all times by one clock").into());
+        let remedy = "say the unit with --time-unit, and write all times by one clock";
+        return Err(ReadError::new(path, Fault::content(problem, remedy)));
     }
     let clock = Clock {
         inferred: clocks.iter().any(|clock| clock.inferred),
@@ -70,11 +71,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: &[String]) -> Res
         unit: clocks[0].unit,
     };
     let mut notes = vec![format!("a file is a vehicle: {}", vehicles.join(", "))];
-    if let Some((named, more)) = left_out.split_at_checked(LISTED.min(left_out.len())).filter(|_| !left_out.is_empty())
-    {
-        let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
-        notes.push(format!("not read, for their names are not those of tables: {}{more}", named.join(", ")));
-    }
+    notes.extend(left_out);
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
         for note in tracks.notes() {

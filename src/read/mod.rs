@@ -50,7 +50,7 @@ pub use order::Recording;
 use std::fs;
 use std::path::Path;
 
-use folder::Folder;
+use folder::{ARCHIVE, Folder};
 use recognise::recognise;
 use source::Source;
 
@@ -84,7 +84,16 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.map_err(|error| error.of(paths.first().copied().unwrap_or(Path::new(""))))
+    opened.map_err(|error| error.of(Path::new(&called(paths))))
+}
+
+/// What several files that are one recording are called.
+#[must_use]
+pub fn called(paths: &[&Path]) -> String {
+    const LISTED: usize = 3;
+    let named: Vec<_> = paths.iter().take(LISTED).map(|path| path.display().to_string()).collect();
+    let more = paths.len().saturating_sub(LISTED);
+    named.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
 /// How close vehicles may come, where the recording says it itself as Skybrush shows do \[m\].
@@ -106,11 +115,7 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
         let folder = Folder::open(path)?;
         let remedy =
             "give a folder with a table or a polynomial file (.csv) for each vehicle, or one with a folder for each";
-        return if folder.is_empty() {
-            Err(Fault::content("there is no table in the folder", remedy).into())
-        } else {
-            Ok(Some(folder))
-        };
+        return if folder.is_empty() { Err(folder.without_tables("folder", remedy).into()) } else { Ok(Some(folder)) };
     }
     if !data.is_file() {
         let problem = "it is a pipe or a device, and a recording is read more than once";
@@ -119,29 +124,34 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     if !recognise::is_archive(path)? {
         return Ok(None);
     }
-    Ok(Some(Folder::of_archive(path)?).filter(|folder| !folder.is_empty()))
+    let folder = Folder::of_archive(path)?;
+    let remedy = "give a .skyc or .npz file, or pack a table for each vehicle";
+    if folder.is_empty() { Err(folder.without_tables(ARCHIVE, remedy).into()) } else { Ok(Some(folder)) }
 }
 
 /// Opens files of one vehicle each.
 fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let polynomials = match folder.files.first_mut() {
-        Some(first) => {
-            let format = recognise(first, options.format).map_err(|error| error.of(&first.shown()))?;
-            format == Format::Crazyflie
-        }
-        None => true,
+    let several = folder.files.len() > 1;
+    let blamed = |error: ReadError, shown: &Path| {
+        let error = error.of(shown);
+        if several { error.among_others() } else { error }
     };
-    if polynomials {
+    let format = folder.first().map(|first| recognise(first, options.format).map_err(|e| blamed(e, &first.shown())));
+    let left_out = folder.note();
+    if format.transpose()? == Some(Format::Crazyflie) {
         options.refuse_needless(Format::Crazyflie)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
-        return crazyflie::open(alone.chain(folder.folders).collect(), options);
+        return crazyflie::open(alone.chain(folder.folders).collect(), left_out, options);
+    }
+    if !folder.folders.is_empty() {
+        return Err(folder.of_folders().into());
     }
     let options = ReadOptions { one_vehicle: true, ..options.clone() };
     let open = |file: Source| {
         let shown = file.shown();
-        Ok((shown.clone(), open_one(file, &options).map_err(|error| error.of(&shown))?))
+        Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))
     };
-    join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, &folder.left_out)
+    join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
 }
 
 fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, ReadError> {
@@ -161,7 +171,7 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
     let source = &source;
     match format {
         Format::Csv | Format::Text => csv::open(source, format, options),
-        Format::Crazyflie => crazyflie::open(vec![(source.stem(), vec![source.clone()])], options),
+        Format::Crazyflie => crazyflie::open(vec![(source.stem(), vec![source.clone()])], None, options),
         Format::Mcap => mcap::open(source, options),
         Format::Npz => npz::open(source, options),
         #[cfg(feature = "parquet")]

@@ -2,10 +2,12 @@
 
 use std::io::Read;
 use std::path::Path;
+use std::str;
 
 use super::archive::Archive;
 use super::error::{Fault, ReadError};
 use super::format::Format;
+use super::heading;
 use super::skybrush::SHOW;
 use super::source::{GZIP_MAGIC, Source};
 use super::stranger;
@@ -49,6 +51,24 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
 pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
     let head = head_of(&Source::file(path))?;
     Ok(by_magic(&head) == Some(Format::Npz) && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
+}
+
+/// Whether a file is text with neither a row of numbers nor the name of a column of time: a note beside tables.
+pub(super) fn is_prose(source: &Source) -> bool {
+    let Ok(head) = head_of(source) else { return false };
+    // What is looked at may end within a letter.
+    let text = match str::from_utf8(&head) {
+        Ok(text) => text,
+        Err(error) if error.error_len().is_none() => str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default(),
+        Err(_) => return false,
+    };
+    let between = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '(' | ')' | '#');
+    let is_of_a_table = |line: &str| {
+        let words: Vec<_> = line.split(between).filter(|word| !word.is_empty()).collect();
+        let numbers = words.iter().filter(|word| word.parse::<f64>().is_ok()).count();
+        (numbers > 1 && 2 * numbers > words.len()) || words.iter().any(|word| heading::is_clock(word))
+    };
+    !text.contains('\0') && !text.lines().any(is_of_a_table)
 }
 
 fn is_recording(entry: &str) -> bool {

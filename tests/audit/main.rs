@@ -1,6 +1,9 @@
 //! The independent judge: of a flight step by step, and of recordings of any origin.
 
+mod curves_at_limits;
+mod encounters;
 mod findings;
 mod flown;
 mod recorded;
 mod scenes;
+mod told;

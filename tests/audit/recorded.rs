@@ -5,25 +5,23 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use tautline::audit::recorded::{
-    Approach, Motion, ObjectPair, Outcome, RecordedError, Settings, Told, ToldViolation, TrackAuditor, VehicleSettings,
-    WIDTH_M, audit,
+    Approach, Motion, ObjectPair, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings, WIDTH_M, audit,
 };
 use tautline::audit::{Obstacle, Shape, Status};
-use tautline::swarm::{ClosestApproach, Pair};
 use tautline::track::{Item, Piece, Sample};
 
 /// Rounding of a handful of operations on numbers around ten.
 const ROUNDING: f64 = 1e-13;
 
-fn seen(vehicle: usize, time_s: f64, at: [f64; 3]) -> Item {
+pub(crate) fn seen(vehicle: usize, time_s: f64, at: [f64; 3]) -> Item {
     Item::Sample(Sample { vehicle, time_s, position_m: at.into(), velocity_m_s: None, radius_m: None })
 }
 
-fn names(count: usize) -> Vec<String> {
+pub(crate) fn names(count: usize) -> Vec<String> {
     ["alpha", "bravo", "charlie", "delta"].iter().take(count).map(ToString::to_string).collect()
 }
 
-fn asked(items: &[Item], settings: Settings) -> Outcome {
+pub(crate) fn asked(items: &[Item], settings: Settings) -> Outcome {
     let count = items.iter().map(|item| item.vehicle() + 1).max().unwrap_or(0);
     audit(&names(count), items, settings).expect("it can be judged")
 }
@@ -33,7 +31,7 @@ fn status(items: &[Item], settings: Settings) -> Status {
 }
 
 /// Two vehicles pass each other within a second, `miss_m` apart in the middle and far apart in every sample.
-fn pass(miss_m: f64) -> Vec<Item> {
+pub(crate) fn pass(miss_m: f64) -> Vec<Item> {
     vec![
         seen(0, 0.0, [-5.0, 0.0, 0.0]),
         seen(1, 0.0, [5.0, miss_m, 0.0]),
@@ -465,7 +463,7 @@ fn radii_and_delta_are_both_kept() {
     assert_eq!(none, RecordedError::NoLimit { vehicle: "alpha".to_owned() });
 }
 
-fn thing(shape: Shape, at: [f64; 3]) -> Obstacle {
+pub(crate) fn thing(shape: Shape, at: [f64; 3]) -> Obstacle {
     Obstacle { name: "thing".to_owned(), shape, clearance_m: None, path: vec![(0.0, at.into())] }
 }
 
@@ -671,80 +669,4 @@ fn two_that_are_far_from_the_origin_and_from_each_other_are_enclosed_without_a_s
     let outcome = asked(&pieces.collect::<Vec<_>>(), settings);
     let Approach { lower_m, upper_m, .. } = outcome.closest[0];
     assert!(outcome.status == Status::Clear && upper_m - lower_m < 1e-5, "{lower_m} {upper_m}");
-}
-
-#[test]
-fn what_a_recording_says_of_the_time_between_its_samples_goes_before_what_is_drawn() {
-    let told = |separation_m, time_s| Told {
-        from_s: 0.0,
-        to_s: 1.0,
-        closest: ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s },
-    };
-    let judged = |items: &[Item], told: Told, settings: Settings| {
-        let mut auditor = TrackAuditor::new(settings).expect("settings");
-        auditor.tell(told);
-        auditor.push(&names(2), items).expect("items");
-        auditor.finish().expect("an outcome")
-    };
-    // Drawn clear, and too close in between.
-    let hit = judged(&pass(3.0), told(0.5, 0.25), Settings::delta(2.0));
-    let found = hit.violations[0];
-    assert_eq!((hit.status, found.min_m, found.min_at_s), (Status::Violation, 0.5, 0.25));
-    assert_eq!(hit.closest[0].upper_m, 0.5);
-    // Drawn too close, and nobody was.
-    let missed = judged(&pass(1.0), told(2.5, 0.25), Settings::delta(2.0));
-    assert_eq!((missed.status, missed.closest[0].lower_m), (Status::Clear, 2.5));
-    // Of pairs that were not the closest the recording tells when they were too close, once for what is drawn of it too.
-    let third = |y| [seen(2, 0.0, [-5.0, 9.0, 0.0]), seen(2, 1.0, [5.0, y, 0.0])];
-    for (only, drawn_y, expected) in [(None, 9.0, 1), (Some([1, 2]), 9.0, 1), (Some([0, 1]), 9.0, 0), (None, -4.0, 1)] {
-        let only = only.map(|pair: [usize; 2]| pair.iter().map(|k| names(3)[*k].clone()).collect());
-        let mut auditor = TrackAuditor::new(Settings { only, ..Settings::delta(2.0) }).expect("settings");
-        auditor.tell_violation(ToldViolation {
-            pair: Pair::new(1, 2),
-            from_s: 0.3,
-            to_s: 0.9,
-            min_m: 1.5,
-            limit_m: 2.0,
-        });
-        let mut items = [&pass(3.0)[..], &third(drawn_y)].concat();
-        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-        auditor.push(&names(3), &items).expect("items");
-        let outcome = auditor.finish().expect("an outcome");
-        let found: Vec<_> =
-            outcome.violations.iter().filter(|v| v.pair == ObjectPair::Vehicles(Pair::new(1, 2))).collect();
-        assert_eq!(found.len(), expected, "{only:?}: {found:?}", only = outcome.vehicles);
-        assert!(found.iter().all(|v| (v.from_s, v.to_s, v.min_m) == (0.3, 0.9, 1.5)), "{found:?}");
-        assert_eq!(outcome.status == Status::Violation, expected > 0);
-    }
-    // Of a part of it, and against other limits, no more is said than is known.
-    let cases = [
-        (2.0, [0.4, 0.6], Status::Violation, Some([0.4, 0.6])),
-        (1.8, [0.4, 0.6], Status::Undecided, None),
-        (1.4, [0.4, 0.6], Status::Clear, None),
-        (1.8, [0.0, 1.0], Status::Violation, Some([0.6, 0.6])),
-        (3.0, [0.0, 1.0], Status::Violation, Some([0.3, 0.9])),
-        (2.0, [0.92, 0.95], Status::Clear, None),
-    ];
-    for (delta_m, [from_s, to_s], expected, span) in cases {
-        let window = Settings { from_s: Some(from_s), to_s: Some(to_s), ..Settings::delta(delta_m) };
-        let mut auditor = TrackAuditor::new(window).expect("settings");
-        let pair = Pair::new(0, 1);
-        auditor.tell_violation(ToldViolation { pair, from_s: 0.3, to_s: 0.9, min_m: 1.5, limit_m: 2.0 });
-        auditor.push(&names(2), &pass(3.5)).expect("items");
-        let outcome = auditor.finish().expect("an outcome");
-        assert_eq!(outcome.status, expected, "{delta_m} {from_s} {to_s}: {outcome:?}");
-        assert_eq!(outcome.violations.first().map(|v| [v.from_s, v.to_s]), span, "{delta_m} {from_s} {to_s}");
-        let closest = outcome.closest[0];
-        assert_eq!(closest.lower_m, if to_s < 0.92 || from_s == 0.0 { 1.5 } else { closest.upper_m });
-    }
-    // What is so at a sample no word takes back.
-    let mut sampled = pass(3.0);
-    sampled.extend([seen(0, 2.0, [0.0; 3]), seen(1, 2.0, [1.0, 0.0, 0.0])]);
-    let words = Told { from_s: 1.0, to_s: 2.0, ..told(2.5, 1.5) };
-    assert_eq!(judged(&sampled, words, Settings::delta(2.0)).status, Status::Violation);
-    // Of a pair that is not asked about, or after the window, nothing is entered; metres say nothing of ellipsoids.
-    let elsewhere = Settings { to_s: Some(0.2), ..Settings::delta(2.0) };
-    assert_eq!(judged(&pass(3.0), told(0.5, 0.25), elsewhere).status, Status::Clear);
-    let scaled = Settings { ellipsoid_m: Some(Vector3::repeat(0.5)), ..Settings::default() };
-    assert_eq!(judged(&pass(3.0), told(0.5, 0.25), scaled).status, Status::Clear);
 }

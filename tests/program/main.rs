@@ -3,6 +3,7 @@
 #[path = "../support/program.rs"]
 mod program;
 
+mod archives;
 mod audit;
 mod check;
 mod compare;
@@ -16,3 +17,4 @@ mod refuses;
 mod runs;
 mod scenarios;
 mod shapes;
+mod told;

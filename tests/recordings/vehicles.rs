@@ -53,7 +53,7 @@ fn a_folder_or_archive_with_a_file_for_each_vehicle_is_one_recording() {
     let found = whole(folder.path()).expect("read");
     assert_eq!((found.vehicles.clone(), found.samples()), (vec!["cf2".to_owned(), "cf10".to_owned()], BOTH.to_vec()));
     assert!(found.notes.iter().any(|note| note == "a file is a vehicle: cf2, cf10"), "{:?}", found.notes);
-    let not_read = "not read, for their names are not those of tables: readme.md";
+    let not_read = "not read, being no tables: readme.md";
     assert!(found.notes.iter().any(|note| note == not_read), "{:?}", found.notes);
 
     for name in ["flight", "flight.zip"] {
@@ -133,7 +133,7 @@ fn files_that_are_not_of_one_recording_are_refused() {
             "times of `b` would be taken as ms and those of `a` as s",
         ),
         (&[("a.csv", A), ("b.csv", "timestamp,x,y\n1700000000.5,1,2\n")], "the clock of `b` begins more than a month"),
-        (&[("a.csv", A), ("a.txt", B)], "two of its files are called `a`"),
+        (&[("a.csv", A), ("a.txt", B)], "is called `a` too"),
         (&[("a.csv", A), ("b.csv", "t,x,y\n0,one,2\n")], "b.csv, line 2: column `x` holds `one`"),
         (&[("a.csv", A), ("b.csv", "duration,x^0,y^0,z^0\n1,0,0,0\n")], "b.csv: it holds a curve"),
         (&[("readme.md", "nothing")], "there is no table in the folder"),

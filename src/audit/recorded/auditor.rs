@@ -5,7 +5,7 @@ use super::outcome::{Gap, Outcome, Presence, Told, ToldViolation};
 use super::rates::Rates;
 use super::settings::{LARGEST, Settings};
 use super::smallest::Smallest;
-use super::told::AllTold;
+use super::told::{AllTold, Counted};
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::audit::outcome::Status;
@@ -108,24 +108,18 @@ impl TrackAuditor {
     }
 
     /// Takes what the recording itself says of the time since the instant before; in order of time, and at any time before
-    /// the end. It counts where distances are metres and no clock is set right.
+    /// the end. It goes before what is drawn; where clocks are set right differently, around ellipsoids, or near the ground
+    /// it says too little for that, and contradicts the lines that are drawn, nothing is decided.
     pub fn tell(&mut self, told: Told) {
-        if self.listens() {
-            self.told.push(told);
-        }
+        self.told.push(told);
     }
 
     /// Takes what the recording itself says of two vehicles that were too close for a while, as [`TrackAuditor::tell`].
     pub fn tell_violation(&mut self, told: ToldViolation) {
         // A file may say anything.
-        let is_one = told.from_s <= told.to_s && told.min_m < told.limit_m;
-        if self.listens() && is_one {
+        if told.from_s <= told.to_s && told.least_m <= told.min_m && told.min_m < told.limit_m {
             self.told.push_violation(told);
         }
-    }
-
-    fn listens(&self) -> bool {
-        self.settings.ellipsoid_m.is_none() && self.settings.vehicles.values().all(|of| of.offset_s == 0.0)
     }
 
     #[inline]
@@ -234,11 +228,12 @@ impl TrackAuditor {
             obstructed || others.filter_map(|(_, there)| there.as_ref()).any(meets)
         });
         self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
-        let radius_of = |vehicle: usize| -> Option<f64> {
+        let counts = |vehicle: usize| {
             let of = self.vehicles.get(vehicle).filter(|of| of.asked_for)?;
-            Some(of.radius_m.unwrap_or(0.0))
+            let offset_s = self.settings.vehicles.get(&of.name).map_or(0.0, |of| of.offset_s);
+            Some(Counted { radius_m: of.radius_m.unwrap_or(0.0), offset_s })
         };
-        self.told.correct(&mut self.results, &self.settings, radius_of);
+        self.told.correct(&mut self.results, &self.settings, counts);
         let Results { ledger, closest, obstacles, swept } = self.results;
         let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
         let decided = looked_at && ledger.is_decided() && self.gaps.is_empty() && contradiction.is_none();

@@ -45,6 +45,10 @@ pub struct Told {
     pub to_s: f64,
     /// Who it was, how close \[m\] and when \[s\].
     pub closest: ClosestApproach,
+    /// How far apart straight lines between the two instants have them then \[m\].
+    pub drawn_m: f64,
+    /// Smallest and largest height of the higher of them at the two instants \[m\].
+    pub height_m: [f64; 2],
 }
 
 /// A time during which two vehicles were too close, by what a recording itself says.
@@ -56,10 +60,14 @@ pub struct ToldViolation {
     pub from_s: f64,
     /// To \[s\].
     pub to_s: f64,
-    /// Their smallest distance within \[m\].
+    /// Their smallest distance within is at least this \[m\].
+    pub least_m: f64,
+    /// It is at most this \[m\], mostly the same.
     pub min_m: f64,
     /// What they were nearer than all along \[m\].
     pub limit_m: f64,
+    /// Smallest and largest height of the higher of them at the instants around it \[m\].
+    pub height_m: [f64; 2],
 }
 
 /// Where a recording contradicts the bound on acceleration that it is judged by.

@@ -2,6 +2,7 @@
 
 use super::outcome::{Told, ToldViolation};
 use super::settings::Settings;
+use crate::audit::limits::Limits;
 use crate::audit::outcome::{Approach, ObjectPair, Undecided, Violation};
 use crate::audit::results::Results;
 use crate::audit::sweep::Interval;
@@ -9,12 +10,101 @@ use crate::swarm::{ClosestApproach, Pair};
 
 /// Relative rounding of a distance that was computed again.
 const ROUNDING: f64 = 1e-9;
+/// Share of a limit by which a straight line may be off from what was told of the same instant and count as the same.
+const SAME: f64 = 1e-3;
+
+/// What is known of a vehicle that is judged.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counted {
+    pub(super) radius_m: f64,
+    /// What is added to its times \[s\].
+    pub(super) offset_s: f64,
+}
 
 /// Everything that was told, in order of time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AllTold {
     closest: Vec<Told>,
     violations: Vec<ToldViolation>,
+}
+
+/// What is asked of the time that was told of. Distances were told in metres and are judged in lengths over half axes.
+struct Question<F> {
+    counts: F,
+    window: Interval,
+    limits: Limits,
+    above_m: Option<f64>,
+    /// Longest and shortest half axis \[m\]; 1 where there is no ellipsoid.
+    longest_m: f64,
+    shortest_m: f64,
+}
+
+/// What is asked of a pair, and how what was told of a time of it bears on that.
+struct Asked {
+    pair: ObjectPair,
+    limit: f64,
+    /// The part that is asked about, by the clock that is judged by.
+    over: Interval,
+    /// What is added to times by the clock of the recording \[s\]; none where that is not the same of both.
+    later_s: Option<f64>,
+    /// Whether all of what was told is asked about.
+    is_whole: bool,
+    /// Whether one of the two was above the ground at every instant around.
+    is_above: bool,
+}
+
+impl<F: Fn(usize) -> Option<Counted>> Question<F> {
+    fn new(settings: &Settings, counts: F) -> Self {
+        let (longest_m, shortest_m) = settings.ellipsoid_m.map_or((1.0, 1.0), |axes| (axes.max(), axes.min()));
+        let (window, limits, above_m) = (settings.window(), settings.limits(), settings.above_m);
+        Self { counts, window, limits, above_m, longest_m, shortest_m }
+    }
+
+    /// The offset of a pair's clocks \[s\], where it is the same.
+    fn later_s(&self, pair: Pair) -> Option<f64> {
+        let [first, second] = [pair.first(), pair.second()].map(|of| (self.counts)(of).map(|of| of.offset_s));
+        first.filter(|first| second == Some(*first))
+    }
+
+    /// What is asked of a time between two vehicles, the higher of which was between two heights; `None` where nothing is.
+    fn of(&self, pair: Pair, [from_s, to_s]: [f64; 2], [low_m, high_m]: [f64; 2]) -> Option<Asked> {
+        let (first, second) = ((self.counts)(pair.first())?, (self.counts)(pair.second())?);
+        let limit = self.limits.of_vehicles(first.radius_m, second.radius_m);
+        let (early_s, late_s) = (first.offset_s.min(second.offset_s), first.offset_s.max(second.offset_s));
+        let all = Interval { from_s: from_s + early_s, to_s: to_s + late_s };
+        let over = Interval { from_s: all.from_s.max(self.window.from_s), to_s: all.to_s.min(self.window.to_s) };
+        let is_asked = over.from_s <= over.to_s && self.above_m.is_none_or(|above_m| high_m > above_m);
+        is_asked.then(|| Asked {
+            pair: ObjectPair::Vehicles(pair),
+            limit,
+            over,
+            later_s: (early_s == late_s).then_some(early_s),
+            is_whole: over.from_s == all.from_s && over.to_s == all.to_s,
+            is_above: self.above_m.is_none_or(|above_m| low_m > above_m),
+        })
+    }
+
+    /// What a distance in metres is at least and at most, as it is judged.
+    fn scaled(&self, least_m: f64, most_m: f64) -> (f64, f64) {
+        (least_m / self.longest_m, most_m / self.shortest_m)
+    }
+}
+
+impl Asked {
+    /// Nobody knows more of the two, over the time that is asked about, than that they were at least so far apart.
+    fn leave_open(&self, lower_m: f64, upper_m: f64, results: &mut Results) {
+        if lower_m < self.limit {
+            let (Interval { from_s, to_s }, limit_m, rate_hz) = (self.over, self.limit, None);
+            results.ledger.undecided(Undecided { pair: self.pair, from_s, to_s, lower_m, upper_m, limit_m, rate_hz });
+        }
+    }
+
+    /// They were below the limit over a time, and so close at an instant of it.
+    fn violate(&self, over: Interval, min_m: f64, min_at_s: f64, results: &mut Results) {
+        let (Interval { from_s, to_s }, limit_m) = (over, self.limit);
+        let violation = Violation { pair: self.pair, from_s, to_s, min_m, min_at_s, limit_m };
+        results.ledger.violated(violation, false);
+    }
 }
 
 impl AllTold {
@@ -26,9 +116,11 @@ impl AllTold {
         self.violations.push(told);
     }
 
-    /// Whether what was drawn between two instants comes closer than anybody did. What is so at an instant itself no word of
-    /// the recording takes back.
-    fn refutes(&self, pair: ObjectPair, from_s: f64, to_s: f64, drawn_m: f64) -> bool {
+    /// Whether what was drawn between two instants comes closer than anybody did, in metres. What is so at an instant itself
+    /// no word of the recording takes back.
+    fn refutes(&self, pair: ObjectPair, [from_s, to_s]: [f64; 2], later_s: f64, drawn_m: f64) -> bool {
+        let rounding_s = if later_s == 0.0 { 0.0 } else { 8.0 * f64::EPSILON * (from_s.abs() + later_s.abs()) };
+        let (from_s, to_s) = (from_s - later_s - rounding_s, to_s - later_s + rounding_s);
         let within = self.closest.get(self.closest.partition_point(|told| told.to_s <= to_s));
         let refutes = |told: &Told| told.from_s < from_s && drawn_m < told.closest.separation_m * (1.0 - ROUNDING);
         pair.vehicles().is_some() && within.is_some_and(refutes)
@@ -41,23 +133,28 @@ impl AllTold {
         known.map(|at| (at.separation_m, at.time_s)).min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Puts what was told in the place of what was drawn: leaves out what nobody did, and enters who came closest of those
-    /// that are asked for, in the time that is asked for.
-    pub(super) fn correct(&self, results: &mut Results, settings: &Settings, counts: impl Fn(usize) -> Option<f64>) {
-        results.closest.retain(|kept| !self.refutes(kept.pair, kept.time_s, kept.time_s, kept.lower_m));
-        results.ledger.retain_violations(|v| !self.refutes(v.pair, v.from_s, v.to_s, v.min_m));
-        if settings.above_m.is_some() {
-            return;
-        }
-        let (window, limits) = (settings.window(), settings.limits());
-        let limit_m = |pair: Pair| {
-            let (first_m, second_m) = counts(pair.first()).zip(counts(pair.second()))?;
-            Some(limits.of_vehicles(first_m, second_m))
+    /// Puts what was told in the place of what was drawn: leaves out what nobody did, enters who came closest of those that
+    /// are asked for, in the time that is asked for, and leaves open what neither says.
+    pub(super) fn correct(
+        &self,
+        results: &mut Results,
+        settings: &Settings,
+        counts: impl Fn(usize) -> Option<Counted>,
+    ) {
+        let question = Question::new(settings, counts);
+        let refuted = |pair: ObjectPair, span_s, drawn: f64| {
+            let later_s = pair.vehicles().and_then(|pair| question.later_s(pair));
+            later_s.is_some_and(|later_s| self.refutes(pair, span_s, later_s, drawn * question.longest_m))
         };
+        results.closest.retain(|kept| !refuted(kept.pair, [kept.time_s; 2], kept.lower_m));
+        results.ledger.retain_violations(|v| !refuted(v.pair, [v.from_s, v.to_s], v.min_m));
         for told in &self.violations {
-            let (from_s, to_s) = (told.from_s.max(window.from_s), told.to_s.min(window.to_s));
-            if let Some(limit_m) = limit_m(told.pair).filter(|_| from_s <= to_s) {
-                self.enter(told, Interval { from_s, to_s }, limit_m, results);
+            let Some(asked) = question.of(told.pair, [told.from_s, told.to_s], told.height_m) else { continue };
+            let (lower_m, upper_m) = question.scaled(told.least_m, told.min_m);
+            match asked.later_s {
+                Some(later_s) if asked.is_above => self.enter(told, &asked, later_s, &question, results),
+                Some(_) => asked.leave_open(lower_m, upper_m, results),
+                None => asked.leave_open(0.0, f64::INFINITY, results),
             }
         }
         let told_too = |told: &Told| {
@@ -65,50 +162,71 @@ impl AllTold {
             self.violations.iter().any(|v| v.pair == pair && v.from_s <= time_s && time_s <= v.to_s)
         };
         for told in self.closest.iter().filter(|told| !told_too(told)) {
-            let ClosestApproach { pair, separation_m: lower_m, time_s } = told.closest;
-            let is_asked = window.from_s <= time_s && time_s <= window.to_s;
-            let Some(limit_m) = limit_m(pair).filter(|_| is_asked) else { continue };
-            let pair = ObjectPair::Vehicles(pair);
-            results.closest.offer(Approach { pair, lower_m, upper_m: lower_m, time_s, limit_m });
-            if lower_m < limit_m {
-                let (from_s, to_s) = (time_s, time_s);
-                let violation = Violation { pair, from_s, to_s, min_m: lower_m, min_at_s: time_s, limit_m };
-                results.ledger.violated(violation, false);
+            Self::enter_closest(told, &question, results);
+        }
+    }
+
+    /// Enters the closest approach of all between two instants. Where its bounds say less than a straight line that agrees
+    /// with it, the line stays.
+    fn enter_closest<F: Fn(usize) -> Option<Counted>>(told: &Told, question: &Question<F>, results: &mut Results) {
+        let ClosestApproach { pair, separation_m, time_s: at_s } = told.closest;
+        let Some(around) = question.of(pair, [told.from_s, told.to_s], told.height_m) else { return };
+        let agrees = (told.drawn_m - separation_m).abs() <= SAME * around.limit * question.shortest_m;
+        let (lower_m, upper_m) = question.scaled(separation_m, separation_m);
+        let Some(later_s) = around.later_s.filter(|_| around.is_above) else {
+            let (lower_m, upper_m) = if around.later_s.is_some() { (lower_m, upper_m) } else { (0.0, f64::INFINITY) };
+            if !agrees {
+                around.leave_open(lower_m, upper_m, results);
             }
+            return;
+        };
+        let Some(asked) = question.of(pair, [at_s; 2], told.height_m) else { return };
+        if lower_m < upper_m && agrees {
+            return;
+        }
+        let (pair, limit_m, time_s) = (asked.pair, asked.limit, at_s + later_s);
+        results.closest.offer(Approach { pair, lower_m, upper_m, time_s, limit_m });
+        if upper_m < limit_m {
+            asked.violate(asked.over, upper_m, time_s, results);
+        } else {
+            around.leave_open(lower_m, upper_m, results);
         }
     }
 
     /// Enters the part of a told violation that is asked about. All along it the two were nearer than the limit of the
     /// recording; how near is known for the whole, and for a part only where they were the closest of all.
-    fn enter(&self, told: &ToldViolation, part: Interval, limit_m: f64, results: &mut Results) {
-        let Interval { from_s, to_s } = part;
-        let is_whole = from_s == told.from_s && to_s == told.to_s;
-        let seen = self.nearest(told.pair, from_s, to_s);
-        let below_m = told.limit_m.next_down();
-        let upper_m = if is_whole { told.min_m } else { seen.map_or(below_m, |(nearest_m, _)| nearest_m.min(below_m)) };
-        let time_s = seen.map_or(f64::midpoint(from_s, to_s), |(_, at_s)| at_s);
-        let pair = ObjectPair::Vehicles(told.pair);
-        results.closest.offer(Approach { pair, lower_m: told.min_m, upper_m, time_s, limit_m });
-        if limit_m >= told.limit_m {
+    fn enter<F: Fn(usize) -> Option<Counted>>(
+        &self,
+        told: &ToldViolation,
+        asked: &Asked,
+        later_s: f64,
+        question: &Question<F>,
+        results: &mut Results,
+    ) {
+        let Asked { pair, limit: limit_m, over: Interval { from_s, to_s }, is_whole, .. } = *asked;
+        let seen = self.nearest(told.pair, from_s - later_s, to_s - later_s);
+        let (lower_m, of_all_m) = question.scaled(told.least_m, told.min_m);
+        let below_m = told.limit_m / question.shortest_m;
+        let nearest_m = seen.map_or(f64::INFINITY, |(nearest_m, _)| nearest_m / question.shortest_m);
+        let upper_m = if is_whole { of_all_m } else { nearest_m.min(below_m.next_down()) };
+        let time_s = seen.map_or(f64::midpoint(from_s, to_s), |(_, at_s)| at_s + later_s);
+        results.closest.offer(Approach { pair, lower_m, upper_m, time_s, limit_m });
+        if limit_m >= below_m {
             // What is drawn of the same time is a part of the same violation.
             let (mut from_s, mut to_s) = (from_s, to_s);
             results.ledger.retain_violations(|v| {
                 let is_other = v.pair != pair || v.to_s < from_s || to_s < v.from_s;
-                if !is_other && limit_m > told.limit_m {
+                if !is_other && limit_m > below_m {
                     (from_s, to_s) = (from_s.min(v.from_s), to_s.max(v.to_s));
                 }
                 is_other
             });
-            let violation = Violation { pair, from_s, to_s, min_m: upper_m, min_at_s: time_s, limit_m };
-            results.ledger.violated(violation, false);
+            asked.violate(Interval { from_s, to_s }, upper_m, time_s, results);
         } else if upper_m < limit_m {
             // Below a smaller limit they were at one instant for certain, and nothing is told of when they went below it.
-            let (from_s, to_s) = (time_s, time_s);
-            let violation = Violation { pair, from_s, to_s, min_m: upper_m, min_at_s: time_s, limit_m };
-            results.ledger.violated(violation, false);
-        } else if told.min_m < limit_m {
-            let (lower_m, rate_hz) = (told.min_m, None);
-            results.ledger.undecided(Undecided { pair, from_s, to_s, lower_m, upper_m, limit_m, rate_hz });
+            asked.violate(Interval { from_s: time_s, to_s: time_s }, upper_m, time_s, results);
+        } else {
+            asked.leave_open(lower_m, upper_m, results);
         }
     }
 }

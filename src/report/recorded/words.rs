@@ -7,7 +7,7 @@ use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
 use crate::report::page::{self, Badge, Markup, Page, Tone, section};
-use crate::text::{at_least, counted, fixed, metres_below, seconds};
+use crate::text::{at_least, at_most, counted, exact, fixed, metres_below, seconds};
 
 /// Violations that are listed in words, and on the page.
 const LISTED_IN_WORDS: usize = 10;
@@ -86,12 +86,12 @@ impl RecordedReport {
         if let Some(OfPair { who: [first, second], finding }) = closest {
             let rate =
                 self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
-            return format!(
-                "{first} and {second} came to between {}{unit} and {}{unit} by {}{rate}",
-                at_least(finding.lower_m, 6),
-                fixed(finding.upper_m, 6),
-                seconds(finding.to_s)
-            );
+            let (low, high, at) = (at_least(finding.lower_m, 6), at_most(finding.upper_m, 6), seconds(finding.to_s));
+            return if finding.upper_m.is_finite() {
+                format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
+            } else {
+                format!("how near {first} and {second} came to each other by {at} is not known")
+            };
         }
         let longest_s = self.gaps.iter().map(|gap| gap.finding.joined_by_s).fold(0.0, f64::max);
         // Rounded up: as it is said it is long enough.
@@ -226,9 +226,13 @@ impl OfPair<Undecided<ObjectPair>> {
     fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
         let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
+        let apart = if finding.upper_m.is_finite() {
+            interval(finding.lower_m, finding.upper_m)
+        } else {
+            "not known".to_owned()
+        };
         format!(
-            "{first} and {second}: {} from {}, limit {}{rate}",
-            interval(finding.lower_m, finding.upper_m),
+            "{first} and {second}: {apart} from {}, limit {}{rate}",
             span(finding.from_s, finding.to_s),
             exact(finding.limit_m)
         )
@@ -246,16 +250,10 @@ fn span(from_s: f64, to_s: f64) -> String {
     format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
 }
 
-/// A limit with at least three decimals, and as many as it has: rounded it would be another one.
-fn exact(limit: f64) -> String {
-    let is_limit = |shown: &String| shown.parse() == Ok(limit);
-    (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
-}
-
-/// A distance with six decimals, rounded down, or an interval where its bounds differ.
+/// A distance with six decimals, rounded down, or an interval where its bounds differ, which holds them.
 #[must_use]
 pub fn interval(lower: f64, upper: f64) -> String {
-    let (low, high) = (at_least(lower, 6), fixed(upper, 6));
+    let (low, high) = (at_least(lower, 6), at_most(upper, 6));
     if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
 }
 

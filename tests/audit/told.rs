@@ -1,0 +1,215 @@
+//! What a run says of the time between its samples binds, or it is said that nobody knows.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use tautline::audit::Status;
+use tautline::audit::recorded::{
+    Motion, ObjectPair, Outcome, Settings, Told, ToldViolation, TrackAuditor, VehicleSettings,
+};
+use tautline::swarm::{ClosestApproach, Pair};
+use tautline::track::Item;
+
+use crate::recorded::{names, pass, seen};
+
+/// The closest that the first two came within the first second; straight lines have them far apart then.
+fn told(separation_m: f64, time_s: f64) -> Told {
+    let closest = ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s };
+    Told { from_s: 0.0, to_s: 1.0, closest, drawn_m: 9.0, height_m: [0.0, 0.0] }
+}
+
+/// Two that were 1.5 m apart, and all along below 2 m.
+fn near(pair: Pair) -> ToldViolation {
+    ToldViolation { pair, from_s: 0.3, to_s: 0.9, least_m: 1.5, min_m: 1.5, limit_m: 2.0, height_m: [0.0, 0.0] }
+}
+
+fn judged(items: &[Item], told: Told, settings: Settings) -> Outcome {
+    let mut auditor = TrackAuditor::new(settings).expect("settings");
+    auditor.tell(told);
+    auditor.push(&names(2), items).expect("items");
+    auditor.finish().expect("an outcome")
+}
+
+fn violated(items: &[Item], told: ToldViolation, settings: Settings) -> Outcome {
+    let mut auditor = TrackAuditor::new(settings).expect("settings");
+    auditor.tell_violation(told);
+    auditor.push(&names(2), items).expect("items");
+    auditor.finish().expect("an outcome")
+}
+
+/// Clocks of the first two that are set right by so much.
+fn clocks(delta_m: f64, [alpha_s, bravo_s]: [f64; 2]) -> Settings {
+    let set = |offset_s| VehicleSettings { offset_s, ..VehicleSettings::default() };
+    let vehicles = BTreeMap::from([("alpha".to_owned(), set(alpha_s)), ("bravo".to_owned(), set(bravo_s))]);
+    Settings { vehicles, ..Settings::delta(delta_m) }
+}
+
+#[test]
+fn what_a_recording_says_of_the_time_between_its_samples_goes_before_what_is_drawn() {
+    // Drawn clear, and too close in between.
+    let hit = judged(&pass(3.0), told(0.5, 0.25), Settings::delta(2.0));
+    let found = hit.violations[0];
+    assert_eq!((hit.status, found.min_m, found.min_at_s), (Status::Violation, 0.5, 0.25));
+    assert_eq!(hit.closest[0].upper_m, 0.5);
+    // Drawn too close, and nobody was.
+    let missed = judged(&pass(1.0), told(2.5, 0.25), Settings::delta(2.0));
+    assert_eq!((missed.status, missed.closest[0].lower_m), (Status::Clear, 2.5));
+    // Of pairs that were not the closest the recording tells when they were too close, once for what is drawn of it too.
+    let third = |y| [seen(2, 0.0, [-5.0, 9.0, 0.0]), seen(2, 1.0, [5.0, y, 0.0])];
+    for (only, drawn_y, expected) in [(None, 9.0, 1), (Some([1, 2]), 9.0, 1), (Some([0, 1]), 9.0, 0), (None, -4.0, 1)] {
+        let only = only.map(|pair: [usize; 2]| pair.iter().map(|k| names(3)[*k].clone()).collect());
+        let mut auditor = TrackAuditor::new(Settings { only, ..Settings::delta(2.0) }).expect("settings");
+        auditor.tell_violation(near(Pair::new(1, 2)));
+        let mut items = [&pass(3.0)[..], &third(drawn_y)].concat();
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        auditor.push(&names(3), &items).expect("items");
+        let outcome = auditor.finish().expect("an outcome");
+        let found: Vec<_> =
+            outcome.violations.iter().filter(|v| v.pair == ObjectPair::Vehicles(Pair::new(1, 2))).collect();
+        assert_eq!(found.len(), expected, "{only:?}: {found:?}", only = outcome.vehicles);
+        assert!(found.iter().all(|v| (v.from_s, v.to_s, v.min_m) == (0.3, 0.9, 1.5)), "{found:?}");
+        assert_eq!(outcome.status == Status::Violation, expected > 0);
+    }
+    // Of a part of it, and against other limits, no more is said than is known.
+    let cases = [
+        (2.0, [0.4, 0.6], Status::Violation, Some([0.4, 0.6])),
+        (1.8, [0.4, 0.6], Status::Undecided, None),
+        (1.4, [0.4, 0.6], Status::Clear, None),
+        (1.8, [0.0, 1.0], Status::Violation, Some([0.6, 0.6])),
+        (3.0, [0.0, 1.0], Status::Violation, Some([0.3, 0.9])),
+        (2.0, [0.92, 0.95], Status::Clear, None),
+    ];
+    for (delta_m, [from_s, to_s], expected, span) in cases {
+        let window = Settings { from_s: Some(from_s), to_s: Some(to_s), ..Settings::delta(delta_m) };
+        let mut auditor = TrackAuditor::new(window).expect("settings");
+        auditor.tell_violation(near(Pair::new(0, 1)));
+        auditor.push(&names(2), &pass(3.5)).expect("items");
+        let outcome = auditor.finish().expect("an outcome");
+        assert_eq!(outcome.status, expected, "{delta_m} {from_s} {to_s}: {outcome:?}");
+        assert_eq!(outcome.violations.first().map(|v| [v.from_s, v.to_s]), span, "{delta_m} {from_s} {to_s}");
+        let closest = outcome.closest[0];
+        assert_eq!(closest.lower_m, if to_s < 0.92 || from_s == 0.0 { 1.5 } else { closest.upper_m });
+    }
+    // What is so at a sample no word takes back.
+    let mut sampled = pass(3.0);
+    sampled.extend([seen(0, 2.0, [0.0; 3]), seen(1, 2.0, [1.0, 0.0, 0.0])]);
+    let words = Told { from_s: 1.0, to_s: 2.0, ..told(2.5, 1.5) };
+    assert_eq!(judged(&sampled, words, Settings::delta(2.0)).status, Status::Violation);
+    // Of a pair that is not asked about, or after the window, nothing is entered.
+    let elsewhere = Settings { to_s: Some(0.2), ..Settings::delta(2.0) };
+    assert_eq!(judged(&pass(3.0), told(0.5, 0.25), elsewhere).status, Status::Clear);
+}
+
+#[test]
+fn what_was_told_moves_with_a_clock_that_both_share_and_is_open_where_clocks_differ() {
+    // Set right alike: the same, later.
+    let hit = judged(&pass(3.0), told(0.5, 0.25), clocks(2.0, [4.0, 4.0]));
+    assert_eq!((hit.status, hit.violations[0].min_at_s, hit.closest[0].time_s), (Status::Violation, 4.25, 4.25));
+    let missed = judged(&pass(1.0), told(2.5, 0.25), clocks(2.0, [0.1, 0.1]));
+    assert_eq!((missed.status, missed.closest[0].lower_m), (Status::Clear, 2.5));
+    let of_part = violated(&pass(3.0), near(Pair::new(0, 1)), Settings { to_s: Some(4.5), ..clocks(2.0, [4.0, 4.0]) });
+    assert_eq!(of_part.violations.iter().map(|v| (v.from_s, v.to_s)).collect::<Vec<_>>(), [(4.3, 4.5)]);
+    // A sample is a sample by any clock.
+    for later_s in [0.1, 0.3, 1e9 / 3.0] {
+        let settings = clocks(2.0, [later_s; 2]);
+        let at_once = [seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [1.0, 0.0, 0.0])];
+        let parted = [seen(0, 1.0, [0.0; 3]), seen(1, 1.0, [9.0, 0.0, 0.0])];
+        let sampled = judged(&[at_once, parted].concat(), told(2.5, 0.5), settings);
+        assert_eq!(sampled.status, Status::Violation, "{later_s}");
+    }
+    // Set right differently: where straight lines are not what was flown nobody knows, whatever they say.
+    for offsets_s in [[0.0, 0.01], [-0.01, 0.0]] {
+        let open = judged(&pass(3.0), told(0.5, 0.25), clocks(2.0, offsets_s));
+        let found = open.undecided[0];
+        assert_eq!((open.status, found.lower_m, found.upper_m), (Status::Undecided, 0.0, f64::INFINITY));
+        let open = violated(&pass(3.0), near(Pair::new(0, 1)), clocks(2.0, offsets_s));
+        assert_eq!(open.status, Status::Undecided, "{offsets_s:?}");
+        // Drawn too close as well: a violation under straight lines, which nothing told of other clocks takes back.
+        assert_eq!(judged(&pass(1.0), told(2.5, 0.25), clocks(2.0, offsets_s)).status, Status::Violation);
+        // Where they agree the lines stand.
+        let same = Told { drawn_m: 0.5, ..told(0.5, 0.25) };
+        assert_eq!(judged(&pass(3.0), same, clocks(2.0, offsets_s)).status, Status::Clear);
+    }
+    // Of others than those who are asked about nothing is open.
+    let mut items = [&pass(3.0)[..], &[seen(2, 0.0, [0.0, 9.0, 0.0]), seen(2, 1.0, [0.0, 9.0, 0.0])]].concat();
+    items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    let only = Some(["alpha", "charlie"].map(str::to_owned).into());
+    let mut auditor = TrackAuditor::new(Settings { only, ..clocks(2.0, [0.0, 0.01]) }).expect("settings");
+    auditor.tell(told(0.5, 0.25));
+    auditor.tell_violation(near(Pair::new(0, 1)));
+    auditor.push(&names(3), &items).expect("items");
+    assert_eq!(auditor.finish().expect("an outcome").status, Status::Clear);
+}
+
+#[test]
+fn metres_bind_around_ellipsoids_as_far_as_they_bound_scaled_distances() {
+    // Half axes of 0.5 m and 1 m: 2.5 m are 2.5 to 5 of them, and 2 is the limit.
+    let axes = |z| Settings { ellipsoid_m: Some(Vector3::new(0.5, 0.5, z)), ..Settings::default() };
+    for (separation_m, expected) in [(2.5, Status::Clear), (1.5, Status::Undecided), (0.9, Status::Violation)] {
+        let outcome = judged(&pass(3.0), told(separation_m, 0.25), axes(1.0));
+        assert_eq!(outcome.status, expected, "{separation_m}: {outcome:?}");
+        let closest = outcome.closest[0];
+        assert_eq!((closest.lower_m, closest.upper_m), (separation_m, 2.0 * separation_m));
+    }
+    // Lines that agree with what was told say in which direction the two were.
+    let same = Told { drawn_m: 1.5, ..told(1.5, 0.25) };
+    let agreed = judged(&pass(3.0), same, axes(1.0));
+    assert_eq!((agreed.status, agreed.closest[0].lower_m), (Status::Clear, 6.0));
+    // Of a ball everything is known.
+    for (separation_m, expected) in [(1.0, Status::Clear), (1.0_f64.next_down(), Status::Violation)] {
+        assert_eq!(judged(&pass(3.0), told(separation_m, 0.25), axes(0.5)).status, expected, "{separation_m}");
+    }
+    // Drawn too close, and nobody was near enough for that in any direction.
+    assert_eq!(judged(&pass(0.5), told(2.5, 0.25), axes(1.0)).status, Status::Clear);
+    assert_eq!(judged(&pass(0.5), told(0.6, 0.25), axes(1.0)).status, Status::Violation);
+    // 1.5 m all along below 2 m: 1.5 to 3 of the half axes.
+    for (z, delta, expected) in [
+        (1.0, None, Status::Undecided),
+        (1.0, Some(1.4), Status::Clear),
+        (1.0, Some(3.5), Status::Violation),
+        (1.0, Some(4.0), Status::Violation),
+        (0.5, Some(3.1), Status::Violation),
+        (0.5, Some(2.9), Status::Clear),
+    ] {
+        let outcome = violated(&pass(3.0), near(Pair::new(0, 1)), Settings { delta_m: delta, ..axes(z) });
+        assert_eq!(outcome.status, expected, "{z} {delta:?}: {outcome:?}");
+    }
+}
+
+#[test]
+fn what_was_told_near_the_ground_is_open_unless_it_was_above_or_below_all_along() {
+    let above = |above_m| Settings { above_m: Some(above_m), ..Settings::delta(2.0) };
+    let at = |height_m| Told { height_m, ..told(0.5, 0.25) };
+    let violation_at = |height_m| ToldViolation { height_m, ..near(Pair::new(0, 1)) };
+    let mut items = pass(3.0);
+    for item in &mut items {
+        if let Item::Sample(sample) = item {
+            sample.position_m.z = 1.0;
+        }
+    }
+    for (height_m, expected) in
+        [([1.0, 1.0], Status::Violation), ([0.2, 1.0], Status::Undecided), ([0.2, 0.5], Status::Clear)]
+    {
+        assert_eq!(judged(&items, at(height_m), above(0.5)).status, expected, "{height_m:?}");
+        assert_eq!(violated(&items, violation_at(height_m), above(0.5)).status, expected, "{height_m:?}");
+    }
+    let agrees = Told { drawn_m: 0.5, ..at([0.2, 1.0]) };
+    assert_eq!(judged(&items, agrees, above(0.5)).status, Status::Clear);
+}
+
+#[test]
+fn a_violation_without_an_end_has_a_smallest_distance_that_only_bounds_are_known_of() {
+    let lasting = ToldViolation { least_m: 0.4, min_m: 1.2, ..near(Pair::new(0, 1)) };
+    for (delta_m, expected) in
+        [(2.0, Status::Violation), (1.3, Status::Violation), (1.0, Status::Undecided), (0.4, Status::Clear)]
+    {
+        let outcome = violated(&pass(3.0), lasting, Settings::delta(delta_m));
+        assert_eq!(outcome.status, expected, "{delta_m}");
+        assert_eq!((outcome.closest[0].lower_m, outcome.closest[0].upper_m), (0.4, 1.2));
+    }
+    // A word that contradicts itself is none.
+    let odd = ToldViolation { least_m: 1.3, min_m: 1.2, ..lasting };
+    assert_eq!(violated(&pass(3.0), odd, Settings::delta(2.0)).status, Status::Clear);
+    let held = Settings { motion: Some(Motion::Hold), ..Settings::delta(2.0) };
+    assert_eq!(violated(&pass(3.0), lasting, held).status, Status::Violation);
+}
