@@ -42,8 +42,11 @@ pub(crate) fn metres_below(number: f64, limit_m: f64) -> String {
     if number >= limit_m * (1.0 - JUST) {
         return format!("just below {}", exact(limit_m));
     }
-    let differs = |&decimals: &usize| fixed(number, decimals) != fixed(limit_m, decimals);
-    (3..=17).find(differs).map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
+    let is_told = |&decimals: &usize| {
+        let shown = fixed(number, decimals);
+        shown != fixed(limit_m, decimals) && (number == 0.0 || shown.parse() != Ok(0.0))
+    };
+    (3..=17).find(is_told).map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
 }
 
 /// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or fill a line.

@@ -36,7 +36,7 @@ pub struct FlightRow {
     pub refused: Vec<String>,
     /// Why it ended before its time.
     pub ended_early: Option<String>,
-    /// Whether the formation was reached and kept to the end.
+    /// Whether the formation was reached and kept to the end; on a flight of several legs each of them.
     pub reached: bool,
     /// From when on \[s\].
     pub reached_at_s: Option<f64>,
@@ -91,7 +91,7 @@ impl FlightRow {
             outcome: Outcome::of(&report),
             refused: report.verdict.refused,
             ended_early: report.run.ended_early,
-            reached: report.formation.reached,
+            reached: report.formation.reached && report.legs.iter().all(|leg| leg.reached_at_s.is_some()),
             reached_at_s: report.formation.reached_at_s,
             min_m: report.separation.min_m,
             min_at_s: report.separation.min_at_s,

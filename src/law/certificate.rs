@@ -60,12 +60,22 @@ impl Certificate {
         Self { certified_m: None, energy_initial: None, void: vec![reason], legs: Vec::new() }
     }
 
-    /// What holds of a flight for which this was promised first and another promise was made later: the least of both,
-    /// which is nothing where either is nothing.
-    pub fn renew(&mut self, later: &Self) {
-        if self.certified_m.is_some() {
-            self.certified_m = self.certified_m.zip(later.certified_m).map(|(before_m, now_m)| before_m.min(now_m));
-            self.void.clone_from(&later.void);
+    /// What holds of a flight for which this was promised first and another promise was made on a leg, from 0, after its
+    /// slots were spread: the least of both, which is nothing where either is nothing. The later promise is of the spread
+    /// slots, of those of the leg, and of the legs after it.
+    pub fn renew(&mut self, later: &Self, leg: usize) {
+        if self.certified_m.is_none() {
+            return;
+        }
+        let least = |before_m: Option<f64>, now_m: Option<f64>| before_m.zip(now_m).map(|(a, b)| a.min(b));
+        self.certified_m = least(self.certified_m, later.certified_m);
+        self.void.clone_from(&later.void);
+        if self.certified_m.is_none() {
+            self.legs.clear();
+        }
+        for (bound, now) in self.legs.iter_mut().skip(leg).zip(later.legs.iter().skip(1)) {
+            bound.energy = bound.energy.max(now.energy);
+            bound.certified_m = least(bound.certified_m, now.certified_m);
         }
     }
 
@@ -154,7 +164,7 @@ mod tests {
             (Some(2.0), None, None),
         ] {
             let mut certificate = promised(before);
-            certificate.renew(&promised(later));
+            certificate.renew(&promised(later), 0);
             assert_eq!(certificate.certified_m, expected);
             assert_eq!(certificate.void.is_empty(), expected.is_some());
         }
@@ -198,7 +208,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[9].to_string(),
+            reasons[10].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

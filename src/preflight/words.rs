@@ -40,9 +40,10 @@ impl Preflight {
         let promise = match self.certified_m {
             Some(certified_m) => {
                 format!(
-                    "certified never closer than {} m in continuous time (delta {} m)",
+                    "certified never closer than {} m in continuous time (delta {} m){}",
                     at_least(certified_m, 6),
-                    self.delta_m
+                    self.delta_m,
+                    if self.breathes { " unless slots are spread" } else { "" }
                 )
             }
             None => "no separation is certified".to_owned(),

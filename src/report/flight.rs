@@ -87,7 +87,7 @@ pub struct Separation<Delta = f64> {
     pub min_at_s: Option<f64>,
     /// Which pair.
     pub min_pair: Option<[usize; 2]>,
-    /// Distance that the law's certificate promised before the first step \[m\].
+    /// Distance that the law's certificate promised before the first step, and anew wherever slots were spread \[m\].
     pub certified_m: Option<f64>,
     /// Why the certificate is void, a sentence each; empty where it holds.
     pub certificate_void: Vec<String>,

@@ -19,7 +19,7 @@ pub struct LegNumbers {
     pub to_s: Option<f64>,
     /// When its formation was reached and kept to the end of the leg \[s\].
     pub reached_at_s: Option<f64>,
-    /// No pair comes closer than this on it, as certified before the first step \[m\].
+    /// No pair comes closer than this on it, as certified before the first step, and anew wherever slots were spread \[m\].
     pub certified_m: Option<f64>,
     /// Nor is the energy larger than this \[m^2/s^2\].
     pub energy_bound: Option<f64>,
@@ -62,7 +62,14 @@ pub(super) fn reason(legs: &[LegNumbers]) -> Option<String> {
             format!("Leg {} was not reached before leg {} began at {at}.", leg.leg, leg.leg + 1)
         })
     });
-    let never = never.map(|leg| format!("Leg {} never began: leg {} was not reached.", leg.leg, leg.leg - 1));
+    let never = never.map(|leg| {
+        let before = &legs[leg.leg - 2];
+        let why = match before.reached_at_s {
+            Some(_) => "the flight ended before".to_owned(),
+            None => format!("leg {} was not reached", before.leg),
+        };
+        format!("Leg {} never began: {why}.", leg.leg)
+    });
     let said: Vec<_> = missed.into_iter().chain(never).collect();
     (!said.is_empty()).then(|| said.join(" "))
 }

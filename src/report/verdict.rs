@@ -196,13 +196,14 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
             judge.edge_error_m
         ),
         Fails::RmsPositionErrorM => format!(
-            "at the end every edge has its length and the shape is another one, or turned where it may not be: vehicles \
-             are {} m (root mean square) from the formation, and {} m are allowed",
+            "at the end every edge has its length and the shape is another one, or it is turned or elsewhere where it may not be: \
+             vehicles are {} m (root mean square) from the formation, and {} m are allowed",
             metres(summary.rms_position_error_m),
             judge.edge_error_m
         ),
         Fails::Disagreement => format!(
-            "at the end vehicles still differ by {} m/s from their mean velocity, and {} m/s are allowed",
+            "at the end vehicles still differ by {} m/s from their mean velocity, or from that of the reference they follow, and \
+             {} m/s are allowed",
             metres(summary.disagreement_m_s),
             judge.disagreement_m_s
         ),

@@ -80,7 +80,7 @@ impl Report {
             }
             Some(Fails::MaxEdgeErrorM) => ("largest edge error", formation.max_edge_error_m, "m"),
             Some(Fails::RmsPositionErrorM) => {
-                ("another shape, rms position error", formation.rms_position_error_m, "m")
+                ("another shape or place, rms position error", formation.rms_position_error_m, "m")
             }
             Some(Fails::Disagreement) => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
         };

@@ -105,7 +105,8 @@ fn anchor(scenario: &mut Scenario) {
     for leg in &mut scenario.legs {
         let slots_m = &mut leg.formation.slots_m;
         let move_m = place_m - row(slots_m, leader);
-        if move_m != Vector3::zeros() {
+        // What is not finite is told of whom it is.
+        if move_m != Vector3::zeros() && move_m.iter().all(|x| x.is_finite()) {
             (0..slots_m.nrows()).for_each(|i| {
                 let slot_m = row(slots_m, i) + move_m;
                 set_row(slots_m, i, slot_m);

@@ -31,7 +31,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Point>, ScenarioError> {
         .comment(Some(b'#'))
         .delimiter(delimiter)
         .from_reader(text.as_bytes());
-    let mut columns: Vec<usize> = Vec::new();
+    let (mut columns, mut is_named): (Vec<usize>, _) = (Vec::new(), false);
     let mut points = Vec::new();
     for record in reader.records() {
         let record =
@@ -48,8 +48,13 @@ pub(super) fn read(path: &Path) -> Result<Vec<Point>, ScenarioError> {
             let found = named.map_or_else(unnamed, Ok);
             columns = found.map_err(|count| refused(line, &format!("{count} columns without the names x and y")))?;
             if is_heading {
+                is_named = true;
                 continue;
             }
+        }
+        if !is_named && fields.len() != columns.len() {
+            let said = format!("{} columns where the first line has {}", fields.len(), columns.len());
+            return Err(refused(line, &said));
         }
         points.push(point(&fields, &columns).map_err(|said| refused(line, &said))?);
     }

@@ -170,7 +170,11 @@ impl ReferenceKind {
                 }
             }
             Self::WayPoints { points_m, times_s, speed_m_s } => {
-                let points_m = places(points_m)?;
+                let mut points_m = places(points_m)?;
+                if times_s.is_none() {
+                    // Two points in one place are one.
+                    points_m.dedup();
+                }
                 let times_s = match (times_s, speed_m_s) {
                     (Some(times_s), None) => times_s.clone(),
                     (None, Some(speed_m_s)) => {
@@ -214,17 +218,16 @@ fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
     points_m.iter().map(|&point| place("reference.points_m", point)).collect()
 }
 
-/// When each point is reached at this largest speed \[s\].
+/// When each point is reached at this largest speed \[s\]: each at another place than the one before.
 fn timed(points_m: &[Vector3<f64>], speed_m_s: f64) -> Vec<f64> {
     let mut time_s = 0.0;
     let ways = points_m.windows(2).map(|way| PEAK_OVER_MEAN * (way[1] - way[0]).norm() / speed_m_s);
-    let mut times_s = vec![0.0];
-    for length_s in ways {
-        // Two points in one place are one.
-        time_s += length_s.max(f64::MIN_POSITIVE);
-        times_s.push(time_s);
-    }
-    times_s
+    std::iter::once(0.0)
+        .chain(ways.map(|length_s| {
+            time_s += length_s;
+            time_s
+        }))
+        .collect()
 }
 
 /// Points with their times, which grow.

@@ -8,6 +8,7 @@ use super::limits::first_within;
 use super::spec::{PlantSpec, Precision, Scenario};
 use crate::law::{Certificate, Law, Void};
 use crate::swarm::{Rows, mean_row, row};
+use crate::target::BreathingMode;
 
 /// Largest error of a22 by the engine's rounding, as a share of a22.
 const DAMPING_RESOLUTION: f64 = 0.01;
@@ -62,10 +63,18 @@ impl Scenario {
         let (epsilon, duration_s) = (plant.epsilon(), self.time.duration_s);
         let seed_m_s = self.start.mean_velocity_m_s().norm() + epsilon;
         let grown = rate_per_s * duration_s;
-        let carried_m = self.reference.as_ref().map_or(0.0, |guidance| guidance.motion.reach_m(duration_s));
+        let carried_m = self.carried_m(duration_s);
         let distance_m = carried_m + seed_m_s * if grown == 0.0 { duration_s } else { grown.exp_m1() / rate_per_s };
         let spacing_m = epsilon * (self.extent_m() + distance_m);
         Drift { speed_m_s: seed_m_s * grown.exp(), distance_m, spacing_m }
+    }
+
+    /// How far from the middle of the start a reference carries the middle of a formation \[m\].
+    fn carried_m(&self, duration_s: f64) -> f64 {
+        let Some(guidance) = &self.reference else { return 0.0 };
+        let begins_m = guidance.motion.at(0.0).position_m - mean_row(&self.start.positions_m);
+        let away_m = self.legs.iter().map(|leg| (mean_row(&leg.formation.slots_m) + begins_m).norm());
+        away_m.fold(0.0, f64::max) + guidance.motion.reach_m(duration_s)
     }
 
     /// The precision that tells positions apart to the end of the flight, which a scenario file gets where it names none.
@@ -84,10 +93,33 @@ impl Scenario {
     /// commands that are held, and numbers that do not tell the promise from delta, it promises nothing.
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
-        let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
+        self.as_far_as_told(self.promised(law))
+    }
+
+    /// Of every leg, with the breath that it begins with where it does.
+    fn promised(&self, law: &dyn Law) -> Certificate {
         let start = self.observation(&self.start);
-        let promised =
-            law.certificate_through(&start, &ahead).void_where(self.time.control_hz.is_some(), Void::CommandsHeld);
+        if self.breathing.mode != BreathingMode::Start || law.settling_rate_per_s().is_none() {
+            let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
+            return law.certificate_through(&start, &ahead);
+        }
+        let leader = self.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
+        let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.breathing.scale, leader)).collect();
+        let ahead: Vec<_> = spread.iter().zip(&self.legs).flat_map(|(spread, leg)| [spread, &leg.formation]).collect();
+        let mut promised = law.certificate_through(&start, &ahead);
+        // What holds on a leg is what holds once its slots have come together.
+        promised.legs = promised.legs.into_iter().skip(2).step_by(2).collect();
+        if self.legs.len() < 2 {
+            promised.legs.clear();
+        }
+        promised
+    }
+
+    /// A promise as far as this scenario lets it hold: not with commands that are held, nor where numbers do not tell it from
+    /// delta.
+    #[must_use]
+    pub fn as_far_as_told(&self, promised: Certificate) -> Certificate {
+        let promised = promised.void_where(self.time.control_hz.is_some(), Void::CommandsHeld);
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
         promised.void_where(unresolved, Void::Unresolved)
     }

@@ -11,7 +11,13 @@ use super::time::TimeSpec;
 use crate::graph::Graph;
 use crate::law::{Controls, Gain, LawSpec};
 use crate::swarm::{Pair, row};
-use crate::target::{Begins, Guidance, Leg};
+use crate::target::{Begins, Leg};
+
+/// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
+const LEADER_ROUNDING: f64 = 1e-9;
+
+/// Steps that a reference takes for any of its turns at least: it is followed from step to step.
+const STEPS_A_TURN: f64 = 10.0;
 
 /// Vehicles that a message names before it counts the rest.
 const NAMED_VEHICLES: usize = 8;
@@ -126,7 +132,18 @@ impl Scenario {
                 .at("law.kind"));
         }
         let start = guidance.motion.at(0.0);
-        if self.space == Space::Plane && self.leaves_the_plane(guidance) {
+        let shortest_s = STEPS_A_TURN * self.time.dt_s;
+        if guidance.motion.shortest_s() < shortest_s {
+            return Err(ScenarioError::new(format!(
+                "the reference turns within {} s, too fast to be followed in steps of {} s",
+                guidance.motion.shortest_s(),
+                self.time.dt_s
+            ))
+            .with_help(format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s"))
+            .at("reference.kind")
+            .at("time.dt_s"));
+        }
+        if self.space == Space::Plane && !guidance.motion.is_level() {
             return Err(ScenarioError::new("the reference leaves the plane z = 0 that the swarm lives in")
                 .with_help("set its z to 0, or swarm.dimensions to 3")
                 .at("reference.kind")
@@ -139,7 +156,9 @@ impl Scenario {
             (row(&self.start.positions_m, leader) - slot_m).norm()
         });
         let off_m = off_m.fold(0.0, f64::max);
-        if off_m_s.norm() <= self.arrival.disagreement_m_s && off_m <= self.arrival.edge_error_m {
+        // Not by more than rounding: what is certified is certified around a leader that is on the reference.
+        let rounding = LEADER_ROUNDING * (1.0 + start.position_m.norm() + start.velocity_m_s.norm());
+        if off_m_s.norm() <= rounding && off_m <= rounding {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
@@ -150,12 +169,6 @@ impl Scenario {
         .with_help("leave out its start velocity: it then starts as the reference does")
         .at_entry("start.velocities_m_s", leader)
         .at("reference.leader"))
-    }
-
-    fn leaves_the_plane(&self, guidance: &Guidance) -> bool {
-        const LOOKS: u32 = 64;
-        let duration_s = self.time.duration_s;
-        (0..=LOOKS).any(|k| guidance.motion.at(duration_s * f64::from(k) / f64::from(LOOKS)).position_m.z != 0.0)
     }
 
     fn check_lengths(&self) -> Result<(), ScenarioError> {

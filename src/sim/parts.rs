@@ -34,7 +34,10 @@ impl Parts {
         let supervisor =
             Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(law.controls().freedom());
         let supervisor = match law.settling_rate_per_s() {
-            Some(rate_per_s) => supervisor.breathing(scenario.breathing, rate_per_s),
+            Some(rate_per_s) => {
+                let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
+                supervisor.breathing(scenario.breathing, rate_per_s, leader)
+            }
             None => supervisor,
         };
         Self { law, motion: Motion::of(scenario), link: Box::new(Direct), supervisor: Box::new(supervisor) }

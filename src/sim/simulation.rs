@@ -406,8 +406,8 @@ impl Simulation {
         let ((judged, audit_time), (commanded, law_time)) =
             if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
         self.performance.audit += audit_time;
-        let Self { watch, controller, state, certificate, events, .. } = self;
-        watch.look(controller, (time_s, state), certificate, events);
+        let Self { watch, scenario, controller, state, certificate, events, .. } = self;
+        watch.look(scenario, controller, (time_s, state), certificate, events);
         let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
         judged.map_err(refused)?;
         self.judge.note_engine_contacts(&self.motion, self.time_s, &mut self.events);

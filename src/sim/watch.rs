@@ -3,6 +3,7 @@
 use super::controller::Controller;
 use crate::law::Certificate;
 use crate::record::{Breath, EnergyRise, Event};
+use crate::scenario::Scenario;
 use crate::swarm::Swarm;
 
 /// What the energy did since the target changed, the worst that it ever did, and the changes themselves.
@@ -19,6 +20,7 @@ impl Watch {
     /// Tells what the supervisor has changed at an instant, and renews what the law promised where it must.
     pub(super) fn look(
         &mut self,
+        scenario: &Scenario,
         controller: &mut Controller,
         (time_s, state): (f64, &Swarm),
         certificate: &mut Certificate,
@@ -28,7 +30,7 @@ impl Watch {
         events.extend((self.leg + 1..=leg).map(|leg| Event::LegBegan { leg, time_s }));
         self.leg = leg;
         if let Some((scale, promise)) = controller.breath(time_s, state) {
-            certificate.renew(&promise);
+            certificate.renew(&scenario.as_far_as_told(promise), leg);
             self.breaths.push(Breath { time_s, scale, certified_m: certificate.certified_m });
             events.push(Event::Breath { time_s, scale });
         }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Arrival, CurrentTarget, Leg, Target};
+use super::{Arrival, CurrentTarget, Leg, Target, spread_slots};
 use crate::formation::{Formation, Freedom};
 use crate::swarm::{Swarm, mean_row, row};
 
@@ -45,6 +45,8 @@ const SLOW: f64 = 0.2;
 const STALLED_S: f64 = 2.0;
 /// Errors of so many times what counts as reached are worth a breath.
 const WORTH: f64 = 2.0;
+/// After so long without progress spread slots are given up \[s\].
+const GIVEN_UP_S: f64 = 10.0;
 /// Spread slots are held until no vehicle is farther from its own than this part of the distance of the slots.
 const SETTLED: f64 = 0.25;
 /// Slots then come together with this e-folding time \[s\].
@@ -57,8 +59,8 @@ const CLOSED: f64 = 0.01;
 enum Phase {
     /// Slots are those of the leg; no progress has been made since this time \[s\].
     Flying { idle_since_s: Option<f64> },
-    /// Slots are spread.
-    Spread { scale: f64 },
+    /// Slots are spread; no progress towards them has been made since this time \[s\].
+    Spread { scale: f64, idle_since_s: Option<f64> },
     /// Slots come together since this time \[s\].
     Closing { scale: f64, since_s: f64 },
 }
@@ -66,9 +68,9 @@ enum Phase {
 /// Spreads the slots of a leg when the swarm is stalled.
 ///
 /// Stalled is a swarm whose vehicles are more than twice the limit of arrival from their slots and for 2 s move slower, root
-/// mean square, than 0.2 of the law's rate times their root mean square error. Slots are then scaled about their centre, held
-/// until every vehicle is within a quarter of the smallest slot distance of its own, and come together with an e-folding time
-/// of 2 s.
+/// mean square, than 0.2 of the law's rate times their root mean square error. Slots are then scaled about their centre, or
+/// about a leader's slot, held until every vehicle is within a quarter of the smallest slot distance of its own or no progress
+/// is made for 10 s, and come together with an e-folding time of 2 s.
 #[derive(Clone, Debug)]
 pub(super) struct Breather {
     breathing: Breathing,
@@ -76,6 +78,7 @@ pub(super) struct Breather {
     rate_per_s: f64,
     tolerance_m: f64,
     freedom: Freedom,
+    leader: Option<usize>,
     phase: Phase,
     breaths: u32,
     begun: Option<f64>,
@@ -108,10 +111,16 @@ impl Errors {
 }
 
 impl Breather {
-    pub(super) fn new(breathing: Breathing, rate_per_s: f64, arrival: Arrival, freedom: Freedom) -> Self {
+    pub(super) fn new(
+        breathing: Breathing,
+        rate_per_s: f64,
+        leader: Option<usize>,
+        arrival: Arrival,
+        freedom: Freedom,
+    ) -> Self {
         let phase = Phase::Flying { idle_since_s: None };
         let tolerance_m = WORTH * arrival.edge_error_m;
-        Self { breathing, rate_per_s, tolerance_m, freedom, phase, breaths: 0, begun: None }
+        Self { breathing, rate_per_s, tolerance_m, freedom, leader, phase, breaths: 0, begun: None }
     }
 
     /// A leg has begun with its slots as they are given.
@@ -130,27 +139,34 @@ impl Breather {
         self.begun.take()
     }
 
+    fn is_idle(&self, errors: &Errors) -> bool {
+        errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.rate_per_s * errors.rms_m
+    }
+
     /// Looks at the swarm on its way to the slots of `leg` and may spread them.
     pub(super) fn supervise(&mut self, time_s: f64, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) {
         let errors = Errors::of(sensed, &target.view(), self.freedom);
         match self.phase {
             Phase::Flying { idle_since_s } => {
                 let first = self.breathing.mode == BreathingMode::Start && self.breaths == 0;
-                let idle = errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.rate_per_s * errors.rms_m;
-                let since_s = idle.then(|| idle_since_s.unwrap_or(time_s));
+                let since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
                 self.phase = Phase::Flying { idle_since_s: since_s };
                 let stalled = since_s.is_some_and(|since_s| time_s - since_s >= STALLED_S);
                 if (first || stalled) && self.breaths < self.breathing.most {
                     let scale = self.breathing.scale + f64::from(self.breaths);
                     self.breaths += 1;
                     self.begun = Some(scale);
-                    self.phase = Phase::Spread { scale };
-                    target.spread_formation(&leg.formation, scale);
+                    self.phase = Phase::Spread { scale, idle_since_s: None };
+                    target.spread_formation(&leg.formation, scale, self.leader);
                 }
             }
-            Phase::Spread { scale } => {
+            Phase::Spread { scale, idle_since_s } => {
                 let slots_m = leg.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m);
-                if errors.max_m < SETTLED * slots_m {
+                let since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
+                self.phase = Phase::Spread { scale, idle_since_s: since_s };
+                // Those who come no nearer to spread slots either are not in each other's way.
+                let gives_up = since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S);
+                if errors.max_m < SETTLED * slots_m || gives_up {
                     self.phase = Phase::Closing { scale, since_s: time_s };
                 }
             }
@@ -160,7 +176,7 @@ impl Breather {
                     self.phase = Phase::Flying { idle_since_s: None };
                     target.set_formation(&leg.formation);
                 } else {
-                    target.spread_formation(&leg.formation, 1.0 + beyond);
+                    target.spread_formation(&leg.formation, 1.0 + beyond, self.leader);
                 }
             }
         }
@@ -168,10 +184,12 @@ impl Breather {
 }
 
 impl Leg {
-    /// Its slots scaled about their centre.
+    /// Its slots scaled about the slot of a leader, or about their centre.
     #[must_use]
-    pub fn spread(&self, scale: f64) -> Formation {
-        self.clone().placed(scale, 0.0, nalgebra::Vector3::zeros()).formation
+    pub fn spread(&self, scale: f64, leader: Option<usize>) -> Formation {
+        let mut formation = self.formation.clone();
+        spread_slots(&mut formation.slots_m, scale, leader);
+        formation
     }
 }
 
@@ -185,7 +203,7 @@ mod tests {
     fn spreads(breathing: Breathing, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, 1.0, ARRIVAL, Freedom::Fixed);
+        let mut breather = Breather::new(breathing, 1.0, None, ARRIVAL, Freedom::Fixed);
         (0..steps)
             .map(|k| {
                 let time_s = 0.5 * f64::from(k);
@@ -212,7 +230,7 @@ mod tests {
         // Settles whenever slots are spread, and is off again when they are not.
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, 1.0, ARRIVAL, Freedom::Translation);
+        let mut breather = Breather::new(breathing, 1.0, None, ARRIVAL, Freedom::Translation);
         let mut begun = Vec::new();
         for k in 0..400 {
             let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
@@ -234,9 +252,12 @@ mod tests {
     }
 
     #[test]
-    fn slots_are_spread_about_their_centre() {
+    fn slots_are_spread_about_their_centre_or_a_leader() {
         let leg = Leg::first(Formation::line(3, 2.0));
-        let slots_m = leg.spread(2.0).slots_m;
-        assert_eq!([slots_m[(0, 0)], slots_m[(1, 0)], slots_m[(2, 0)]], [-2.0, 2.0, 6.0]);
+        let along = |leader| {
+            let slots_m = leg.spread(2.0, leader).slots_m;
+            [slots_m[(0, 0)], slots_m[(1, 0)], slots_m[(2, 0)]]
+        };
+        assert_eq!((along(None), along(Some(2))), ([-2.0, 2.0, 6.0], [-4.0, 0.0, 4.0]));
     }
 }

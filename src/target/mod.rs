@@ -17,7 +17,7 @@ pub use supervisor::{Schedule, Supervisor};
 use nalgebra::{Rotation3, Vector3};
 
 use crate::formation::Formation;
-use crate::swarm::{mean_row, row, set_row};
+use crate::swarm::{Rows, mean_row, row, set_row};
 
 /// One formation of a flight, flown towards until the next leg begins.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,6 +77,18 @@ impl LegTimes {
     }
 }
 
+/// Scales slots about the slot of a leader, or about their centre.
+fn spread_slots(slots_m: &mut Rows, scale: f64, leader: Option<usize>) {
+    if scale == 1.0 {
+        return;
+    }
+    let fixed_m = leader.map_or_else(|| mean_row(slots_m), |leader| row(slots_m, leader));
+    for i in (0..slots_m.nrows()).filter(|&i| Some(i) != leader) {
+        let slot_m = fixed_m + (row(slots_m, i) - fixed_m) * scale;
+        set_row(slots_m, i, slot_m);
+    }
+}
+
 /// What the vehicles are told to reach, at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target<'a> {
@@ -86,7 +98,7 @@ pub struct Target<'a> {
     pub revision: u64,
     /// The slots h.
     pub formation: &'a Formation,
-    /// They are those of the leg scaled by this about their centre; 1 for the leg as it was given.
+    /// They are those of the leg scaled by this about their centre, or about a leader's slot; 1 for the leg as it was given.
     pub spread: f64,
     /// The motion r(t) that the formation shall be carried along with.
     pub reference: Reference,
@@ -133,25 +145,18 @@ impl CurrentTarget {
 
     /// Changes the slots within the leg.
     pub fn set_formation(&mut self, formation: &Formation) {
-        self.spread_formation(formation, 1.0);
+        self.spread_formation(formation, 1.0, None);
     }
 
-    /// Changes the slots within the leg to these, scaled by `spread` about their centre. Allocates nothing for as many slots
-    /// as before.
-    pub fn spread_formation(&mut self, formation: &Formation, spread: f64) {
+    /// Changes the slots within the leg to these, scaled by `spread` about the slot of a leader, or about their centre.
+    /// Allocates nothing for as many slots as before.
+    pub fn spread_formation(&mut self, formation: &Formation, spread: f64, leader: Option<usize>) {
         if self.formation.count() == formation.count() {
             self.formation.slots_m.copy_from(&formation.slots_m);
         } else {
             self.formation.clone_from(formation);
         }
-        if spread != 1.0 {
-            let slots_m = &mut self.formation.slots_m;
-            let centre_m = mean_row(slots_m);
-            for i in 0..slots_m.nrows() {
-                let slot_m = centre_m + (row(slots_m, i) - centre_m) * spread;
-                set_row(slots_m, i, slot_m);
-            }
-        }
+        spread_slots(&mut self.formation.slots_m, spread, leader);
         self.spread = spread;
         self.revision += 1;
     }

@@ -118,6 +118,35 @@ impl ReferenceMotion {
         }
     }
 
+    /// The shortest time in which it turns round: of a quarter of a circle, a way from rest to rest, two points of a table
+    /// \[s\].
+    #[must_use]
+    pub fn shortest_s(&self) -> f64 {
+        let least = |times_s: &mut dyn Iterator<Item = f64>| {
+            let mut before_s = None;
+            let lengths = times_s.filter_map(|time_s| before_s.replace(time_s).map(|before_s| time_s - before_s));
+            lengths.fold(f64::INFINITY, f64::min)
+        };
+        match self {
+            Self::Rest { .. } | Self::Velocity { .. } => f64::INFINITY,
+            Self::Circle { period_s, .. } => 0.25 * period_s.abs(),
+            Self::WayPoints { points } => least(&mut points.iter().map(|&(time_s, _)| time_s)),
+            Self::Table(spline) => 2.0 * least(&mut spline.rows.iter().map(|row| row.time_s)),
+        }
+    }
+
+    /// Whether it stays in the plane z = 0.
+    #[must_use]
+    pub fn is_level(&self) -> bool {
+        match self {
+            Self::Rest { position_m } => position_m.z == 0.0,
+            Self::Velocity { from_m, velocity_m_s } => from_m.z == 0.0 && velocity_m_s.z == 0.0,
+            Self::Circle { centre_m, .. } => centre_m.z == 0.0,
+            Self::WayPoints { points } => points.iter().all(|(_, point)| point.z == 0.0),
+            Self::Table(spline) => spline.rows.iter().all(|row| row.position_m.z == 0.0),
+        }
+    }
+
     /// Whether it never accelerates.
     #[must_use]
     pub fn is_uniform(&self) -> bool {

@@ -70,12 +70,13 @@ impl Schedule {
         self
     }
 
-    /// The same, spreading slots where the swarm is stalled under a law by which errors fall at a rate `rate_per_s` \[1/s\].
+    /// The same, spreading slots (about those of a leader, where there is one) where the swarm is stalled under a law by which
+    /// errors fall at a rate `rate_per_s` \[1/s\].
     /// To be said after [`Schedule::free_by`].
     #[must_use]
-    pub fn breathing(mut self, breathing: Breathing, rate_per_s: f64) -> Self {
+    pub fn breathing(mut self, breathing: Breathing, rate_per_s: f64, leader: Option<usize>) -> Self {
         let breathes = breathing.mode != BreathingMode::Off && breathing.most > 0;
-        self.breather = breathes.then(|| Breather::new(breathing, rate_per_s, self.arrival, self.freedom));
+        self.breather = breathes.then(|| Breather::new(breathing, rate_per_s, leader, self.arrival, self.freedom));
         self
     }
 

@@ -201,26 +201,34 @@ fn forces_that_are_bounded_stop_only_so_much_speed() {
     assert!(unbounded.certificate.certified_m.is_some_and(|certified_m| closest_m(&unbounded) >= certified_m));
 }
 
+/// Links of an alpha-lattice, and its source's measure of how far it is from one: the sum of squared deviations from the spacing over
+/// links + 1, in units of the spacing.
+fn lattice(positions_m: &Rows, spacing_m: f64) -> (u32, f64) {
+    let count = positions_m.nrows();
+    let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+    let lengths = pairs.map(|(i, j)| separation(positions_m, i, j) / spacing_m).filter(|length| *length < 1.2);
+    let (links, squares) = lengths.fold((0, 0.0), |(links, sum), length| (links + 1, sum + (length - 1.0).powi(2)));
+    (links, squares / f64::from(links + 1))
+}
+
 #[test]
 fn a_flock_becomes_a_lattice_of_its_spacing_that_moves_as_one() {
     const SPACING_M: f64 = 3.0;
-    let places_m = Rows::from_fn(7, |i, axis| [4.0 * (i % 3) as f64, 4.0 * (i / 3) as f64, 0.0][axis]);
-    let stir = |i: usize, axis: usize| if axis < 2 { 0.7 * libm::sin((3 * i + 5 * axis) as f64) } else { 0.0 };
-    let mut start = Swarm::at_rest(Rows::from_fn(7, |i, axis| places_m[(i, axis)] + stir(i, axis)));
+    let hexagon_m = circle(6, 3.5);
+    let stir = |i: usize, axis: usize| if axis < 2 { 0.5 * libm::sin((3 * i + 5 * axis) as f64) } else { 0.0 };
+    let place = |i: usize, axis: usize| if i < 6 { hexagon_m[(i, axis)] } else { 0.0 };
+    let mut start = Swarm::at_rest(Rows::from_fn(7, |i, axis| place(i, axis) + stir(i, axis)));
     start.velocities_m_s[(0, 0)] = 0.5;
+    assert!(lattice(&start.positions_m, SPACING_M).1 > 5e-3);
     let keys = FlockingKeys { spacing_m: Some(SPACING_M), ..FlockingKeys::default() };
-    let flock = scenario("flock", start, places_m, 60.0, LawSpec::Flocking(keys));
+    let slots_m = Formation::line(7, SPACING_M).slots_m;
+    let flock = scenario("flock", start, slots_m, 60.0, LawSpec::Flocking(keys));
     let (flight, _) = fly(&flock);
     assert_eq!(flight.audit.status, Status::Clear);
-    let pairs = (0..7).flat_map(|i| (i + 1..7).map(move |j| (i, j)));
-    let lengths_m: Vec<f64> = pairs.map(|(i, j)| separation(&flight.last.positions_m, i, j)).collect();
-    let near = lengths_m.iter().filter(|length_m| **length_m < 1.2 * SPACING_M);
-    let (links, squares) = near.fold((0, 0.0), |(n, sum), l| (n + 1, sum + (l - SPACING_M).powi(2)));
-    // The source's measure: the sum of squared deviations over links + 1, in units of the spacing.
-    let deviation = squares / f64::from(links + 1) / (SPACING_M * SPACING_M);
-    assert!(links >= 10 && deviation < 1e-3, "{links} links, deviation {deviation}");
+    let (links, deviation) = lattice(&flight.last.positions_m, SPACING_M);
+    assert!(links == 12 && deviation < 1e-3, "a hexagon and its centre: {links} links, deviation {deviation}");
     assert!(flight.last.disagreement_m_s() < 1e-3, "{}", flight.last.disagreement_m_s());
-    assert!(missing_m(&flock, &flight) > 1.0, "given slots are not what it goes for");
+    assert!(missing_m(&flock, &flight) > SPACING_M, "given slots are not what it goes for");
 }
 
 #[test]

@@ -544,8 +544,9 @@ fn the_schema_bounds_a_number_where_the_reader_does() {
                 lists.into_iter().flatten().flatten().any(|needed| needed == key)
             };
             let properties = keys("properties");
-            // Files are looked for before numbers are.
-            if properties.iter().any(|(_, value)| value["const"] == "file") {
+            // Files are looked for, and lists read, before numbers are.
+            let of_lists = ["file", "points"].map(|shape| properties.iter().any(|(_, value)| value["const"] == shape));
+            if of_lists.contains(&true) {
                 continue;
             }
             let of_numbers: Vec<_> = properties.iter().filter(|(_, value)| value["type"] == "number").collect();
