@@ -86,7 +86,8 @@ impl Folder {
 
     /// That there is no table: in `what`.
     pub(super) fn without_tables(&self, what: &str, remedy: &str) -> Fault {
-        let holds = if self.left_out.is_empty() { String::new() } else { format!(": it holds {}", listed(&self.left_out)) };
+        let holds =
+            if self.left_out.is_empty() { String::new() } else { format!(": it holds {}", listed(&self.left_out)) };
         let alone = self.left_out.iter().find(|name| ALONE.contains(&&*extension(Path::new(name))));
         let remedy = match alone {
             Some(name) if what == ARCHIVE => format!("unpack it, and give {name}"),
@@ -106,7 +107,9 @@ impl Folder {
         let file = self.folders.first().and_then(|(_, files)| files.first());
         let folder = file.and_then(|file| Some(file.shown().parent()?.to_owned())).unwrap_or_default();
         let remedy = match (file, self.folders.first()) {
-            (Some(Source { entry: Some(_), .. }), Some((name, _))) => format!("unpack it, and give a folder of it: {name}"),
+            (Some(Source { entry: Some(_), .. }), Some((name, _))) => {
+                format!("unpack it, and give a folder of it: {name}")
+            }
             _ => format!("give one of them: {}", folder.display()),
         };
         let beside = if self.files.is_empty() { "" } else { "some of " };

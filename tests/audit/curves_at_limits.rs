@@ -183,7 +183,8 @@ fn agree(first: &[Part], second: &[Part], asked: Asked) -> Result<(), String> {
     let Ok(outcome) = judged else { return Ok(()) };
     let found = sampled(first, second, asked.above_m.unwrap_or(f64::NEG_INFINITY));
     let is_continuous = [first, second].iter().all(|parts| is_continuous(parts, found.rounding_m));
-    contradiction(&outcome, &found, asked, is_continuous).map_or(Ok(()), |what| Err(format!("{what}: {found:?} {outcome:?}")))
+    contradiction(&outcome, &found, asked, is_continuous)
+        .map_or(Ok(()), |what| Err(format!("{what}: {found:?} {outcome:?}")))
 }
 
 fn contradiction(outcome: &Outcome, found: &Sampled, asked: Asked, is_continuous: bool) -> Option<&'static str> {
@@ -209,7 +210,8 @@ fn contradiction(outcome: &Outcome, found: &Sampled, asked: Asked, is_continuous
 
 /// What is asked: a share of a distance, off by a few units in its last place or by a bit more, perhaps above a height.
 fn asked() -> impl Strategy<Value = (f64, f64, Option<f64>)> {
-    let off = prop::sample::select(vec![0.0, 0.0, f64::EPSILON, -f64::EPSILON, 1e-12, -1e-12, 1e-9, -1e-9, 1e-3, -1e-3]);
+    let off =
+        prop::sample::select(vec![0.0, 0.0, f64::EPSILON, -f64::EPSILON, 1e-12, -1e-12, 1e-9, -1e-9, 1e-3, -1e-3]);
     let height = prop_oneof![4 => Just(None), 3 => Just(Some(0.5)), 1 => size().prop_map(Some)];
     (prop_oneof![4 => Just(1.0), 1 => 0.1..3.0_f64], off, height)
 }
@@ -260,7 +262,8 @@ fn two_whose_distance_touches_the_limit_are_judged_as_places_on_them_say() {
 #[test]
 fn one_who_leaves_the_ground_by_less_than_rounding_ends_the_search() {
     let rise = prop::sample::select(vec![1e-18, -1e-18, 1e-30, 2.0_f64.powi(-53), 1e-12, 0.0]);
-    let rises = (rise, prop::collection::vec(size(), 0..6), 0.1..3.0_f64, prop::sample::select(vec![0.0, 0.5, 1e-18, 1e9]));
+    let rises =
+        (rise, prop::collection::vec(size(), 0..6), 0.1..3.0_f64, prop::sample::select(vec![0.0, 0.5, 1e-18, 1e9]));
     each(rises.prop_map(|(rise, more, beside_m, above_m)| {
         let heights = [vec![above_m, rise], more].concat();
         let mut climbs: Vec<_> = heights.into_iter().map(|z| Vector3::new(0.0, 0.0, z)).collect();
