@@ -111,6 +111,22 @@ mod tests {
     }
 
     #[test]
+    fn what_rounding_explains_of_a_distance_is_no_disagreement_however_far_the_obstacle_is() {
+        for shape in one_of_each() {
+            for k in 0..50_u32 {
+                let turn = f64::from(k) * 2.4;
+                let far = Vector3::new(3e7 * turn.cos(), 2e7 * turn.sin(), 1e7);
+                let along = |u: f64| far + Vector3::new(6.0 * u - 3.0, 2.0, 0.0);
+                let (lower, at) = shape.closest(along(0.0), along(1.0));
+                let right = Minimum { lower, upper: lower, at };
+                assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?} {far:?}");
+                let wrong = Minimum { upper: lower + 0.1, ..right };
+                assert!(!from_shape(&shape, 1.0, &wrong, along).agrees, "{shape:?} {far:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_minimum_that_is_wrong_is_a_disagreement() {
         let along = |u: f64| Vector3::new(6.0 * u - 3.0, 2.0, 0.0);
         for shape in one_of_each() {

@@ -197,12 +197,6 @@ impl AuditArguments {
         outputs::check(&inputs, &outputs)
     }
 
-    /// What a recording of ours says of itself.
-    fn own(&self, scale: f64) -> Option<OwnRecording> {
-        let may_be_ours = self.reading.more.is_empty() && self.format.is_none_or(|format| format == Format::Mcap);
-        may_be_ours.then(|| OwnRecording::read(&self.reading.recording, scale)).flatten()
-    }
-
     /// Refuses to judge a vehicle alone, and another number of vehicles than is expected.
     fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
         let path = self.reading.called();
@@ -274,7 +268,7 @@ impl AuditArguments {
 pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<RecordedReport, Failure> {
     let mut settings = arguments.settings()?;
     let options = arguments.reading.options(arguments.format)?;
-    let own = arguments.own(options.scale);
+    let own = arguments.reading.own(arguments.format, options.scale);
     let is_silent = arguments.delta.is_none() && arguments.radius.is_empty() && arguments.ellipsoid.is_none();
     let own_delta_m =
         own.as_ref().map(|own| own.delta_m).or_else(|| read::own_limit_m(&arguments.reading.recording, &options));
@@ -372,7 +366,9 @@ impl From<RecordedError> for Failure {
             RecordedError::Unnamed { .. }
             | RecordedError::TimeNotIncreasing { .. }
             | RecordedError::OutOfOrder { .. }
-            | RecordedError::Item { .. } => "mend the recording there, or leave the vehicle out with --ids",
+            | RecordedError::Item { .. } => {
+                "mend the recording there, leave the vehicle out with --ids, or look at --offset and --time-scale"
+            }
         };
         Self::input(error.to_string(), help)
     }

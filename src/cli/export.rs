@@ -107,7 +107,15 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     }
     let exported = exported?;
     let console = Console { data_on_stdout: false, quiet: arguments.quiet };
-    for note in &exported.notes {
+    let own = arguments.reading.own(arguments.input_format, reading.scale).filter(|own| !own.has_every_step);
+    let lost = own.map(|own| {
+        let file = path.display();
+        format!(
+            "up to {} steps were flown between two samples: what the run saw between them is not in {file}",
+            own.most_steps
+        )
+    });
+    for note in exported.notes.iter().chain(&lost) {
         console.warn(&format!("note: {note}"));
     }
     let vehicles =

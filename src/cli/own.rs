@@ -53,7 +53,8 @@ impl OwnRecording {
                     sample.swarm.positions_m *= scale;
                     let last = before.as_ref().unwrap_or(&sample);
                     own.most_steps = own.most_steps.max(sample.step.saturating_sub(last.step));
-                    own.told.extend(sample.separation.and_then(|closest| told(last, &sample, closest, scale)));
+                    let told = sample.separation.and_then(|closest| told(last, &sample, closest, scale));
+                    own.told.extend(told.map(|told| Told { others_m: own.delta_m, ..told }));
                     own.violations.extend(near.pass(&sample));
                     before = Some(sample);
                 }
@@ -101,7 +102,7 @@ fn told(before: &OwnedSample, sample: &OwnedSample, mut closest: ClosestApproach
     let passed = if to_s > from_s { ((closest.time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0) } else { 1.0 };
     let drawn_m = from.lerp(&to, passed).norm();
     let heights = [height(before, closest.pair), height(sample, closest.pair)];
-    Some(Told { from_s, to_s, closest, drawn_m, height_m: around(heights) })
+    Some(Told { from_s, to_s, closest, drawn_m, others_m: 0.0, height_m: around(heights) })
 }
 
 /// From the first to the second of a pair \[m\].

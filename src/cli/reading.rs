@@ -6,6 +6,7 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::Failure;
+use super::own::OwnRecording;
 use super::run::RECORDING;
 use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
 
@@ -85,6 +86,12 @@ impl ReadArguments {
     /// What the recording is called.
     pub(super) fn called(&self) -> String {
         read::called(&self.paths().collect::<Vec<_>>())
+    }
+
+    /// What the recording says of itself, where it is ours.
+    pub(super) fn own(&self, format: Option<Format>, scale: f64) -> Option<OwnRecording> {
+        let may_be_ours = self.more.is_empty() && format.is_none_or(|format| format == Format::Mcap);
+        may_be_ours.then(|| OwnRecording::read(&self.recording, scale)).flatten()
     }
 
     /// All files.

@@ -106,6 +106,13 @@ impl Text {
 
     fn read_header(&mut self, format: Format, comment: &[u8]) -> Result<(), Fault> {
         let line = self.lines.line();
+        if line.contains(&b'\r') {
+            let remedy = "save it with the line ends of Unix or Windows";
+            return Err(Fault::content(
+                "its lines end with carriage returns alone, as those of old Macintoshes",
+                remedy,
+            ));
+        }
         if let Some(value) = decimal_comma(line) {
             let problem = format!("column `1` holds {}, a number with a decimal comma", quoted(&value));
             return Err(Fault::content(problem, "write numbers with a decimal point"));

@@ -25,6 +25,7 @@ const MAGICS: [(Format, &[u8]); 4] = [
 
 /// Recognises a file, and finds out whether it is packed by gzip.
 pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
+    source.gzip = false;
     let mut head = head_of(source)?;
     source.gzip = head.starts_with(&GZIP_MAGIC);
     if source.gzip {

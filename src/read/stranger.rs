@@ -5,7 +5,7 @@ use std::path::Path;
 use super::error::Fault;
 
 /// Beginnings of files, what they are, and what helps.
-const STRANGERS: [(&[u8], &str, &str); 11] = [
+const STRANGERS: [(&[u8], &str, &str); 14] = [
     (b"#ROSBAG V", "a ROS 1 bag", "convert it with `rosbags-convert` to a ROS 2 bag in MCAP, and give its .mcap file"),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
     (
@@ -13,6 +13,7 @@ const STRANGERS: [(&[u8], &str, &str); 11] = [
         "a ULog of PX4",
         "write its vehicle_local_position with `ulog2csv`, and give a file for each vehicle",
     ),
+    (b"Format Version,", "a take of OptiTrack Motive", "write the positions of its rigid bodies as a table t,id,x,y,z"),
     (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
     (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
@@ -25,11 +26,14 @@ const STRANGERS: [(&[u8], &str, &str); 11] = [
     (b"MATLAB 5.0", "a file of MATLAB", "write it with `writetable` as t,id,x,y,z"),
     (b"RRF2", "a recording of Rerun", "write its positions as a table t,id,x,y,z"),
     (b"\x28\xb5\x2f\xfd", "packed by zstd", "unpack it first, with unzstd"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
+    (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
 const BAG: &str = "convert it with `ros2 bag convert` to MCAP, and give the .mcap file";
 const DATAFLASH: &str =
     "write the messages of position with `mavlogdump.py --format csv`, a file for each vehicle in metres";
+const UNPACK: &str = "unpack it, and give the folder";
 pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z";
 const EARTH: &str = "convert degrees to metres in a plane first, and give a table t,id,x,y,z";
 
@@ -39,6 +43,9 @@ pub(super) fn of_bytes(head: &[u8]) -> Option<Fault> {
     if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
         let remedy = "write its LOCAL_POSITION_NED with `mavlogdump.py --format csv`, a file for each vehicle";
         return Some(Fault::content("it is a MAVLink telemetry log, which is not read", remedy));
+    }
+    if head.get(257..262) == Some(b"ustar") {
+        return Some(Fault::content("it is a tar archive, which is not read", UNPACK));
     }
     let stranger = STRANGERS.iter().find(|(begin, ..)| head.starts_with(begin));
     stranger.map(|(_, what, remedy)| Fault::content(format!("it is {what}, which is not read"), *remedy))

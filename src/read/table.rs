@@ -118,6 +118,14 @@ impl<C: Cells> Table<C> {
         if let Some(stamp) = self.cells.stamp(column).filter(|stamp| stamp.approximately().is_finite()) {
             return Ok(stamp);
         }
+        if let Some(of_day) = self.cells.text(column).ok().filter(|text| text.contains(':')) {
+            let problem =
+                format!("column `{}` holds {}, a time of day", self.cells.header()[column], quoted(of_day.trim()));
+            return Err(Fault::content(
+                problem,
+                "write times as numbers: in seconds, or in s, ms, us or ns since 1970",
+            ));
+        }
         let number = odd_number(&self.cells, column, "take the row out: each needs a time")?;
         number.map(Stamp::Real).ok_or_else(|| empty(&self.cells, column))
     }

@@ -15,7 +15,7 @@ use crate::recorded::{names, pass, seen};
 /// The closest that the first two came within the first second; straight lines have them far apart then.
 fn told(separation_m: f64, time_s: f64) -> Told {
     let closest = ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s };
-    Told { from_s: 0.0, to_s: 1.0, closest, drawn_m: 9.0, height_m: [0.0, 0.0] }
+    Told { from_s: 0.0, to_s: 1.0, closest, drawn_m: 9.0, others_m: 2.0, height_m: [0.0, 0.0] }
 }
 
 /// Two that were 1.5 m apart, and all along below 2 m.
@@ -133,12 +133,22 @@ fn what_was_told_moves_with_a_clock_that_both_share_and_is_open_where_clocks_dif
     // Of others than those who are asked about nothing is open.
     let mut items = [&pass(3.0)[..], &[seen(2, 0.0, [0.0, 9.0, 0.0]), seen(2, 1.0, [0.0, 9.0, 0.0])]].concat();
     items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-    let only = Some(["alpha", "charlie"].map(str::to_owned).into());
-    let mut auditor = TrackAuditor::new(Settings { only, ..clocks(2.0, [0.0, 0.01]) }).expect("settings");
-    auditor.tell(told(0.5, 0.25));
-    auditor.tell_violation(near(Pair::new(0, 1)));
-    auditor.push(&names(3), &items).expect("items");
-    assert_eq!(auditor.finish().expect("an outcome").status, Status::Clear);
+    let only = || Some(["alpha", "charlie"].map(str::to_owned).into());
+    let others = |told: Told, settings: Settings| {
+        let mut auditor = TrackAuditor::new(Settings { only: only(), ..settings }).expect("settings");
+        auditor.tell(told);
+        auditor.tell_violation(near(Pair::new(0, 1)));
+        auditor.push(&names(3), &items).expect("items");
+        auditor.finish().expect("an outcome")
+    };
+    assert_eq!(others(told(0.5, 0.25), clocks(2.0, [0.0, 0.01])).status, Status::Clear);
+    // Unless more is asked of them than is told of all who are not told to be too close.
+    let open = others(told(0.5, 0.25), Settings::delta(2.5));
+    assert_eq!((open.status, open.undecided.len(), open.undecided[0].lower_m), (Status::Undecided, 1, 2.0));
+    assert_eq!(others(Told { drawn_m: 0.5, ..told(0.5, 0.25) }, Settings::delta(2.5)).status, Status::Clear);
+    assert_eq!(others(told(0.5, 0.25), clocks(2.0, [0.01, 0.0])).status, Status::Undecided);
+    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(1.0), ..Settings::delta(2.5) };
+    assert_eq!(others(told(0.5, 0.25), bounded).status, Status::Clear, "how far anybody was from the lines is bounded");
 }
 
 #[test]

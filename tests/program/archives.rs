@@ -116,6 +116,17 @@ fn notes_beside_tables_are_named_and_not_read_and_no_table_is_taken_for_one() {
             assert!(words(&ran).contains("not read, being no tables: readme.txt, site.dat"), "{path}: {ran:?}");
         }
     }
+    // What is packed is unpacked, whichever comes first.
+    let packed = |table: &str| {
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        gzip.write_all(table.as_bytes()).expect("written");
+        gzip.finish().expect("finished")
+    };
+    let packed = self::both(&[("a.csv.gz", &packed(A)), ("b.csv.gz", &packed(B))]);
+    for path in ["flight", "flight.zip"] {
+        let ran = audit(packed.path(), &[path]);
+        assert_eq!(ran.exit, Some(0), "{path}: {ran:?}");
+    }
     // Tables that are wrong, or hold nothing, may be of a vehicle.
     for (name, content, said) in [
         ("c.txt", "t x y z\n", "c.txt: it has a header and no rows"),

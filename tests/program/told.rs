@@ -11,7 +11,7 @@ fn flown(record_hz: &str, duration_s: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let fixed = ["run", "pentagon-laplacian", "--out", "coarse", "--no-snapshots", "--no-figures", "--quiet"];
     let times = [format!("time.record_hz={record_hz}"), format!("time.duration_s={duration_s}")];
-    let sets = ["law.f1_per_s2=30", "law.f2_per_s=1", &times[0], &times[1]];
+    let sets = ["law.f1_per_s2=30", "law.f2_per_s=1", "arrival.hold_s=0.1", &times[0], &times[1]];
     let sets = sets.iter().flat_map(|set| ["--set", set]);
     let ran = ran_by(TAUTLINE, folder.path(), &fixed.into_iter().chain(sets).collect::<Vec<_>>());
     assert_eq!(ran.exit, Some(1), "{ran:?}");
@@ -36,8 +36,13 @@ fn what_a_run_saw_binds_under_other_clocks_and_around_ellipsoids_or_nobody_knows
     assert_eq!(whole["status"], "violation");
     let exported = ran_by(TAUTLINE, folder.path(), &["export", "coarse", "-o", "drawn.csv"]);
     assert_eq!(exported.exit, Some(0), "{exported:?}");
+    assert!(exported.err.contains("what the run saw between them is not in drawn.csv"), "{exported:?}");
     let drawn = ran_by(TAUTLINE, folder.path(), &["audit", "drawn.csv", "--delta", "2"]);
     assert_eq!(drawn.exit, Some(0), "straight lines say the opposite: {drawn:?}");
+    // Of others too, where more is asked than the run saw of all.
+    let others = audit(folder.path(), &["--ids", "1,5", "--delta", "4"]);
+    assert!(others.exit == Some(1) && others.out.starts_with("UNDECIDED: how near 1 and 5 came"), "{others:?}");
+    assert_eq!(audit(folder.path(), &["--ids", "1,5"]).exit, Some(0));
     // All clocks later by the same: the same, later.
     let all: Vec<_> = (1..=5).flat_map(|k| ["--offset".to_owned(), format!("{k}=100")]).collect();
     let later = audit(folder.path(), &all.iter().map(String::as_str).chain(["--json"]).collect::<Vec<_>>());

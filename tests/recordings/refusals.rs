@@ -52,6 +52,8 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         (last("0.5,2,1,2,-inf"), line(5), "column `z` holds `-inf`", "leave the cells empty"),
         (last("0.5,2,1,2,1e999"), line(5), "`1e999`, which is not finite", "leave the cells empty"),
         (last("later,2,1,2,3"), line(5), "column `t` holds `later`", "decimal point"),
+        (last("12:00:01,2,1,2,3"), line(5), "column `t` holds `12:00:01`, a time of day", "in seconds"),
+        (LONG.replace('\n', "\r"), line(1), "its lines end with carriage returns alone", "line ends of Unix"),
         (last("nan,2,1,2,3"), line(5), "column `t` holds `nan`", "each needs a time"),
         (last(",2,1,2,3"), line(5), "column `t` is empty", "fill it"),
         (last("0.5,,1,2,3"), line(5), "column `id` is empty", "fill it"),

@@ -109,7 +109,8 @@ impl TrackAuditor {
 
     /// Takes what the recording itself says of the time since the instant before; in order of time, and at any time before
     /// the end. It goes before what is drawn; where clocks are set right differently, around ellipsoids, or near the ground
-    /// it says too little for that, and contradicts the lines that are drawn, nothing is decided.
+    /// it says too little for that, and contradicts the lines that are drawn, nothing is decided; nor of other pairs then, where
+    /// they might be too close for all that is told of them.
     pub fn tell(&mut self, told: Told) {
         self.told.push(told);
     }
@@ -233,7 +234,7 @@ impl TrackAuditor {
             let offset_s = self.settings.vehicles.get(&of.name).map_or(0.0, |of| of.offset_s);
             Some(Counted { radius_m: of.radius_m.unwrap_or(0.0), offset_s })
         };
-        self.told.correct(&mut self.results, &self.settings, counts);
+        self.told.correct(&mut self.results, &self.settings, self.vehicles.len(), counts);
         let Results { ledger, closest, obstacles, swept } = self.results;
         let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
         let decided = looked_at && ledger.is_decided() && self.gaps.is_empty() && contradiction.is_none();

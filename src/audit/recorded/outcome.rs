@@ -47,6 +47,8 @@ pub struct Told {
     pub closest: ClosestApproach,
     /// How far apart straight lines between the two instants have them then \[m\].
     pub drawn_m: f64,
+    /// All pairs were at least so far apart while no violation of them is told \[m\].
+    pub others_m: f64,
     /// Smallest and largest height of the higher of them at the two instants \[m\].
     pub height_m: [f64; 2],
 }

@@ -1,10 +1,10 @@
 //! What a recording itself says of the time between its instants.
 
 use super::outcome::{Told, ToldViolation};
-use super::settings::Settings;
+use super::settings::{Motion, Settings};
 use crate::audit::limits::Limits;
 use crate::audit::outcome::{Approach, ObjectPair, Undecided, Violation};
-use crate::audit::results::Results;
+use crate::audit::results::{KEPT, Results};
 use crate::audit::sweep::Interval;
 use crate::swarm::{ClosestApproach, Pair};
 
@@ -37,6 +37,8 @@ struct Question<F> {
     /// Longest and shortest half axis \[m\]; 1 where there is no ellipsoid.
     longest_m: f64,
     shortest_m: f64,
+    /// Whether what is drawn is all that is known between two instants: no bound on how far from it anybody was.
+    is_drawn: bool,
 }
 
 /// What is asked of a pair, and how what was told of a time of it bears on that.
@@ -57,7 +59,8 @@ impl<F: Fn(usize) -> Option<Counted>> Question<F> {
     fn new(settings: &Settings, counts: F) -> Self {
         let (longest_m, shortest_m) = settings.ellipsoid_m.map_or((1.0, 1.0), |axes| (axes.max(), axes.min()));
         let (window, limits, above_m) = (settings.window(), settings.limits(), settings.above_m);
-        Self { counts, window, limits, above_m, longest_m, shortest_m }
+        let is_drawn = settings.motion != Some(Motion::Bounded);
+        Self { counts, window, limits, above_m, longest_m, shortest_m, is_drawn }
     }
 
     /// The offset of a pair's clocks \[s\], where it is the same.
@@ -82,6 +85,11 @@ impl<F: Fn(usize) -> Option<Counted>> Question<F> {
             is_whole: over.from_s == all.from_s && over.to_s == all.to_s,
             is_above: self.above_m.is_none_or(|above_m| low_m > above_m),
         })
+    }
+
+    /// Whether what was told is unlike what is drawn of the same instant, which nobody can go by then.
+    fn contradicts(&self, told: &Told, limit: f64) -> bool {
+        self.is_drawn && (told.drawn_m - told.closest.separation_m).abs() > SAME * limit * self.shortest_m
     }
 
     /// What a distance in metres is at least and at most, as it is judged.
@@ -139,6 +147,7 @@ impl AllTold {
         &self,
         results: &mut Results,
         settings: &Settings,
+        vehicles: usize,
         counts: impl Fn(usize) -> Option<Counted>,
     ) {
         let question = Question::new(settings, counts);
@@ -154,7 +163,8 @@ impl AllTold {
             match asked.later_s {
                 Some(later_s) if asked.is_above => self.enter(told, &asked, later_s, &question, results),
                 Some(_) => asked.leave_open(lower_m, upper_m, results),
-                None => asked.leave_open(0.0, f64::INFINITY, results),
+                None if question.is_drawn => asked.leave_open(0.0, f64::INFINITY, results),
+                None => {}
             }
         }
         let told_too = |told: &Told| {
@@ -164,6 +174,44 @@ impl AllTold {
         for told in self.closest.iter().filter(|told| !told_too(told)) {
             Self::enter_closest(told, &question, results);
         }
+        if results.ledger.violations.is_empty() {
+            self.leave_others_open(vehicles, &question, results);
+        }
+    }
+
+    /// Leaves open what lines say of other pairs where they are unlike what was told of one; of the first pairs, if many.
+    fn leave_others_open<F: Fn(usize) -> Option<Counted>>(
+        &self,
+        vehicles: usize,
+        question: &Question<F>,
+        results: &mut Results,
+    ) {
+        let counted: Vec<_> = (0..vehicles).filter_map(&question.counts).collect();
+        let radii = || counted.iter().map(|of| of.radius_m);
+        let (small_m, large_m) = (radii().fold(f64::INFINITY, f64::min), radii().fold(0.0, f64::max));
+        let [smallest, largest] = [small_m, large_m].map(|radius_m| question.limits.of_vehicles(radius_m, radius_m));
+        let one_clock = counted.windows(2).all(|pair| pair[0].offset_s == pair[1].offset_s);
+        let least = |told: &Told| question.scaled(told.closest.separation_m.max(told.others_m), 0.0).0;
+        let is_odd = |told: &&Told| question.contradicts(told, smallest) && !(one_clock && least(told) >= largest);
+        let odd: Vec<_> = self.closest.iter().filter(is_odd).collect();
+        if odd.is_empty() {
+            return;
+        }
+        let pairs = (0..vehicles).flat_map(|i| (i + 1..vehicles).map(move |j| Pair::new(i, j)));
+        let mut left_open = 0;
+        for pair in pairs {
+            let open = odd.iter().filter_map(|told| {
+                let asked = question.of(pair, [told.from_s, told.to_s], [f64::INFINITY; 2])?;
+                let lower = if asked.later_s.is_some() { least(told) } else { 0.0 };
+                (lower < asked.limit && question.contradicts(told, asked.limit)).then_some((asked, lower))
+            });
+            let open: Vec<_> = open.collect();
+            open.iter().for_each(|(asked, lower)| asked.leave_open(*lower, f64::INFINITY, results));
+            left_open += usize::from(!open.is_empty());
+            if left_open == KEPT {
+                return;
+            }
+        }
     }
 
     /// Enters the closest approach of all between two instants. Where its bounds say less than a straight line that agrees
@@ -171,7 +219,7 @@ impl AllTold {
     fn enter_closest<F: Fn(usize) -> Option<Counted>>(told: &Told, question: &Question<F>, results: &mut Results) {
         let ClosestApproach { pair, separation_m, time_s: at_s } = told.closest;
         let Some(around) = question.of(pair, [told.from_s, told.to_s], told.height_m) else { return };
-        let agrees = (told.drawn_m - separation_m).abs() <= SAME * around.limit * question.shortest_m;
+        let agrees = !question.contradicts(told, around.limit);
         let (lower_m, upper_m) = question.scaled(separation_m, separation_m);
         let Some(later_s) = around.later_s.filter(|_| around.is_above) else {
             let (lower_m, upper_m) = if around.later_s.is_some() { (lower_m, upper_m) } else { (0.0, f64::INFINITY) };
