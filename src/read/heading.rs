@@ -208,7 +208,22 @@ pub(super) fn said_unit(name: &str) -> Option<String> {
     time_and_unit(name).1
 }
 
+/// Whether a column names the vehicle of a row.
 pub(super) fn is_id(name: &str) -> bool {
-    let name = units::bracketed(name).0.to_lowercase();
-    matches!(name.as_str(), "id" | "name" | "vehicle" | "vehicle_id" | "drone" | "drone_id" | "uav" | "agent" | "robot")
+    let name = joined(name);
+    let stem = name.strip_suffix("id").or_else(|| name.strip_suffix("name")).unwrap_or(&name);
+    !name.is_empty() && matches!(stem, "" | "vehicle" | "drone" | "uav" | "agent" | "robot")
+}
+
+/// Whether a column may well name the vehicle of a row, in a table that is said to be of one.
+pub(super) fn may_be_id(name: &str) -> bool {
+    let name = joined(name);
+    let stem = name.strip_suffix("id").or_else(|| name.strip_suffix("name")).unwrap_or(&name);
+    let things = ["model", "object", "track", "body", "rigidbody", "tag", "entity", "callsign", "childframe"];
+    is_id(&name) || things.contains(&stem)
+}
+
+/// A name in lower case without its unit, as one word.
+fn joined(name: &str) -> String {
+    units::bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")
 }

@@ -103,10 +103,10 @@ impl Part {
                     (sample.vehicle, sample.time_s) = (vehicle, sample.time_s + self.shift_s);
                     continue;
                 }
-                Item::Sample(_) => "it holds several vehicles",
+                Item::Sample(_) => "it holds several vehicles: a column of it names those of its rows",
                 Item::Piece(_) => "it holds a curve, and the first of its files samples",
             };
-            let remedy = "files that are joined hold the samples of one vehicle each";
+            let remedy = "files that are joined hold the samples of one vehicle each: split it, or take the column out";
             return Err(ReadError::new(&self.path, Fault::content(problem, remedy)));
         }
         self.until_s = items.last().map_or(self.until_s, Item::time_s);

@@ -75,7 +75,8 @@ impl Layout {
         let time = columns.get("", TIME).or_else(|| first(heading::is_time)).or_else(|| first(heading::is_frame));
         let time = time.ok_or_else(|| missing(header, TIME, ""))?;
         let unit = unit_of_time(&header[time], options)?;
-        let id = columns.get("", ID).or_else(|| first(heading::is_id));
+        let may_be_id = || if options.one_vehicle { first(heading::may_be_id) } else { None };
+        let id = columns.get("", ID).or_else(|| first(heading::is_id)).or_else(may_be_id);
 
         let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
         let headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();

@@ -117,6 +117,17 @@ fn a_straight_way_beside_a_curve_over_a_part_of_it_is_judged_and_drawn_where_it_
 }
 
 #[test]
+fn two_curves_that_are_one_are_no_distance_apart() {
+    let both = |coefficients: &[[f64; 3]]| [piece(0, [0.0, 1.0], coefficients), piece(1, [0.0, 1.0], coefficients)];
+    for coefficients in [&[[3.0, 2.0, 1.0]][..], &[[3.0, 2.0, 1.0], [1.0, 0.0, 0.0]]] {
+        let outcome = asked(&both(coefficients), Settings::delta(1.0));
+        assert_eq!((outcome.status, outcome.closest[0].upper_m), (Status::Violation, 0.0));
+        let [found] = outcome.violations[..] else { panic!("{outcome:?}") };
+        assert_eq!((found.from_s, found.to_s), (0.0, 1.0));
+    }
+}
+
+#[test]
 fn a_curve_that_jumps_past_a_curve_meets_it() {
     // Bravo jumps at 1 s from one side of alpha to the other.
     let items = |aside_m: f64| {

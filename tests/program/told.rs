@@ -10,8 +10,9 @@ use crate::program::{Ran, TAUTLINE, ran_by};
 fn flown(record_hz: &str, duration_s: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let fixed = ["run", "pentagon-laplacian", "--out", "coarse", "--no-snapshots", "--no-figures", "--quiet"];
-    let times = [format!("time.record_hz={record_hz}"), format!("time.duration_s={duration_s}")];
-    let sets = ["law.f1_per_s2=30", "law.f2_per_s=1", "arrival.hold_s=0.1", &times[0], &times[1]];
+    let times = [("time.record_hz", record_hz), ("time.duration_s", duration_s), ("arrival.hold_s", duration_s)];
+    let times = times.map(|(key, value)| format!("{key}={value}"));
+    let sets = ["law.f1_per_s2=30", "law.f2_per_s=1", &times[0], &times[1], &times[2]];
     let sets = sets.iter().flat_map(|set| ["--set", set]);
     let ran = ran_by(TAUTLINE, folder.path(), &fixed.into_iter().chain(sets).collect::<Vec<_>>());
     assert_eq!(ran.exit, Some(1), "{ran:?}");
@@ -94,8 +95,8 @@ fn a_part_of_what_a_run_saw_is_said_as_people_read_it() {
 fn a_violation_that_lasts_to_the_end_binds_before_it() {
     let [from_s, to_s] = longest(&json(&audit(flown("1", "20").path(), &["--json"])));
     let end_s = f64::midpoint(from_s, to_s);
-    // Nothing but the begin and the end is recorded.
-    let folder = flown("0.001", &format!("{end_s}"));
+    // Recorded before it begins, and at the end.
+    let folder = flown(&format!("{}", 2.0 / end_s), &format!("{end_s}"));
     let whole = json(&audit(folder.path(), &["--json"]));
     let report = std::fs::read_to_string(folder.path().join("coarse/report.json")).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");

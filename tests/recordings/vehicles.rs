@@ -128,6 +128,7 @@ fn tables_of_any_format_are_joined_by_one_clock() {
 fn files_that_are_not_of_one_recording_are_refused() {
     for (files, said) in [
         (&[("a.csv", A), ("b.csv", "t,x1,y1,x2,y2\n0,1,2,3,4\n")][..], "b.csv: it holds several vehicles"),
+        (&[("a.csv", A), ("b.csv", "t,model_name,x,y\n0,p,1,2\n1,q,3,4\n")], "b.csv: it holds several vehicles"),
         (
             &[("a.csv", A), ("b.csv", "t,x,y\n0,1,2\n10,1,2\n")],
             "times of `b` would be taken as ms and those of `a` as s",
