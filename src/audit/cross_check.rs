@@ -121,7 +121,8 @@ mod tests {
                 let right = Minimum { lower, upper: lower, at };
                 assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?} {far:?}");
                 let wrong = Minimum { upper: lower + 0.1, ..right };
-                assert!(!from_shape(&shape, 1.0, &wrong, along).agrees, "{shape:?} {far:?}");
+                // Within a half-space one depth is as good as another.
+                assert!(lower < 0.0 || !from_shape(&shape, 1.0, &wrong, along).agrees, "{shape:?} {far:?}");
             }
         }
     }

@@ -322,7 +322,7 @@ fn the_headline_names_the_number_that_fails() {
         (
             Summary { rms_position_error_m: 0.6, ..lost },
             Some(Fails::RmsPositionErrorM),
-            " (another shape, rms position error 0.60 m, at rest elsewhere)",
+            " (another shape or place, rms position error 0.60 m, at rest elsewhere)",
         ),
         (
             Summary { disagreement_m_s: 0.7, ..lost },

@@ -545,8 +545,10 @@ fn the_schema_bounds_a_number_where_the_reader_does() {
             };
             let properties = keys("properties");
             // Files are looked for, and lists read, before numbers are.
-            let of_lists = ["file", "points"].map(|shape| properties.iter().any(|(_, value)| value["const"] == shape));
-            if of_lists.contains(&true) {
+            let is_read_first = |(key, value): &(String, serde_json::Value)| {
+                value["const"] == "file" || (required(key) && value["type"] == "array")
+            };
+            if properties.iter().any(is_read_first) {
                 continue;
             }
             let of_numbers: Vec<_> = properties.iter().filter(|(_, value)| value["type"] == "number").collect();
@@ -562,6 +564,9 @@ fn the_schema_bounds_a_number_where_the_reader_does() {
                 let mut others: String = others.collect();
                 if table == "start" && !others.contains("shape") {
                     others += ", shape = \"line\", spacing_m = 4.0";
+                }
+                if table == "formation" && !others.contains("shape") {
+                    others += ", shape = \"circle\", radius_m = 4.0";
                 }
                 let refuses = |number: &str| {
                     let start = "start={shape=\"line\", spacing_m=4}".to_owned();

@@ -365,7 +365,7 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
     assert_eq!(apart["audit"]["assumes"], "straight between samples");
     ran_by(TAUTLINE, folder.path(), &["export", "apart/run.mcap", "-o", "apart.csv"]);
     let drawn = audit(folder.path(), &["apart.csv", "--delta", "1"]);
-    assert!(drawn.out.starts_with("VIOLATION: 1 and 2 came to 0.000 m"), "{drawn:?}");
+    assert!(drawn.out.starts_with("VIOLATION: 1 and 2 came to 0.000"), "{drawn:?}");
     // Every step is recorded: proved.
     let (exit, every) = fly("pentagon-laplacian", "every", &["time.duration_s=2", "time.record_hz=240"]);
     assert_eq!((exit, &every["audit"]["proved"]), (Some(0), &true.into()), "{every}");
