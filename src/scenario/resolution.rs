@@ -126,7 +126,8 @@ impl Scenario {
 
     /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.
     fn is_unresolved(&self, distance_m: f64) -> bool {
-        distance_m - self.delta_m <= self.plant.epsilon() * self.extent_m()
+        let extent_m = self.extent_m() + self.carried_m(self.time.duration_s);
+        distance_m - self.delta_m <= self.plant.epsilon() * extent_m
     }
 
     /// Largest distance of a start or a slot from the middle of its swarm \[m\].

@@ -249,6 +249,95 @@ fn a_swarm_that_is_stuck_breathes_once_and_arrives_and_without_a_breath_does_not
     assert!(first.scale == 2.0 && report.separation.certified_m <= first.certified_m, "{:?}", report.breaths);
 }
 
+/// Slots that are spread from the start, on a weakly damped star: what is certified before the first step counts that breath.
+#[test]
+fn a_breath_that_is_sure_to_come_is_part_of_what_is_certified() {
+    let weak = BREATH.replace("MODE", "start");
+    let scenario = read(&weak);
+    let promised_m = tautline::preflight::Preflight::of(&scenario).expect("a law").certified_m.expect("a promise");
+    let report = run(&scenario, &mut ()).expect("a report");
+    let closest_m = report.separation.min_m.expect("a pair");
+    assert!(promised_m <= closest_m && closest_m < 1.1, "{promised_m} {closest_m}");
+    // Negative twin: without the breath that much would not be kept.
+    let still = read(&BREATH.replace("MODE", "off"));
+    let promised_m = tautline::preflight::Preflight::of(&still).expect("a law").certified_m.expect("a promise");
+    assert!(promised_m > closest_m, "{promised_m} {closest_m}");
+}
+
+/// A leader stays where it is while slots are spread about it, and the energy does what the proof says.
+#[test]
+fn a_breath_around_a_leader_leaves_it_alone() {
+    let led = BREATH.replace("MODE", "start") + "reference = { kind = \"rest\", leader = 1 }\n";
+    let scenario = read(&led);
+    let (flight, log) = fly(&scenario);
+    let moved_m = |sample: &tautline::record::OwnedSample| {
+        (row(&sample.swarm.positions_m, 0) - row(&scenario.start.positions_m, 0)).norm()
+    };
+    assert!(log.samples.iter().all(|sample| moved_m(sample) < 1e-9));
+    let rise = flight.energy_rise.expect("an energy");
+    assert!(rise.to <= rise.from * (1.0 + 1e-3) && !flight.breaths.is_empty(), "{rise:?}");
+}
+
+const BREATH: &str = r#"
+swarm = { count = 5 }
+start = { positions_m = [[0, 0], [2, 0], [0, 2], [-2, 0], [0, -2]] }
+formation = { shape = "points", points_m = [[0, 0], [2, 0], [0, 2], [-2, 0], [0, -2]] }
+law = { kind = "displacement", delta_m = 1.0, zeta_per_s = 0.1 }
+graph = { kind = "star" }
+breathing = { mode = "MODE", scale = 4.0 }
+time = { duration_s = 60.0 }
+plant = { precision = "double" }
+"#;
+
+/// What a stalled swarm is promised anew holds for the leg that is under way and those after it.
+#[test]
+fn legs_are_promised_anew_where_slots_are_spread() {
+    let text = CROWD.replace("MODE", "auto") + "[[leg]]\nscale = 1.2\n";
+    let report = run(&read(&text), &mut ()).expect("a report");
+    let breath = report.breaths.first().expect("a breath");
+    assert!(report.legs.iter().all(|leg| leg.certified_m <= breath.certified_m), "{:?} {breath:?}", report.legs);
+    assert!(report.legs[1].certified_m <= report.separation.certified_m, "{:?}", report.legs);
+    assert!(report.separation.min_m > report.separation.certified_m);
+}
+
+/// What a reference must be, each with a word of what is said otherwise.
+#[test]
+fn a_reference_or_a_leg_that_cannot_be_flown_is_refused_by_what_is_wrong() {
+    let refused = |reference: &str| {
+        let text = MISSION.lines().filter(|line| !line.starts_with("reference")).collect::<Vec<_>>().join("\n");
+        let text = format!("reference = {{ {reference} }}\n{text}");
+        let source = tautline::scenario::Source::Text { name: "test".to_owned(), text };
+        tautline::scenario::Scenario::read(&source, &[]).map_or_else(|error| error.to_string(), |_| String::new())
+    };
+    for (reference, said) in [
+        ("kind = \"rest\", leader = 9", "there is no vehicle 9"),
+        ("kind = \"rest\", leader = 0", "there is no vehicle 0"),
+        ("kind = \"rest\", known_by = []", "no vehicle knows the reference"),
+        ("kind = \"rest\", leader = 1, known_by = \"all\"", "both `known_by` and `leader`"),
+        ("kind = \"circle\", radius_m = 3, period_s = 0.01", "too fast to be followed"),
+        ("kind = \"way-points\", points_m = [[0, 0], [1, 0]], times_s = [0, 0.001]", "too fast to be followed"),
+        ("kind = \"way-points\", points_m = [[0, 0], [1, 0]]", "either `times_s` or `speed_m_s`"),
+        ("kind = \"spline\", points_m = [[0, 0], [1, 0]], times_s = [0, 0]", "jumps at 0 s"),
+        ("kind = \"spline\", points_m = [[0, 0], [1, 0]], times_s = [0, 10]", "the flight lasts from 0 to 60 s"),
+        (
+            "kind = \"spline\", points_m = [[0, 0], [0, 0.1], [9, 0], [9, 0.1]], times_s = [0, 20, 40, 60]",
+            "jumps between 20 and 40 s",
+        ),
+    ] {
+        assert!(refused(reference).contains(said), "{reference}: {}", refused(reference));
+    }
+    assert_eq!(refused("kind = \"way-points\", points_m = [[0, 0], [0, 0], [3, 0]], speed_m_s = 1.0"), "");
+    let leg = |from: &str, to: &str| {
+        let source = tautline::scenario::Source::Text { name: "test".to_owned(), text: MISSION.replace(from, to) };
+        tautline::scenario::Scenario::read(&source, &[]).map_or_else(|error| error.to_string(), |_| String::new())
+    };
+    assert!(leg("start_s = 40.0", "start_s = 70.0").contains("leg 3 begins at 70 s"));
+    assert!(leg("spacing_m = 2.5\nassign", "spacing_m = 1.0\nassign").contains("a desired distance of 1 m"));
+    assert!(leg("kind = \"displacement\"", "kind = \"edge-tension\"").contains("follows no reference"));
+    let short = "shape = \"points\"\npoints_m = [[0, 0], [3, 0]]\n";
+    assert!(leg("shape = \"grid\"\nspacing_m = 2.5\n", short).contains("leg 2 has 2 slots for 6 vehicles"));
+}
+
 const CROWD: &str = r#"
 swarm = { count = 16 }
 start = { shape = "random", half_extent_m = 3.8, min_separation_m = 1.15, seed = 5 }
