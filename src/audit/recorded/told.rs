@@ -206,7 +206,9 @@ impl AllTold {
                 (lower < asked.limit && question.contradicts(told, asked.limit)).then_some((asked, lower))
             });
             let open: Vec<_> = open.collect();
-            open.iter().for_each(|(asked, lower)| asked.leave_open(*lower, f64::INFINITY, results));
+            for (asked, lower) in &open {
+                asked.leave_open(*lower, f64::INFINITY, results);
+            }
             left_open += usize::from(!open.is_empty());
             if left_open == KEPT {
                 return;
