@@ -227,6 +227,26 @@ mod tests {
     }
 
     #[test]
+    fn rounding_far_from_the_origin_is_bounded_and_by_no_more_than_it_takes() {
+        let (from, to) = (Vector3::new(1e8 / 3.0, -2e8 / 3.0, 0.1), Vector3::new(1e8 / 7.0, 1e8, 0.7));
+        let line = Segment::straight(1.0, 4.0, from, to);
+        let coefficients = vec![from, (to - from) / 3.0];
+        let curve = Curve { from_s: 1.0, to_s: 4.0, coefficients, deviation: Deviation::default() };
+        let over = Interval { from_s: 1.3, to_s: 3.1 };
+        let (straight, curved) = (line.local(over), Segment::curved(curve.clone()).local(over));
+        let mut largest = 0.0_f64;
+        for k in 0..=100 {
+            let u = f64::from(k) / 100.0;
+            let places = [&straight, &curved].map(|local| local[0] + local[1] * u);
+            let there = line.position(1.3 + 1.8 * u);
+            largest = places.iter().map(|place| (place - there).amax()).fold(largest, f64::max);
+        }
+        for bound in [line.rounding(), Segment::curved(curve).rounding()] {
+            assert!(0.0 < largest && largest <= bound && bound < 1e-6, "{largest} {bound}");
+        }
+    }
+
+    #[test]
     fn a_clipped_segment_is_where_the_whole_one_is() {
         let line = Segment::straight(1.0, 3.0, Vector3::zeros(), Vector3::new(4.0, 0.0, 2.0));
         let part = line.clipped(Interval { from_s: 2.0, to_s: 9.0 }).unwrap();

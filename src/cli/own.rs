@@ -69,7 +69,7 @@ impl OwnRecording {
         }
         own.violations.append(&mut near.ended);
         if let Some(last) = &before {
-            own.violations.extend(near.ended_at(last, own.delta_m, &own.told));
+            own.violations.extend(near.lasting(last, own.delta_m, &own.told));
         }
         own.has_every_step &= own.most_steps <= 1;
         if own.has_every_step {
@@ -165,7 +165,7 @@ impl Near {
 
     /// Those that last to the last sample, which the recording does not tell the smallest distance of: nobody came closer
     /// than it says of all, and at the last sample they are as far apart as it says.
-    fn ended_at(self, last: &OwnedSample, limit_m: f64, all: &[Told]) -> Vec<ToldViolation> {
+    fn lasting(self, last: &OwnedSample, limit_m: f64, all: &[Told]) -> Vec<ToldViolation> {
         let told = self.since.into_iter().filter_map(|(pair, (from_s, height_m))| {
             let to_s = last.time_s;
             let within = all.iter().filter(|told| told.to_s >= from_s).map(|told| told.closest);

@@ -90,7 +90,7 @@ fn placed(parts: &[Part]) -> Vec<Placed<'_>> {
 
 /// What places on two curves say of them.
 #[derive(Debug)]
-#[expect(clippy::struct_field_names, reason = "each is in metres")]
+#[expect(clippy::struct_field_names, reason = "all are lengths")]
 struct Sampled {
     /// The smallest distance at a place, and one that no distance is below.
     most_m: f64,

@@ -134,3 +134,13 @@ fn what_has_no_law_is_refused() {
     let setting = Setting::new(&links, &tight, DELTA_M, 0.0);
     assert!(matches!(DisplacementLaw::new(&setting, keys()), Err(ParameterError::Tension { .. })));
 }
+
+#[test]
+fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
+    let law = law(&Graph::complete(7), &Formation::grid(7, 2.0));
+    let rate = |nearest_m| law.fastest_rate_per_s(Some(nearest_m), A22_PER_S).expect("a rate");
+    let rest_m = law.sensing_range_m().expect("a range");
+    assert_eq!(rate(rest_m), rate(50.0 * rest_m));
+    assert!(rate(rest_m.next_down()) > rate(rest_m) && rate(1.01 * DELTA_M) > rate(rest_m.next_down()));
+    assert_eq!(law.fastest_rate_per_s(None, A22_PER_S), None);
+}
