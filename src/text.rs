@@ -131,7 +131,7 @@ mod tests {
             (1.999_999_9, 2.0, "1.9999999"),
             (2.0_f64.next_down(), 2.0, "just below 2.000"),
             (0.3_f64.next_down(), 0.3, "just below 0.300"),
-            (5e-13, 1e-12, "0.0000000000005"),
+            (6e-13, 1e-12, "0.0000000000006"),
         ] {
             assert_eq!(metres_below(number, limit_m), said);
         }

@@ -120,6 +120,7 @@ mod tests {
                 let (lower, at) = shape.closest(along(0.0), along(1.0));
                 let right = Minimum { lower, upper: lower, at };
                 assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?} {far:?}");
+                // Within, parry says zero however deep it is.
                 let wrong = Minimum { upper: lower + 0.1, ..right };
                 // Within a half-space one depth is as good as another.
                 assert!(lower < 0.0 || !from_shape(&shape, 1.0, &wrong, along).agrees, "{shape:?} {far:?}");

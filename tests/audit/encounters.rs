@@ -1,10 +1,10 @@
 //! What figures show of two that came close, and straight ways beside curves.
 
 use nalgebra::Vector3;
-use tautline::audit::recorded::{ObjectPair, Outcome, PairSample, PairSeries, Settings};
+use tautline::audit::recorded::{Motion, ObjectPair, Outcome, PairSample, PairSeries, Settings};
 use tautline::audit::{Shape, Status};
 use tautline::swarm::Pair;
-use tautline::track::{Item, Piece};
+use tautline::track::{Item, Piece, Sample};
 
 use crate::recorded::{asked, pass, seen, thing};
 
@@ -113,6 +113,38 @@ fn a_straight_way_beside_a_curve_over_a_part_of_it_is_judged_and_drawn_where_it_
     for sample in found {
         let expected_m = 1.0 + (sample.time_s - 3.0).powi(2);
         assert!((sample.distance_m - expected_m).abs() < ROUNDING, "{sample:?}");
+    }
+}
+
+#[test]
+fn what_is_drawn_through_positions_and_velocities_is_their_cubic() {
+    // x = 5 - 9 t + 12 t^2 - 5 t^3 from 2 s on, past one that stands.
+    let cubic = |t: f64| 5.0 - 9.0 * t + 12.0 * t * t - 5.0 * t * t * t;
+    let sample = |vehicle, time_s, x: f64, speed: f64| {
+        let (position_m, velocity_m_s) = (Vector3::new(x, 0.0, 0.0), Some(Vector3::new(speed, 0.0, 0.0)));
+        Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s, radius_m: None })
+    };
+    let items = [
+        sample(0, 2.0, 0.0, 0.0),
+        sample(1, 2.0, 5.0, -9.0),
+        sample(0, 3.0, 0.0, 0.0),
+        sample(1, 3.0, 3.0, 0.0),
+        sample(0, 5.0, 0.0, 0.0),
+        sample(1, 5.0, 3.0, 0.0),
+    ];
+    let settings = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(24.0), ..Settings::delta(0.1) };
+    let settings = Settings { max_gap_s: Some(9.0), ..settings };
+    let outcome = asked(&items, settings.clone());
+    assert_eq!(outcome.contradiction, None);
+    let found = followed(&items, &settings, &outcome, first_two(), 6);
+    assert_eq!(found.len(), 18);
+    for sample in found {
+        let t = (sample.time_s - 2.0).min(1.0);
+        assert!((sample.distance_m - cubic(t)).abs() < ROUNDING, "{sample:?}");
+        // By A h^2 / 16 for each of the two, in the middle.
+        if sample.time_s == 2.5 {
+            assert!((sample.deviation_m - 3.0).abs() < ROUNDING, "{sample:?}");
+        }
     }
 }
 

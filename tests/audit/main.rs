@@ -6,4 +6,5 @@ mod findings;
 mod flown;
 mod recorded;
 mod scenes;
+mod times;
 mod told;

@@ -223,3 +223,35 @@ fn a_violation_without_an_end_has_a_smallest_distance_that_only_bounds_are_known
     let held = Settings { motion: Some(Motion::Hold), ..Settings::delta(2.0) };
     assert_eq!(violated(&pass(3.0), lasting, held).status, Status::Violation);
 }
+
+#[test]
+fn the_closest_of_all_says_when_and_how_near_two_were_of_whom_a_violation_is_told() {
+    let outcome = |window: [f64; 2], pair: Pair| {
+        let [from_s, to_s] = window.map(Some);
+        let mut auditor = TrackAuditor::new(Settings { from_s, to_s, ..Settings::delta(2.0) }).expect("settings");
+        auditor.tell(told(1.5, 0.5));
+        auditor.tell_violation(near(pair));
+        let third = [seen(2, 0.0, [0.0, 9.0, 0.0]), seen(2, 1.0, [0.0, 9.0, 0.0])];
+        let mut items = [&pass(3.5)[..], &third].concat();
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        auditor.push(&names(3), &items).expect("items");
+        auditor.finish().expect("an outcome")
+    };
+    let (own, other) = (Pair::new(0, 1), Pair::new(1, 2));
+    let below_m = 2.0_f64.next_down();
+    for (window, [from_s, to_s], [min_m, min_at_s]) in [
+        ([0.0, 1.0], [0.3, 0.9], [1.5, 0.5]),
+        ([0.4, 0.6], [0.4, 0.6], [1.5, 0.5]),
+        ([0.4, 0.5], [0.4, 0.5], [1.5, 0.5]),
+        ([0.5, 0.6], [0.5, 0.6], [1.5, 0.5]),
+        ([0.625, 0.75], [0.625, 0.75], [below_m, 0.6875]),
+    ] {
+        let found = outcome(window, own).violations;
+        let [found] = found[..] else { panic!("{window:?}: {found:?}") };
+        assert_eq!((found.from_s, found.to_s, found.min_m, found.min_at_s), (from_s, to_s, min_m, min_at_s));
+    }
+    // Beside a violation of others it is one of its own.
+    let both = outcome([0.0, 1.0], other).violations;
+    let spans: Vec<_> = both.iter().map(|v| (v.pair, v.from_s, v.to_s)).collect();
+    assert_eq!(spans, [(ObjectPair::Vehicles(other), 0.3, 0.9), (ObjectPair::Vehicles(own), 0.5, 0.5)]);
+}

@@ -86,3 +86,20 @@ fn who_is_too_near_collides_and_who_feeds_in_more_than_is_braked_is_promised_not
     let pushed = command(&mut limited, &Observation::exact(&near, &links, &formation)).expect("a command");
     assert!((pushed[(0, 0)] + 0.5).abs() < 1e-12 && (pushed[(1, 0)] - 0.5).abs() < 1e-12, "{pushed}");
 }
+
+#[test]
+fn rates_are_those_of_the_potential_s_second_derivative_and_of_the_braking() {
+    const STEP_M: f64 = 1e-4;
+    let law = law(&Graph::complete(2), &Formation::line(2, 2.0));
+    let potential = |l_m: f64| 0.5 * 0.4 * law.steepness(Pair::new(0, 1), l_m).expect("above delta").0.powi(2);
+    for l_m in [1.1, 1.4, 1.8] {
+        let curved = potential(l_m + STEP_M) - 2.0 * potential(l_m) + potential(l_m - STEP_M);
+        let omega_squared = 0.7 + 2.0 * curved / (STEP_M * STEP_M);
+        let (rate, half) = (law.fastest_rate_per_s(Some(l_m), A22_PER_S).expect("a rate"), 0.5 * (1.1 - A22_PER_S));
+        let expected = half + (half * half + omega_squared).sqrt();
+        assert!((rate - expected).abs() < 1e-5 * expected, "{l_m}: {rate} {expected}");
+    }
+    let margin = law.velocity_margin(0.0, A22_PER_S).expect("it brakes");
+    assert_eq!([margin.per_s, margin.terms_per_s], [1.1 - A22_PER_S, 1.1 + A22_PER_S]);
+    assert_eq!(law.common_mode_rate_per_s(A22_PER_S), A22_PER_S - 1.1);
+}
