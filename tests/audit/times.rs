@@ -1,10 +1,11 @@
 //! Times before zero, and gaps that somebody else is there at the edge of alone.
 
+use nalgebra::Vector3;
 use tautline::audit::Status;
-use tautline::audit::recorded::{Settings, VehicleSettings};
-use tautline::track::Item;
+use tautline::audit::recorded::{Motion, RecordedError, Settings, VehicleSettings, audit};
+use tautline::track::{Item, Piece, Sample};
 
-use crate::recorded::{asked, seen};
+use crate::recorded::{asked, names, seen};
 
 /// Two that fly side by side from a time on, ten times a second for 20 s, and are near each other in the second after it.
 fn beside(begin_s: f64) -> Vec<Item> {
@@ -55,5 +56,62 @@ fn a_gap_matters_where_somebody_is_there_within_it_and_not_at_its_edge() {
         let outcome = with_bravo(there);
         assert_eq!(outcome.status, expected, "{:?}", outcome.gaps);
         assert_eq!(outcome.gaps.len(), usize::from(expected == Status::Undecided));
+    }
+}
+
+/// A piece of a curve.
+fn piece(vehicle: usize, [from_s, to_s]: [f64; 2], coefficients: &[[f64; 3]]) -> Item {
+    Item::Piece(Piece { vehicle, from_s, to_s, coefficients: coefficients.iter().map(|&c| Vector3::from(c)).collect() })
+}
+
+#[test]
+fn between_pieces_that_are_joined_a_vehicle_is_where_they_end_and_begin() {
+    // Alpha stands, on pieces with 0.2 s between them, and bravo is nearest to it in the middle of that time.
+    for (second_x, expected) in [(0.0, Status::Violation), (40.0, Status::Violation)] {
+        let items = [
+            piece(0, [0.0, 1.0], &[[0.0; 3]]),
+            piece(1, [0.0, 2.2], &[[110.0, 1.0, 0.0], [-100.0, 0.0, 0.0]]),
+            piece(0, [1.2, 2.2], &[[second_x, 0.0, 0.0]]),
+        ];
+        let joined = Settings { max_gap_s: Some(0.5), ..Settings::delta(2.0) };
+        assert_eq!(asked(&items, joined).status, expected, "{second_x}");
+        let apart = Settings { max_gap_s: Some(0.1), ..Settings::delta(2.0) };
+        assert_eq!(asked(&items, apart).gaps.len(), 1);
+    }
+}
+
+#[test]
+fn a_curve_that_leads_beyond_what_can_be_judged_is_refused() {
+    let judged = |speed_m_s: f64| {
+        let far = piece(0, [0.0, 1e30], &[[0.0; 3], [speed_m_s, 0.0, 0.0]]);
+        audit(&names(2), &[far, piece(1, [0.0, 1.0], &[[5.0, 0.0, 0.0]])], Settings::delta(1.0))
+    };
+    assert!(judged(1e30).is_ok());
+    assert!(matches!(judged(1e50), Err(RecordedError::Item { vehicle, .. }) if vehicle == "alpha"));
+}
+
+#[test]
+fn a_straight_flight_far_from_the_origin_needs_no_acceleration() {
+    for with_velocity in [false, true] {
+        let at = |k: u32| {
+            let time_s = 0.1 * f64::from(k);
+            [0.0, 5.0].map(|aside_m| {
+                let vehicle = usize::from(aside_m > 0.0);
+                let position_m = Vector3::new(1e8 / 3.0 + 0.3 * time_s, 1e7 / 7.0 - 0.7 * time_s, aside_m);
+                let velocity_m_s = with_velocity.then_some(Vector3::new(0.3, -0.7, 0.0));
+                Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s, radius_m: None })
+            })
+        };
+        let items: Vec<_> = (0..100).flat_map(at).collect();
+        let bounded =
+            |delta_m| Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(0.0), ..Settings::delta(delta_m) };
+        let outcome = asked(&items, bounded(4.9));
+        assert_eq!((outcome.contradiction, outcome.status), (None, Status::Clear), "{with_velocity}");
+        // One who is elsewhere in one sample needs some.
+        let mut odd = items.clone();
+        if let Item::Sample(sample) = &mut odd[100] {
+            sample.position_m.x += 1e-3;
+        }
+        assert!(asked(&odd, bounded(4.9)).contradiction.is_some(), "{with_velocity}");
     }
 }
