@@ -147,6 +147,10 @@ fn what_was_told_moves_with_a_clock_that_both_share_and_is_open_where_clocks_dif
     let open = others(told(0.5, 0.25), Settings::delta(2.5));
     assert_eq!((open.status, open.undecided.len(), open.undecided[0].lower_m), (Status::Undecided, 1, 2.0));
     assert_eq!(others(Told { drawn_m: 0.5, ..told(0.5, 0.25) }, Settings::delta(2.5)).status, Status::Clear);
+    for (at_s, expected) in [(0.0, Status::Clear), (0.5, Status::Undecided), (1.0, Status::Clear)] {
+        let instant = Settings { from_s: Some(at_s), to_s: Some(at_s), ..Settings::delta(2.5) };
+        assert_eq!(others(told(0.5, 0.25), instant).status, expected, "{at_s}: at a sample it is known");
+    }
     assert_eq!(others(told(0.5, 0.25), clocks(2.0, [0.01, 0.0])).status, Status::Undecided);
     let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(1.0), ..Settings::delta(2.5) };
     assert_eq!(others(told(0.5, 0.25), bounded).status, Status::Clear, "how far anybody was from the lines is bounded");
