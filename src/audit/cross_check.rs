@@ -116,7 +116,9 @@ mod tests {
             for k in 0..50_u32 {
                 let turn = f64::from(k) * 2.4;
                 let far = Vector3::new(3e7 * turn.cos(), 2e7 * turn.sin(), 1e7);
-                let along = |u: f64| far + Vector3::new(6.0 * u - 3.0, 2.0, 0.0);
+                // Past it: nearest somewhere between the ends.
+                let across = Vector3::new(-far.y, far.x, 0.0).normalize();
+                let along = |u: f64| far + across * (6e6 * u - 2.9e6);
                 let (lower, at) = shape.closest(along(0.0), along(1.0));
                 let right = Minimum { lower, upper: lower, at };
                 assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?} {far:?}");

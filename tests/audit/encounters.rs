@@ -161,6 +161,21 @@ fn two_curves_that_are_one_are_no_distance_apart() {
 }
 
 #[test]
+fn a_curve_that_is_back_at_the_limit_for_an_instant_is_too_close_twice() {
+    let items = |apart_m: f64| {
+        [
+            piece(0, [0.0, 2.0], &[[0.0; 3]]),
+            piece(1, [0.0, 1.0], &[[apart_m - 1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+            piece(1, [1.0, 2.0], &[[apart_m, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
+        ]
+    };
+    for (apart_m, expected) in [(2.0, 2), (1.75, 1), (2.5, 2)] {
+        let outcome = asked(&items(apart_m), Settings::delta(2.0));
+        assert_eq!(outcome.violations.len(), expected, "{apart_m}: {:?}", outcome.violations);
+    }
+}
+
+#[test]
 fn a_curve_that_jumps_past_a_curve_meets_it() {
     // Bravo jumps at 1 s from one side of alpha to the other.
     let items = |aside_m: f64| {

@@ -33,6 +33,7 @@ const CSV: &str =
 const WIDE: &str = "t,x1,y1,z1,x2,y2,z2\n0,1,2,3,-1.5,.25,1e-3\n.5,1.5,2,3,,,\n";
 const TEXT: &str = "# t x1 y1 z1 x2 y2 z2\n0 1 2 3 -1.5 .25 1e-3\n.5   1.5\t2 3 -1 .25 2e-3\n";
 const TUPLES: &str = "0 (1,2) (-1.5,.25)\n.5 (1.5, 2) (-1,.25)\n";
+const ONE: &str = "t,x,y,z\n0,1,2,3\n.5,1,2,4\n";
 const POLYNOMIAL: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1,\n1,0,1,0,0,1,0,\n0.5,1,1,0,0,1,0,\n";
 const SHOW: &str = r#"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
     "takeoffTime": 2, "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], [[0, 0, 0]]]]}}},
@@ -52,11 +53,14 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
     };
     let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     gzip.write_all(CSV.as_bytes()).expect("written");
-    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, bytes) in [("show.json", SHOW), ("a.json", r#"{"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]}"#)] {
-        zip.start_file(name, zip::write::SimpleFileOptions::default()).expect("an entry");
-        zip.write_all(bytes.as_bytes()).expect("written");
-    }
+    let zipped = |files: &[(&str, &str)]| {
+        let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, bytes) in files {
+            zip.start_file(*name, zip::write::SimpleFileOptions::default()).expect("an entry");
+            zip.write_all(bytes.as_bytes()).expect("written");
+        }
+        zip.finish().expect("finished").into_inner()
+    };
     vec![
         ("long", CSV.into()),
         ("wide", WIDE.into()),
@@ -65,7 +69,9 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("polynomial", POLYNOMIAL.into()),
         ("show", SHOW.into()),
         ("gzip", gzip.finish().expect("finished")),
-        ("skyc", zip.finish().expect("finished").into_inner()),
+        ("skyc", zipped(&[("show.json", SHOW), ("a.json", r#"{"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]}"#)])),
+        ("tables", zipped(&[("f/a.csv", ONE), ("f/b.txt", "0 1 2 3\n.5 1 2 4\n"), ("f/readme.txt", "1 2 3\n")])),
+        ("pieces", zipped(&[("a/1.csv", POLYNOMIAL), ("a/2.csv", POLYNOMIAL), ("b/1.csv", POLYNOMIAL)])),
         ("parquet", exported(export::Format::Parquet)),
         ("npz", exported(export::Format::Npz)),
         ("mcap", exported(export::Format::Mcap)),

@@ -203,7 +203,10 @@ impl AllTold {
             let open = odd.iter().filter_map(|told| {
                 let asked = question.of(pair, [told.from_s, told.to_s], [f64::INFINITY; 2])?;
                 let lower = if asked.later_s.is_some() { least(told) } else { 0.0 };
-                (lower < asked.limit && question.contradicts(told, asked.limit)).then_some((asked, lower))
+                // At a sample alone it is known where they are.
+                let at_ends = |later_s: f64| [told.from_s + later_s, told.to_s + later_s].contains(&asked.over.from_s);
+                let is_sample = asked.over.from_s == asked.over.to_s && asked.later_s.is_some_and(at_ends);
+                (!is_sample && lower < asked.limit && question.contradicts(told, asked.limit)).then_some((asked, lower))
             });
             let open: Vec<_> = open.collect();
             for (asked, lower) in &open {
