@@ -108,6 +108,8 @@ fn report(
         refused: &preflight.refusing(),
         certificate: &flight.certificate,
         audit: &flight.audit,
+        clearance: flight.clearance.as_ref(),
+        obstacles: &scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect::<Vec<_>>(),
         engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))
             .then_some(flight.engine_contacts.len() as u64),
         hulls: &hulls,

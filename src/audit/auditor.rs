@@ -64,7 +64,7 @@ impl Auditor {
     /// outcome's count of refusals, which keeps it from being clear.
     pub fn start(&mut self, time_s: f64, positions_m: &Rows) -> Result<StepFinding<'_>, AuditError> {
         let checked = if self.time_s.is_some() { Err(AuditError::AlreadyStarted) } else { Ok(()) };
-        self.admit(checked.and_then(|()| self.check(time_s, positions_m)))?;
+        self.admit(checked.and_then(|()| check_instant(self.vehicles, time_s, positions_m)))?;
         self.positions_m.clone_from(positions_m);
         self.nearest_m = (1..self.vehicles).map(|i| separation(positions_m, i - 1, i)).fold(f64::INFINITY, f64::min);
         Ok(self.sweep(Interval { from_s: time_s, to_s: time_s }, positions_m))
@@ -79,7 +79,7 @@ impl Auditor {
         let checked = match self.time_s {
             None => Err(AuditError::NotStarted),
             Some(previous_s) if time_s <= previous_s => Err(AuditError::TimeNotIncreasing { previous_s, time_s }),
-            Some(previous_s) => self.check(time_s, positions_m).map(|()| previous_s),
+            Some(previous_s) => check_instant(self.vehicles, time_s, positions_m).map(|()| previous_s),
         };
         let previous_s = self.admit(checked)?;
         self.outcome.steps += 1;
@@ -105,28 +105,6 @@ impl Auditor {
     fn admit<T>(&mut self, checked: Result<T, AuditError>) -> Result<T, AuditError> {
         self.outcome.refused += u64::from(checked.is_err());
         checked
-    }
-
-    fn check(&self, time_s: f64, positions_m: &Rows) -> Result<(), AuditError> {
-        if !time_s.is_finite() {
-            return Err(AuditError::TimeNotFinite { time_s });
-        }
-        if positions_m.nrows() != self.vehicles {
-            return Err(AuditError::WrongCount { expected: self.vehicles, found: positions_m.nrows() });
-        }
-        let near = |x: &f64| x.abs() <= MAX_LENGTH_M;
-        // Without an early exit the usual case has no branch per number.
-        if positions_m.iter().fold(true, |all, x| all & near(x)) {
-            return Ok(());
-        }
-        let far = (0..self.vehicles).find(|&i| !positions_m.row(i).iter().all(near));
-        far.map_or(Ok(()), |vehicle| {
-            Err(if positions_m.row(vehicle).iter().all(|x| x.is_finite()) {
-                AuditError::TooFar { vehicle, time_s, limit_m: MAX_LENGTH_M }
-            } else {
-                AuditError::NotFinite { vehicle, time_s }
-            })
-        })
     }
 
     /// Sweeps from the positions held to `to`, which must have been checked.
@@ -176,6 +154,29 @@ impl Auditor {
         self.time_s = Some(step.to_s);
         StepFinding { closest, began: &self.began, ended: &self.ended }
     }
+}
+
+/// Whether an instant can be judged: a time, and a position for each vehicle, that are not beyond what is computed with.
+pub(super) fn check_instant(vehicles: usize, time_s: f64, positions_m: &Rows) -> Result<(), AuditError> {
+    if !time_s.is_finite() {
+        return Err(AuditError::TimeNotFinite { time_s });
+    }
+    if positions_m.nrows() != vehicles {
+        return Err(AuditError::WrongCount { expected: vehicles, found: positions_m.nrows() });
+    }
+    let near = |x: &f64| x.abs() <= MAX_LENGTH_M;
+    // Without an early exit the usual case has no branch per number.
+    if positions_m.iter().fold(true, |all, x| all & near(x)) {
+        return Ok(());
+    }
+    let far = (0..vehicles).find(|&i| !positions_m.row(i).iter().all(near));
+    far.map_or(Ok(()), |vehicle| {
+        Err(if positions_m.row(vehicle).iter().all(|x| x.is_finite()) {
+            AuditError::TooFar { vehicle, time_s, limit_m: MAX_LENGTH_M }
+        } else {
+            AuditError::NotFinite { vehicle, time_s }
+        })
+    })
 }
 
 #[cfg(test)]

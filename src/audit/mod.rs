@@ -1,7 +1,8 @@
 //! The independent judge: did any two come closer than they may?
 //!
 //! It is fed with motion alone and knows no controller and no engine. Motion comes in segments: the steps of a flight, in
-//! which every vehicle moves on a straight line from one instant to the next ([`Auditor`]), or what a recording says of
+//! which every vehicle moves on a straight line from one instant to the next ([`Auditor`], and [`ClearanceAuditor`] past
+//! obstacles), or what a recording says of
 //! each vehicle at times of its own, on lines, on curves, or within a bound ([`recorded`]). Whole segments are swept, so
 //! nothing passes between samples. Two detectors look at each pair that is swept:
 //!
@@ -34,6 +35,7 @@
 
 mod auditor;
 mod candidates;
+mod clearance;
 mod cross_check;
 mod enclosure;
 mod error;
@@ -50,7 +52,10 @@ mod segment;
 mod sweep;
 
 pub use auditor::Auditor;
+pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};
 pub use error::AuditError;
 pub use obstacle::{Obstacle, ObstacleError, Shape};
-pub use outcome::{AuditOutcome, Disagreement, ParryEvidence, Status, StepFinding, Undecided, Violation};
+pub use outcome::{
+    Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
+};
 pub use sweep::swept_separation_m;

@@ -177,7 +177,7 @@ impl From<SimError> for Failure {
         match error {
             SimError::Record(error) => error.into(),
             SimError::Law(error) => error.into(),
-            SimError::NoLeg | SimError::Vehicles { .. } | SimError::Commands { .. } => {
+            SimError::NoLeg | SimError::Obstacle(_) | SimError::Vehicles { .. } | SimError::Commands { .. } => {
                 Self::plain(Exit::WrongInput, error.to_string())
             }
             SimError::Audit(error) => {

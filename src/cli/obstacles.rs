@@ -1,88 +1,22 @@
-//! The file of obstacles.
-//!
-//! ```toml
-//! [[obstacle]]
-//! name = "tower"
-//! box = { size_m = [2.0, 2.0, 30.0], yaw_deg = 15.0 }
-//! at_m = [10.0, 4.0, 15.0]
-//! clearance_m = 1.5            # without it: the vehicle's radius, or delta / 2
-//!
-//! [[obstacle]]
-//! name = "truck"
-//! ball = { radius_m = 3.0 }
-//! path = [[0.0, -20.0, 0.0, 1.0], [8.0, 20.0, 0.0, 1.0]]   # t [s], x, y, z [m]
-//!
-//! [[obstacle]]
-//! name = "cable"
-//! capsule = { from_m = [0.0, 0.0, 8.0], to_m = [30.0, 0.0, 9.0], radius_m = 0.05 }
-//!
-//! [[obstacle]]
-//! name = "ground"
-//! half_space = { normal = [0.0, 0.0, 1.0] }
-//! ```
+//! The file of obstacles. Its tables are those of a scenario, and may move.
 
 use std::ops::Range;
 use std::path::Path;
 
-use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::Failure;
-use crate::audit::{Obstacle, Shape};
+use crate::audit::Obstacle;
+use crate::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
+use crate::sim;
 
 /// Largest file that is read \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
-const HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and a place at_m = [x, y, z] or a \
-                    path = [[t, x, y, z], ...]";
-
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
     #[serde(default)]
-    obstacle: Vec<toml::Spanned<Entry>>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Entry {
-    name: String,
-    ball: Option<Ball>,
-    #[serde(rename = "box")]
-    cuboid: Option<Cuboid>,
-    capsule: Option<Capsule>,
-    half_space: Option<HalfSpace>,
-    at_m: Option<[f64; 3]>,
-    path: Option<Vec<[f64; 4]>>,
-    clearance_m: Option<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Ball {
-    radius_m: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Cuboid {
-    size_m: [f64; 3],
-    #[serde(default)]
-    yaw_deg: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(clippy::struct_field_names, reason = "each is in metres")]
-struct Capsule {
-    from_m: [f64; 3],
-    to_m: [f64; 3],
-    radius_m: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct HalfSpace {
-    normal: [f64; 3],
+    obstacle: Vec<toml::Spanned<ObstacleTable>>,
 }
 
 /// Reads a file of obstacles.
@@ -102,7 +36,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Obstacle>, Failure> {
 fn parse(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
     let wrong = |message: String, place: Option<Range<usize>>| {
         let line = place.map_or(1, |place| 1 + text[..place.start.min(text.len())].matches('\n').count());
-        Failure::input(format!("{}, line {line}: {message}", path.display()), HELP)
+        Failure::input(format!("{}, line {line}: {message}", path.display()), OBSTACLE_HELP)
     };
     let document: Document = toml::from_str(text).map_err(|error| wrong(error.message().to_owned(), error.span()))?;
     let obstacles: Result<Vec<_>, _> = document
@@ -116,40 +50,19 @@ fn parse(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
     obstacles
 }
 
-fn obstacle(entry: Entry) -> Result<Obstacle, String> {
-    let Entry { name, .. } = entry;
-    let in_space = matches!((&entry.capsule, &entry.half_space), (Some(_), _) | (_, Some(_)));
-    let shapes = [
-        entry.ball.map(|ball| Shape::Ball { radius_m: ball.radius_m }),
-        entry.cuboid.map(|cuboid| Shape::Box {
-            half_m: Vector3::from(cuboid.size_m) * 0.5,
-            yaw_rad: cuboid.yaw_deg.to_radians(),
-        }),
-        entry.capsule.map(|capsule| Shape::Capsule {
-            from_m: capsule.from_m.into(),
-            to_m: capsule.to_m.into(),
-            radius_m: capsule.radius_m,
-        }),
-        entry.half_space.map(|half_space| Shape::HalfSpace { normal: half_space.normal.into() }),
-    ];
-    let mut shapes = shapes.into_iter().flatten();
-    let (Some(shape), None) = (shapes.next(), shapes.next()) else {
-        return Err(format!("obstacle `{name}` needs one shape and no more"));
-    };
-    let path = match (entry.at_m, entry.path) {
-        (Some(at_m), None) => vec![(0.0, at_m.into())],
-        (None, Some(path)) => path.into_iter().map(|[t, x, y, z]| (t, Vector3::new(x, y, z))).collect(),
-        (None, None) if in_space => vec![(0.0, Vector3::zeros())],
-        (None, None) => return Err(format!("obstacle `{name}` has no place")),
-        (Some(_), Some(_)) => return Err(format!("obstacle `{name}` has a place and a path")),
-    };
-    let obstacle = Obstacle { name, shape, clearance_m: entry.clearance_m, path };
+fn obstacle(table: ObstacleTable) -> Result<Obstacle, String> {
+    let name = table.name.clone();
+    let Solid { shape, path, clearance_m } = table.solid()?;
+    let obstacle = Obstacle { name, shape: sim::judged_shape(shape), clearance_m, path };
     obstacle.check().map(|()| obstacle).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
+    use crate::audit::Shape;
 
     fn read(text: &str) -> Result<Vec<Obstacle>, String> {
         parse(text, Path::new("obstacles.toml")).map_err(|failure| failure.said.message)

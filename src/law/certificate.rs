@@ -9,6 +9,9 @@ use super::error::LawError;
 pub struct Certificate {
     /// No pair ever comes closer than this \[m\], under the assumptions of the law's proof.
     pub certified_m: Option<f64>,
+    /// No vehicle ever comes nearer to an obstacle than its clearance and this \[m\], where the law keeps clear of obstacles
+    /// and there are some.
+    pub certified_room_m: Option<f64>,
     /// Energy E(0) of the start \[m^2/s^2\], where the law has one, whether or not it certifies anything.
     pub energy_initial: Option<f64>,
     /// Every reason why nothing is certified.
@@ -24,6 +27,8 @@ pub struct LegBound {
     pub energy: f64,
     /// No pair comes closer than this \[m\].
     pub certified_m: Option<f64>,
+    /// No vehicle comes nearer to an obstacle than its clearance and this \[m\].
+    pub certified_room_m: Option<f64>,
 }
 
 /// Why a certificate is void.
@@ -47,6 +52,10 @@ pub enum Void {
     CommandsHeld,
     /// The vehicles are not told how the reference that they follow moves.
     ReferenceNotFed,
+    /// There are obstacles, and the law does not keep clear of them.
+    ObstaclesUnknown,
+    /// The swarm is carried past obstacles that stand.
+    CarriedPastObstacles,
     /// What would be certified is so near delta that the plant's numbers do not tell the two apart.
     Unresolved,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
@@ -57,7 +66,7 @@ impl Certificate {
     /// A certificate that promises nothing, for one reason.
     #[must_use]
     pub fn void(reason: Void) -> Self {
-        Self { certified_m: None, energy_initial: None, void: vec![reason], legs: Vec::new() }
+        Self { certified_m: None, certified_room_m: None, energy_initial: None, void: vec![reason], legs: Vec::new() }
     }
 
     /// What holds of a flight for which this was promised first and another promise was made on a leg, from 0, after its
@@ -69,6 +78,7 @@ impl Certificate {
         }
         let least = |before_m: Option<f64>, now_m: Option<f64>| before_m.zip(now_m).map(|(a, b)| a.min(b));
         self.certified_m = least(self.certified_m, later.certified_m);
+        self.certified_room_m = least(self.certified_room_m, later.certified_room_m);
         self.void.clone_from(&later.void);
         if self.certified_m.is_none() {
             self.legs.clear();
@@ -76,6 +86,7 @@ impl Certificate {
         for (bound, now) in self.legs.iter_mut().skip(leg).zip(later.legs.iter().skip(1)) {
             bound.energy = bound.energy.max(now.energy);
             bound.certified_m = least(bound.certified_m, now.certified_m);
+            bound.certified_room_m = least(bound.certified_room_m, now.certified_room_m);
         }
     }
 
@@ -83,7 +94,7 @@ impl Certificate {
     #[must_use]
     pub fn void_where(mut self, breaks: bool, reason: Void) -> Self {
         if breaks && !self.void.contains(&reason) {
-            self.certified_m = None;
+            (self.certified_m, self.certified_room_m) = (None, None);
             self.legs.clear();
             self.void.push(reason);
         }
@@ -105,6 +116,8 @@ impl Void {
             Self::CommandsFromOutside => "commands-from-outside",
             Self::CommandsHeld => "commands-held",
             Self::ReferenceNotFed => "reference-not-fed",
+            Self::ObstaclesUnknown => "obstacles-unknown",
+            Self::CarriedPastObstacles => "carried-past-obstacles",
             Self::Unresolved => "certificate-unresolved",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
@@ -136,6 +149,12 @@ impl fmt::Display for Void {
             Self::ReferenceNotFed => {
                 f.write_str("The vehicles are not told how their reference moves (reference.feed_forward).")
             }
+            Self::ObstaclesUnknown => {
+                f.write_str("The law does not keep clear of obstacles: what hits one moves in another way than it says.")
+            }
+            Self::CarriedPastObstacles => f.write_str(
+                "The reference moves and obstacles stand: what the swarm is carried by may press it against them.",
+            ),
             Self::Unresolved => f.write_str(
                 "The distance that the law certifies is nearer to delta than positions are told apart: there is too much energy.",
             ),
@@ -153,6 +172,7 @@ mod tests {
     fn a_renewed_promise_is_never_more_than_the_one_before() {
         let promised = |certified_m: Option<f64>| Certificate {
             certified_m,
+            certified_room_m: None,
             energy_initial: Some(1.0),
             void: if certified_m.is_some() { Vec::new() } else { vec![Void::NoBarrier] },
             legs: Vec::new(),
@@ -183,6 +203,8 @@ mod tests {
             Void::CommandsFromOutside,
             Void::CommandsHeld,
             Void::ReferenceNotFed,
+            Void::ObstaclesUnknown,
+            Void::CarriedPastObstacles,
             Void::Unresolved,
             Void::StartRefused(collision),
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
@@ -198,6 +220,8 @@ mod tests {
             "commands-from-outside",
             "commands-held",
             "reference-not-fed",
+            "obstacles-unknown",
+            "carried-past-obstacles",
             "certificate-unresolved",
             "start-too-close",
             "start-refused",
@@ -208,7 +232,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[10].to_string(),
+            reasons[12].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

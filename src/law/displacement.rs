@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, LegBound, Void};
+use super::clearance::ClearanceTension;
 use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
 use super::error::{LawError, ParameterError};
 use super::interface::{Controls, Law, VelocityMargin};
@@ -15,9 +16,9 @@ use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
 use crate::observation::Observation;
-use crate::space::NearPairs;
+use crate::space::{NearPairs, Obstacle};
 use crate::swarm::{Pair, Rows, row, set_row};
-use crate::target::{ReferenceMotion, Target};
+use crate::target::{Leg, ReferenceMotion, Target};
 
 /// Keys of `[law]` with `kind = "displacement"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -91,8 +92,14 @@ impl DisplacementKeys {
 /// Where slots change by D, at once or along straight lines, `sqrt E` grows by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`:
 /// what holds through all legs is known before the first step.
 ///
+/// # Obstacles
+/// The same one-sided tension acts between vehicles and obstacles at rest, on the distance from the surface less the
+/// clearance, over a range of R - delta, or of the least room that a slot has where slots are places. E holds all of these
+/// and absolute velocities then. So what is certified, of pairs and of the room from obstacles, is certified of a reference at
+/// rest, or without a reference for a22 <= 0. A leader keeps clear by itself.
+///
 /// # Cost
-/// O(links + near pairs) a step without allocation; O(N + near pairs) on the complete graph.
+/// O(links + near pairs) a step without allocation; O(N + near pairs) on the complete graph. Each obstacle adds O(N).
 #[derive(Clone, Debug)]
 pub struct DisplacementLaw {
     pulls: PinnedConsensus,
@@ -110,6 +117,10 @@ pub struct DisplacementLaw {
     tension: EdgeTension,
     /// R is at most this, for legs to come \[m\].
     rest_at_most_m: f64,
+    /// Between vehicles and obstacles, where there are any.
+    clearance: Option<ClearanceTension>,
+    /// Whether a reference that moves carries the swarm.
+    is_carried: bool,
     /// Whether there are two vehicles at all.
     has_pairs: bool,
     /// That of the target that R is taken from.
@@ -125,7 +136,7 @@ impl DisplacementLaw {
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
     /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
     pub fn new(setting: &Setting<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, later, guidance, delta_m, a22_per_s } = setting;
+        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s } = setting;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
         for formation in std::iter::once(formation).chain(later.iter().map(|leg| &leg.formation)) {
             ParameterError::check(links, formation, &gains)?;
@@ -146,7 +157,16 @@ impl DisplacementLaw {
             }
             rest_at_most_m = tension.rest_m();
         }
+        let clearance = if obstacles.is_empty() {
+            None
+        } else {
+            let range_m = slot_room_m(setting)?.min(tension.rest_m() - delta_m);
+            let tension = ClearanceTension::new(keys.alpha, range_m);
+            Some(tension.map_err(|source| ParameterError::Tension { pair: Pair::new(0, 1), source })?)
+        };
         Ok(Self {
+            clearance,
+            is_carried: guidance.is_some_and(|guidance| !guidance.motion.is_at_rest()),
             largest: links.largest_eigenvalue_bound(&pulls.pinning),
             pulls,
             keys,
@@ -191,12 +211,16 @@ impl DisplacementLaw {
         Ok((apart_m * (-slope_m_s2 / separation_m), self.tension.value(separation_m)))
     }
 
-    /// Sum of `V_R` over all near pairs of a state that the law was not asked about \[m^2/s^2\].
-    fn potential(&self, positions_m: &Rows) -> Result<f64, LawError> {
+    /// Sum of the tensions of a state that the law was not asked about \[m^2/s^2\].
+    fn potential(&self, positions_m: &Rows, obstacles: &[Obstacle]) -> Result<f64, LawError> {
+        let of_obstacles = match &self.clearance {
+            Some(clearance) => clearance.potential(obstacles, positions_m)?,
+            None => 0.0,
+        };
         let mut near = NearPairs::default();
         near.update(positions_m, self.tension.rest_m());
         let of_pair = |&(i, j): &(usize, usize)| Ok(self.push(i, j, row(positions_m, i) - row(positions_m, j))?.1);
-        near.pairs().iter().map(of_pair).sum()
+        Ok(of_obstacles + near.pairs().iter().map(of_pair).sum::<Result<f64, LawError>>()?)
     }
 
     /// `(sigma k/2) e' M e` \[m^2/s^2\].
@@ -208,15 +232,24 @@ impl DisplacementLaw {
         check_state(self.pulls.graph.count(), at.own)?;
         let (positions_m, Target { formation, reference, .. }) = (&at.own.positions_m, at.target);
         let stretch = self.stretch(|i| error_m(positions_m, formation, reference.position_m, i));
-        let pushes = self.memo.of(positions_m).map_or_else(|| self.potential(positions_m), Ok)?;
-        let energy = self.pulls.kinetic_energy(at.own, &reference) + stretch + pushes;
+        let pushes = self.memo.of(positions_m).map_or_else(|| self.potential(positions_m, at.obstacles), Ok)?;
+        let is_absolute = self.clearance.is_some() && !self.is_guided();
+        let kinetic = if is_absolute {
+            0.5 * at.own.velocities_m_s.norm_squared()
+        } else {
+            self.pulls.kinetic_energy(at.own, &reference)
+        };
+        let energy = kinetic + stretch + pushes;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
 
     /// What holds from a state of this energy on, and from each time that the slots become those of the next formation.
     fn bounds(&self, energy: f64, now: &Formation, ahead: &[&Formation]) -> Vec<LegBound> {
-        let bound =
-            |energy: f64| LegBound { energy, certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)) };
+        let bound = |energy: f64| LegBound {
+            energy,
+            certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)),
+            certified_room_m: self.clearance.map(|clearance| clearance.least_room_m(energy)),
+        };
         let (mut before, mut root) = (now, energy.sqrt());
         let mut bounds = vec![bound(energy)];
         for &next in ahead {
@@ -237,6 +270,30 @@ impl DisplacementLaw {
 /// The two slots that are nearest to each other, and how near \[m\]; a vehicle alone keeps any distance.
 fn nearest_slots(formation: &Formation, delta_m: f64) -> (Pair, f64) {
     formation.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
+}
+
+/// The least room that a slot of any leg has from an obstacle \[m\], where slots are places that stay.
+fn slot_room_m(setting: &Setting<'_>) -> Result<f64, ParameterError> {
+    let Some(guidance) = setting.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
+        return Ok(f64::INFINITY);
+    };
+    let place_m = guidance.motion.at(0.0).position_m;
+    let mut least_m = f64::INFINITY;
+    let later = setting.later.iter().map(|Leg { formation, .. }| formation);
+    for formation in std::iter::once(setting.formation).chain(later) {
+        for vehicle in 0..formation.count() {
+            for (obstacle, solid) in setting.obstacles.iter().enumerate() {
+                let (room_m, _) = solid.room_m(row(&formation.slots_m, vehicle) + place_m);
+                if room_m <= 0.0 {
+                    let clearance_m = solid.clearance_m;
+                    let distance_m = room_m + clearance_m;
+                    return Err(ParameterError::ObstacleOverSlot { vehicle, obstacle, distance_m, clearance_m });
+                }
+                least_m = least_m.min(room_m);
+            }
+        }
+    }
+    Ok(least_m)
 }
 
 fn tension_between(
@@ -263,7 +320,10 @@ impl Law for DisplacementLaw {
         command.fill(0.0);
         let gains = Gains { position: self.keys.k_per_s2, velocity: self.damping_per_s() };
         self.pulls.add_pulls(at, gains, -self.scale(), command)?;
-        let potential = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
+        let mut potential = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
+        if let Some(clearance) = &self.clearance {
+            potential += clearance.add_pushes(at, command)?;
+        }
         if let Some(swarm) = at.shared() {
             self.memo.keep(&swarm.positions_m, potential);
         }
@@ -309,11 +369,17 @@ impl Law for DisplacementLaw {
             Err(fault) => return Certificate::void(Void::StartRefused(fault)),
         };
         let legs = self.bounds(energy, start.target.formation, ahead);
-        let certified_m = legs.last().and_then(|last| last.certified_m);
+        let last = legs.last();
+        let (certified_m, certified_room_m) =
+            (last.and_then(|last| last.certified_m), last.and_then(|last| last.certified_room_m));
         let legs = if ahead.is_empty() { Vec::new() } else { legs };
         let closes_in = ahead.iter().any(|formation| self.rest_for(formation).1 < self.tension.rest_m());
-        Certificate { certified_m, energy_initial: Some(energy), void: Vec::new(), legs }
+        let has_obstacles = self.clearance.is_some();
+        let is_fed_energy = has_obstacles && !self.is_guided() && self.a22_per_s > 0.0;
+        Certificate { certified_m, certified_room_m, energy_initial: Some(energy), void: Vec::new(), legs }
             .void_where(closes_in, Void::TargetChanges)
+            .void_where(has_obstacles && self.is_carried, Void::CarriedPastObstacles)
+            .void_where(is_fed_energy, Void::VelocityUndamped)
             .void_where(!self.is_fed && !self.needs_no_feed, Void::ReferenceNotFed)
     }
 
@@ -334,7 +400,18 @@ impl Law for DisplacementLaw {
     }
 
     fn needs(&self) -> &'static [&'static str] {
+        if self.clearance.is_some() {
+            return &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"];
+        }
         &["all share a compass", "each sees who is nearer than slots are"]
+    }
+
+    fn keeps_clear_of_obstacles(&self) -> bool {
+        self.clearance.is_some()
+    }
+
+    fn obstacle_rate_squared(&self, room_m: f64) -> f64 {
+        self.clearance.map_or(0.0, |clearance| clearance.rate_squared(room_m))
     }
 
     /// With mu, the largest eigenvalue of the graph's Laplacian: a near pair adds 2 `V_R''` at `nearest_m` to omega^2 and the

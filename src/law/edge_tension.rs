@@ -307,7 +307,7 @@ impl Law for EdgeTensionLaw {
         }
         let energy_initial = energy.ok();
         let certified_m = if void.is_empty() { self.linked_separation_m(start) } else { None };
-        Certificate { certified_m, energy_initial, void, legs: Vec::new() }
+        Certificate { certified_m, certified_room_m: None, energy_initial, void, legs: Vec::new() }
     }
 }
 

@@ -18,6 +18,22 @@ pub enum LawError {
         /// The safety distance delta \[m\].
         delta_m: f64,
     },
+    /// A vehicle is at or inside the clearance of an obstacle, where the law's tension is infinite.
+    #[error(
+        "vehicle {} is {distance_m} m from obstacle {}, not more than the clearance {clearance_m} m",
+        vehicle + 1,
+        obstacle + 1
+    )]
+    Obstacle {
+        /// The first such vehicle, from 0.
+        vehicle: usize,
+        /// The first such obstacle, from 0.
+        obstacle: usize,
+        /// Distance from its surface \[m\].
+        distance_m: f64,
+        /// What must be kept \[m\].
+        clearance_m: f64,
+    },
     /// A position or velocity is not a finite number.
     #[error("the state of vehicle {} is not a finite number", vehicle + 1)]
     NotFinite {
@@ -57,6 +73,22 @@ pub enum ParameterError {
         pair: Pair,
         /// What is wrong.
         source: TensionError,
+    },
+    /// A slot leaves a vehicle no room from an obstacle.
+    #[error(
+        "the slot of vehicle {} is {distance_m} m from obstacle {}, not more than the clearance {clearance_m} m",
+        vehicle + 1,
+        obstacle + 1
+    )]
+    ObstacleOverSlot {
+        /// The vehicle, from 0.
+        vehicle: usize,
+        /// The obstacle, from 0.
+        obstacle: usize,
+        /// Distance of the slot from its surface \[m\].
+        distance_m: f64,
+        /// What must be kept \[m\].
+        clearance_m: f64,
     },
     /// Graph and formation are of different swarms.
     #[error("the graph has {graph} vehicles and the formation has {formation}")]

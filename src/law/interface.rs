@@ -94,6 +94,18 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Whether the law keeps vehicles clear of the obstacles that it is told of. What any other certifies is void where there
+    /// are some: it is certified of vehicles that hit nothing.
+    fn keeps_clear_of_obstacles(&self) -> bool {
+        false
+    }
+
+    /// What obstacles add to the square of [`Law::fastest_rate_per_s`] \[1/s^2\] while no vehicle has less than `room_m` from
+    /// any of them beyond its clearance.
+    fn obstacle_rate_squared(&self, _room_m: f64) -> f64 {
+        0.0
+    }
+
     /// Rate at which errors of position fall where nothing stands in their way \[1/s\], for a law that may be given slots that
     /// are spread for a while ([`crate::target::Breathing`]) and renews its promise then. `None` for any other.
     fn settling_rate_per_s(&self) -> Option<f64> {

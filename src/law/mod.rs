@@ -6,6 +6,7 @@
 
 mod cbf_qp;
 mod certificate;
+mod clearance;
 mod consensus;
 mod displacement;
 mod edge_tension;

@@ -2,6 +2,7 @@
 
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
+use crate::space::Obstacle;
 use crate::target::{Guidance, Leg};
 
 /// What a law is built from beside its own keys.
@@ -15,6 +16,8 @@ pub struct Setting<'a> {
     pub later: &'a [Leg],
     /// The motion that formations are carried along with, and who knows it.
     pub guidance: Option<&'a Guidance>,
+    /// What stands in the way.
+    pub obstacles: &'a [Obstacle],
     /// Safety distance delta \[m\].
     pub delta_m: f64,
     /// Velocity coefficient a22 of the vehicles \[1/s\].
@@ -25,7 +28,7 @@ impl<'a> Setting<'a> {
     /// One formation, wherever it comes to be.
     #[must_use]
     pub fn new(links: &'a Graph, formation: &'a Formation, delta_m: f64, a22_per_s: f64) -> Self {
-        Self { links, formation, later: &[], guidance: None, delta_m, a22_per_s }
+        Self { links, formation, later: &[], guidance: None, obstacles: &[], delta_m, a22_per_s }
     }
 
     /// Who knows the reference.

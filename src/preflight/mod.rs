@@ -194,7 +194,7 @@ impl Preflight {
             legs: certificate
                 .legs
                 .iter()
-                .map(|&LegBound { energy, certified_m }| LegPromise { certified_m, energy_bound: energy })
+                .map(|&LegBound { energy, certified_m, .. }| LegPromise { certified_m, energy_bound: energy })
                 .collect(),
             breathes: law.settling_rate_per_s().is_some() && scenario.breathing.mode != BreathingMode::Off,
             needs: law.needs().to_vec(),

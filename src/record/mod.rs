@@ -165,6 +165,26 @@ pub enum Event {
         /// Smallest separation within \[m\].
         min_m: f64,
     },
+    /// A vehicle came nearer to an obstacle than its clearance.
+    ObstacleViolationBegan {
+        /// The vehicle, from 0.
+        vehicle: usize,
+        /// The obstacle, from 0.
+        obstacle: usize,
+        /// When \[s\].
+        time_s: f64,
+    },
+    /// A vehicle that was nearer to an obstacle than its clearance no longer is.
+    ObstacleViolationEnded {
+        /// The vehicle, from 0.
+        vehicle: usize,
+        /// The obstacle, from 0.
+        obstacle: usize,
+        /// When \[s\].
+        time_s: f64,
+        /// Smallest distance from its surface within \[m\], below zero within.
+        min_m: f64,
+    },
     /// The flight is under another law than the scenario's. Told at its start.
     OtherLaw {
         /// When \[s\].
@@ -246,6 +266,8 @@ impl Event {
         match *self {
             Self::ViolationBegan { time_s, .. }
             | Self::ViolationEnded { time_s, .. }
+            | Self::ObstacleViolationBegan { time_s, .. }
+            | Self::ObstacleViolationEnded { time_s, .. }
             | Self::OtherLaw { time_s, .. }
             | Self::LegBegan { time_s, .. }
             | Self::Breath { time_s, .. }

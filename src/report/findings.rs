@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::hulls::Hulls;
-use crate::audit::AuditOutcome;
+use crate::audit::{AuditOutcome, ClearanceOutcome, Status};
 use crate::law::Certificate;
 use crate::metrics::{LegSummary, Summary};
 use crate::record::{Breath, EnergyRise};
@@ -31,6 +31,10 @@ pub struct Findings<'a> {
     pub certificate: &'a Certificate,
     /// What the judge found.
     pub audit: &'a AuditOutcome,
+    /// What it found of the ways past obstacles, where there are any, and the names of these.
+    pub clearance: Option<&'a ClearanceOutcome>,
+    /// Names of the obstacles, in the order of the scenario.
+    pub obstacles: &'a [String],
     /// Pairs whose keep-out balls the engine's own collision detection saw overlap; none for a plant without one.
     pub engine_contact_pairs: Option<u64>,
     /// What solid hulls did, or would have done.
@@ -53,6 +57,19 @@ pub struct Findings<'a> {
     pub run: &'a Run,
     /// Wall-clock times.
     pub performance: Performance,
+}
+
+impl Findings<'_> {
+    /// The judge's verdict on vehicles and obstacles together: the worse one.
+    pub(super) fn status(&self) -> Status {
+        let both = [Some(self.audit.status), self.clearance.map(|clearance| clearance.status)];
+        let has = |status: Status| both.contains(&Some(status));
+        match (has(Status::Violation), has(Status::Undecided)) {
+            (true, _) => Status::Violation,
+            (false, true) => Status::Undecided,
+            (false, false) => Status::Clear,
+        }
+    }
 }
 
 /// Why a run ended that its user stopped.

@@ -8,6 +8,7 @@ use super::artefact::{ArtefactError, write_atomically};
 use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
 use super::legs::{self, LegNumbers};
+use super::obstacles::Obstacles;
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use crate::audit::{self, Status};
@@ -32,6 +33,9 @@ pub struct Report {
     pub separation: Separation,
     /// What the judgement rests on.
     pub audit: Audit,
+    /// How vehicles kept clear of obstacles, where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacles: Option<Obstacles>,
     /// What solid hulls did, or would have done.
     #[serde(default)]
     pub hulls: Hulls,
@@ -96,7 +100,7 @@ pub struct Separation<Delta = f64> {
 /// What the judgement rests on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Audit {
-    /// The judge's verdict on separation.
+    /// The judge's verdict on separation, and on obstacles where there are any: the worse of the two.
     pub status: Status,
     /// Every time that a pair was closer than delta.
     pub violations: Vec<Violation>,
@@ -238,7 +242,7 @@ impl Report {
                 certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             },
             audit: Audit {
-                status: audit.status,
+                status: findings.status(),
                 violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
                 steps: audit.steps,
                 pairs_checked: audit.pairs_checked,
@@ -249,6 +253,7 @@ impl Report {
                 },
                 rapier: Rapier { contact_pairs: findings.engine_contact_pairs },
             },
+            obstacles: Obstacles::of(findings),
             hulls: findings.hulls.clone(),
             formation: FormationNumbers {
                 reached: summary.reached_at_s.is_some(),

@@ -12,6 +12,7 @@ mod flight;
 mod html;
 mod hulls;
 mod legs;
+mod obstacles;
 pub mod page;
 pub mod recorded;
 mod verdict;
@@ -28,6 +29,7 @@ pub use flight::{
 pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
+pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
 pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 

@@ -9,7 +9,11 @@ use crate::metrics::{LegSummary, Summary};
 fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
     let ended = |ended_at_s: f64, reached_at_s: Option<f64>| LegSummary { ended_at_s, reached_at_s };
     let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
-        let bound = |energy: f64, certified_m: f64| crate::law::LegBound { energy, certified_m: Some(certified_m) };
+        let bound = |energy: f64, certified_m: f64| crate::law::LegBound {
+            energy,
+            certified_m: Some(certified_m),
+            certified_room_m: None,
+        };
         let certificate = Certificate { legs: vec![bound(3.0, 2.1), bound(4.0, 2.06)], ..Case::good().certificate };
         Case { summary, certificate, legs, ended_legs, ..Case::good() }.report()
     };
@@ -39,8 +43,13 @@ fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
 #[test]
 fn a_certificate_is_broken_by_a_share_of_its_clearance() {
     let report = |certified_m: f64, closest_m: f64| {
-        let certificate =
-            Certificate { certified_m: Some(certified_m), energy_initial: Some(3.656), void: vec![], legs: vec![] };
+        let certificate = Certificate {
+            certified_m: Some(certified_m),
+            certified_room_m: None,
+            energy_initial: Some(3.656),
+            void: vec![],
+            legs: vec![],
+        };
         Case { audit: passing(closest_m), certificate, ..Case::good() }.report().verdict
     };
     // A clearance of 1.451 mm of which a tenth is missing, and one of which nothing is but rounding.

@@ -48,6 +48,7 @@ pub(super) struct Case {
     pub(super) ended_early: Option<&'static str>,
     pub(super) refused: &'static [&'static str],
     pub(super) certificate: Certificate,
+    pub(super) clearance: Option<crate::audit::ClearanceOutcome>,
     pub(super) energy_falls: bool,
     pub(super) energy_rise: Option<EnergyRise>,
     pub(super) legs: usize,
@@ -56,8 +57,13 @@ pub(super) struct Case {
 
 impl Case {
     pub(super) fn good() -> Self {
-        let certificate =
-            Certificate { certified_m: Some(2.055_307), energy_initial: Some(3.656), void: vec![], legs: vec![] };
+        let certificate = Certificate {
+            certified_m: Some(2.055_307),
+            certified_room_m: None,
+            energy_initial: Some(3.656),
+            void: vec![],
+            legs: vec![],
+        };
         Self {
             audit: passing(2.4607),
             summary: REACHED,
@@ -65,6 +71,7 @@ impl Case {
             ended_early: None,
             refused: &[],
             certificate,
+            clearance: None,
             energy_falls: true,
             energy_rise: Some(EnergyRise { from: 3.656_742_96, to: 3.656_742_96 }),
             legs: 1,
@@ -83,6 +90,8 @@ impl Case {
             refused: self.refused,
             certificate: &self.certificate,
             audit: &self.audit,
+            clearance: self.clearance.as_ref(),
+            obstacles: &["tower".to_owned()],
             engine_contact_pairs: Some(0),
             hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
             summary: &self.summary,
@@ -272,7 +281,13 @@ fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
 #[test]
 fn rounding_breaks_no_certificate() {
     // A swarm that starts in its own formation certifies its own distances, and flies in single precision.
-    let certificate = Certificate { certified_m: Some(3.0), energy_initial: Some(0.0), void: vec![], legs: vec![] };
+    let certificate = Certificate {
+        certified_m: Some(3.0),
+        certified_room_m: None,
+        energy_initial: Some(0.0),
+        void: vec![],
+        legs: vec![],
+    };
     let case = Case { audit: passing(2.999_999_88), certificate: certificate.clone(), ..Case::good() };
     assert!(case.report().verdict.pass && !case.report().headline().contains("breaks"), "{:?}", case.report().verdict);
     let case = Case { audit: passing(2.998), certificate, ..Case::good() };

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::energy::{INTEGRATION, highest_honest};
 use super::findings::Findings;
 use super::legs;
+use super::obstacles::Obstacles;
 use crate::audit::Status;
 use crate::metrics::Summary;
 use crate::record::EnergyRise;
@@ -29,6 +30,7 @@ impl Verdict {
         let reasons: Vec<_> = [
             refused(findings),
             violation(findings),
+            Obstacles::of(findings).and_then(|obstacles| obstacles.reason()),
             findings.hulls.reason(),
             disagreement(findings),
             undecided(findings),

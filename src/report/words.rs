@@ -51,7 +51,9 @@ impl Report {
                     Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
                     None => String::new(),
                 };
-                format!("CLEAR: {closest} (delta {delta} m){broken}{rose}, {}", self.formation_in_words())
+                let room = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::room);
+                let room = room.map(|room| format!(", {room}")).unwrap_or_default();
+                format!("CLEAR: {closest} (delta {delta} m){room}{broken}{rose}, {}", self.formation_in_words())
             }
             Status::Violation => {
                 let deepest = self.deepest_in_words();
@@ -93,6 +95,15 @@ impl Report {
     }
 
     fn deepest_in_words(&self) -> String {
+        let of_obstacles = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::brief);
+        if let Some(of_obstacles) = of_obstacles {
+            let is_alone = self.audit.violations.is_empty();
+            return if is_alone { of_obstacles } else { format!("{}; {of_obstacles}", self.deepest_pair_in_words()) };
+        }
+        self.deepest_pair_in_words()
+    }
+
+    fn deepest_pair_in_words(&self) -> String {
         let Self { separation, .. } = self;
         let delta_m = separation.delta_m;
         let (Some([first, second]), Some(min_m)) = (separation.min_pair, separation.min_m) else {
@@ -114,6 +125,7 @@ impl Report {
         let [disagreement, common] = [velocity.disagreement_m_s, velocity.common_m_s].map(or_dash);
         let mut rows: Vec<(String, String)> =
             vec![("separation".to_owned(), self.separation_line()), ("audit".to_owned(), self.audit_line())];
+        rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
         rows.extend(super::legs::lines(&self.legs));
         let rest = [
             ("formation", self.formation_line()),

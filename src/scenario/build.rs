@@ -31,12 +31,17 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     {
         set_row(&mut start.velocities_m_s, leader, guidance.motion.at(0.0).velocity_m_s);
     }
+    let hull_radius_m = per_vehicle(document.swarm.hull_radius_m, count);
+    let clearance_m = hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m));
+    let obstacles = document.obstacle.iter().enumerate();
+    let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
     let mut scenario = Scenario {
         start,
         mass_kg: per_vehicle(document.swarm.mass_kg, count),
-        hull_radius_m: per_vehicle(document.swarm.hull_radius_m, count),
+        hull_radius_m,
         a22_per_s: document.swarm.a22_per_s,
         legs: Vec::new(),
+        obstacles,
         reference,
         graph: graph(&document.graph.kind, count)?,
         plant: match document.plant {

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::laws::Laws;
+use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 #[cfg(feature = "shapes")]
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
@@ -37,6 +38,9 @@ pub(super) struct Document {
     /// The formations after it, in their order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) leg: Vec<LegTable>,
+    /// Solids at rest that are in the way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) obstacle: Vec<ObstacleTable>,
     /// A motion that the formations are carried along with; slots are places then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "ReferenceTable"))]

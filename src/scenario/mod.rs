@@ -24,6 +24,8 @@ mod laws;
 mod legs;
 mod limits;
 #[cfg(feature = "files")]
+mod obstacles;
+#[cfg(feature = "files")]
 mod overrides;
 #[cfg(feature = "shapes")]
 mod points;
@@ -45,6 +47,7 @@ mod spec;
 mod start;
 #[cfg(feature = "files")]
 mod suggest;
+mod surroundings;
 #[cfg(feature = "files")]
 mod template;
 #[cfg(feature = "files")]
@@ -59,6 +62,8 @@ pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,
 };
+#[cfg(feature = "program")]
+pub(crate) use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 #[cfg(feature = "files")]
 pub use overrides::Override;
 pub use resolution::Drift;

@@ -93,7 +93,8 @@ impl Scenario {
     /// commands that are held, and numbers that do not tell the promise from delta, it promises nothing.
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
-        self.as_far_as_told(self.promised(law))
+        let ignored = !self.obstacles.is_empty() && !law.keeps_clear_of_obstacles();
+        self.as_far_as_told(self.promised(law)).void_where(ignored, Void::ObstaclesUnknown)
     }
 
     /// Of every leg, with the breath that it begins with where it does.

@@ -11,6 +11,7 @@ use super::document::{
     PlantTable, StartTable, SwarmTable,
 };
 use super::laws::Laws;
+use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Scenario, Space};
 use super::values::{Edge, PerVehicle, Point};
@@ -96,6 +97,7 @@ impl From<&Scenario> for Document {
                 shape: FormationShape::Points { points_m: scenario.points(&scenario.formation().slots_m) },
             },
             leg: scenario.legs.iter().skip(1).map(|leg| scenario.leg_table(leg)).collect(),
+            obstacle: scenario.obstacles.iter().map(ObstacleTable::from).collect(),
             reference: scenario.reference.as_ref().map(ReferenceTable::from),
             law: LawTable { kind: law, delta_m: scenario.delta_m },
             laws: Laws::new(),
@@ -146,7 +148,7 @@ fn write_document(out: &mut String, document: &Table) -> fmt::Result {
 fn write_keys(out: &mut String, table: &Table) -> fmt::Result {
     for (key, value) in table {
         match value {
-            Value::Table(choice) => {
+            Value::Table(choice) if choice.values().all(Value::is_table) => {
                 for (name, keys) in choice {
                     writeln!(out, "{key} = \"{name}\"")?;
                     write_keys(out, keys.as_table().unwrap_or(&Table::new()))?;
@@ -167,6 +169,10 @@ fn write_keys(out: &mut String, table: &Table) -> fmt::Result {
 fn inline(value: &Value) -> String {
     match value {
         Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),
+        Value::Table(keys) => {
+            let keys: Vec<_> = keys.iter().map(|(key, value)| format!("{key} = {}", inline(value))).collect();
+            format!("{{ {} }}", keys.join(", "))
+        }
         Value::Float(x) if x.is_nan() => "nan".to_owned(),
         Value::Float(x) => format!("{x:?}"),
         _ => value.to_string(),

@@ -11,6 +11,7 @@ use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::law::{EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
 use crate::observation::Observation;
+use crate::space::Obstacle;
 use crate::swarm::{Rows, Swarm};
 use crate::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
 
@@ -37,6 +38,8 @@ pub struct Scenario {
     /// The formations to be reached, one after the other and at least one, up to a rigid motion for laws that control
     /// distances only.
     pub legs: Vec<Leg>,
+    /// Solids at rest that are in the way.
+    pub obstacles: Vec<Obstacle>,
     /// The motion that formations are carried along with, and who knows it; a formation without one is reached wherever it
     /// comes to be.
     pub reference: Option<Guidance>,
@@ -121,6 +124,7 @@ impl Scenario {
             breathing: Breathing::default(),
             start,
             legs: vec![Leg::first(formation)],
+            obstacles: Vec::new(),
             reference: None,
         }
     }
@@ -147,7 +151,7 @@ impl Scenario {
         let guidance = self.reference.as_ref();
         let later = self.legs.get(1..).unwrap_or_default();
         let setting = Setting::new(&self.graph, self.formation(), self.delta_m, self.a22_per_s);
-        self.law.build(&Setting { later, guidance, ..setting })
+        self.law.build(&Setting { later, guidance, obstacles: &self.obstacles, ..setting })
     }
 
     /// Where the reference is at a time of the flight \[s\]; at rest at the origin where there is none.
@@ -167,6 +171,6 @@ impl Scenario {
     pub fn observation_at<'a>(&'a self, swarm: &'a Swarm, time_s: f64) -> Observation<'a> {
         let exact = Observation::exact(swarm, &self.graph, self.formation());
         let target = Target { reference: self.reference_at(time_s), ..exact.target };
-        Observation { time_s, target, ..exact }
+        Observation { time_s, target, obstacles: &self.obstacles, ..exact }
     }
 }

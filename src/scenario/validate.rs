@@ -47,6 +47,7 @@ impl Scenario {
         self.check_separations()?;
         self.check_reference()?;
         self.check_hulls()?;
+        self.check_obstacles()?;
         check_connected(&self.graph)?;
         self.check_time()?;
         self.check_arrival()?;

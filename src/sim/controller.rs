@@ -7,7 +7,7 @@ use crate::law::{Certificate, Law, LawError};
 use crate::link::Link;
 use crate::observation::Observation;
 use crate::scenario::Scenario;
-use crate::space::KeptPairs;
+use crate::space::{KeptPairs, Obstacle};
 use crate::swarm::{Rows, Swarm};
 use crate::target::{CurrentTarget, Guidance, Supervisor};
 
@@ -20,6 +20,7 @@ pub(super) struct Controller {
     pub(super) target: CurrentTarget,
     guidance: Option<Guidance>,
     pub(super) links: Graph,
+    pub(super) obstacles: Vec<Obstacle>,
     near: KeptPairs,
 }
 
@@ -32,7 +33,8 @@ impl Controller {
     ) -> Result<Self, SimError> {
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
         let (guidance, links) = (scenario.reference.clone(), scenario.graph.clone());
-        Ok(Self { law, link, supervisor, target, guidance, links, near: KeptPairs::default() })
+        let (obstacles, near) = (scenario.obstacles.clone(), KeptPairs::default());
+        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, near })
     }
 
     /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
@@ -67,7 +69,7 @@ impl Controller {
             target: self.target.view(),
             links: &self.links,
             near: self.near.pairs(),
-            obstacles: &[],
+            obstacles: &self.obstacles,
         };
         self.law.command(&at, command)?;
         self.link.actuate(time_s, command);
@@ -80,7 +82,8 @@ impl Controller {
         let target = self.target.view();
         let exact = Observation::exact(truth, &self.links, target.formation);
         let ahead = self.supervisor.ahead(&target);
-        Some((scale, self.law.certificate_through(&Observation { time_s, target, ..exact }, &ahead)))
+        let start = Observation { time_s, target, obstacles: &self.obstacles, ..exact };
+        Some((scale, self.law.certificate_through(&start, &ahead)))
     }
 
     /// All random numbers begin anew.
@@ -93,7 +96,8 @@ impl Controller {
     /// The law's energy of a true state, against the target that was looked at last.
     pub(super) fn energy(&self, time_s: f64, truth: &Swarm) -> Option<f64> {
         let exact = Observation::exact(truth, &self.links, self.target.view().formation);
-        self.law.energy(&Observation { time_s, target: self.target.view(), ..exact })
+        let (target, obstacles) = (self.target.view(), self.obstacles.as_slice());
+        self.law.energy(&Observation { time_s, target, obstacles, ..exact })
     }
 }
 

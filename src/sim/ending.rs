@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::audit::{AuditError, AuditOutcome};
+use crate::audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError};
 use crate::law::{Certificate, LawError, ParameterError};
 use crate::record::{Breath, EnergyRise, RecordError};
 use crate::swarm::{Bounce, Pair, Swarm};
@@ -26,6 +26,8 @@ pub struct Flight {
     pub certificate: Certificate,
     /// What the independent judge found.
     pub audit: AuditOutcome,
+    /// What it found of the ways past obstacles, where there are any.
+    pub clearance: Option<ClearanceOutcome>,
     /// Pairs whose keep-out balls the plant's own collision detection saw overlap, in index order.
     pub engine_contacts: Vec<Pair>,
     /// Every time that two hulls hit, in order of time: from then on a bounce is flown and not the law's motion alone.
@@ -133,6 +135,9 @@ pub enum SimError {
     /// There is no judge for the scenario.
     #[error(transparent)]
     Audit(#[from] AuditError),
+    /// An obstacle cannot be judged.
+    #[error(transparent)]
+    Obstacle(#[from] ObstacleError),
     /// The recording could not be kept.
     #[error(transparent)]
     Record(#[from] RecordError),

@@ -1,19 +1,30 @@
 //! The judge's place in the loop: every way is swept, and what it finds is kept for the next sample.
 
-use crate::audit::{AuditError, AuditOutcome, Auditor, StepFinding, Violation, swept_separation_m};
+use crate::audit::{
+    AuditError, AuditOutcome, Auditor, ClearanceAuditor, ClearanceFinding, ClearanceOutcome, ObjectPair, Obstacle,
+    StepFinding, Violation, swept_distance_m, swept_separation_m,
+};
 use crate::graph::Graph;
 use crate::law::Law;
 use crate::plant::{HullContact, Path};
 use crate::record::Event;
+use crate::scenario::Scenario;
 use crate::space::NearPairs;
 use crate::swarm::{Bounce, ClosestApproach, Pair, Rows, Swarm, row};
 
+use super::ending::SimError;
 use super::motion::Motion;
+use super::obstacles::judged;
 
 /// The auditor with what the loop asks of it from step to step.
 #[derive(Clone)]
 pub(super) struct Judge {
     auditor: Auditor,
+    /// What judges the way past obstacles, where there are any, and these.
+    clearance: Option<ClearanceAuditor>,
+    obstacles: Vec<Obstacle>,
+    /// The least that any vehicle has beyond an obstacle's clearance now.
+    pub(super) room_m: f64,
     /// Closest approach since the last sample.
     pub(super) closest: Option<ClosestApproach>,
     /// Smallest separation over the last sweep: bounds from below how near any pair is now.
@@ -28,10 +39,24 @@ pub(super) struct Judge {
     hulls_before: Vec<HullContact>,
 }
 
+/// What is known of a flight in the end.
+pub(super) struct Judged {
+    pub(super) audit: AuditOutcome,
+    pub(super) clearance: Option<ClearanceOutcome>,
+    pub(super) engine_contacts: Vec<Pair>,
+    pub(super) bounces: Vec<Bounce>,
+}
+
 impl Judge {
-    pub(super) fn new(count: usize, delta_m: f64) -> Result<Self, AuditError> {
+    pub(super) fn new(scenario: &Scenario) -> Result<Self, SimError> {
+        let count = scenario.count();
+        let obstacles: Vec<_> = scenario.obstacles.iter().map(judged).collect();
+        let clearance = if obstacles.is_empty() { None } else { Some(ClearanceAuditor::new(count, &obstacles)?) };
         Ok(Self {
-            auditor: Auditor::new(count, delta_m)?,
+            auditor: Auditor::new(count, scenario.delta_m)?,
+            clearance,
+            obstacles,
+            room_m: f64::INFINITY,
             closest: None,
             nearest_m: 0.0,
             near: NearPairs::default(),
@@ -46,17 +71,41 @@ impl Judge {
     pub(super) fn start(&mut self, time_s: f64, positions_m: &Rows, events: &mut Vec<Event>) -> Result<(), AuditError> {
         let finding = self.auditor.start(time_s, positions_m)?;
         note(finding, &mut self.closest, &mut self.nearest_m, events);
-        Ok(())
+        self.clear_of_obstacles(time_s, positions_m, events)
     }
 
     /// Sweeps the straight line to these positions.
     pub(super) fn sweep(&mut self, time_s: f64, positions_m: &Rows, events: &mut Vec<Event>) -> Result<(), AuditError> {
         let finding = self.auditor.step(time_s, positions_m)?;
         note(finding, &mut self.closest, &mut self.nearest_m, events);
+        self.clear_of_obstacles(time_s, positions_m, events)
+    }
+
+    fn clear_of_obstacles(
+        &mut self,
+        time_s: f64,
+        positions_m: &Rows,
+        events: &mut Vec<Event>,
+    ) -> Result<(), AuditError> {
+        if let Some(clearance) = &mut self.clearance {
+            let ClearanceFinding { least_room_m, began, ended } = clearance.step(time_s, positions_m)?;
+            self.room_m = least_room_m;
+            for &Violation { pair, from_s: time_s, .. } in began {
+                if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
+                    events.push(Event::ObstacleViolationBegan { vehicle, obstacle, time_s });
+                }
+            }
+            for &Violation { pair, to_s: time_s, min_m, .. } in ended {
+                if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
+                    events.push(Event::ObstacleViolationEnded { vehicle, obstacle, time_s, min_m });
+                }
+            }
+        }
         Ok(())
     }
 
-    /// Whether the move from `start` to `end` takes more than half of some pair's clearance above the law's barrier.
+    /// Whether the move from `start` to `end` takes more than half of some pair's clearance above the law's barrier, or of what
+    /// a vehicle has beyond an obstacle's clearance where the law keeps clear of obstacles.
     pub(super) fn refuses(&mut self, law: &dyn Law, links: &Graph, start: &Swarm, path: &Path, end: &Swarm) -> bool {
         let Some(barrier_m) = law.barrier_m() else { return false };
         let start = &start.positions_m;
@@ -64,6 +113,9 @@ impl Judge {
         let moved_m = instants()
             .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
             .fold(0.0, f64::max);
+        if moved_m > 0.5 * self.room_m && law.keeps_clear_of_obstacles() && self.nears_an_obstacle(start, path, end) {
+            return true;
+        }
         // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
         if 2.0 * moved_m <= 0.5 * (self.nearest_m - barrier_m) {
             return false;
@@ -80,6 +132,20 @@ impl Judge {
         // A pair that begins farther apart keeps half of its clearance.
         self.near.update(start, barrier_m + 4.0 * moved_m);
         self.near.pairs().iter().copied().any(loses_half)
+    }
+
+    fn nears_an_obstacle(&self, start: &Rows, path: &Path, end: &Swarm) -> bool {
+        (0..start.nrows()).any(|i| {
+            self.obstacles.iter().any(|obstacle| {
+                let limit_m = obstacle.clearance_m.unwrap_or_default();
+                let mut from = row(start, i);
+                let least_m = limit_m + 0.5 * (swept_distance_m(obstacle, from, from) - limit_m);
+                path.passed().map(|(_, rows)| rows).chain([&end.positions_m]).any(|rows| {
+                    let to = row(rows, i);
+                    swept_distance_m(obstacle, std::mem::replace(&mut from, to), to) < least_m
+                })
+            })
+        })
     }
 
     /// Keeps the pairs whose keep-out balls the engine sees overlap for the first time, in index order.
@@ -107,8 +173,13 @@ impl Judge {
         }
     }
 
-    pub(super) fn finish(self) -> (AuditOutcome, Vec<Pair>, Vec<Bounce>) {
-        (self.auditor.finish(), self.engine_contacts, self.bounces)
+    pub(super) fn finish(self) -> Judged {
+        Judged {
+            audit: self.auditor.finish(),
+            clearance: self.clearance.map(ClearanceAuditor::finish),
+            engine_contacts: self.engine_contacts,
+            bounces: self.bounces,
+        }
     }
 }
 

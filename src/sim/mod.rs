@@ -9,6 +9,7 @@ mod controller;
 mod ending;
 mod judge;
 mod motion;
+mod obstacles;
 mod parts;
 mod resolution;
 mod simulation;
@@ -19,6 +20,7 @@ use std::time::Instant;
 
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub use motion::Motion;
+pub use obstacles::{judged, judged_shape};
 pub use parts::Parts;
 pub use simulation::{Saved, Simulation};
 

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError};
-use super::judge::Judge;
+use super::judge::{Judge, Judged};
 use super::motion::Motion;
 use super::parts::Parts;
 use super::resolution::Resolution;
@@ -105,7 +105,7 @@ impl Simulation {
             controller: Controller::new(scenario, law, link, supervisor)?,
             motion,
             certificate,
-            judge: Judge::new(count, scenario.delta_m)?,
+            judge: Judge::new(scenario)?,
             next: state.clone(),
             path: Path::default(),
             control: Rows::zeros(count),
@@ -272,7 +272,7 @@ impl Simulation {
     /// What the flight left behind besides its recording. One that is under way counts as interrupted here.
     #[must_use]
     pub fn finish(self) -> Flight {
-        let (audit, engine_contacts, bounces) = self.judge.finish();
+        let Judged { audit, clearance, engine_contacts, bounces } = self.judge.finish();
         Flight {
             law: self.controller.law.name().to_owned(),
             ending: self.ending.unwrap_or(Ending::Interrupted),
@@ -280,6 +280,7 @@ impl Simulation {
             steps: self.steps,
             certificate: self.certificate,
             audit,
+            clearance,
             engine_contacts,
             bounces,
             energy_rise: self.watch.worst(),
@@ -307,6 +308,10 @@ impl Simulation {
     fn longest_step_s(&self) -> f64 {
         let (law, nearest_m) = (&self.controller.law, self.judge.nearest_m);
         let rate_per_s = law.fastest_rate_per_s(Some(nearest_m), self.scenario.a22_per_s);
+        let rate_per_s = match law.obstacle_rate_squared(self.judge.room_m) {
+            0.0 => rate_per_s,
+            squared => rate_per_s.map(|rate_per_s| (rate_per_s.powi(2) + squared).sqrt()),
+        };
         rate_per_s
             .filter(|_| self.motion.holds_commands())
             .map_or(f64::INFINITY, |rate_per_s| self.scenario.time.max_rate_dt / rate_per_s)

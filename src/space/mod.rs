@@ -17,11 +17,38 @@ pub use spaced::Spaced;
 
 use nalgebra::Vector3;
 
-/// A solid at its place.
+use crate::swarm::{Rows, row};
+
+/// A solid at rest that vehicles keep clear of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstacle {
+    /// What it is called.
+    pub name: String,
     /// Where the shape's own origin is \[m\].
     pub place_m: Vector3<f64>,
     /// The solid.
     pub shape: Shape,
+    /// Distance that the centre of a vehicle must keep from the surface \[m\].
+    pub clearance_m: f64,
+}
+
+impl Obstacle {
+    /// How much farther from the surface than its clearance a point is \[m\], and the direction in which that grows by one
+    /// metre a metre ([`Shape::signed_distance_m`]).
+    #[must_use]
+    pub fn room_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
+        let (distance_m, normal) = self.shape.signed_distance_m(point_m - self.place_m);
+        (distance_m - self.clearance_m, normal)
+    }
+}
+
+/// The least room that rows of positions have from any obstacle \[m\], with the row and the obstacle; none where there is
+/// nothing to compare.
+#[must_use]
+pub fn least_room(obstacles: &[Obstacle], positions_m: &Rows) -> Option<(f64, usize, usize)> {
+    let rooms = (0..positions_m.nrows()).flat_map(|i| {
+        let point_m = row(positions_m, i);
+        obstacles.iter().enumerate().map(move |(k, obstacle)| (obstacle.room_m(point_m).0, i, k))
+    });
+    rooms.min_by(|a, b| a.0.total_cmp(&b.0))
 }

@@ -14,8 +14,8 @@ pub enum Shape {
     Box {
         /// Half of its lengths \[m\].
         half_m: Vector3<f64>,
-        /// How far it is turned about the vertical \[rad\], counter-clockwise from above.
-        yaw_rad: f64,
+        /// How far it is turned about the vertical \[deg\], counter-clockwise from above.
+        yaw_deg: f64,
     },
     /// Everything within a radius of a straight line.
     Capsule {
@@ -44,7 +44,9 @@ impl Shape {
     pub fn signed_distance_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
         match *self {
             Self::Ball { radius_m } => from_core(point_m, radius_m, Vector3::z()),
-            Self::Box { half_m, yaw_rad } => {
+            Self::Box { half_m, yaw_deg: 0.0 } => from_box(point_m, half_m),
+            Self::Box { half_m, yaw_deg } => {
+                let yaw_rad = yaw_deg.to_radians();
                 let (sin, cos) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
                 let turned =
                     Vector3::new(cos * point_m.x + sin * point_m.y, cos * point_m.y - sin * point_m.x, point_m.z);
@@ -112,8 +114,8 @@ mod tests {
         let length = || 0.1..3.0;
         prop_oneof![
             length().prop_map(|radius_m| Shape::Ball { radius_m }),
-            ([length(), length(), length()], -7.0..7.0)
-                .prop_map(|(half, yaw_rad)| Shape::Box { half_m: half.into(), yaw_rad }),
+            ([length(), length(), length()], prop_oneof![1 => Just(0.0), 4 => -400.0..400.0])
+                .prop_map(|(half, yaw_deg)| Shape::Box { half_m: half.into(), yaw_deg }),
             (vector(3.0), vector(3.0), length()).prop_map(|(from_m, to_m, radius_m)| Shape::Capsule {
                 from_m,
                 to_m,
@@ -129,8 +131,8 @@ mod tests {
         let point = vector(point);
         match *shape {
             Shape::Ball { radius_m } => Ball::new(radius_m).distance_to_local_point(point, false),
-            Shape::Box { half_m, yaw_rad } => Cuboid::new(vector(half_m)).distance_to_point(
-                &Pose::rotation(Vector::new(0.0, 0.0, yaw_rad)),
+            Shape::Box { half_m, yaw_deg } => Cuboid::new(vector(half_m)).distance_to_point(
+                &Pose::rotation(Vector::new(0.0, 0.0, yaw_deg.to_radians())),
                 point,
                 false,
             ),
@@ -185,7 +187,7 @@ mod tests {
         assert_eq!(capsule(Vector3::x()).signed_distance_m(Vector3::x() * 0.5), (-0.5, up));
         assert_eq!(capsule(up).signed_distance_m(up * 0.5), (-0.5, Vector3::x()));
         assert_eq!(capsule(Vector3::zeros()).signed_distance_m(Vector3::zeros()), (-0.5, up));
-        let cube = Shape::Box { half_m: Vector3::repeat(1.0), yaw_rad: 0.0 };
+        let cube = Shape::Box { half_m: Vector3::repeat(1.0), yaw_deg: 0.0 };
         assert_eq!(cube.signed_distance_m(Vector3::zeros()), (-1.0, Vector3::x()));
     }
 }

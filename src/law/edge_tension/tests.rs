@@ -210,7 +210,13 @@ fn a_swarm_without_pairs_is_left_alone() -> Result<(), LawError> {
         let mut control = Rows::from_element(count, 1.0);
         law.command(&exact(&swarm), &mut control)?;
         assert_eq!((control.amax(), law.energy(&exact(&swarm))), (0.0, Some(0.0)));
-        let expected = Certificate { certified_m: None, energy_initial: Some(0.0), void: vec![], legs: vec![] };
+        let expected = Certificate {
+            certified_m: None,
+            certified_room_m: None,
+            energy_initial: Some(0.0),
+            void: vec![],
+            legs: vec![],
+        };
         assert_eq!(law.certificate(&exact(&swarm)), expected);
     }
     Ok(())

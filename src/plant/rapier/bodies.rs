@@ -2,12 +2,13 @@
 
 use engine::prelude::{
     ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, LockedAxes, PhysicsWorld, Real,
-    RigidBodyBuilder, RigidBodyHandle, Vector,
+    RigidBodyBuilder, RigidBodyHandle, SharedShape, Vector,
 };
 use nalgebra::Vector3;
 
 use crate::plant::{HullContact, Path, Plant, PlantError};
 use crate::scenario::{CONTACT_PREDICTION_M, Scenario, Space};
+use crate::space::{Obstacle, Shape};
 use crate::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 
 /// Hulls meet hulls.
@@ -43,6 +44,7 @@ impl Bodies {
         let mut world = empty_world();
         let origin_m = mean_row(&scenario.start.positions_m);
         let handles = (0..scenario.count()).map(|i| insert_vehicle(&mut world, scenario, origin_m, i)).collect();
+        scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
         Self {
             world,
             handles,
@@ -236,6 +238,23 @@ fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vecto
     world.colliders.insert_with_parent(keep_out, handle, &mut world.bodies);
     world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
     handle
+}
+
+/// A solid that hulls meet and nothing moves. It is the hull of no vehicle.
+fn insert_obstacle(world: &mut PhysicsWorld, obstacle: &Obstacle, origin_m: Vector3<f64>) {
+    let place_m = obstacle.place_m - origin_m;
+    let collider = match obstacle.shape {
+        Shape::Ball { radius_m } => ColliderBuilder::ball(real(radius_m)),
+        Shape::Box { half_m, yaw_deg } => ColliderBuilder::cuboid(real(half_m.x), real(half_m.y), real(half_m.z))
+            .rotation(reals(Vector3::z() * yaw_deg.to_radians())),
+        Shape::Capsule { from_m, to_m, radius_m } => {
+            ColliderBuilder::capsule_from_endpoints(reals(from_m), reals(to_m), real(radius_m))
+        }
+        Shape::HalfSpace { normal } => ColliderBuilder::new(SharedShape::halfspace(reals(normal.normalize()))),
+    };
+    let hulls = InteractionGroups::new(HULL, HULL, InteractionTestMode::And);
+    let collider = collider.translation(reals(place_m)).restitution(HULL_RESTITUTION).friction(0.0);
+    world.colliders.insert(collider.collision_groups(hulls).user_data(u128::MAX));
 }
 
 #[allow(

@@ -210,46 +210,61 @@ pub(super) struct EventMessage<S> {
     text: String,
 }
 
+/// Numbers of an event that is of no pair.
+const NO_PAIR: [usize; 2] = [0, 0];
+
 impl From<&Event> for EventMessage<&'static str> {
     fn from(event: &Event) -> Self {
         let (kind, pair, value, text) = match event {
             Event::ViolationBegan { pair, .. } => (
                 "violation-began",
-                Some(*pair),
+                pair.numbers(),
                 f64::NAN,
                 format!("vehicles {pair} came closer than the safety distance"),
             ),
             Event::ViolationEnded { pair, min_m, .. } => (
                 "violation-ended",
-                Some(*pair),
+                pair.numbers(),
                 *min_m,
                 format!("vehicles {pair} are clear again after coming to {min_m} m"),
             ),
-            Event::OtherLaw { name, .. } => ("other-law", None, f64::NAN, name.clone()),
+            Event::ObstacleViolationBegan { vehicle, obstacle, .. } => (
+                "obstacle-violation-began",
+                [vehicle + 1, obstacle + 1],
+                f64::NAN,
+                format!("vehicle {} came nearer to obstacle {} than its clearance", vehicle + 1, obstacle + 1),
+            ),
+            Event::ObstacleViolationEnded { vehicle, obstacle, min_m, .. } => (
+                "obstacle-violation-ended",
+                [vehicle + 1, obstacle + 1],
+                *min_m,
+                format!("vehicle {} is clear of obstacle {} again after {min_m} m", vehicle + 1, obstacle + 1),
+            ),
+            Event::OtherLaw { name, .. } => ("other-law", NO_PAIR, f64::NAN, name.clone()),
             Event::LegBegan { leg, .. } => {
-                ("leg-began", None, (leg + 1) as f64, format!("leg {} of the flight began", leg + 1))
+                ("leg-began", NO_PAIR, (leg + 1) as f64, format!("leg {} of the flight began", leg + 1))
             }
             Event::Breath { scale, .. } => {
-                ("breath", None, *scale, format!("slots were scaled by {scale} to let vehicles past each other"))
+                ("breath", NO_PAIR, *scale, format!("slots were scaled by {scale} to let vehicles past each other"))
             }
             Event::EngineContact { pair, .. } => (
                 "engine-contact",
-                Some(*pair),
+                pair.numbers(),
                 f64::NAN,
                 format!("the engine saw the keep-out balls of vehicles {pair} overlap"),
             ),
             Event::HullsHit { pair, closing_m_s, .. } => (
                 "hulls-hit",
-                Some(*pair),
+                pair.numbers(),
                 *closing_m_s,
                 format!("the hulls of vehicles {pair} hit at {closing_m_s} m/s"),
             ),
             Event::StepRefined { dt_s, .. } => {
-                ("step-refined", None, *dt_s, format!("a step was flown in steps down to {dt_s} s"))
+                ("step-refined", NO_PAIR, *dt_s, format!("a step was flown in steps down to {dt_s} s"))
             }
-            Event::EndedEarly { reason, .. } => ("ended-early", None, f64::NAN, reason.clone()),
+            Event::EndedEarly { reason, .. } => ("ended-early", NO_PAIR, f64::NAN, reason.clone()),
         };
-        Self { kind, time_s: event.time_s(), pair: numbers_of(pair), value, text }
+        Self { kind, time_s: event.time_s(), pair: pair.map(|number| number as u64), value, text }
     }
 }
 
@@ -260,6 +275,14 @@ impl EventMessage<String> {
         Ok(match self.kind.as_str() {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
+            "obstacle-violation-began" => {
+                let [vehicle, obstacle] = self.vehicle_and_obstacle()?;
+                Event::ObstacleViolationBegan { vehicle, obstacle, time_s }
+            }
+            "obstacle-violation-ended" => {
+                let [vehicle, obstacle] = self.vehicle_and_obstacle()?;
+                Event::ObstacleViolationEnded { vehicle, obstacle, time_s, min_m: self.value }
+            }
             "engine-contact" => Event::EngineContact { pair: pair()?, time_s },
             "hulls-hit" => Event::HullsHit { pair: pair()?, time_s, closing_m_s: self.value },
             "other-law" => Event::OtherLaw { time_s, name: self.text },
@@ -269,6 +292,13 @@ impl EventMessage<String> {
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },
             unknown => return Err(Own::Events.fault(format!("unknown kind {unknown:?}"))),
         })
+    }
+
+    fn vehicle_and_obstacle(&self) -> Result<[usize; 2], ReadFault> {
+        let [vehicle, obstacle] =
+            self.pair.map(|number| number.checked_sub(1).and_then(|index| usize::try_from(index).ok()));
+        let both = vehicle.zip(obstacle).map(|(vehicle, obstacle)| [vehicle, obstacle]);
+        both.ok_or_else(|| Own::Events.fault("there is no vehicle or obstacle 0".to_owned()))
     }
 
     fn leg(&self) -> Result<usize, ReadFault> {
