@@ -274,19 +274,33 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
         own.as_ref().map(|own| own.delta_m).or_else(|| read::own_limit_m(&arguments.reading.recording, &options));
     let own_delta_m = own_delta_m.filter(|_| is_silent);
     settings.delta_m = settings.delta_m.or(own_delta_m);
+    let own_obstacles = own
+        .as_ref()
+        .map(|own| &own.obstacles)
+        .filter(|own| arguments.obstacles.is_none() && arguments.ellipsoid.is_none() && !own.obstacles.is_empty());
+    settings.obstacles.extend(own_obstacles.iter().flat_map(|own| own.obstacles.iter().cloned()));
     let mut auditor = TrackAuditor::new(settings.clone())?;
     if arguments.html.is_some() {
         auditor = auditor.with_smallest();
     }
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
-    let Judged { outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
+    let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
+    own_obstacles.iter().for_each(|own| own.bind(&mut outcome, &settings));
     arguments.check_count(&outcome, &settings)?;
     let between = arguments.between(curves, own.as_ref());
     let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
+    let is_passed_over = arguments.obstacles.is_none() && own_obstacles.is_none();
+    if is_passed_over && own.as_ref().is_some_and(|own| own.has_obstacles) {
+        notes.push("the obstacles that were flown past are not judged: lengths are not metres here".to_owned());
+    }
+    notes.extend(own_obstacles.map(|own| {
+        let names: Vec<_> = own.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
+        format!("the obstacles are the recording's own: {}", names.join(", "))
+    }));
     for note in &notes {
         console.warn(&format!("note: {note}"));
     }

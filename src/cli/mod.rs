@@ -22,6 +22,7 @@ mod list;
 mod obstacles;
 mod outputs;
 mod own;
+mod own_obstacles;
 mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+use super::own_obstacles::OwnObstacles;
 use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, OwnedSample};
@@ -23,6 +24,10 @@ pub(super) struct OwnRecording {
     pub(super) has_every_step: bool,
     /// Most steps between two of its samples.
     pub(super) most_steps: u64,
+    /// What it was flown past; nothing where its lengths are taken for others than they are.
+    pub(super) obstacles: OwnObstacles,
+    /// Whether there were obstacles at all.
+    pub(super) has_obstacles: bool,
     /// The law that was flown, where it is not the scenario's.
     other_law: Option<String>,
 }
@@ -35,8 +40,8 @@ impl OwnRecording {
         let header = recording.header();
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
-        let is_straight =
-            Scenario::read(&source, &[]).is_ok_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
+        let scenario = Scenario::read(&source, &[]).ok();
+        let is_straight = scenario.as_ref().is_some_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
         let mut own = Self {
             delta_m: header.delta_m * scale,
             told: Vec::new(),
@@ -44,6 +49,8 @@ impl OwnRecording {
             has_every_step: is_straight,
             most_steps: 0,
             other_law: None,
+            has_obstacles: scenario.as_ref().is_some_and(|scenario| !scenario.obstacles.is_empty()),
+            obstacles: scenario.as_ref().filter(|_| scale == 1.0).map(OwnObstacles::of).unwrap_or_default(),
         };
         let mut before: Option<OwnedSample> = None;
         let mut near = Near::default();
@@ -64,7 +71,7 @@ impl OwnRecording {
                     near.end(pair, time_s, min_m * scale, own.delta_m, before.as_ref());
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
-                Entry::Event(_) => {}
+                Entry::Event(event) => own.obstacles.note(&event),
             }
         }
         own.violations.append(&mut near.ended);
@@ -75,6 +82,7 @@ impl OwnRecording {
         if own.has_every_step {
             own.told.clear();
             own.violations.clear();
+            own.obstacles.forget_what_was_seen();
         }
         Some(own)
     }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::formation::affine_dimension;
 use crate::law::{Controls, Law, LegBound, ParameterError, Void};
 use crate::scenario::{LARGEST, Scenario};
-use crate::space::closest_pair;
+use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::target::BreathingMode;
 use crate::text::at_least;
@@ -49,6 +49,12 @@ pub struct Preflight {
     pub energy_initial: Option<f64>,
     /// Separation below which no pair ever comes \[m\].
     pub certified_m: Option<f64>,
+    /// What every vehicle keeps beyond the clearance of every obstacle \[m\], where there are obstacles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certified_room_m: Option<f64>,
+    /// The least that a vehicle has beyond the clearance of an obstacle at the start \[m\], where there are obstacles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_room_m: Option<f64>,
     /// The same for each leg of a flight of several, in their order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub legs: Vec<LegPromise>,
@@ -191,6 +197,8 @@ impl Preflight {
             common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.a22_per_s),
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
+            certified_room_m: certificate.certified_room_m,
+            start_room_m: least_room(&scenario.obstacles, &scenario.start.positions_m).map(|(room_m, ..)| room_m),
             legs: certificate
                 .legs
                 .iter()
@@ -204,9 +212,10 @@ impl Preflight {
             drift_m: drift.distance_m,
             spacing_m: drift.spacing_m,
             dt_s: scenario.time.dt_s,
-            dt_max_s: law
-                .fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s)
-                .map(|rate_per_s| scenario.time.max_rate_dt / rate_per_s),
+            dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s).map(|rate_per_s| {
+                let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
+                scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
+            }),
             start_dimension: motion_dimension(&scenario.start),
             start_margin_m: margin(&scenario.start.positions_m),
             formation_dimension,

@@ -60,6 +60,7 @@ impl Preflight {
     pub fn text(&self) -> String {
         let mut rows =
             vec![("stability".to_owned(), self.stability_line()), ("certificate".to_owned(), self.certificate_line())];
+        rows.extend(self.start_room_m.map(|room_m| ("obstacles".to_owned(), self.obstacles_line(room_m))));
         rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
         let rest = [
             ("needs", self.needs_line()),
@@ -91,6 +92,14 @@ impl Preflight {
             }
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }
+    }
+
+    fn obstacles_line(&self, start_room_m: f64) -> String {
+        let certified = match self.certified_room_m {
+            Some(room_m) => format!("certified {} m beyond every clearance", at_least(room_m, 6)),
+            None => "not certified".to_owned(),
+        };
+        format!("{certified}, {start_room_m:.6} m at the start")
     }
 
     fn needs_line(&self) -> String {

@@ -35,6 +35,6 @@ pub use gpu::{AdapterChoice, Renderer};
 pub use picture::{Picture, contact_sheet, data_uri};
 pub use scene::{CameraSpec, Extent, Layers, Scene, Theme, View};
 pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
-pub use timeline::{Frame, Keyframe, Plan, Timeline, TracksError};
+pub use timeline::{Frame, Keyframe, Plan, Timeline, TooNear, TracksError};
 #[cfg(feature = "window")]
 pub use window::{LiveUpdate, is_in_window_library, show};

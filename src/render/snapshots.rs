@@ -22,10 +22,10 @@ pub struct Snapshot {
 #[must_use]
 pub fn snapshot_names() -> Vec<String> {
     let violations = (1..=PICTURED).map(|k| format!("violation-{k}"));
-    ["start", "closest", "end"].map(str::to_owned).into_iter().chain(violations).collect()
+    ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(violations).collect()
 }
 
-/// Pictures of the start, the closest approach, the end and the first ten violations of a flight; none of a flight
+/// Pictures of the start, the closest approach, the end, the first violation of an obstacle's clearance and the first ten of two vehicles of a flight; none of a flight
 /// without samples.
 ///
 /// # Errors
@@ -57,6 +57,11 @@ pub fn snapshots_of_run(
         shoot("closest", what, time_s, None)?;
     }
     shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
+    if let Some(near) = timeline.too_near().first() {
+        let (vehicle, obstacle) = (&timeline.vehicles[near.vehicle], timeline.obstacle(near.obstacle));
+        let what = format!("Vehicle {vehicle} came too near to {obstacle} at {:.2} s.", near.from_s);
+        shoot("obstacle", what, f64::midpoint(near.from_s, near.to_s.min(end_s)), None)?;
+    }
     for (k, span) in timeline.violations().iter().take(PICTURED).enumerate() {
         let (pair, from_s, to_s) = (span.pair, span.from_s, span.to_s.min(end_s));
         let what = format!("Vehicles {pair} were closer than delta from {from_s:.2} s to {to_s:.2} s.");

@@ -57,6 +57,9 @@ impl Report {
         if !page.pictures.is_empty() {
             sections.push(section("Pictures", &[page::pictures(page.pictures)]));
         }
+        if let Some(obstacles) = &self.obstacles {
+            sections.push(section("Obstacles", &[obstacles.table()]));
+        }
         if !page.figures.is_empty() {
             sections.push(section("Figures", &[page::figures(page.figures)]));
         }

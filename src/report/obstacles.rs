@@ -1,11 +1,16 @@
 //! How vehicles kept clear of obstacles.
 
+use maud::{Markup, html};
 use serde::{Deserialize, Serialize};
 
 use super::energy::INTEGRATION;
 use super::findings::{Findings, finite};
+use super::page;
 use crate::audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
 use crate::text::{at_least, counted, metres, metres_below, seconds};
+
+/// Violations that a page lists.
+const LISTED: usize = 50;
 
 /// The judge's findings on a flight past obstacles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -131,6 +136,39 @@ impl Obstacles {
         let open = (self.status == Status::Undecided && self.disagreements == 0)
             .then(|| "It cannot be told whether every vehicle kept clear of the obstacles.".to_owned());
         violation.into_iter().chain(broken).chain(disagree).chain(open).reduce(|all, next| all + " " + &next)
+    }
+
+    /// The closest approaches, with what is certified, and the violations, for a page.
+    pub(super) fn table(&self) -> Markup {
+        let cells = |approach: &ObstacleApproach| {
+            let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = approach;
+            [vehicle.to_string(), obstacle.clone(), metres(*clearance_m), shown(*min_m), seconds(*min_at_s)]
+        };
+        let certified = match self.certified_room_m {
+            Some(room_m) => format!("certified {} m beyond every clearance", at_least(room_m, 6)),
+            None => "nothing is certified".to_owned(),
+        };
+        let violations = self.violations.iter().take(LISTED);
+        html! {
+            (page::numbers(
+                &format!("The closest that vehicles came to obstacles; {certified}"),
+                &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At"],
+                self.closest.iter().map(cells),
+            ))
+            @if !self.violations.is_empty() {
+                (page::numbers(
+                    "Times that a vehicle was nearer to an obstacle than its clearance",
+                    &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At", "From", "To"],
+                    violations.map(|violation| {
+                        let [vehicle, obstacle, clearance, min, at] = cells(&violation.approach);
+                        [vehicle, obstacle, clearance, min, at, seconds(violation.from_s), seconds(violation.to_s)]
+                    }),
+                ))
+                @if let Some(more @ 1..) = self.violations.len().checked_sub(LISTED) {
+                    p { (more) " more are in report.json." }
+                }
+            }
+        }
     }
 
     /// One line of a table.

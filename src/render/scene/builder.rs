@@ -7,7 +7,7 @@ use super::colour::Colour;
 use super::extent::Extent;
 use super::view::View;
 use crate::audit::Violation;
-use crate::render::timeline::{Frame, Timeline};
+use crate::render::timeline::{Frame, Timeline, TooNear};
 use crate::swarm::Pair;
 
 /// Everything that a scene is made of.
@@ -19,7 +19,9 @@ pub(super) struct SceneBuilder<'a> {
     pub(super) camera: Camera,
     /// Violations that last at this time, one of a pair, and the distances of the pairs as drawn \[m\], the nearest first.
     pub(super) violated: Vec<(&'a Violation, f64)>,
-    /// Whether a vehicle is closer than delta to another one.
+    /// Who is nearer to an obstacle than its clearance at this time.
+    pub(super) too_near: Vec<&'a TooNear>,
+    /// Whether a vehicle is closer than delta to another one, or too near to an obstacle.
     pub(super) alarmed: Vec<bool>,
 }
 
@@ -38,10 +40,13 @@ impl<'a> SceneBuilder<'a> {
         violated.dedup_by_key(|(violation, _)| violation.pair);
         violated.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut alarmed = vec![false; timeline.count()];
+        let now_s = frame.time_s;
+        let too_near: Vec<_> = timeline.too_near_by(now_s).filter(|near| near.to_s >= now_s).collect();
+        too_near.iter().for_each(|near| alarmed[near.vehicle] = true);
         for (Violation { pair, .. }, _) in &violated {
             (alarmed[pair.first()], alarmed[pair.second()]) = (true, true);
         }
-        Self { timeline, extent, frame, view, camera, violated, alarmed }
+        Self { timeline, extent, frame, view, camera, violated, too_near, alarmed }
     }
 
     /// Where a vehicle is, in the scene's coordinates \[m\]; none where it is not there.

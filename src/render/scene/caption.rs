@@ -65,9 +65,7 @@ impl SceneBuilder<'_> {
 
     /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
-        let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
-        let Some(&(violation, drawn_m)) = self.violated.first() else { return self.margin() };
-        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
+        let Some(&(violation, drawn_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
         let Violation { min_m, min_at_s, limit_m, .. } = *violation;
         let (pair, limit) = (self.pair(violation.pair), metres(limit_m));
         let apart = if drawn_m < limit_m {
@@ -86,6 +84,29 @@ impl SceneBuilder<'_> {
             format!("VIOLATION {pair} {apart}"),
             "VIOLATION".to_owned(),
         ];
+        self.alarm(labels, &texts)
+    }
+
+    /// The same where nobody is too near to another vehicle, and somebody to an obstacle.
+    fn obstacle_banner(&self, labels: &mut LabelLayout) -> f32 {
+        let Some(near) = self.too_near.first() else { return self.margin() };
+        let (vehicle, obstacle) = (&self.timeline.vehicles[near.vehicle], self.timeline.obstacle(near.obstacle));
+        let more = match self.too_near.len() - 1 {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let texts = [
+            format!("VIOLATION  vehicle {vehicle} too near to {obstacle}{more}"),
+            format!("VIOLATION {vehicle} {obstacle}"),
+            "VIOLATION".to_owned(),
+        ];
+        self.alarm(labels, &texts)
+    }
+
+    /// Writes the first of three texts that has room across the top, and frames the picture; gives where the caption begins.
+    fn alarm(&self, labels: &mut LabelLayout, texts: &[String; 3]) -> f32 {
+        let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
+        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
         let bottom = 1.9 * size_px;
         labels.draw(Annotation::Box { corners_px: [[0.0, 0.0], [width_px, bottom]], colour: alarm, round_px: 0.0 });
@@ -105,6 +126,14 @@ impl SceneBuilder<'_> {
         }
         let began: Vec<_> = self.timeline.begun(now_s).collect();
         let undecided_s = self.timeline.undecided_s.filter(|from_s| *from_s <= now_s);
+        if began.is_empty()
+            && let Some(near) = self.timeline.too_near_by(now_s).next()
+        {
+            let at = format!("violated at {:.2} s", near.from_s);
+            let (vehicle, obstacle) = (&self.timeline.vehicles[near.vehicle], self.timeline.obstacle(near.obstacle));
+            let texts = vec![format!("{at} by {vehicle} near {obstacle}"), at, "violated".to_owned()];
+            return (texts, theme.alarm());
+        }
         match (began.first(), undecided_s) {
             (None, None) if self.timeline.assumes_straight => {
                 let texts =

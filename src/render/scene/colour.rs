@@ -121,6 +121,11 @@ impl Theme {
         self.pick(0x8F_B4_D9, 0x5C_7F_A3, 0x6E_8A_A8)
     }
 
+    /// What is in the way.
+    pub(in crate::render) fn obstacle(self) -> Colour {
+        self.pick(0xB8_A0_78, 0x8A_6D_3B, 0x7A_60_34)
+    }
+
     /// What must not be overlooked: a violation.
     pub(in crate::render) fn alarm(self) -> Colour {
         self.pick(0xFF_2F_3C, 0xD4_00_14, 0xD4_00_14)
@@ -172,6 +177,7 @@ mod tests {
                 ("pushing", theme.tension(-1.0), 3.0),
                 ("pulling", theme.tension(1.0), 3.0),
                 ("vehicle", theme.vehicle(0), 3.0),
+                ("obstacle", theme.obstacle(), 3.0),
             ] {
                 let found = contrast(colour, theme.background());
                 assert!(found >= least, "{what} in {name}: {found}");

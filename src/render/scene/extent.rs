@@ -8,6 +8,7 @@ use super::camera::{Camera, CameraSpec, ISO_DEG, Orbit};
 use super::view::View;
 use crate::render::error::RenderError;
 use crate::render::timeline::{Frame, Timeline};
+use crate::space::{Obstacle, Shape};
 use crate::swarm::{Pair, Rows, row};
 
 /// Most places of vehicles that framing looks at.
@@ -25,6 +26,8 @@ const FOLLOWED_RADII: f64 = 20.0;
 const CLOSEST_DISTANCES: f64 = 1.1;
 /// Nearest that anything is drawn, in units of the farthest: centimetres in a flight of tens of kilometres.
 const NEAREST: f64 = 1e-6;
+/// How far around the flight obstacles are still shown whole, in units of its extent.
+const OBSTACLE_ROOM: f64 = 0.5;
 /// Room around the ground for its scale, in distances of its lines.
 const SCALE_ROOM: f64 = 0.6;
 
@@ -61,6 +64,16 @@ impl Extent {
         for (place, radius) in &places {
             (low, high, largest) = (low.inf(place), high.sup(place), largest.max(*radius));
         }
+        let flown = if places.is_empty() { [Vector3::zeros(); 2] } else { [low, high] };
+        if !places.is_empty() {
+            let room = Vector3::repeat(OBSTACLE_ROOM * (high - low).max().max(largest));
+            let [least, most] = [low - room, high + room];
+            let obstacles = timeline.plan.iter().flat_map(|plan| &plan.obstacles);
+            for corner in obstacles.flat_map(corners).map(|corner| corner.sup(&least).inf(&most)) {
+                (low, high) = (low.inf(&corner), high.sup(&corner));
+                places.push((corner, 0.0));
+            }
+        }
         if places.is_empty() {
             (low, high, largest) = (Vector3::zeros(), Vector3::zeros(), 1.0);
         }
@@ -69,7 +82,8 @@ impl Extent {
         for (place, _) in &mut places {
             *place -= origin_m;
         }
-        let is_near = low.z >= 0.0 && low.z <= NEAR_GROUND * (high - low).norm() + largest;
+        let [lowest, highest] = flown;
+        let is_near = lowest.z >= 0.0 && lowest.z <= NEAR_GROUND * (highest - lowest).norm() + largest;
         let z = if is_near { 0.0 } else { low.z - largest } - origin_m.z;
         let (low, high) = (low - origin_m, high - origin_m);
         let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
@@ -87,6 +101,11 @@ impl Extent {
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
         Self { origin_m, places, framed: Mutex::new(None), ground_m, grid_m, reach }
+    }
+
+    /// Middle \[m\] and radius \[m\] of a ball that holds everything, in the scene's coordinates.
+    pub(super) fn reach(&self) -> (Vector3<f64>, f64) {
+        self.reach
     }
 
     /// Where the origin of the scene's coordinates is in the recording's \[m\].
@@ -168,6 +187,25 @@ impl Extent {
         let far = (middle + radius).max(1e-2);
         [(middle - radius).max(NEAREST * far), far]
     }
+}
+
+/// Corners of a box around an obstacle \[m\]; none for one without bounds.
+fn corners(obstacle: &Obstacle) -> Vec<Vector3<f64>> {
+    let (low, high) = match obstacle.shape {
+        Shape::Ball { radius_m } => (-Vector3::repeat(radius_m), Vector3::repeat(radius_m)),
+        Shape::Capsule { from_m, to_m, radius_m } => {
+            let round = Vector3::repeat(radius_m);
+            (from_m.inf(&to_m) - round, from_m.sup(&to_m) + round)
+        }
+        Shape::Box { half_m, .. } => {
+            let across = half_m.xy().norm();
+            let half = Vector3::new(across, across, half_m.z);
+            (-half, half)
+        }
+        Shape::HalfSpace { .. } => return Vec::new(),
+    };
+    let corner = |k: usize| Vector3::from_fn(|axis, _| if k >> axis & 1 == 0 { low[axis] } else { high[axis] });
+    (0..8).map(|k| obstacle.place_m + corner(k)).collect()
 }
 
 /// The vehicle of this name.

@@ -14,6 +14,7 @@ mod extent;
 mod geometry;
 mod ground;
 mod labels;
+mod obstacles;
 mod view;
 
 #[cfg(feature = "window")]

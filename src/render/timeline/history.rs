@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::frame::{Frame, Keyframe, nearest_present};
+use super::obstacles::TooNear;
 use super::plan::Plan;
 use crate::audit::Violation;
 use crate::record::mcap::{Entry, McapRecording};
@@ -42,6 +43,7 @@ pub struct Timeline {
     pub notes: Vec<String>,
     pub(super) keyframes: Vec<Keyframe>,
     pub(super) violations: Vec<Violation>,
+    pub(super) too_near: Vec<TooNear>,
     /// Index of the violation of every pair that is in one.
     open: BTreeMap<Pair, usize>,
     /// When hulls hit first, whose, and how fast their centres neared each other \[m/s\].
@@ -76,6 +78,7 @@ impl Timeline {
             notes: Vec::new(),
             keyframes: Vec::new(),
             violations: Vec::new(),
+            too_near: Vec::new(),
             open: BTreeMap::new(),
             hit: None,
             undecided_s: None,
@@ -251,6 +254,7 @@ impl Timeline {
         if let Some(plan) = &mut self.plan {
             plan.note(event);
         }
+        self.note_obstacles(event);
         match *event {
             Event::ViolationBegan { pair, time_s } if self.has(pair) => {
                 self.open.insert(pair, self.violations.len());

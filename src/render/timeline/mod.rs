@@ -3,12 +3,14 @@
 mod frame;
 mod history;
 mod judge;
+mod obstacles;
 mod plan;
 mod tracks;
 
 pub use frame::{Frame, Keyframe};
 pub(super) use history::PICTURED;
 pub use history::Timeline;
+pub use obstacles::TooNear;
 pub use plan::Plan;
 pub use tracks::TracksError;
 

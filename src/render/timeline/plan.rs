@@ -7,6 +7,7 @@ use crate::graph::Graph;
 use crate::law::{EdgeTension, EdgeTensionKeys, LawSpec};
 use crate::record::Event;
 use crate::scenario::Scenario;
+use crate::space::Obstacle;
 use crate::swarm::{Pair, Rows, mean_row, row};
 use crate::target::{Guidance, Leg, LegTimes};
 
@@ -21,6 +22,8 @@ pub struct Plan {
     pub graph: Graph,
     law: LawSpec,
     delta_m: f64,
+    /// What is in the way.
+    pub obstacles: Vec<Obstacle>,
 }
 
 impl Plan {
@@ -34,6 +37,7 @@ impl Plan {
             graph: scenario.graph.clone(),
             law: scenario.law.clone(),
             delta_m: scenario.delta_m,
+            obstacles: scenario.obstacles.clone(),
         }
     }
 
