@@ -7,7 +7,7 @@
 use super::document::{Document, GraphKind, PlantKind, PlantTable, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::legs::{check_slots, legs, listed_slots};
-use super::limits::{check_count, check_lengths, check_memory, pair_count};
+use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memory, pair_count};
 use super::reference::ReferenceTable;
 use super::slots::is_flat;
 use super::spec::{PlantSpec, Precision, Scenario, Space};
@@ -32,7 +32,8 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         set_row(&mut start.velocities_m_s, leader, guidance.motion.at(0.0).velocity_m_s);
     }
     let hull_radius_m = per_vehicle(document.swarm.hull_radius_m, count);
-    let clearance_m = hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m));
+    let clearance_m =
+        hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m + CONTACT_PREDICTION_M));
     let obstacles = document.obstacle.iter().enumerate();
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
     let mut scenario = Scenario {

@@ -49,6 +49,11 @@ const ALL: &[Builtin] = &[
         toml: include_str!("../../assets/show.toml"),
     },
     Builtin {
+        name: "obstacles",
+        summary: "eight vehicles past pillars, a house and a cable, in two legs: clear of each other and of them, reached",
+        toml: include_str!("../../assets/obstacles.toml"),
+    },
+    Builtin {
         name: "thousand",
         summary: "a thousand vehicles draw together in space: clear and reached",
         toml: include_str!("../../assets/thousand.toml"),

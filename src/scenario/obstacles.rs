@@ -59,8 +59,8 @@ pub(crate) struct ObstacleTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(skip))]
     path: Option<Vec<[f64; 4]>>,
-    /// Distance in m that the centre of a vehicle must keep from its surface; unless given, half of `law.delta_m`, or the
-    /// radius of the largest hull where that is more.
+    /// Distance in m that the centre of a vehicle must keep from its surface; unless given, half of `law.delta_m`, or 0.02
+    /// m more than the radius of the largest hull where that is more.
     #[serde(skip_serializing_if = "Option::is_none")]
     clearance_m: Option<f64>,
 }

@@ -8,6 +8,7 @@ mod ideal_plant;
 mod law_properties;
 mod loop_claims;
 mod missions;
+mod obstacles;
 mod plant_claims;
 mod random_scenarios;
 mod reference_flights;

@@ -52,7 +52,7 @@ impl SceneBuilder<'_> {
                         let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
                         let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
                         let of = |k: usize, share: f64| turned * Vector3::ith(k, half_m[k] * share);
-                        self.hatched(place + of(axis, sign), of(u, 1.0), of(v, 1.0), lines);
+                        self.hatched(RIM, place + of(axis, sign), of(u, 1.0), of(v, 1.0), lines);
                     }
                 }
                 Shape::HalfSpace { normal } => {
@@ -61,7 +61,7 @@ impl SceneBuilder<'_> {
                     let foot = centre - normal * (centre - place).dot(&normal);
                     let least = normal.iamin();
                     let u = normal.cross(&Vector3::ith(least, 1.0)).normalize() * reach_m;
-                    self.hatched(foot, u, normal.cross(&u), lines);
+                    self.hatched(HATCH, foot, u, normal.cross(&u), lines);
                 }
                 Shape::Ball { .. } | Shape::Capsule { .. } => {}
             }
@@ -69,14 +69,15 @@ impl SceneBuilder<'_> {
     }
 
     /// A flat piece around its middle, from minus to plus two vectors.
-    fn hatched(&self, middle: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>, lines: &mut Vec<Line>) {
+    fn hatched(&self, rim: f32, middle: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>, lines: &mut Vec<Line>) {
         let (colour, width_px) = (self.view.theme.obstacle(), 1.4 * self.view.unit_px());
         for k in 0..=HATCHES {
             let share = 2.0 * f64::from(k) / f64::from(HATCHES) - 1.0;
-            let strength = if k == 0 || k == HATCHES { RIM } else { HATCH };
+            let is_rim = k == 0 || k == HATCHES;
+            let strength = if is_rim { rim } else { HATCH };
             let mut line = |from, to| lines.push(Line::new([from, to], colour.at(strength), width_px));
             line(middle + u * share - v, middle + u * share + v);
-            if strength == RIM {
+            if is_rim {
                 line(middle + v * share - u, middle + v * share + u);
             }
         }
