@@ -5,9 +5,11 @@ use std::io;
 
 use foxglove::messages::line_primitive::Type as LineType;
 use foxglove::messages::{
-    Color, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3,
+    Color, CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate,
+    SpherePrimitive, Timestamp, Vector3,
 };
 use foxglove::{Encode as _, Schema};
+use nalgebra::UnitQuaternion;
 
 use super::scene::{Colour, Theme};
 use super::timeline::Plan;
@@ -15,6 +17,7 @@ use crate::graph::Graph;
 use crate::record::mcap::{ExtraTopic, Topic};
 use crate::record::{Event, Sample};
 use crate::scenario::Scenario;
+use crate::space::{Obstacle, Shape};
 use crate::swarm::{Pair, Rows, row, separation};
 
 /// Scenes a second \[Hz\].
@@ -23,6 +26,8 @@ pub const SCENE_HZ: f64 = 5.0;
 const MOST_EDGES: usize = 300;
 /// Width of an edge \[m\].
 const EDGE_M: f64 = 0.03;
+/// Side of the plate that stands for a half-space \[m\].
+const PLATE_M: f64 = 100.0;
 /// Times are products of steps.
 const ROUNDING_S: f64 = 1e-6;
 
@@ -67,6 +72,10 @@ impl FoxgloveScene {
             let colour = if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
             sphere(positions_m, k, self.radius_m[k], colour)
         });
+        let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
+            Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
+            _ => None,
+        });
         let shells = (0..count).map(|k| {
             let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
             sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15))
@@ -91,7 +100,9 @@ impl FoxgloveScene {
                 timestamp: Some(timestamp(time_s)),
                 frame_id: "world".to_owned(),
                 id: "swarm".to_owned(),
-                spheres: hulls.chain(shells).collect(),
+                spheres: hulls.chain(shells).chain(solids).collect(),
+                cubes: self.plan.obstacles.iter().filter_map(cube).collect(),
+                cylinders: self.plan.obstacles.iter().filter_map(cylinder).collect(),
                 lines: if lines.points.is_empty() { Vec::new() } else { vec![lines] },
                 ..SceneEntity::default()
             }],
@@ -131,7 +142,54 @@ impl ExtraTopic for FoxgloveScene {
 }
 
 fn sphere(positions_m: &Rows, k: usize, radius_m: f64, shown: Colour) -> SpherePrimitive {
-    let place = row(positions_m, k);
+    ball(row(positions_m, k), radius_m, shown)
+}
+
+/// A box, or a half-space as a plate around its place.
+fn cube(obstacle: &Obstacle) -> Option<CubePrimitive> {
+    let (size, turn) = match obstacle.shape {
+        Shape::Box { half_m, yaw_deg } => {
+            (half_m * 2.0, UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw_deg.to_radians()))
+        }
+        Shape::HalfSpace { normal } => (nalgebra::Vector3::new(PLATE_M, PLATE_M, 1e-3), from_z(normal)),
+        Shape::Ball { .. } | Shape::Capsule { .. } => return None,
+    };
+    Some(CubePrimitive {
+        pose: Some(turned(obstacle.place_m, turn)),
+        size: Some(Vector3 { x: size.x, y: size.y, z: size.z }),
+        color: Some(colour(Theme::Dark.obstacle())),
+    })
+}
+
+/// A capsule without its ends.
+fn cylinder(obstacle: &Obstacle) -> Option<CylinderPrimitive> {
+    let Shape::Capsule { from_m, to_m, radius_m } = obstacle.shape else { return None };
+    let side = 2.0 * radius_m;
+    Some(CylinderPrimitive {
+        pose: Some(turned(obstacle.place_m + (from_m + to_m) / 2.0, from_z(to_m - from_m))),
+        size: Some(Vector3 { x: side, y: side, z: (to_m - from_m).norm() + side }),
+        bottom_scale: 1.0,
+        top_scale: 1.0,
+        color: Some(colour(Theme::Dark.obstacle())),
+    })
+}
+
+/// What turns the z axis to a direction.
+fn from_z(direction: nalgebra::Vector3<f64>) -> UnitQuaternion<f64> {
+    let z = nalgebra::Vector3::z();
+    UnitQuaternion::rotation_between(&z, &direction)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI))
+}
+
+fn turned(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
+    let [x, y, z, w] = turn.coords.into();
+    Pose {
+        position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
+        orientation: Some(Quaternion { x, y, z, w }),
+    }
+}
+
+fn ball(place: nalgebra::Vector3<f64>, radius_m: f64, shown: Colour) -> SpherePrimitive {
     let side = 2.0 * radius_m;
     SpherePrimitive {
         pose: Some(pose(Vector3 { x: place.x, y: place.y, z: place.z })),
@@ -182,6 +240,19 @@ mod tests {
         };
         let mut bytes = Vec::new();
         scene.message(&sample, &mut bytes).expect("encoded").then_some(bytes)
+    }
+
+    #[test]
+    fn a_scene_holds_the_obstacles() {
+        let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+        let mut scene = FoxgloveScene::of(&scenario);
+        let bytes = message(&mut scene, 0.0, &scenario.start).expect("a message");
+        let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
+        let entity = &update.entities[0];
+        assert_eq!((entity.cubes.len(), entity.cylinders.len()), (2, 3));
+        let cable = entity.cylinders[2].pose.and_then(|pose| pose.position).expect("a place");
+        assert_eq!((cable.x, cable.y, cable.z), (16.0, 0.0, 7.25));
+        assert_eq!(entity.cubes[0].size.map(|size| (size.x, size.y, size.z)), Some((3.0, 5.0, 3.0)));
     }
 
     #[test]

@@ -2,8 +2,11 @@
 
 use super::tests::{Case, NOT_REACHED, REACHED, passing};
 use super::*;
+use crate::audit::{ClearanceAuditor, ClearanceOutcome, Obstacle, Shape};
 use crate::law::Certificate;
 use crate::metrics::{LegSummary, Summary};
+use crate::record::EnergyRise;
+use crate::swarm::Rows;
 
 #[test]
 fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
@@ -55,4 +58,49 @@ fn a_certificate_is_broken_by_a_share_of_its_clearance() {
     // A clearance of 1.451 mm of which a tenth is missing, and one of which nothing is but rounding.
     assert!(!report(2.001_451, 2.001_314).pass);
     assert!(report(2.001_451, 2.001_450_5).pass);
+}
+
+#[test]
+fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows() {
+    let risen = |share: f64, energy_falls: bool| {
+        let energy_rise = Some(EnergyRise { from: 3.656_742_96, to: 3.656_742_96 * (1.0 + share) });
+        let case = Case { energy_falls, energy_rise, ..Case::good() };
+        case.report().verdict
+    };
+    assert!(risen(0.9e-3, true).pass, "the error of integration");
+    let verdict = risen(0.77, true);
+    assert!(!verdict.pass && verdict.reasons[0].contains("rose from 3.6567e0 to 6.4724e0"), "{verdict:?}");
+    assert!(risen(0.77, false).pass, "nothing is proved there");
+}
+
+/// A vehicle passes a ball of 1 m, whose clearance is 0.5 m, at this distance from its middle.
+fn passing_a_ball(miss_m: f64) -> ClearanceOutcome {
+    let ball = Obstacle {
+        name: "tower".to_owned(),
+        shape: Shape::Ball { radius_m: 1.0 },
+        clearance_m: Some(0.5),
+        path: vec![(0.0, nalgebra::Vector3::zeros())],
+    };
+    let mut auditor = ClearanceAuditor::new(2, &[ball]).expect("a judge");
+    for (time_s, x) in [(0.0, -9.0), (1.0, 9.0)] {
+        auditor.step(time_s, &Rows::from_row_slice(&[x, miss_m, 0.0, x, 50.0, 0.0])).expect("judged");
+    }
+    auditor.finish()
+}
+
+#[test]
+fn who_is_too_near_to_an_obstacle_or_nearer_than_certified_does_not_pass() {
+    let report = |miss_m: f64, certified_room_m: Option<f64>| {
+        let certificate = Certificate { certified_room_m, ..Case::good().certificate };
+        Case { clearance: Some(passing_a_ball(miss_m)), certificate, ..Case::good() }.report()
+    };
+    let clear = report(2.0, Some(0.4));
+    assert!(clear.verdict.pass, "{:?}", clear.verdict);
+    assert!(clear.headline().contains("0.500 m beyond every obstacle's clearance"), "{}", clear.headline());
+    let broken = report(2.0, Some(0.6));
+    assert!(!broken.verdict.pass && broken.verdict.reasons[0].contains("certifies 0.600 m beyond every clearance"));
+    let violated = report(1.25, None);
+    assert_eq!((violated.audit.status, violated.audit.violations.len()), (Status::Violation, 0));
+    assert_eq!(violated.headline(), "VIOLATION: vehicle 1 came to 0.250 m from `tower` at 0.50 s (clearance 0.500 m)");
+    assert!(report(0.25, None).headline().contains("0.750 m inside `tower`"));
 }

@@ -441,16 +441,3 @@ fn a_report_on_disk_is_the_report() {
     assert_eq!(serde_json::from_str::<Report>(&text).expect("reads back"), report);
     assert!(report.write(&folder.path().join("missing/report.json")).is_err());
 }
-
-#[test]
-fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows() {
-    let risen = |share: f64, energy_falls: bool| {
-        let energy_rise = Some(EnergyRise { from: 3.656_742_96, to: 3.656_742_96 * (1.0 + share) });
-        let case = Case { energy_falls, energy_rise, ..Case::good() };
-        case.report().verdict
-    };
-    assert!(risen(0.9e-3, true).pass, "the error of integration");
-    let verdict = risen(0.77, true);
-    assert!(!verdict.pass && verdict.reasons[0].contains("rose from 3.6567e0 to 6.4724e0"), "{verdict:?}");
-    assert!(risen(0.77, false).pass, "nothing is proved there");
-}

@@ -5,7 +5,6 @@ use nalgebra::Vector3;
 use super::error::ScenarioError;
 use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, require_finite, require_positive};
 use super::spec::Scenario;
-use crate::law::Controls;
 use crate::space::{Obstacle, Shape, least_room};
 use crate::swarm::{Rows, row, set_row};
 
@@ -35,10 +34,6 @@ impl Scenario {
         let Some(guidance) = self.reference.as_ref().filter(|guidance| guidance.motion.is_at_rest()) else {
             return Ok(());
         };
-        let is_placed = self.law().is_ok_and(|law| law.controls() == Controls::Places);
-        if !is_placed || self.obstacles.is_empty() {
-            return Ok(());
-        }
         let place_m = guidance.motion.at(0.0).position_m;
         for (leg, of_leg) in self.legs.iter().enumerate() {
             let mut slots_m = of_leg.formation.slots_m.clone();

@@ -84,13 +84,16 @@ fn every_key_of_the_report_is_on_its_page() {
     let mission =
         [&["run", "pentagon-leader", "--set", "leg=[{scale=1.2}]", "--set", "breathing.mode=start"], &quick[..]]
             .concat();
-    assert_documented("report.json", &[&hit, &passed_through, &mission]);
+    let into_a_pillar = "reference={kind=\"velocity\",velocity_m_s=[3,2.0,0],leader=1}";
+    let among = [&["run", "obstacles", "--set", into_a_pillar], &quick[..]].concat();
+    assert_documented("report.json", &[&hit, &passed_through, &mission, &among]);
 }
 
 #[test]
 fn every_key_of_the_check_is_on_its_page() {
     let mission = ["check", "pentagon-leader", "--json", "--set", "leg=[{scale=1.2}]"];
-    assert_documented("check --json", &[&["check", "--json"], &mission]);
+    let among = ["check", "obstacles", "--json"];
+    assert_documented("check --json", &[&["check", "--json"], &mission, &among]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::frame::{Frame, Keyframe, nearest_present};
-use super::obstacles::TooNear;
+use super::obstacles::{AllTooNear, TooNear};
 use super::plan::Plan;
 use crate::audit::Violation;
 use crate::record::mcap::{Entry, McapRecording};
@@ -43,7 +43,7 @@ pub struct Timeline {
     pub notes: Vec<String>,
     pub(super) keyframes: Vec<Keyframe>,
     pub(super) violations: Vec<Violation>,
-    pub(super) too_near: Vec<TooNear>,
+    too_near: AllTooNear,
     /// Index of the violation of every pair that is in one.
     open: BTreeMap<Pair, usize>,
     /// When hulls hit first, whose, and how fast their centres neared each other \[m/s\].
@@ -78,7 +78,7 @@ impl Timeline {
             notes: Vec::new(),
             keyframes: Vec::new(),
             violations: Vec::new(),
-            too_near: Vec::new(),
+            too_near: AllTooNear::default(),
             open: BTreeMap::new(),
             hit: None,
             undecided_s: None,
@@ -178,6 +178,24 @@ impl Timeline {
         self.violations.iter().filter(move |violation| violation.from_s <= until_s)
     }
 
+    /// Every time that a vehicle was nearer to an obstacle than its clearance, in order of its beginning.
+    #[must_use]
+    pub fn too_near(&self) -> &[TooNear] {
+        &self.too_near.0
+    }
+
+    /// Those that have begun by a time \[s\]; at the end of the flight all of them.
+    pub(in crate::render) fn too_near_by(&self, time_s: f64) -> impl Iterator<Item = &TooNear> {
+        let until_s = if time_s < self.range_s()[1] { time_s } else { f64::INFINITY };
+        self.too_near().iter().filter(move |near| near.from_s <= until_s)
+    }
+
+    /// Name of an obstacle, in quotes; its number where it is not known.
+    pub(in crate::render) fn obstacle(&self, k: usize) -> String {
+        let known = self.plan.as_ref().and_then(|plan| plan.obstacles.get(k));
+        known.map_or_else(|| format!("obstacle {}", k + 1), |obstacle| format!("`{}`", obstacle.name))
+    }
+
     /// Why nothing is judged, where that is so.
     pub(in crate::render) fn unjudged(&self) -> Option<&'static str> {
         match self.delta_m {
@@ -254,7 +272,7 @@ impl Timeline {
         if let Some(plan) = &mut self.plan {
             plan.note(event);
         }
-        self.note_obstacles(event);
+        self.too_near.note(event, self.vehicles.len());
         match *event {
             Event::ViolationBegan { pair, time_s } if self.has(pair) => {
                 self.open.insert(pair, self.violations.len());

@@ -1,0 +1,203 @@
+//! Obstacles of a scenario, through the program.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+const SCENARIO: &str = r#"[swarm]
+count = 3
+[start]
+positions_m = [[-6, 0], [-6, 3], [-8, 0]]
+[formation]
+shape = "points"
+points_m = [[6, -1], [6, 1], [4, 0]]
+[reference]
+kind = "rest"
+[[obstacle]]
+name = "tower"
+ball = { radius_m = 1.0 }
+at_m = [0.0, 0.3, 0.0]
+[[obstacle]]
+name = "wall"
+box = { size_m = [4.0, 1.0, 3.0], yaw_deg = 33.3 }
+at_m = [0.0, 6.0, 0.0]
+clearance_m = 0.7
+[law]
+kind = "displacement"
+delta_m = 1.0
+[time]
+duration_s = 25
+"#;
+
+/// A leader is flown into the tower.
+const HIT: &str = r#"[swarm]
+count = 2
+[start]
+positions_m = [[-5, 0], [-5, 3]]
+[formation]
+shape = "line"
+spacing_m = 3.0
+[reference]
+kind = "velocity"
+velocity_m_s = [2.0, 0]
+leader = 1
+[[obstacle]]
+name = "tower"
+ball = { radius_m = 1.0 }
+at_m = [0.0, 0.0, 0.0]
+[law]
+kind = "displacement"
+delta_m = 1.0
+[time]
+duration_s = 8
+"#;
+
+fn folder(scenario: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("among.toml"), scenario).expect("a file");
+    folder
+}
+
+fn ran(folder: &tempfile::TempDir, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder.path(), arguments)
+}
+
+fn json(ran: &Ran) -> Value {
+    serde_json::from_str(&ran.out).unwrap_or_else(|error| panic!("{error}: {}", ran.err))
+}
+
+#[test]
+fn a_flight_among_obstacles_is_checked_flown_reported_and_audited_with_them() {
+    let folder = folder(SCENARIO);
+    let checked = json(&ran(&folder, &["check", "among.toml", "--json"]));
+    let promised_m = checked["certified_room_m"].as_f64().expect("a promise");
+    assert!(promised_m > 0.0 && checked["start_room_m"].as_f64().expect("room") > 3.9, "{checked}");
+    let flown = ran(&folder, &["run", "among.toml", "--json", "--no-figures", "--no-snapshots"]);
+    assert_eq!(flown.exit, Some(0), "{}", flown.err);
+    let report = json(&flown);
+    assert_eq!((report["verdict"]["pass"].as_bool(), report["audit"]["status"].as_str()), (Some(true), Some("clear")));
+    let obstacles = &report["obstacles"];
+    assert_eq!(obstacles["certified_room_m"].as_f64(), Some(promised_m));
+    let nearest = &obstacles["closest"][0];
+    let (min_m, clearance_m) = (nearest["min_m"].as_f64().expect("m"), nearest["clearance_m"].as_f64().expect("m"));
+    assert!(nearest["obstacle"] == "tower" && clearance_m == 0.5 && min_m >= clearance_m + promised_m, "{nearest}");
+    assert_eq!(obstacles["violations"].as_array().map(Vec::len), Some(0));
+
+    let audited = ran(&folder, &["audit", "out/among/run.mcap", "--json"]);
+    let audit = json(&audited);
+    assert_eq!((audited.exit, audit["status"].as_str()), (Some(0), Some("clear")), "{}", audited.err);
+    assert!(audited.err.contains("the obstacles are the recording's own: tower, wall"), "{}", audited.err);
+    assert_eq!(audit["obstacles"]["closest"][0]["who"][1], "tower");
+    let other = "[[obstacle]]\nname = \"tree\"\nball = { radius_m = 0.5 }\nat_m = [6.0, 1.0, 0.0]\n";
+    fs::write(folder.path().join("other.toml"), other).expect("a file");
+    let other = ran(&folder, &["audit", "out/among/run.mcap", "--obstacles", "other.toml"]);
+    assert_eq!(other.exit, Some(1), "others than its own, where a slot is: {}", other.out);
+    assert!(other.out.contains("tree") && !other.out.contains("tower"), "{}", other.out);
+    let scaled = ran(&folder, &["audit", "out/among/run.mcap", "--scale", "2", "--delta", "1"]);
+    assert!(scaled.err.contains("are not judged: lengths are not metres"), "{}", scaled.err);
+
+    // What the recording holds is the scenario, obstacles to the last bit.
+    let held = ran(&folder, &["list", "--show", "out/among/run.mcap"]).out;
+    fs::write(folder.path().join("held.toml"), held).expect("a file");
+    let again =
+        json(&ran(&folder, &["run", "held.toml", "--json", "--no-figures", "--no-snapshots", "--out", "again"]));
+    assert_eq!(
+        (&again["run"]["state_hash"], &again["scenario"]["sha256"]),
+        (&report["run"]["state_hash"], &report["scenario"]["sha256"])
+    );
+}
+
+#[test]
+fn a_vehicle_that_is_flown_into_an_obstacle_fails_in_every_word_and_in_an_audit_between_samples() {
+    let folder = folder(HIT);
+    let flown = ran(&folder, &["run", "among.toml", "--json", "--no-figures", "--no-snapshots"]);
+    let report = json(&flown);
+    assert_eq!((flown.exit, report["audit"]["status"].as_str()), (Some(1), Some("violation")), "{}", flown.err);
+    assert_eq!(report["obstacles"]["violations"][0]["obstacle"], "tower");
+    assert_eq!(report["audit"]["violations"].as_array().map(Vec::len), Some(0));
+    let reason = report["verdict"]["reasons"][0].as_str().expect("a reason");
+    assert!(reason.starts_with("A vehicle came too near to an obstacle: vehicle 1"), "{reason}");
+    let words = ran(&folder, &["run", "among.toml", "--force", "--no-figures", "--no-snapshots"]);
+    assert!(words.out.starts_with("VIOLATION: vehicle 1 came to 0.4"), "{}", words.out);
+    let audited = ran(&folder, &["audit", "out/among/run.mcap"]);
+    assert_eq!(audited.exit, Some(1), "{}", audited.out);
+    assert!(audited.out.starts_with("VIOLATION: 1 and tower"), "{}", audited.out);
+}
+
+#[test]
+fn what_is_wrong_with_an_obstacle_is_said_with_its_place_and_remedy() {
+    let tower = "[[obstacle]]\nname = \"tower\"\nball = { radius_m = 1.0 }\nat_m = [0.0, 0.3, 0.0]\n";
+    let instead = |with: &str| SCENARIO.replace(tower, with);
+    for (scenario, said, help) in [
+        (
+            SCENARIO.replace("[0.0, 0.3, 0.0]", "[-6.0, 1.2, 0.0]"),
+            "vehicle 1 starts 0.19999999999999996 m from obstacle `tower`",
+            "move one",
+        ),
+        (
+            SCENARIO.replace("[0.0, 0.3, 0.0]", "[-6.0, 0.2, 0.0]"),
+            "vehicle 1 starts inside obstacle `tower`",
+            "move one",
+        ),
+        (SCENARIO.replace("[0.0, 0.3, 0.0]", "[6.0, 2.2, 0.0]"), "the slot of vehicle 2 is", "move one"),
+        (SCENARIO.replace("radius_m = 1.0", "radius_m = 0.0"), "the radius of obstacle `tower` is 0", "more than 0"),
+        (
+            SCENARIO.replace("clearance_m = 0.7", "clearance_m = 0.26"),
+            "the hull of vehicle 3 touches obstacle `wall`",
+            "enlarge",
+        ),
+        (
+            SCENARIO.replace("clearance_m = 0.7", "clearance_m = nan"),
+            "the clearance of obstacle `wall` is not a number",
+            "finite",
+        ),
+        (SCENARIO.replace("\"wall\"", "\"tower\""), "two obstacles are named `tower`", "name of its own"),
+        (SCENARIO.replace("\"wall\"", "\"\""), "the name of an obstacle is empty", "give it one"),
+        (
+            instead("[[obstacle]]\nname = \"tower\"\nball = { radius_m = 1.0 }\n"),
+            "obstacle `tower` has no place",
+            "at_m",
+        ),
+        (
+            instead("[[obstacle]]\nname = \"tower\"\nat_m = [0, 0, 0]\n"),
+            "obstacle `tower` needs one shape",
+            "ball, box",
+        ),
+        (
+            instead("[[obstacle]]\nname = \"t\"\nball = { radius_m = 1 }\npath = [[0, 0, 0, 0], [1, 1, 0, 0]]\n"),
+            "obstacle `t` moves",
+            "stand",
+        ),
+        (
+            instead("[[obstacle]]\nname = \"t\"\nbal = { radius_m = 1 }\nat_m = [0, 0, 0]\n"),
+            "unknown key `bal`",
+            "ball",
+        ),
+        (
+            instead("[[obstacle]]\nname = \"t\"\nhalf_space = { normal = [0, 0, 0] }\n"),
+            "the length of the normal of obstacle `t` is 0",
+            "more than 0",
+        ),
+    ] {
+        let folder = folder(&scenario);
+        for command in ["check", "run"] {
+            let ran = ran(&folder, &[command, "among.toml"]);
+            assert_eq!(ran.exit, Some(2), "{said}: {}", ran.err);
+            assert!(ran.err.contains(said) && ran.err.contains(help), "{said}: {}", ran.err);
+            assert!(ran.err.contains("among.toml:"), "{said}: {}", ran.err);
+            assert!(!folder.path().join("out").exists());
+        }
+    }
+}
+
+#[test]
+fn a_law_that_knows_no_obstacles_certifies_nothing_among_them_and_says_why() {
+    let folder =
+        folder(&SCENARIO.replace("[reference]\nkind = \"rest\"\n", "").replace("\"displacement\"", "\"edge-tension\""));
+    let checked = ran(&folder, &["check", "among.toml"]);
+    assert_eq!(checked.exit, Some(0), "{}", checked.err);
+    let said = checked.out + &checked.err;
+    assert!(said.contains("does not keep clear of obstacles"), "{said}");
+}
