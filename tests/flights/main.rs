@@ -10,6 +10,7 @@ mod loop_claims;
 mod missions;
 mod plant_claims;
 mod random_scenarios;
+mod reach;
 mod reference_flights;
 mod rivals;
 mod scenario_files;
