@@ -13,6 +13,7 @@ mod exports;
 mod interruption;
 mod keys;
 mod reads;
+mod references;
 mod refuses;
 mod runs;
 mod scenarios;
