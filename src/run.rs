@@ -117,6 +117,7 @@ fn report(
         legs: scenario.legs.len(),
         ended_legs: metrics.ended_legs(),
         breaths: &flight.breaths,
+        assignments: &flight.assignments,
         energy_rise: flight.energy_rise,
         energy_falls: energy_falls(preflight, &flight.certificate),
         epsilon: scenario.plant.epsilon(),

@@ -53,6 +53,9 @@ pub(super) struct CompareArguments {
     /// Write a page with a picture of each law at its worst moment.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Overwrite files that exist.
+    #[arg(long)]
+    force: bool,
     /// What draws pictures: best, hardware, software, or a part of an adapter's name.
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "NAME", default_value = "best")]
@@ -77,8 +80,8 @@ impl CompareArguments {
         all.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
     }
 
-    /// Refuses outputs that would replace the scenario or each other, and places that cannot be written to, before an
-    /// hour of flights.
+    /// Refuses outputs that would replace the scenario, each other, or without `--force` a file of an earlier comparison,
+    /// and places that cannot be written to, before an hour of flights.
     fn check_outputs(&self) -> Result<(), Failure> {
         let (piped, files): (Vec<_>, Vec<_>) = self.outputs().partition(|(_, file)| is_standard_output(file));
         if let [(first, _), (second, _), ..] = piped[..] {
@@ -89,10 +92,21 @@ impl CompareArguments {
         let inputs: Vec<_> = scenario.is_file().then_some(("the scenario", scenario)).into_iter().collect();
         outputs::check(&inputs, &files)?;
         for (option, file) in files {
-            let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file() || there.is_dir());
+            let shown = file.display();
+            if file.is_dir() {
+                let help = format!("give {option} a file within it");
+                return Err(Failure::input(format!("{shown} is a directory"), help));
+            }
+            if file.is_file() && !self.force {
+                return Err(Failure::input(
+                    format!("{shown} exists"),
+                    "overwrite it with --force, or write another file",
+                ));
+            }
+            let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file());
             let folder = file.parent().unwrap_or(Path::new(""));
             if is_new_or_plain && let Err(error) = try_to_write_in(folder) {
-                let message = format!("cannot write {}: {error}", file.display());
+                let message = format!("cannot write {shown}: {error}");
                 return Err(Failure::machine(message).with_help(format!("give {option} a file that can be written")));
             }
         }

@@ -4,7 +4,6 @@ use super::axis::{Axis, extent};
 use crate::record::mcap::Entry;
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::swarm::{ClosestApproach, Pair, Rows, row, separation};
-use crate::target::LegTimes;
 
 /// Most spans of time that are kept: some four for each pixel of a figure's width.
 const MOST_SPANS: usize = 2048;
@@ -40,7 +39,8 @@ pub struct RunHistory {
     last: Option<Span>,
     closest: Option<ClosestApproach>,
     energy_initial: Option<f64>,
-    pub(super) leg_times: LegTimes,
+    /// Where the target changed: a leg began, or vehicles were given other slots.
+    pub(super) turns: Vec<Event>,
     /// The first times that hulls hit \[s\], and how often they did.
     hits: Vec<(f64, Pair)>,
     hit_count: usize,
@@ -119,8 +119,8 @@ impl RunHistory {
     }
 
     fn note(&mut self, event: &Event) {
-        if let Event::LegBegan { leg, time_s } = *event {
-            self.leg_times.begin(leg, time_s);
+        if let Event::LegBegan { .. } | Event::Assigned { .. } = event {
+            self.turns.push(event.clone());
         }
         if let Event::HullsHit { pair, time_s, .. } = *event {
             self.hit_count += 1;

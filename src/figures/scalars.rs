@@ -8,7 +8,8 @@ use super::history::{FEW_VEHICLES, RunHistory, Span};
 use super::svg::{INK, PALETTE, Stroke};
 use crate::formation::largest_edge_error_m;
 use crate::graph::Graph;
-use crate::target::Leg;
+use crate::record::Event;
+use crate::target::{Course, Leg};
 
 /// Distances that are computed for the shape error, at most.
 const DISTANCES: usize = 16_000_000;
@@ -76,11 +77,19 @@ pub fn shape_error(history: &RunHistory, legs: &[Leg], graph: &Graph, allowed_m:
     let count = history.vehicles();
     let fits = !legs.is_empty() && legs.iter().all(|leg| leg.formation.count() == count) && graph.count() == count;
     let instants = history.spread((DISTANCES / graph.edge_count().max(1)).max(FEWEST_INSTANTS));
+    let mut course = Course::new(legs);
+    for turn in &history.turns {
+        match turn {
+            &Event::LegBegan { leg, time_s } => course.begin(leg, time_s),
+            Event::Assigned { slots, time_s } => course.assign(slots, *time_s),
+            _ => {}
+        }
+    }
     let error = |span: &&Span| {
-        let leg = history.leg_times.leg_at(span.time_s).min(legs.len() - 1);
-        (span.time_s, largest_edge_error_m(&span.positions_m, &legs[leg].formation, graph))
+        let formation = course.formation_at(span.time_s)?;
+        Some((span.time_s, largest_edge_error_m(&span.positions_m, formation, graph)))
     };
-    let points = if fits { instants.iter().map(error).collect() } else { Vec::new() };
+    let points = if fits { instants.iter().filter_map(error).collect() } else { Vec::new() };
     decay(history, "shape-error", title, "largest edge error", "m", points, allowed_m)
 }
 

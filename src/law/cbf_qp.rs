@@ -4,11 +4,12 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::carried::Carried;
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
-use super::interface::Law;
+use super::interface::{Controls, Law};
 use super::near_lists::NearLists;
 use super::setting::{Gain, Setting};
 use crate::observation::Observation;
@@ -95,6 +96,7 @@ impl CbfQpKeys {
 #[derive(Clone, Debug)]
 pub struct CbfQpLaw {
     keys: CbfQpKeys,
+    carried: Carried,
     count: usize,
     delta_m: f64,
     a22_per_s: f64,
@@ -107,8 +109,8 @@ impl CbfQpLaw {
     /// The law of so many vehicles; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a key is not
-    /// finite.
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
+    /// finite, or where there is a reference that some do not know.
     pub fn new(setting: &Setting<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
         let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
         let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
@@ -116,6 +118,7 @@ impl CbfQpLaw {
         Ok(Self {
             range_m: range_m(&keys, delta_m, a22_per_s),
             keys,
+            carried: Carried::new(setting)?,
             count: links.count(),
             delta_m,
             a22_per_s,
@@ -131,7 +134,7 @@ impl CbfQpLaw {
         let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
         let wanted_m_s = reference.velocity_m_s + (missing_m * (k_per_s2 / c_per_s)).cap_magnitude(max_speed_m_s);
         let own_m_s = row(&at.own.velocities_m_s, i);
-        reference.acceleration_m_s2 + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
+        self.carried.fed_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
     }
 
     /// What vehicle j leaves of vehicle i's accelerations; everything where it is out of range.
@@ -200,7 +203,11 @@ impl Law for CbfQpLaw {
     }
 
     fn needs(&self) -> &'static [&'static str] {
-        &["all share a compass and know where they are", "each sees who is near and how fast it moves"]
+        self.carried.needs()
+    }
+
+    fn controls(&self) -> Controls {
+        self.carried.controls()
     }
 
     fn sensing_range_m(&self) -> Option<f64> {

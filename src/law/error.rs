@@ -107,6 +107,9 @@ pub enum ParameterError {
     /// There is a reference, and no vehicle knows it.
     #[error("no vehicle knows the reference")]
     NobodyKnowsTheReference,
+    /// The law has no links over which those who do not know the reference could learn of it.
+    #[error("the law has no links over which vehicles that do not know the reference could follow it")]
+    ReferenceNotHeard,
     /// A gain is not a finite number.
     #[error("{name} is {value}; it must be a finite number")]
     NotFinite {

@@ -5,10 +5,11 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::carried::Carried;
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_count, check_observation, check_range};
 use super::error::{LawError, ParameterError};
-use super::interface::Law;
+use super::interface::{Controls, Law};
 use super::setting::{Gain, Setting};
 use crate::formation::Formation;
 use crate::observation::Observation;
@@ -72,13 +73,13 @@ impl FlockingKeys {
 /// 2006, algorithm 2), whose objective pulls with at most `c1_gamma` times a metre, as its algorithm 3 does:
 ///
 /// ```text
-/// u_i = c1a sum_j phi_a(|q_ij|_s) n_ij + c2a sum_j a_ij (v_j - v_i) - c1g s(p_i - p_r) - c2g (v_i - v_r) - a22 v_i,   |u_i| <= a_max
+/// u_i = c1a sum_j phi_a(|q_ij|_s) n_ij + c2a sum_j a_ij (v_j - v_i) - c1g s(p_i - p_r) - c2g (v_i - v_r) + r'' - a22 v_i,   |u_i| <= a_max
 /// |z|_s = (sqrt(1 + eps |z|^2) - 1)/eps,   n_ij = q_ij/sqrt(1 + eps |q_ij|^2),   q_ij = p_j - p_i,   s(z) = z/sqrt(1 + |z|^2)
 /// phi_a(z) = rho(z/|r|_s) a s(z - |d|_s),   a_ij = rho(|q_ij|_s/|r|_s),   c2 = 2 sqrt(c1)
 /// ```
 ///
 /// with eps = 0.1, a = b = 5, h = 0.2 and r = 1.2 d. rho is 1 up to h and falls as a cosine to 0 at 1. `p_r` is the centre of the
-/// slots. The formation is an alpha-lattice, in which all who are nearer than r are d apart: whoever gets wherever in it is not
+/// slots, where the reference has carried it, and `v_r` is r'; the source does not feed r''. The formation is an alpha-lattice, in which all who are nearer than r are d apart: whoever gets wherever in it is not
 /// asked for, and given slots are not reached but by chance.
 ///
 /// # Guarantee
@@ -89,6 +90,7 @@ impl FlockingKeys {
 #[derive(Clone, Debug)]
 pub struct FlockingLaw {
     keys: FlockingKeys,
+    carried: Carried,
     count: usize,
     a22_per_s: f64,
     /// d \[m\].
@@ -101,14 +103,15 @@ impl FlockingLaw {
     /// The law of so many vehicles; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a key is not
-    /// finite.
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
+    /// finite, or where there is a reference that some do not know.
     pub fn new(setting: &Setting<'_>, keys: FlockingKeys) -> Result<Self, ParameterError> {
         let &Setting { links, formation, a22_per_s, .. } = setting;
         let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
         ParameterError::check(links, formation, &gains)?;
         let spacing_m = spacing_m(&keys, formation);
-        Ok(Self { keys, count: links.count(), a22_per_s, spacing_m, revision: 0 })
+        let carried = Carried::new(setting)?;
+        Ok(Self { keys, carried, count: links.count(), a22_per_s, spacing_m, revision: 0 })
     }
 
     /// r \[m\].
@@ -133,7 +136,8 @@ impl FlockingLaw {
         let off_m = row(&at.own.positions_m, i) - centre_m - reference.position_m;
         let own_m_s = row(&at.own.velocities_m_s, i);
         let off_m_s = own_m_s - reference.velocity_m_s;
-        off_m * (-c1 / (1.0 + off_m.norm_squared()).sqrt()) - off_m_s * (2.0 * c1.sqrt()) - own_m_s * self.a22_per_s
+        let drawn_m_s2 = off_m * (-c1 / (1.0 + off_m.norm_squared()).sqrt()) - off_m_s * (2.0 * c1.sqrt());
+        self.carried.fed_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
     }
 }
 
@@ -204,7 +208,11 @@ impl Law for FlockingLaw {
     }
 
     fn needs(&self) -> &'static [&'static str] {
-        &["all share a compass and know where they are", "each sees who is near and how fast it moves"]
+        self.carried.needs()
+    }
+
+    fn controls(&self) -> Controls {
+        self.carried.controls()
     }
 
     fn sensing_range_m(&self) -> Option<f64> {

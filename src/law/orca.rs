@@ -7,11 +7,12 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use self::obstacle::VelocityObstacle;
+use super::carried::Carried;
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
-use super::interface::Law;
+use super::interface::{Controls, Law};
 use super::near_lists::NearLists;
 use super::setting::{Gain, Setting};
 use crate::observation::Observation;
@@ -95,7 +96,7 @@ impl OrcaKeys {
 ///
 /// ```text
 /// V_i   = in |v| <= v_max and all half-spaces of i, the velocity nearest to r' + min(k |d_i|, speed) d_i/|d_i|,   d_i = h_i + r - p_i
-/// u_i   = tracking (V_i - v_i) - a22 v_i,    |u_i| <= max_accel
+/// u_i   = r'' + tracking (V_i - v_i) - a22 v_i,    |u_i| <= max_accel
 /// ```
 ///
 /// The velocity obstacle of a pair is the set of relative velocities that bring the two nearer than D within the horizon: a
@@ -112,6 +113,7 @@ impl OrcaKeys {
 #[derive(Clone, Debug)]
 pub struct OrcaLaw {
     keys: OrcaKeys,
+    carried: Carried,
     count: usize,
     delta_m: f64,
     /// D \[m\].
@@ -128,8 +130,8 @@ impl OrcaLaw {
     /// The law of so many vehicles; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a key is not
-    /// finite.
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
+    /// finite, or where there is a reference that some do not know.
     pub fn new(setting: &Setting<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
         let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
         let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
@@ -138,6 +140,7 @@ impl OrcaLaw {
         let range_m = keys.range_m.unwrap_or(diameter_m + 2.0 * keys.max_speed_m_s * keys.horizon_s);
         Ok(Self {
             keys,
+            carried: Carried::new(setting)?,
             count: links.count(),
             delta_m,
             diameter_m,
@@ -216,9 +219,11 @@ impl Law for OrcaLaw {
 
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         self.velocities(at, command)?;
+        let fed_m_s2 = self.carried.fed_m_s2(&at.target.reference);
         for i in 0..self.count {
             let own_m_s = row(&at.own.velocities_m_s, i);
-            let wanted = (row(command, i) - own_m_s) * self.keys.tracking_per_s - own_m_s * self.a22_per_s;
+            let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
+            let wanted = fed_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
             set_row(command, i, wanted.cap_magnitude(self.keys.max_accel_m_s2));
         }
         check_range(command)
@@ -229,7 +234,11 @@ impl Law for OrcaLaw {
     }
 
     fn needs(&self) -> &'static [&'static str] {
-        &["all share a compass and know where they are", "each sees who is near and how fast it moves"]
+        self.carried.needs()
+    }
+
+    fn controls(&self) -> Controls {
+        self.carried.controls()
     }
 
     fn sensing_range_m(&self) -> Option<f64> {

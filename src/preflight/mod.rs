@@ -15,7 +15,6 @@ use crate::law::{Controls, Law, LegBound, ParameterError, Void};
 use crate::scenario::{LARGEST, Scenario};
 use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
-use crate::target::BreathingMode;
 use crate::text::at_least;
 
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
@@ -60,6 +59,8 @@ pub struct Preflight {
     pub legs: Vec<LegPromise>,
     /// Whether slots may be spread where the swarm is stalled, which renews what is certified.
     pub breathes: bool,
+    /// Whether interchangeable vehicles may be given other slots before that, which renews it too.
+    pub reassigns: bool,
     /// What the law needs beside the links, such as a sensor, in a few words each.
     pub needs: Vec<&'static str>,
     /// Why nothing is certified, a sentence each.
@@ -91,9 +92,11 @@ pub struct Preflight {
     /// What stands in the way, the worst first.
     pub warnings: Vec<Warning>,
     #[serde(skip)]
-    controls_distances: bool,
+    controls: Controls,
     #[serde(skip)]
     links_all: bool,
+    #[serde(skip)]
+    barrier_m: Option<f64>,
 }
 
 /// What is certified from the beginning of a leg to the beginning of the next.
@@ -204,7 +207,10 @@ impl Preflight {
                 .iter()
                 .map(|&LegBound { energy, certified_m, .. }| LegPromise { certified_m, energy_bound: energy })
                 .collect(),
-            breathes: law.settling_rate_per_s().is_some() && scenario.breathing.mode != BreathingMode::Off,
+            breathes: law.settling_rate_per_s().is_some() && scenario.breathing.is_on(),
+            reassigns: law.settling_rate_per_s().is_some()
+                && scenario.breathing.is_on()
+                && scenario.legs.iter().any(|leg| leg.interchangeable),
             needs: law.needs().to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             certified_edges_m: None,
@@ -222,8 +228,9 @@ impl Preflight {
             formation_margin_m: scenario.legs.iter().filter_map(|leg| margin(&leg.formation.slots_m)).reduce(f64::min),
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
-            controls_distances: law.controls() == Controls::Distances,
+            controls: law.controls(),
             links_all: scenario.graph.is_complete(),
+            barrier_m: law.barrier_m(),
         };
         let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
         if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {
@@ -268,10 +275,14 @@ impl Preflight {
         })
     }
 
+    fn controls_distances(&self) -> bool {
+        self.controls == Controls::Distances
+    }
+
     /// Dimension of the flat that the start never leaves, where the formation does not fit into it.
     #[must_use]
     pub fn trap_dimension(&self) -> Option<usize> {
-        (self.controls_distances && self.start_dimension < self.formation_dimension).then_some(self.start_dimension)
+        (self.controls_distances() && self.start_dimension < self.formation_dimension).then_some(self.start_dimension)
     }
 
     fn start_too_flat(&self) -> Option<String> {
@@ -299,7 +310,7 @@ impl Preflight {
         };
         let remedy =
             if scenario.graph.is_complete() { "Bend the formation a little." } else { "Add edges to the graph." };
-        (self.controls_distances && rigidity.rigid == Some(false)).then(|| {
+        (self.controls_distances() && rigidity.rigid == Some(false)).then(|| {
             format!(
                 "The formation is not rigid on its graph: {} of {} independent constraints hold it, so other shapes have \
                  the same edges or are approached only slowly. {remedy}",
@@ -313,7 +324,7 @@ impl Preflight {
         let said = "The formation is flat and the swarm lives in space: at the goal nothing resists motion out of the \
                     flat to first order, so that part of the error falls as t^(-1/2), not exponentially. Set \
                     swarm.dimensions to 2 if the swarm may stay in the plane.";
-        (self.controls_distances && self.is_flat_in_space()).then(|| said.to_owned())
+        (self.controls_distances() && self.is_flat_in_space()).then(|| said.to_owned())
     }
 
     /// Why no separation is certified, and what is in its place.

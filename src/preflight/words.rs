@@ -43,7 +43,11 @@ impl Preflight {
                     "certified never closer than {} m in continuous time (delta {} m){}",
                     at_least(certified_m, 6),
                     self.delta_m,
-                    if self.breathes { " unless slots are spread" } else { "" }
+                    match (self.breathes, self.reassigns) {
+                        (true, true) => " unless slots are spread or assigned anew",
+                        (true, false) => " unless slots are spread",
+                        _ => "",
+                    }
                 )
             }
             None => "no separation is certified".to_owned(),
@@ -87,7 +91,11 @@ impl Preflight {
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
             Some(certified_m) => {
-                let breath = if self.breathes { ", renewed where slots are spread (breathing.mode)" } else { "" };
+                let breath = match (self.breathes, self.reassigns) {
+                    (true, true) => ", renewed where slots are spread or assigned anew (breathing.mode)",
+                    (true, false) => ", renewed where slots are spread (breathing.mode)",
+                    _ => "",
+                };
                 format!("{} m, from {energy}{breath}", at_least(certified_m, 6))
             }
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
@@ -118,7 +126,8 @@ impl Preflight {
                     significant(self.dt_max_s.unwrap_or_default())
                 );
             }
-            None => "flown in parts where a clearance shrinks too fast",
+            None if self.barrier_m.is_some() => "flown in parts where a clearance shrinks too fast",
+            None => "what the law needs depends on how near vehicles come",
         };
         format!("{} s, {parts}", significant(self.dt_s))
     }
@@ -143,8 +152,8 @@ impl Preflight {
             format!("{said} (needs {})", rigidity.needed)
         };
         let convergence = match self.rigidity.rigid {
-            Some(true) if self.controls_distances && !self.refuses() => ", exponential convergence near the goal",
-            Some(false) if self.controls_distances && !self.refuses() => self.approach(),
+            Some(true) if self.controls_distances() && !self.refuses() => ", exponential convergence near the goal",
+            Some(false) if self.controls_distances() && !self.refuses() => self.approach(),
             _ => "",
         };
         format!("rank {rank}: in the plane {}, in space {}{convergence}", place(2), place(3))

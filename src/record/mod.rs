@@ -206,6 +206,13 @@ pub enum Event {
         /// They are scaled by this about their centre.
         scale: f64,
     },
+    /// Interchangeable vehicles were given other slots, since they stood in each other's way; what the law promised is renewed.
+    Assigned {
+        /// When \[s\].
+        time_s: f64,
+        /// From now on vehicle i goes to the slot that was vehicle `slots[i]`'s.
+        slots: Vec<usize>,
+    },
     /// The engine's own collision detection saw two keep-out balls overlap for the first time.
     EngineContact {
         /// The pair.
@@ -250,6 +257,17 @@ pub struct Breath {
     pub certified_m: Option<f64>,
 }
 
+/// A time at which interchangeable vehicles were given other slots.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reassignment {
+    /// When \[s\].
+    pub time_s: f64,
+    /// How many of them.
+    pub vehicles: usize,
+    /// No pair comes closer than this in the whole flight, as far as that was certified up to then \[m\].
+    pub certified_m: Option<f64>,
+}
+
 /// How far a law's energy rose while its target stayed as it was.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyRise {
@@ -271,6 +289,7 @@ impl Event {
             | Self::OtherLaw { time_s, .. }
             | Self::LegBegan { time_s, .. }
             | Self::Breath { time_s, .. }
+            | Self::Assigned { time_s, .. }
             | Self::EngineContact { time_s, .. }
             | Self::HullsHit { time_s, .. }
             | Self::StepRefined { time_s, .. }

@@ -6,7 +6,7 @@ use super::hulls::Hulls;
 use crate::audit::{AuditOutcome, ClearanceOutcome, Status};
 use crate::law::Certificate;
 use crate::metrics::{LegSummary, Summary};
-use crate::record::{Breath, EnergyRise};
+use crate::record::{Breath, EnergyRise, Reassignment};
 use crate::target::Arrival;
 
 /// Everything that a report is made of.
@@ -47,6 +47,8 @@ pub struct Findings<'a> {
     pub ended_legs: &'a [LegSummary],
     /// Every time that slots were spread.
     pub breaths: &'a [Breath],
+    /// Every time that interchangeable vehicles were given other slots.
+    pub assignments: &'a [Reassignment],
     /// By how much the energy rose between two changes of the target, at most.
     pub energy_rise: Option<EnergyRise>,
     /// Whether the law's energy is proved never to grow in this flight.

@@ -12,7 +12,7 @@ use super::obstacles::Obstacles;
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use crate::audit::{self, Status};
-use crate::record::Breath;
+use crate::record::{Breath, Reassignment};
 use crate::swarm::Pair;
 
 /// Version of the keys: raised when one is renamed, removed or changes its meaning.
@@ -47,6 +47,9 @@ pub struct Report {
     /// Every time that slots were spread to let vehicles past each other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub breaths: Vec<Breath>,
+    /// Every time that interchangeable vehicles were given other slots.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub assignments: Vec<Reassignment>,
     /// The law's energy.
     pub energy: Energy,
     /// Commanded accelerations.
@@ -266,6 +269,7 @@ impl Report {
             },
             legs: legs::legs(findings),
             breaths: findings.breaths.to_vec(),
+            assignments: findings.assignments.to_vec(),
             energy: Energy {
                 initial: summary.energy_initial.and_then(finite),
                 at_end: summary.energy_final.and_then(finite),

@@ -10,7 +10,7 @@ use crate::figures::Figure;
 use crate::formation::Freedom;
 use crate::scenario::{PlantSpec, Precision, Scenario};
 use crate::swarm::Bounce;
-use crate::text::{at_least, counted, seconds, significant};
+use crate::text::{at_least, seconds, significant};
 
 /// Most violations, or hits of hulls, that are listed one by one.
 const LISTED: usize = 50;
@@ -83,10 +83,8 @@ impl Report {
         let at = separation.min_at_s.map(|at_s| format!("at {}", seconds(at_s)));
         let closest = [pair, at].into_iter().flatten().collect::<Vec<_>>().join(" ");
         let certificate = if separation.certified_m.is_some() {
-            match self.breaths.len() {
-                0 => "promised before the first step".to_owned(),
-                n => format!("promised before the first step, and anew at {}", counted(n as u64, "breath", "breaths")),
-            }
+            let anew = self.changes().map(|changes| format!(", and anew at {changes}"));
+            format!("promised before the first step{}", anew.unwrap_or_default())
         } else {
             separation.certificate_void.join(" ")
         };

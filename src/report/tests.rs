@@ -98,6 +98,7 @@ impl Case {
             legs: self.legs,
             ended_legs: &self.ended_legs,
             breaths: &[],
+            assignments: &[],
             energy_rise: self.energy_rise,
             energy_falls: self.energy_falls,
             epsilon: f64::from(f32::EPSILON),

@@ -20,16 +20,22 @@ impl Report {
         let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
         let hulls = self.hulls.brief().map(|hulls| format!("; {hulls}"));
         let legs = super::legs::brief(&self.legs).map(|legs| format!("; {legs}"));
-        let breaths = match self.breaths.len() {
-            0 => String::new(),
-            n => format!("; {}", counted(n as u64, "breath", "breaths")),
-        };
+        let changes = self.changes().map(|changes| format!("; {changes}"));
         self.judged()
             + &legs.unwrap_or_default()
-            + &breaths
+            + &changes.unwrap_or_default()
             + &hulls.unwrap_or_default()
             + &ended.unwrap_or_default()
             + &refused
+    }
+
+    /// How often slots were spread, and vehicles given others; none where neither was.
+    pub(super) fn changes(&self) -> Option<String> {
+        let counts =
+            [(self.breaths.len(), "breath", "breaths"), (self.assignments.len(), "new assignment", "new assignments")];
+        let some = counts.into_iter().filter(|&(n, ..)| n > 0);
+        let said: Vec<_> = some.map(|(n, one, many)| counted(n as u64, one, many)).collect();
+        (!said.is_empty()).then(|| said.join(" and "))
     }
 
     /// What was judged of what was flown.

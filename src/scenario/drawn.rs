@@ -70,7 +70,7 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
     let (drawing, key) = match (&keys.path, &keys.file) {
         (Some(data), None) => (Drawing::path(data, keys.filled).map_err(|error| refused(&error, PATH, None))?, PATH),
         (None, Some(file)) => {
-            let bytes = files::bytes(file)?;
+            let bytes = files::bytes(file, files::KEY)?;
             (Drawing::svg(&bytes, keys.filled).map_err(|error| refused(&error, files::KEY, Some(file)))?, files::KEY)
         }
         (given, _) => {
@@ -88,7 +88,7 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
 /// A picture.
 pub(super) fn image(keys: &ImageKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
     let size = size(keys.height_m, keys.width_m, keys.spacing_m, delta_m)?;
-    let bytes = files::bytes(&keys.file)?;
+    let bytes = files::bytes(&keys.file, files::KEY)?;
     let drawing = Drawing::png(&bytes, keys.ink).map_err(|error| refused(&error, files::KEY, Some(&keys.file)))?;
     sized(&drawing, size, count, delta_m, files::KEY)
 }

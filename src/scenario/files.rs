@@ -1,4 +1,4 @@
-//! Files that a formation names.
+//! Files that a scenario names.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -6,16 +6,16 @@ use std::path::Path;
 
 use super::error::ScenarioError;
 
-/// The key that names a file.
+/// The key that names the file of a formation.
 pub(super) const KEY: &str = "formation.file";
 
 /// Largest file that is read \[bytes\].
 const MAX_BYTES: u64 = 128 << 20;
 
-/// All bytes of a file that is not too long.
-pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, ScenarioError> {
+/// All bytes of a file that is not too long, which a key names.
+pub(super) fn bytes(path: &Path, key: &'static str) -> Result<Vec<u8>, ScenarioError> {
     let shown = path.display();
-    let refused = |said: String, help: &str| ScenarioError::new(said).with_help(help).at(KEY);
+    let refused = |said: String, help: &str| ScenarioError::new(said).with_help(help).at(key);
     let unreadable = |error: std::io::Error| {
         let help = "give the path of a file that can be read; it counts from the folder of the scenario file, or from the \
                     working directory where there is none";
@@ -31,7 +31,7 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, ScenarioError> {
     if bytes.len() as u64 > MAX_BYTES {
         return Err(refused(
             format!("{shown} has more than {} MiB", MAX_BYTES >> 20),
-            "no formation is that long: is it the right file?",
+            "nothing that a scenario names is that long: is it the right file?",
         ));
     }
     Ok(bytes)

@@ -28,9 +28,10 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
     let placement = Placement::of(0, (first.scale, first.yaw_deg, first.move_m))?;
     let leg = placement.place(Leg::first(formation(&first.shape, count, delta_m)?));
     scenario.legs.push(leg);
-    let is_assigned =
-        first.assignment == Assignment::Optimal || later.iter().any(|leg| leg.assignment == Assignment::Optimal);
-    let freedom = if is_assigned { freedom(scenario)? } else { None };
+    let mut assignments = std::iter::once(first.assignment).chain(later.iter().map(|leg| leg.assignment));
+    let freedom = if assignments.any(|by| by != Assignment::Given) { freedom(scenario)? } else { None };
+    let is_interchangeable = interchangeable(scenario, 0, first.assignment)?;
+    scenario.legs[0].interchangeable = is_interchangeable;
     let starts_m = scenario.start.positions_m.clone();
     assign(&mut scenario.legs[0], first.assignment, &starts_m, freedom);
     for (number, table) in later.iter().enumerate() {
@@ -42,7 +43,8 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
             .map_or_else(|| Ok(before.clone()), |shape| formation(shape, count, delta_m))
             .map_err(|error| error.on_leg(number + 1))?;
         let begins = table.start_s.map_or(Begins::Reached, Begins::At);
-        let mut leg = placement.place(Leg { formation, begins });
+        let interchangeable = interchangeable(scenario, number + 1, table.assignment)?;
+        let mut leg = placement.place(Leg { formation, begins, interchangeable });
         assign(&mut leg, table.assignment, &before.slots_m, freedom);
         scenario.legs.push(leg);
     }
@@ -64,6 +66,28 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
             .at("swarm.count"));
     }
     Ok(Some(freedom))
+}
+
+/// Whether a leg's vehicles may be given other slots where they are stalled. Nobody tells whether they are under a law that
+/// is not given spread slots then either, or where breathing is off.
+fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> Result<bool, ScenarioError> {
+    if assignment == Assignment::Given {
+        return Ok(false);
+    }
+    let Ok(law) = scenario.law() else { return Ok(false) };
+    let why = match (law.settling_rate_per_s(), scenario.breathing.is_on()) {
+        (Some(_), true) => return Ok(true),
+        (None, _) => format!("under the law `{}` nobody is assigned anew where the swarm is stalled", law.name()),
+        (Some(_), false) => "with breathing off nobody is assigned anew where the swarm is stalled".to_owned(),
+    };
+    if assignment != Assignment::WhenStalled {
+        return Ok(false);
+    }
+    Err(ScenarioError::new(why)
+        .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and breathing.mode to \"auto\"")
+        .at_leg(leg, "formation.assignment")
+        .at("law.kind")
+        .at("breathing.mode"))
 }
 
 /// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least.

@@ -9,6 +9,8 @@
 mod build;
 #[cfg(feature = "files")]
 pub mod builtin;
+#[cfg(feature = "shapes")]
+mod columns;
 #[cfg(feature = "files")]
 mod deserializer;
 #[cfg(feature = "files")]

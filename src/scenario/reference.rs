@@ -1,5 +1,8 @@
 //! `[reference]` of the scenario file: its keys, and the motion that they mean.
 
+#[cfg(feature = "shapes")]
+use std::path::{Path, PathBuf};
+
 use nalgebra::Vector3;
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -87,6 +90,13 @@ pub(super) enum ReferenceKind {
         /// When it is at each of them in s.
         times_s: Vec<f64>,
     },
+    /// The same through the points of a file.
+    #[cfg(feature = "shapes")]
+    File {
+        /// A text file with a line for each point: t in s, x, y and, unless it is 0, z in m, with commas, semicolons, tabs or
+        /// blanks between; relative to the folder of the scenario file. A first line may name the columns.
+        file: PathBuf,
+    },
 }
 
 fn origin() -> Point {
@@ -103,6 +113,15 @@ impl ReferenceTable {
         })
     }
 
+    /// Puts the points of its file, named relative to a folder, in the place of the file.
+    #[cfg(feature = "shapes")]
+    pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+        if let ReferenceKind::File { file } = &self.kind {
+            self.kind = ReferenceKind::of_file(&folder.join(file))?;
+        }
+        Ok(())
+    }
+
     /// Whether it stays in the plane z = 0.
     pub(super) fn is_flat(&self) -> bool {
         let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
@@ -111,6 +130,8 @@ impl ReferenceTable {
             ReferenceKind::Velocity { position_m, velocity_m_s } => flat(&[*position_m, *velocity_m_s]),
             ReferenceKind::Circle { centre_m, .. } => flat(&[*centre_m]),
             ReferenceKind::WayPoints { points_m, .. } | ReferenceKind::Spline { points_m, .. } => flat(points_m),
+            #[cfg(feature = "shapes")]
+            ReferenceKind::File { .. } => true,
         }
     }
 
@@ -147,6 +168,12 @@ impl ReferenceTable {
 }
 
 impl ReferenceKind {
+    #[cfg(feature = "shapes")]
+    fn of_file(file: &Path) -> Result<Self, ScenarioError> {
+        let (times_s, points_m) = super::points::places(file)?;
+        Ok(Self::Spline { points_m, times_s })
+    }
+
     fn motion(&self, duration_s: f64) -> Result<ReferenceMotion, ScenarioError> {
         Ok(match self {
             &Self::Rest { position_m } => {
@@ -198,6 +225,8 @@ impl ReferenceKind {
                     .ok_or_else(|| ScenarioError::new("no curve goes through the points").at("reference.points_m"))?;
                 ReferenceMotion::Table(spline)
             }
+            #[cfg(feature = "shapes")]
+            Self::File { file } => Self::of_file(file)?.motion(duration_s)?,
         })
     }
 }

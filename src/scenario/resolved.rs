@@ -48,7 +48,7 @@ impl Scenario {
                 Begins::At(start_s) => Some(start_s),
                 Begins::Reached => None,
             },
-            assignment: Assignment::Given,
+            assignment: assignment(leg),
             scale: 1.0,
             yaw_deg: 0.0,
             move_m: None,
@@ -90,7 +90,7 @@ impl From<&Scenario> for Document {
                 shape: None,
             },
             formation: FormationTable {
-                assignment: Assignment::Given,
+                assignment: scenario.legs.first().map_or(Assignment::Given, assignment),
                 scale: 1.0,
                 yaw_deg: 0.0,
                 move_m: None,
@@ -115,6 +115,11 @@ impl From<&Scenario> for Document {
             breathing: scenario.breathing,
         }
     }
+}
+
+/// Slots are in the order in which vehicles were assigned to them.
+fn assignment(leg: &Leg) -> Assignment {
+    if leg.interchangeable { Assignment::WhenStalled } else { Assignment::Given }
 }
 
 /// One number if all are the same, otherwise the list.

@@ -90,6 +90,10 @@ fn bound(schema: &mut Value, bound: &str) {
         Value::Object(object) if object.get("type").is_some_and(|of| of == "number") => {
             object.insert(bound.to_owned(), 0.into());
         }
+        // The least whole number that is more than 0 is 1.
+        Value::Object(object) if object.get("type").is_some_and(|of| of == "integer") => {
+            object.insert("minimum".to_owned(), u8::from(bound != "minimum").into());
+        }
         Value::Object(object) => object.values_mut().for_each(|value| self::bound(value, bound)),
         Value::Array(list) => list.iter_mut().for_each(|value| self::bound(value, bound)),
         _ => {}
@@ -130,6 +134,20 @@ fn chosen(keys: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_more_than_0_is_bounded_by_0_and_what_is_counted_by_1() {
+        let schema = schema();
+        let mut law = schema["$defs"]["LawTable"]["oneOf"].as_array().into_iter().flatten();
+        let orca = law.find(|law| law["properties"]["kind"]["const"] == "orca").expect("orca");
+        let key = |name: &str| {
+            let keys =
+                orca["$ref"].as_str().map_or(orca, |path| &schema["$defs"][path.rsplit('/').next().expect("a name")]);
+            keys["properties"][name].clone()
+        };
+        assert_eq!((&key("neighbours_max")["minimum"], &key("speed_m_s")["exclusiveMinimum"]), (&json!(1), &json!(0)));
+        assert_eq!((&key("margin_m")["minimum"], &key("margin_m")["exclusiveMinimum"]), (&json!(0), &Value::Null));
+    }
 
     #[test]
     fn a_key_is_found_in_its_table_and_in_each_choice_that_has_it() {

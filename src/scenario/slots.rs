@@ -29,7 +29,7 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
         #[cfg(feature = "shapes")]
         FormationShape::Image(keys) => super::drawn::image(keys, count, delta_m)?,
         #[cfg(feature = "shapes")]
-        FormationShape::File(keys) => Formation::points(rows(&super::points::read(&keys.file)?)),
+        FormationShape::File(keys) => Formation::points(rows(&super::points::slots(&keys.file)?)),
     })
 }
 
@@ -41,7 +41,7 @@ pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -
         FormationShape::Svg(keys) => keys.file = keys.file.take().map(|file| folder.join(file)),
         FormationShape::Image(keys) => keys.file = folder.join(&keys.file),
         FormationShape::File(keys) => {
-            *shape = FormationShape::Points { points_m: super::points::read(&folder.join(&keys.file))? };
+            *shape = FormationShape::Points { points_m: super::points::slots(&folder.join(&keys.file))? };
         }
         _ => {}
     }

@@ -116,10 +116,13 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
     Ok(scenario)
 }
 
-/// Finds the files that shapes of the scenario name, from a folder.
+/// Finds the files that shapes of the scenario and its reference name, from a folder.
 #[cfg(feature = "shapes")]
 fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioError> {
     super::slots::found_from(folder, &mut document.formation.shape)?;
+    if let Some(reference) = &mut document.reference {
+        reference.found_from(folder)?;
+    }
     for (number, leg) in document.leg.iter_mut().enumerate() {
         if let Some(shape) = &mut leg.shape {
             super::slots::found_from(folder, shape).map_err(|error| error.on_leg(number + 1))?;

@@ -19,7 +19,7 @@ use super::schema::tables_with;
 use super::suggest::suggest;
 
 /// Keys that give a missing key its value, in order: an error at one of these keys stands where its value comes from.
-const ORIGINS: [(&str, &[&str]); 5] = [
+const ORIGINS: [(&str, &[&str]); 7] = [
     (
         "start.positions_m",
         &["start.spacing_m", "start.radius_m", "start.min_separation_m", "start.half_extent_m", "start.shape"],
@@ -38,6 +38,8 @@ const ORIGINS: [(&str, &[&str]); 5] = [
         ],
     ),
     ("graph.edges", &["graph.kind"]),
+    ("reference.points_m", &["reference.file"]),
+    ("reference.times_s", &["reference.file"]),
     ("swarm.hull_radius_m", &["law.delta_m"]),
     ("swarm.count", &["start.positions_m", "formation.points_m", "formation.shape"]),
 ];

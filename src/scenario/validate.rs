@@ -8,10 +8,10 @@ use super::limits::{
 };
 use super::spec::{Scenario, Space};
 use super::time::TimeSpec;
-use crate::graph::Graph;
-use crate::law::{Controls, Gain, LawSpec};
+use crate::graph::{Graph, Pinning};
+use crate::law::{Controls, Gain, LawSpec, ParameterError};
 use crate::swarm::{Pair, row};
-use crate::target::{Begins, Leg};
+use crate::target::{Begins, BreathingMode, Guidance, Leg};
 
 /// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
 const LEADER_ROUNDING: f64 = 1e-9;
@@ -57,6 +57,15 @@ impl Scenario {
 
     fn check_breathing(&self) -> Result<(), ScenarioError> {
         let scale = positive("breathing.scale", "the scale of a breath", self.breathing.scale)?;
+        if self.breathing.mode == BreathingMode::Start
+            && let Ok(law) = self.law()
+            && law.settling_rate_per_s().is_none()
+        {
+            return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
+                .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
+                .at("breathing.mode")
+                .at("law.kind"));
+        }
         if scale >= 1.0 {
             return Ok(());
         }
@@ -124,14 +133,7 @@ impl Scenario {
     /// A reference that its law follows and that begins where its leader is.
     fn check_reference(&self) -> Result<(), ScenarioError> {
         let Some(guidance) = &self.reference else { return Ok(()) };
-        if let Ok(law) = self.law()
-            && law.controls() != Controls::Places
-        {
-            return Err(ScenarioError::new(format!("the law `{}` follows no reference", law.name()))
-                .with_help("set law.kind to \"displacement\", or leave out [reference]")
-                .at("reference.kind")
-                .at("law.kind"));
-        }
+        self.check_followed(guidance)?;
         let start = guidance.motion.at(0.0);
         let shortest_s = STEPS_A_TURN * self.time.dt_s;
         if guidance.motion.shortest_s() < shortest_s {
@@ -170,6 +172,32 @@ impl Scenario {
         .with_help("leave out its start velocity: it then starts as the reference does")
         .at_entry("start.velocities_m_s", leader)
         .at("reference.leader"))
+    }
+
+    /// A reference that the law follows, known by whom it must be.
+    fn check_followed(&self, guidance: &Guidance) -> Result<(), ScenarioError> {
+        let refuse = |said: String, help: &str, key: &'static str| {
+            Err(ScenarioError::new(said).with_help(help).at(key).at("law.kind"))
+        };
+        match self.law() {
+            Ok(law) if law.controls() != Controls::Places => {
+                let follows = |spec: &LawSpec| {
+                    let guidance = Guidance { known_by: Pinning::All, ..guidance.clone() };
+                    let other = Self { law: spec.clone(), reference: Some(guidance), ..self.clone() };
+                    Some(other.law().ok().filter(|law| law.controls() == Controls::Places)?.name().to_owned())
+                };
+                let laws: Vec<_> = LawSpec::all().iter().filter_map(follows).collect();
+                let help = format!("set law.kind to one that does ({}), or leave out [reference]", laws.join(", "));
+                refuse(format!("the law `{}` follows no reference", law.name()), &help, "reference.kind")
+            }
+            Err(error @ ParameterError::ReferenceNotHeard) => {
+                let key = if guidance.known_by.leader().is_some() { "reference.leader" } else { "reference.known_by" };
+                let help = "leave it out: then all know the reference; or set law.kind to \"displacement\"";
+                refuse(error.to_string(), help, key)
+            }
+            // What is wrong with a law is told of its keys.
+            _ => Ok(()),
+        }
     }
 
     fn check_lengths(&self) -> Result<(), ScenarioError> {

@@ -9,7 +9,7 @@ use crate::observation::Observation;
 use crate::scenario::Scenario;
 use crate::space::{KeptPairs, Obstacle};
 use crate::swarm::{Rows, Swarm};
-use crate::target::{CurrentTarget, Guidance, Supervisor};
+use crate::target::{Change, CurrentTarget, Guidance, Supervisor};
 
 /// Everything between the true state and the vehicles' actuators, with all of its memory.
 #[derive(Clone)]
@@ -76,14 +76,18 @@ impl Controller {
         Ok(())
     }
 
-    /// What the law promises anew from this true state on, where the supervisor has begun a breath, and its scale.
-    pub(super) fn breath(&mut self, time_s: f64, truth: &Swarm) -> Option<(f64, Certificate)> {
-        let scale = self.supervisor.take_breath()?;
+    /// What the supervisor has changed within a leg, and what the law promises anew from this true state on.
+    pub(super) fn change(&mut self, time_s: f64, truth: &Swarm) -> Option<(Change, Certificate)> {
+        let change = self.supervisor.take_change()?;
         let target = self.target.view();
         let exact = Observation::exact(truth, &self.links, target.formation);
-        let ahead = self.supervisor.ahead(&target);
+        let mut ahead = self.supervisor.ahead(&target);
+        if matches!(change, Change::Assigned { .. }) {
+            // The slots of the leg, which are still to come where they are spread, are there.
+            ahead.insert(0, target.formation);
+        }
         let start = Observation { time_s, target, obstacles: &self.obstacles, ..exact };
-        Some((scale, self.law.certificate_through(&start, &ahead)))
+        Some((change, self.law.certificate_through(&start, &ahead)))
     }
 
     /// All random numbers begin anew.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError};
 use crate::law::{Certificate, LawError, ParameterError};
-use crate::record::{Breath, EnergyRise, RecordError};
+use crate::record::{Breath, EnergyRise, Reassignment, RecordError};
 use crate::swarm::{Bounce, Pair, Swarm};
 
 /// A path may bend away from the straight line that is swept by this much \[m\]; two vehicles by twice as much. A step
@@ -37,6 +37,8 @@ pub struct Flight {
     pub energy_rise: Option<EnergyRise>,
     /// Every time that slots were spread, in the order of time.
     pub breaths: Vec<Breath>,
+    /// Every time that vehicles were given other slots, in the order of time.
+    pub assignments: Vec<Reassignment>,
     /// State at the end.
     pub last: Swarm,
     /// Wall-clock time by kind of work.

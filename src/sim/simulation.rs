@@ -285,6 +285,7 @@ impl Simulation {
             bounces,
             energy_rise: self.watch.worst(),
             breaths: self.watch.breaths,
+            assignments: self.watch.assignments,
             last: self.state,
             performance: self.performance,
         }

@@ -2,9 +2,10 @@
 
 use super::controller::Controller;
 use crate::law::Certificate;
-use crate::record::{Breath, EnergyRise, Event};
+use crate::record::{Breath, EnergyRise, Event, Reassignment};
 use crate::scenario::Scenario;
 use crate::swarm::Swarm;
+use crate::target::Change;
 
 /// What the energy did since the target changed, the worst that it ever did, and the changes themselves.
 #[derive(Clone, Debug, Default)]
@@ -14,6 +15,7 @@ pub(super) struct Watch {
     worst: Option<EnergyRise>,
     leg: usize,
     pub(super) breaths: Vec<Breath>,
+    pub(super) assignments: Vec<Reassignment>,
 }
 
 impl Watch {
@@ -29,11 +31,20 @@ impl Watch {
         let leg = controller.target.view().leg;
         events.extend((self.leg + 1..=leg).map(|leg| Event::LegBegan { leg, time_s }));
         self.leg = leg;
-        if let Some((scale, promise)) = controller.breath(time_s, state) {
-            certificate.renew(&scenario.as_far_as_told(promise), leg);
-            self.breaths.push(Breath { time_s, scale, certified_m: certificate.certified_m });
-            events.push(Event::Breath { time_s, scale });
-        }
+        let Some((change, promise)) = controller.change(time_s, state) else { return };
+        certificate.renew(&scenario.as_far_as_told(promise), leg);
+        let certified_m = certificate.certified_m;
+        events.push(match change {
+            Change::Spread { scale } => {
+                self.breaths.push(Breath { time_s, scale, certified_m });
+                Event::Breath { time_s, scale }
+            }
+            Change::Assigned { slots } => {
+                let vehicles = slots.iter().enumerate().filter(|&(i, &slot)| i != slot).count();
+                self.assignments.push(Reassignment { time_s, vehicles, certified_m });
+                Event::Assigned { time_s, slots }
+            }
+        });
     }
 
     /// Takes the energy of the next instant, under the target of this revision.

@@ -1,12 +1,15 @@
-//! Breathing: slots that are spread for a while, so that vehicles that stand in each other's way get past.
+//! Breathing: slots that are spread for a while, so that vehicles that stand in each other's way get past; and before that,
+//! where vehicles are interchangeable, other slots for them.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Arrival, CurrentTarget, Leg, Target, spread_slots};
+#[cfg(feature = "files")]
+use crate::formation::optimal_slots;
 use crate::formation::{Formation, Freedom};
-use crate::swarm::{Swarm, mean_row, row};
+use crate::swarm::{Rows, Swarm, mean_row, row};
 
-/// When slots are spread.
+/// When slots are spread, or interchangeable vehicles get others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -37,6 +40,29 @@ impl Default for Breathing {
     fn default() -> Self {
         Self { mode: BreathingMode::Auto, scale: 2.0, most: 8 }
     }
+}
+
+impl Breathing {
+    /// Whether slots are spread at all.
+    #[must_use]
+    pub fn is_on(&self) -> bool {
+        self.mode != BreathingMode::Off && self.most > 0
+    }
+}
+
+/// What a [supervisor](super::Supervisor) changed within a leg.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// A breath began: slots are spread.
+    Spread {
+        /// They are scaled by this about their centre, or about a leader's slot.
+        scale: f64,
+    },
+    /// Vehicles go to other slots.
+    Assigned {
+        /// Vehicle i goes to the slot that was vehicle `slots[i]`'s.
+        slots: Vec<usize>,
+    },
 }
 
 /// The root mean square speed below this part of the error times the law's rate is no progress.
@@ -71,6 +97,9 @@ enum Phase {
 /// mean square, than 0.2 of the law's rate times their root mean square error. Slots are then scaled about their centre, or
 /// about a leader's slot, held until every vehicle is within a quarter of the smallest slot distance of its own or no progress
 /// is made for 10 s, and come together with an e-folding time of 2 s.
+///
+/// Where vehicles are interchangeable, they are first given the slots with the shortest ways from where they are; slots are
+/// spread where they have them already, or have been given others `most` times on the leg.
 #[derive(Clone, Debug)]
 pub(super) struct Breather {
     breathing: Breathing,
@@ -81,7 +110,9 @@ pub(super) struct Breather {
     leader: Option<usize>,
     phase: Phase,
     breaths: u32,
-    begun: Option<f64>,
+    assignments: u32,
+    /// Until it is taken.
+    change: Option<Change>,
 }
 
 /// Errors and speeds relative to what the formation may be moved by.
@@ -120,13 +151,13 @@ impl Breather {
     ) -> Self {
         let phase = Phase::Flying { idle_since_s: None };
         let tolerance_m = WORTH * arrival.edge_error_m;
-        Self { breathing, rate_per_s, tolerance_m, freedom, leader, phase, breaths: 0, begun: None }
+        Self { breathing, rate_per_s, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
     }
 
     /// A leg has begun with its slots as they are given.
     pub(super) fn begin_leg(&mut self) {
         self.phase = Phase::Flying { idle_since_s: None };
-        self.breaths = 0;
+        (self.breaths, self.assignments) = (0, 0);
     }
 
     /// Whether slots are those of the leg.
@@ -134,16 +165,41 @@ impl Breather {
         matches!(self.phase, Phase::Flying { .. })
     }
 
-    /// The scale of a breath that has begun since this was asked.
-    pub(super) fn take_begun(&mut self) -> Option<f64> {
-        self.begun.take()
+    /// What has been changed since this was taken.
+    pub(super) fn take_change(&mut self) -> Option<Change> {
+        self.change.take()
     }
 
     fn is_idle(&self, errors: &Errors) -> bool {
         errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.rate_per_s * errors.rms_m
     }
 
-    /// Looks at the swarm on its way to the slots of `leg` and may spread them.
+    /// Spreads the slots of a leg, once more.
+    fn breathe(&mut self, leg: &Leg, target: &mut CurrentTarget) {
+        if self.breaths >= self.breathing.most {
+            return;
+        }
+        let scale = self.breathing.scale + f64::from(self.breaths);
+        self.breaths += 1;
+        self.change = Some(Change::Spread { scale });
+        self.phase = Phase::Spread { scale, idle_since_s: None };
+        target.spread_formation(&leg.formation, scale, self.leader);
+    }
+
+    /// Gives interchangeable vehicles slots with shorter ways. Whether there are any.
+    fn assign(&mut self, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) -> bool {
+        if !leg.interchangeable || self.assignments >= self.breathing.most {
+            return false;
+        }
+        let Some(slots) = shorter_ways(&sensed.positions_m, &leg.formation, self.leader) else { return false };
+        self.assignments += 1;
+        target.set_formation(&leg.formation.reordered(&slots));
+        self.change = Some(Change::Assigned { slots });
+        self.phase = Phase::Flying { idle_since_s: None };
+        true
+    }
+
+    /// Looks at the swarm on its way to the slots of `leg` and may spread them, or give vehicles others.
     pub(super) fn supervise(&mut self, time_s: f64, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) {
         let errors = Errors::of(sensed, &target.view(), self.freedom);
         match self.phase {
@@ -152,12 +208,8 @@ impl Breather {
                 let since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
                 self.phase = Phase::Flying { idle_since_s: since_s };
                 let stalled = since_s.is_some_and(|since_s| time_s - since_s >= STALLED_S);
-                if (first || stalled) && self.breaths < self.breathing.most {
-                    let scale = self.breathing.scale + f64::from(self.breaths);
-                    self.breaths += 1;
-                    self.begun = Some(scale);
-                    self.phase = Phase::Spread { scale, idle_since_s: None };
-                    target.spread_formation(&leg.formation, scale, self.leader);
+                if first || (stalled && !self.assign(sensed, leg, target)) {
+                    self.breathe(leg, target);
                 }
             }
             Phase::Spread { scale, idle_since_s } => {
@@ -181,6 +233,35 @@ impl Breather {
             }
         }
     }
+}
+
+/// The sum of squared ways must become less by more than this part of it.
+#[cfg(feature = "files")]
+const SHORTER: f64 = 1e-9;
+
+/// Whose slot each vehicle gets so that the sum of squared ways is least, where that is less than it is; a leader keeps its
+/// own. Wherever the formation is moved to, the same ones are best.
+#[cfg(feature = "files")]
+fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
+    let free: Vec<usize> = (0..positions_m.nrows()).filter(|&i| Some(i) != leader).collect();
+    let of_free = |rows: &Rows| Formation::points(rows.clone()).reordered(&free);
+    let (from, slots) = (of_free(positions_m), of_free(&formation.slots_m));
+    let found = optimal_slots(&from.slots_m, &slots, Freedom::Fixed)?;
+    let centre_m = mean_row(&from.slots_m) - mean_row(&slots.slots_m);
+    let square = |i: usize, slot: usize| (row(&from.slots_m, i) - row(&slots.slots_m, slot) - centre_m).norm_squared();
+    let before: f64 = (0..free.len()).map(|i| square(i, i)).sum();
+    let now: f64 = found.iter().enumerate().map(|(i, &slot)| square(i, slot)).sum();
+    (now < before * (1.0 - SHORTER)).then(|| {
+        let mut given: Vec<usize> = (0..positions_m.nrows()).collect();
+        found.iter().enumerate().for_each(|(i, &slot)| given[free[i]] = free[slot]);
+        given
+    })
+}
+
+/// Assignments are made by a crate of the feature `files`.
+#[cfg(not(feature = "files"))]
+fn shorter_ways(_positions_m: &Rows, _formation: &Formation, _leader: Option<usize>) -> Option<Vec<usize>> {
+    None
 }
 
 impl Leg {
@@ -236,9 +317,9 @@ mod tests {
             let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
             swarm.positions_m[(1, 1)] += if breather.is_closed() { 0.5 } else { 0.0 };
             breather.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
-            begun.extend(breather.take_begun());
+            begun.extend(breather.take_change());
         }
-        assert_eq!(begun, [2.0, 3.0]);
+        assert_eq!(begun, [2.0, 3.0].map(|scale| Change::Spread { scale }));
         assert_eq!(target.view().spread, 1.0);
     }
 
@@ -249,6 +330,45 @@ mod tests {
         assert!(spreads(off, |_| 0.5, 20).iter().all(|&spread| spread == 1.0));
         let start = Breathing { mode: BreathingMode::Start, ..Breathing::default() };
         assert_eq!(spreads(start, |_| 0.0, 1), [2.0]);
+    }
+
+    /// What is changed while vehicles stand so far from their first slots along x.
+    #[cfg(feature = "files")]
+    fn changes(leg: &Leg, leader: Option<usize>, at_m: [f64; 3]) -> Vec<Change> {
+        let mut target = CurrentTarget::first_of(std::slice::from_ref(leg)).expect("a leg");
+        let mut leg = leg.clone();
+        let mut breather = Breather::new(Breathing::default(), 1.0, leader, ARRIVAL, Freedom::Fixed);
+        let mut swarm = Swarm::at_rest(leg.formation.slots_m.clone());
+        (0..3).for_each(|i| swarm.positions_m[(i, 0)] = at_m[i]);
+        let mut found = Vec::new();
+        for k in 0..20 {
+            breather.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
+            if let Some(change) = breather.take_change() {
+                if let Change::Assigned { slots } = &change {
+                    super::super::assign_anew(std::slice::from_mut(&mut leg), 0, slots);
+                    assert_eq!(target.view().formation, &leg.formation);
+                }
+                found.push(change);
+            }
+        }
+        found
+    }
+
+    #[cfg(feature = "files")]
+    #[test]
+    fn interchangeable_vehicles_get_the_nearest_slots_and_breathe_only_where_they_have_them() {
+        let given = Leg::first(Formation::line(3, 2.0));
+        let leg = Leg { interchangeable: true, ..given.clone() };
+        let assigned = |slots: [usize; 3]| Change::Assigned { slots: slots.to_vec() };
+        let spread = [Change::Spread { scale: 2.0 }];
+        // In the slots of others, and at rest there: then nobody is anywhere else.
+        assert_eq!(changes(&leg, None, [4.0, 0.0, 2.0]), [assigned([2, 0, 1])]);
+        assert_eq!(changes(&leg, None, [4.5, 0.5, 2.5]), [assigned([2, 0, 1]), spread[0].clone()]);
+        assert_eq!(changes(&leg, None, [0.5, 2.5, 4.5]), spread, "nothing is shorter");
+        assert_eq!(changes(&given, None, [4.0, 0.0, 2.0]), spread, "each has its own");
+        // A leader keeps its slot, and the others share what is left.
+        assert_eq!(changes(&leg, Some(0), [0.0, 4.0, 2.0]), [assigned([0, 2, 1])]);
+        assert_eq!(changes(&leg, Some(1), [2.0, 2.0, 2.0]), spread);
     }
 
     #[test]

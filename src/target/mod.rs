@@ -6,11 +6,13 @@
 
 mod arrival;
 mod breathing;
+mod course;
 mod reference;
 mod supervisor;
 
 pub use arrival::{Arrival, Distance};
-pub use breathing::{Breathing, BreathingMode};
+pub use breathing::{Breathing, BreathingMode, Change};
+pub use course::{Course, assign_anew};
 pub use reference::{Guidance, Reference, ReferenceMotion, Spline};
 pub use supervisor::{Schedule, Supervisor};
 
@@ -26,6 +28,8 @@ pub struct Leg {
     pub formation: Formation,
     /// What ends the leg before and begins this one. The first leg begins with the flight, whatever stands here.
     pub begins: Begins,
+    /// Whether any vehicle may go to any slot: a swarm that is stalled is then assigned anew before its slots are spread.
+    pub interchangeable: bool,
 }
 
 /// What begins a leg.
@@ -41,7 +45,7 @@ impl Leg {
     /// The first leg of a flight.
     #[must_use]
     pub fn first(formation: Formation) -> Self {
-        Self { formation, begins: Begins::At(0.0) }
+        Self { formation, begins: Begins::At(0.0), interchangeable: false }
     }
 
     /// The same leg with its slots scaled by `scale` and turned by `yaw_rad` (counterclockwise seen from above) about
@@ -57,23 +61,6 @@ impl Leg {
             set_row(slots_m, i, centre_m + from_centre_m + offset_m);
         }
         self
-    }
-}
-
-/// When the legs of a flight began, as it tells.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LegTimes(Vec<(f64, usize)>);
-
-impl LegTimes {
-    /// A leg, from 0, began at a time \[s\] that is not before that of another.
-    pub fn begin(&mut self, leg: usize, time_s: f64) {
-        self.0.push((time_s, leg));
-    }
-
-    /// The leg that is under way at a time \[s\]; the first before another began.
-    #[must_use]
-    pub fn leg_at(&self, time_s: f64) -> usize {
-        self.0[..self.0.partition_point(|&(from_s, _)| from_s <= time_s)].last().map_or(0, |&(_, leg)| leg)
     }
 }
 
@@ -180,15 +167,6 @@ mod tests {
         for (i, slot) in expected.into_iter().enumerate() {
             assert!((row(slots, i) - slot).norm() < 1e-14, "{slots}");
         }
-    }
-
-    #[test]
-    fn a_leg_is_under_way_from_its_beginning_to_that_of_the_next() {
-        let mut times = LegTimes::default();
-        times.begin(1, 2.0);
-        times.begin(2, 2.0);
-        times.begin(3, 5.0);
-        assert_eq!([0.0, 1.9, 2.0, 4.9, 5.0, 9.0].map(|time_s| times.leg_at(time_s)), [0, 0, 2, 2, 3, 3]);
     }
 
     #[test]

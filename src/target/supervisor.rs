@@ -2,8 +2,8 @@
 
 use dyn_clone::DynClone;
 
-use super::breathing::{Breather, Breathing, BreathingMode};
-use super::{Arrival, Begins, CurrentTarget, Distance, Leg, Target};
+use super::breathing::{Breather, Breathing, Change};
+use super::{Arrival, Begins, CurrentTarget, Distance, Leg, Target, assign_anew};
 use crate::formation::{Formation, Freedom};
 use crate::graph::Graph;
 use crate::swarm::Swarm;
@@ -26,8 +26,9 @@ pub trait Supervisor: DynClone + Send {
         self.is_idle()
     }
 
-    /// The scale of a breath that it began when it was asked last: what a law promised is renewed then. Told once.
-    fn take_breath(&mut self) -> Option<f64> {
+    /// What it changed within a leg when it was asked last, where that breaks a promise: what the law promised is renewed
+    /// then. Told once.
+    fn take_change(&mut self) -> Option<Change> {
         None
     }
 
@@ -42,8 +43,8 @@ pub trait Supervisor: DynClone + Send {
 
 dyn_clone::clone_trait_object!(Supervisor);
 
-/// Goes from leg to leg by time, or when the leg before has been reached and held; and may spread the slots of a leg where
-/// the swarm is stalled ([`Breathing`]).
+/// Goes from leg to leg by time, or when the leg before has been reached and held; and may assign interchangeable vehicles
+/// anew, or spread the slots of a leg, where the swarm is stalled ([`Breathing`]).
 #[derive(Clone, Debug)]
 pub struct Schedule {
     legs: Vec<Leg>,
@@ -53,14 +54,23 @@ pub struct Schedule {
     /// Since when the present leg has been within the limits \[s\].
     within_since_s: Option<f64>,
     breather: Option<Breather>,
+    /// Until it is taken.
+    change: Option<Change>,
 }
 
 impl Schedule {
     /// The legs of a flight on this graph; the first is under way.
     #[must_use]
     pub fn new(legs: &[Leg], links: &Graph, arrival: Arrival) -> Self {
-        let freedom = Freedom::RigidMotion;
-        Self { legs: legs.to_vec(), links: links.clone(), arrival, freedom, within_since_s: None, breather: None }
+        Self {
+            legs: legs.to_vec(),
+            links: links.clone(),
+            arrival,
+            freedom: Freedom::RigidMotion,
+            within_since_s: None,
+            breather: None,
+            change: None,
+        }
     }
 
     /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
@@ -75,8 +85,8 @@ impl Schedule {
     /// To be said after [`Schedule::free_by`].
     #[must_use]
     pub fn breathing(mut self, breathing: Breathing, rate_per_s: f64, leader: Option<usize>) -> Self {
-        let breathes = breathing.mode != BreathingMode::Off && breathing.most > 0;
-        self.breather = breathes.then(|| Breather::new(breathing, rate_per_s, leader, self.arrival, self.freedom));
+        self.breather =
+            breathing.is_on().then(|| Breather::new(breathing, rate_per_s, leader, self.arrival, self.freedom));
         self
     }
 
@@ -113,6 +123,12 @@ impl Supervisor for Schedule {
         }
         if let (Some(breather), Some(leg)) = (&mut self.breather, self.legs.get(target.view().leg)) {
             breather.supervise(time_s, sensed, leg, target);
+            if let Some(change) = breather.take_change() {
+                if let Change::Assigned { slots } = &change {
+                    assign_anew(&mut self.legs, target.view().leg, slots);
+                }
+                self.change = Some(change);
+            }
         }
     }
 
@@ -124,8 +140,8 @@ impl Supervisor for Schedule {
         self.is_idle() || self.legs == legs
     }
 
-    fn take_breath(&mut self) -> Option<f64> {
-        self.breather.as_mut()?.take_begun()
+    fn take_change(&mut self) -> Option<Change> {
+        self.change.take()
     }
 
     fn ahead(&self, target: &Target<'_>) -> Vec<&Formation> {
@@ -139,7 +155,7 @@ mod tests {
     use super::*;
 
     fn legs(begins: [Begins; 2]) -> Vec<Leg> {
-        let leg = |spacing_m, begins| Leg { formation: Formation::line(2, spacing_m), begins };
+        let leg = |spacing_m, begins| Leg { begins, ..Leg::first(Formation::line(2, spacing_m)) };
         vec![Leg::first(Formation::line(2, 1.0)), leg(2.0, begins[0]), leg(3.0, begins[1])]
     }
 

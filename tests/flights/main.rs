@@ -11,6 +11,7 @@ mod missions;
 mod obstacles;
 mod plant_claims;
 mod random_scenarios;
+mod reach;
 mod reference_flights;
 mod rivals;
 mod scenario_files;

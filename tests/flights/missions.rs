@@ -11,6 +11,7 @@ use tautline::law::{DisplacementKeys, LawSpec, Void};
 use tautline::record::Event;
 use tautline::run::run;
 use tautline::scenario::{PlantSpec, Precision, Scenario};
+use tautline::sim::Simulation;
 use tautline::swarm::{Rows, Swarm, row, separation, set_row};
 use tautline::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
 
@@ -45,7 +46,7 @@ fn mission(seed: u64) -> Scenario {
             _ => Formation::circle(count, radius_m),
         };
         let moved_m = Vector3::new(numbers.between(-1.0, 1.0), numbers.between(-1.0, 1.0), 0.0) * extent_m;
-        let leg = Leg { formation, begins: Begins::At(2.0 * f64::from(number)) };
+        let leg = Leg { begins: Begins::At(2.0 * f64::from(number)), ..Leg::first(formation) };
         legs.push(leg.placed(numbers.between(1.0, 1.5), numbers.between(-3.0, 3.0), moved_m));
     }
     let mut scenario = Scenario::new("mission", Swarm::at_rest(start), legs[0].formation.clone(), delta_m, 6.0);
@@ -299,6 +300,49 @@ fn legs_are_promised_anew_where_slots_are_spread() {
     assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
     assert!(report.legs[1].certified_m <= report.separation.certified_m, "{:?}", report.legs);
     assert!(report.separation.min_m > report.separation.certified_m);
+}
+
+/// Interchangeable vehicles that are stuck get each other's slots, keep them on the leg that follows, and need no breath.
+#[test]
+fn interchangeable_vehicles_that_are_stuck_go_to_other_slots_and_need_no_breath() {
+    let anew = "assignment = \"when-stalled\"";
+    let text = CROWD.replace("MODE", "auto").replace("spacing_m = 1.4", &format!("spacing_m = 1.4, {anew}"))
+        + &format!("[[leg]]\nscale = 1.2\n{anew}\n");
+    let scenario = read(&text);
+    let report = run(&scenario, &mut ()).expect("a report");
+    assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
+    let [assignment] = report.assignments[..] else { panic!("{:?} {:?}", report.assignments, report.breaths) };
+    assert!(report.breaths.is_empty() && assignment.vehicles > 1, "{}", report.headline());
+    assert!(report.headline().contains("2 of 2 legs reached; 1 new assignment"), "{}", report.headline());
+    assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
+    assert_eq!(
+        (report.legs[1].certified_m, report.separation.certified_m),
+        (assignment.certified_m, assignment.certified_m)
+    );
+    assert!(report.separation.min_m > report.separation.certified_m);
+    let promised_m = tautline::preflight::Preflight::of(&scenario).expect("a law").certified_m;
+    assert!(assignment.certified_m <= promised_m, "{assignment:?} {promised_m:?}");
+
+    // The scenario as it was flown is the same scenario.
+    assert_eq!(read(&scenario.resolved_toml()), scenario);
+
+    // A simulation that is saved before goes on to the same bits.
+    let mut simulation = Simulation::new(&scenario).expect("a flight");
+    while simulation.time_s() < assignment.time_s - 0.5 {
+        simulation.step();
+    }
+    let saved = simulation.save();
+    let mut go_on = |simulation: &mut Simulation| {
+        while simulation.time_s() < assignment.time_s + 3.0 {
+            simulation.step();
+        }
+        let changed: Vec<_> = simulation.events().filter(|event| matches!(event, Event::Assigned { .. })).collect();
+        (changed, simulation.state().clone())
+    };
+    let first = go_on(&mut simulation);
+    assert_eq!(first.0.len(), 1);
+    simulation.load(&saved, None);
+    assert_eq!(go_on(&mut simulation), first);
 }
 
 /// What a reference must be, each with a word of what is said otherwise.

@@ -60,8 +60,11 @@ fn among(seed: u64) -> Scenario {
         rows
     };
     let start = Swarm::at_rest(places(1.1));
-    let legs =
-        [0.0, 4.0].map(|from_s| Leg { formation: Formation { slots_m: places(1.3) }, begins: Begins::At(from_s) });
+    let legs = [0.0, 4.0].map(|from_s| Leg {
+        formation: Formation { slots_m: places(1.3) },
+        begins: Begins::At(from_s),
+        interchangeable: false,
+    });
     let mut scenario = Scenario::new("among", start, legs[0].formation.clone(), delta_m, 8.0);
     scenario.graph = match 3.0 * numbers.unit() {
         ..1.0 => Graph::complete(count),

@@ -5,12 +5,13 @@ use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::{CbfQpKeys, FlockingKeys, LawSpec, OrcaKeys, OrcaLaw, PotentialKeys, Setting, Void};
 use tautline::observation::Observation;
+use tautline::run::run;
 use tautline::scenario::{PlantSpec, Precision, Scenario};
 use tautline::sim::{Ending, Flight};
 use tautline::space::NearPairs;
-use tautline::swarm::{Rows, Swarm, row, separation};
+use tautline::swarm::{Rows, Swarm, mean_row, row, separation};
 
-use crate::flight::fly;
+use crate::flight::{fly, read};
 
 /// RVO2's Circle demo: radius 1.5 m, at most 10 neighbours within 15 m, horizon 10 s, highest speed 2 m/s, preferred 1 m/s and
 /// less within 1 m of the goal, a step of 0.25 s, vehicles that are too near part within a step.
@@ -243,4 +244,50 @@ fn no_rival_leaves_the_plane_or_exceeds_its_limit() {
         let peak = log.samples.iter().filter_map(|sample| sample.peaks.control_m_s2).fold(0.0, f64::max);
         assert!(peak > 0.3 && peak <= 5.0 + 1e-9, "{law:?}: {peak}");
     }
+}
+
+/// Four behind a reference that runs around a circle.
+fn carried(law: &str, fed: bool) -> Scenario {
+    read(&format!(
+        "swarm = {{ count = 4, a22_per_s = 0.05 }}\n\
+         start = {{ shape = \"line\", spacing_m = 3.0 }}\n\
+         formation = {{ shape = \"circle\", radius_m = 3.0 }}\n\
+         law = {{ kind = \"{law}\", delta_m = 1.0 }}\n\
+         reference = {{ kind = \"circle\", radius_m = 4.0, period_s = 40.0, feed_forward = {fed} }}\n\
+         time = {{ duration_s = 60.0 }}\n\
+         [[leg]]\nstart_s = 30.0\nshape = \"grid\"\nspacing_m = 3.0\n"
+    ))
+}
+
+/// Those that go to slots reach them where the reference has carried them, leg after leg. Without its acceleration they come
+/// late by r''/k, which is more than counts as reached.
+#[test]
+fn laws_that_go_to_slots_reach_them_behind_a_reference_and_late_where_its_acceleration_is_not_told() {
+    for law in ["orca", "cbf-qp"] {
+        let report = run(&carried(law, true), &mut ()).expect("a report");
+        assert!(report.verdict.pass, "{law}: {:?}", report.verdict.reasons);
+        assert!(report.legs.iter().all(|leg| leg.reached_at_s.is_some()), "{law}: {:?}", report.legs);
+        let late = run(&carried(law, false), &mut ()).expect("a report");
+        assert!(late.audit.status == Status::Clear && !late.formation.reached, "{law}: {}", late.headline());
+    }
+}
+
+/// A flock has no slots: its pulls towards the reference are in balance, and where its acceleration is not told, as in its
+/// source, they make up for that.
+#[test]
+fn a_flock_follows_a_reference() {
+    let pull = |fed: bool| {
+        let scenario = carried("flocking", fed);
+        let (flight, _) = fly(&scenario);
+        let there = scenario.reference_at(flight.duration_s);
+        let middle_m = mean_row(&scenario.legs[1].formation.slots_m) + there.position_m;
+        let off_m = |i: usize| row(&flight.last.positions_m, i) - middle_m;
+        let pulls = (0..4).map(|i| off_m(i) / (1.0 + off_m(i).norm_squared()).sqrt());
+        let apart_m_s = (flight.last.mean_velocity_m_s() - there.velocity_m_s).norm();
+        (0.25 * pulls.sum::<nalgebra::Vector3<f64>>().norm(), apart_m_s)
+    };
+    let (balanced, apart_m_s) = pull(true);
+    assert!(balanced < 0.01 && apart_m_s < 0.01, "{balanced} {apart_m_s}");
+    let (late, apart_m_s) = pull(false);
+    assert!(late > 0.1 && apart_m_s > 0.01, "{late} {apart_m_s}");
 }

@@ -151,7 +151,7 @@ fn commands_from_outside_are_flown_in_the_place_of_the_laws() {
 /// The pentagon, and then a larger one.
 fn two_legs(begins: Begins) -> Scenario {
     let mut scenario = builtin("pentagon", &["time.duration_s=120", "swarm.a22_per_s=-0.1"]);
-    scenario.legs.push(Leg { formation: Formation::pentagon(4.0), begins });
+    scenario.legs.push(Leg { begins, ..Leg::first(Formation::pentagon(4.0)) });
     scenario
 }
 
@@ -284,7 +284,7 @@ fn a_certificate_for_one_leg_is_none_for_two_and_every_law_follows_its_target() 
         let slots = Formation::pentagon(4.0);
         let mut scenario = Scenario::new("nearer", Swarm::at_rest(slots.slots_m.clone()), slots, 1.0, 60.0);
         scenario.law = law;
-        scenario.legs.push(Leg { formation: Formation::pentagon(2.5), begins: Begins::At(2.0) });
+        scenario.legs.push(Leg { begins: Begins::At(2.0), ..Leg::first(Formation::pentagon(2.5)) });
         scenario.validate().expect("two legs");
         let (flight, _) = fly(&scenario);
         assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![Void::TargetChanges]));

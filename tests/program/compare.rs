@@ -140,7 +140,7 @@ fn files(folder: &Path, variable: &str, more: &[&str]) -> [String; 4] {
     let names = ["c.json", "c.csv", "c.tex", "c.html"];
     let mut command = Command::new(TAUTLINE);
     command.arg("compare").args(CROSSING).args(["--laws=potential,edge-tension,laplacian", "--runs=3", "--quiet"]);
-    command.args(["--json", names[0], "--csv", names[1], "--latex", names[2], "--html", names[3]]);
+    command.args(["--json", names[0], "--csv", names[1], "--latex", names[2], "--html", names[3], "--force"]);
     command.args(["--adapter", "an adapter that is nowhere"]).args(more);
     command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).env("RAYON_NUM_THREADS", variable);
     let done = command.output().expect("the program");
@@ -320,6 +320,8 @@ fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
     ] {
         file(at, &format!("{name}.toml"), &format!("{PAIR}{table}\n"));
     }
+    fs::create_dir(at.join("folder.csv")).expect("a folder");
+    file(at, "earlier.html", "an earlier comparison");
     let before = fs::read_dir(at).expect("a folder").count();
     let cases: &[(&[&str], &str, &str)] = &[
         (&["pair.toml", "--laws", "laplacain"], "there is no law named `laplacain`", "did you mean `laplacian`?"),
@@ -339,6 +341,8 @@ fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
         (&["nowhere"], "neither a built-in scenario nor a file", ""),
         (&["pair.toml", "--csv", "a.txt", "--json", "./a.txt"], "would overwrite", "another file"),
         (&["pair.toml", "--csv", "pair.toml"], "would overwrite the scenario", "another file"),
+        (&["pair.toml", "--json", "new.json", "--csv", "folder.csv"], "folder.csv is a directory", "a file within it"),
+        (&["pair.toml", "--html", "earlier.html"], "earlier.html exists", "--force"),
         (&["pair.toml", "--csv", "-", "--json", "-"], "both to go to standard output", "into a file"),
     ];
     for (arguments, said, remedy) in cases {
@@ -353,6 +357,11 @@ fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
     assert_eq!((nowhere.exit, nowhere.out.as_str()), (Some(3), ""), "{}", nowhere.err);
     assert!(nowhere.err.contains("cannot write") && nowhere.err.contains("--json"), "{}", nowhere.err);
     assert_eq!(fs::read_dir(at).expect("a folder").count(), before, "nothing is written");
+    let earlier = || fs::read_to_string(at.join("earlier.html")).expect("a file");
+    assert_eq!(earlier(), "an earlier comparison");
+    let again = ["compare", "pair.toml", "--laws", "laplacian", "--runs", "1", "--csv", "earlier.html", "--force"];
+    assert_eq!(ran(at, &again).exit, Some(0));
+    assert!(earlier().starts_with("law,"), "{}", earlier());
 }
 
 #[test]

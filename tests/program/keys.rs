@@ -86,7 +86,17 @@ fn every_key_of_the_report_is_on_its_page() {
             .concat();
     let into_a_pillar = "reference={kind=\"velocity\",velocity_m_s=[3,2.0,0],leader=1}";
     let among = [&["run", "obstacles", "--set", into_a_pillar], &quick[..]].concat();
-    assert_documented("report.json", &[&hit, &passed_through, &mission, &among]);
+    // Two who are in each other's way, head-on.
+    let swap = [
+        "--set",
+        "start={positions_m=[[0, 0], [4, 0]]}",
+        "--set",
+        "formation={shape=\"points\", points_m=[[4, 0], [0, 0]], assignment=\"when-stalled\"}",
+        "--set",
+        "time.duration_s=12",
+    ];
+    let assigned = [&["run", "pentagon", "--set", "law.kind=displacement"], &quick[..], &swap].concat();
+    assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned]);
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod interruption;
 mod keys;
 mod obstacles;
 mod reads;
+mod references;
 mod refuses;
 mod runs;
 mod scenarios;

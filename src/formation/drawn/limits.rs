@@ -3,7 +3,7 @@
 /// Most slots of a drawing.
 pub const MAX_DRAWN_SLOTS: usize = 100_000;
 
-/// Most pixels of a picture: 4096 x 4096.
+/// Most pixels of a picture in all, whatever its sides: 4096 x 4096.
 pub const MAX_PIXELS: u64 = 1 << 24;
 
 /// Longest text \[characters\].

@@ -200,6 +200,9 @@ impl SummaryMessage {
     }
 }
 
+/// What stands before the slots that vehicles 1, 2, ... are given: the numbers of those who had them.
+const ASSIGNED: &str = "vehicles 1, 2, ... go to the slots of ";
+
 /// The fields of `event.msg`, in order.
 #[derive(Serialize, Deserialize)]
 pub(super) struct EventMessage<S> {
@@ -247,6 +250,10 @@ impl From<&Event> for EventMessage<&'static str> {
             Event::Breath { scale, .. } => {
                 ("breath", NO_PAIR, *scale, format!("slots were scaled by {scale} to let vehicles past each other"))
             }
+            Event::Assigned { slots, .. } => {
+                let slots: Vec<_> = slots.iter().map(|slot| (slot + 1).to_string()).collect();
+                ("assigned", NO_PAIR, f64::NAN, format!("{ASSIGNED}{}", slots.join(" ")))
+            }
             Event::EngineContact { pair, .. } => (
                 "engine-contact",
                 pair.numbers(),
@@ -288,6 +295,7 @@ impl EventMessage<String> {
             "other-law" => Event::OtherLaw { time_s, name: self.text },
             "leg-began" => Event::LegBegan { leg: self.leg()?, time_s },
             "breath" => Event::Breath { time_s, scale: self.value },
+            "assigned" => Event::Assigned { time_s, slots: self.slots()? },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },
             unknown => return Err(Own::Events.fault(format!("unknown kind {unknown:?}"))),
@@ -299,6 +307,20 @@ impl EventMessage<String> {
             self.pair.map(|number| number.checked_sub(1).and_then(|index| usize::try_from(index).ok()));
         let both = vehicle.zip(obstacle).map(|(vehicle, obstacle)| [vehicle, obstacle]);
         both.ok_or_else(|| Own::Events.fault("there is no vehicle or obstacle 0".to_owned()))
+    }
+
+    /// Those of the text, from 0: an order of so many vehicles.
+    fn slots(&self) -> Result<Vec<usize>, ReadFault> {
+        let listed = self.text.strip_prefix(ASSIGNED).unwrap_or_default().split_whitespace();
+        let slots = listed.map(|number| number.parse::<usize>().ok()?.checked_sub(1)).collect::<Option<Vec<_>>>();
+        let is_order = |slots: &Vec<usize>| {
+            let mut sorted = slots.clone();
+            sorted.sort_unstable();
+            !slots.is_empty() && sorted.into_iter().eq(0..slots.len())
+        };
+        slots
+            .filter(is_order)
+            .ok_or_else(|| Own::Events.fault("the slots that vehicles are given are no order of them".to_owned()))
     }
 
     fn leg(&self) -> Result<usize, ReadFault> {
@@ -319,5 +341,28 @@ fn pair_of(topic: Own, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
     match numbers.map(index) {
         [Some(first), Some(second)] if first != second => Ok(Pair::new(first, second)),
         _ => Err(topic.fault(format!("{} and {} are not a pair of vehicles", numbers[0], numbers[1]))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(event: &Event) -> EventMessage<String> {
+        let EventMessage { kind, time_s, pair, value, text } = EventMessage::from(event);
+        EventMessage { kind: kind.to_owned(), time_s, pair, value, text }
+    }
+
+    #[test]
+    fn slots_that_vehicles_are_given_are_read_back_and_what_is_no_order_of_them_is_damage() {
+        let event = Event::Assigned { time_s: 2.5, slots: vec![2, 0, 1] };
+        let kept = message(&event);
+        assert_eq!(kept.text, "vehicles 1, 2, ... go to the slots of 3 1 2");
+        assert_eq!(kept.into_event().expect("an event"), event);
+        for wrong in ["", "3 1", "1 1 2", "0 1 2", "1 2 4", "1 2 x"] {
+            let text = format!("{ASSIGNED}{wrong}");
+            assert!(EventMessage { text, ..message(&event) }.into_event().is_err(), "{wrong}");
+        }
+        assert!(EventMessage { text: "1 2 3".to_owned(), ..message(&event) }.into_event().is_err());
     }
 }

@@ -1,5 +1,7 @@
 //! What a flight is after: its formations, where they are to be, and how hard an edge of its graph pulls.
 
+use std::sync::LazyLock;
+
 use nalgebra::Vector3;
 
 use crate::formation::{Formation, Freedom, best_rigid_motion};
@@ -9,13 +11,12 @@ use crate::record::Event;
 use crate::scenario::Scenario;
 use crate::space::Obstacle;
 use crate::swarm::{Pair, Rows, mean_row, row};
-use crate::target::{Guidance, Leg, LegTimes};
+use crate::target::{Course, Guidance};
 
 /// Formations, graph and how hard an edge pulls.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    legs: Vec<Leg>,
-    leg_times: LegTimes,
+    course: Course,
     guidance: Option<Guidance>,
     freedom: Freedom,
     /// Who senses whom.
@@ -30,8 +31,7 @@ impl Plan {
     /// Formations, graph and law of a scenario.
     pub(in crate::render) fn of(scenario: &Scenario) -> Self {
         Self {
-            legs: scenario.legs.clone(),
-            leg_times: LegTimes::default(),
+            course: Course::new(&scenario.legs),
             guidance: scenario.reference.clone(),
             freedom: scenario.law().map_or(Freedom::RigidMotion, |law| law.controls().freedom()),
             graph: scenario.graph.clone(),
@@ -43,21 +43,24 @@ impl Plan {
 
     /// Takes note of what happened.
     pub(in crate::render) fn note(&mut self, event: &Event) {
-        if let &Event::LegBegan { leg, time_s } = event {
-            self.leg_times.begin(leg, time_s);
+        match event {
+            &Event::LegBegan { leg, time_s } => self.course.begin(leg, time_s),
+            Event::Assigned { slots, time_s } => self.course.assign(slots, *time_s),
+            _ => {}
         }
     }
 
     /// The leg that is under way at a time \[s\], from 0, and how many there are.
     #[must_use]
     pub fn leg_at(&self, time_s: f64) -> (usize, usize) {
-        (self.leg_times.leg_at(time_s).min(self.legs.len().saturating_sub(1)), self.legs.len())
+        (self.course.leg_at(time_s), self.course.count())
     }
 
     /// The slots that are to be reached at a time \[s\].
     #[must_use]
     pub fn formation_at(&self, time_s: f64) -> &Formation {
-        &self.legs[self.leg_at(time_s).0].formation
+        static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
+        self.course.formation_at(time_s).unwrap_or(&NOWHERE)
     }
 
     /// Where the reference is at a time \[s\], where there is one \[m\].

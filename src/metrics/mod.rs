@@ -3,18 +3,21 @@
 //! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Peaks are over the
 //! steps between samples too where a sample tells them, see [`crate::record::Peaks`].
 
+use std::borrow::Cow;
+
 use nalgebra::Vector3;
 
 use crate::formation::Freedom;
 use crate::graph::Graph;
 use crate::record::{Event, Peaks, RecordError, Sample, Sink};
 use crate::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
-use crate::target::{Arrival, Begins, Distance, Guidance, Leg, Reference};
+use crate::target::{Arrival, Begins, Distance, Guidance, Leg, Reference, assign_anew};
 
 /// Folds samples, in the order of time, into a [`Summary`].
 #[derive(Clone, Debug)]
 pub struct Metrics<'a> {
-    legs: &'a [Leg],
+    /// As vehicles are assigned to them now.
+    legs: Cow<'a, [Leg]>,
     graph: &'a Graph,
     guidance: Option<&'a Guidance>,
     arrival: Arrival,
@@ -98,7 +101,7 @@ impl<'a> Metrics<'a> {
     #[must_use]
     pub fn new(legs: &'a [Leg], graph: &'a Graph, arrival: Arrival) -> Self {
         Self {
-            legs,
+            legs: Cow::Borrowed(legs),
             graph,
             guidance: None,
             arrival,
@@ -153,7 +156,7 @@ impl<'a> Metrics<'a> {
 
     /// Ends the present leg. One that ended because it was reached has been, whatever the samples show.
     fn begin_leg(&mut self, leg: usize, time_s: f64) {
-        let held_since_s = self.good_since_s.filter(|&since_s| self.arrival.is_held(since_s, self.last_s));
+        let held_since_s = self.good_since_s.filter(|&since_s| self.arrival.is_held(since_s, time_s));
         let by_event = self.legs.get(leg).is_some_and(|next| next.begins == Begins::Reached);
         let told_s = by_event.then(|| self.good_since_s.unwrap_or(time_s - self.arrival.hold_s));
         self.ended.push(LegSummary { ended_at_s: time_s, reached_at_s: held_since_s.or(told_s) });
@@ -254,8 +257,10 @@ impl Sink for Metrics<'_> {
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        if let &Event::LegBegan { leg, time_s } = event {
-            self.begin_leg(leg, time_s);
+        match event {
+            &Event::LegBegan { leg, time_s } => self.begin_leg(leg, time_s),
+            Event::Assigned { slots, .. } => _ = assign_anew(self.legs.to_mut(), self.leg, slots),
+            _ => {}
         }
         Ok(())
     }
@@ -267,161 +272,4 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::formation::Formation;
-
-    /// Sums of a few numbers of order 1 are right to some 1e-15.
-    const ROUNDING: f64 = 1e-12;
-    const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
-
-    fn pair_of_vehicles() -> (Vec<Leg>, Graph) {
-        (vec![Leg::first(Formation::line(2, 3.0))], Graph::complete(2))
-    }
-
-    /// Two vehicles `error_m` too far apart, parting at `relative_m_s`, sampled every 0.25 s.
-    fn summary(course: &[(f64, f64)], judge: Arrival) -> Summary {
-        let (legs, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&legs, &graph, judge);
-        let control = Rows::zeros(2);
-        for (k, (error_m, relative_m_s)) in course.iter().enumerate() {
-            let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0 + error_m, 0.0, 0.0]));
-            swarm.velocities_m_s[(1, 0)] = *relative_m_s;
-            let time_s = 0.25 * k as f64;
-            metrics.observe(&Sample {
-                time_s,
-                step: k as u64,
-                swarm: &swarm,
-                control: &control,
-                separation: None,
-                energy: None,
-                peaks: crate::record::Peaks::default(),
-                channels: &[],
-            });
-        }
-        metrics.finish()
-    }
-
-    const GOOD: (f64, f64) = (0.005, 0.0);
-    const FAR: (f64, f64) = (0.5, 0.0);
-    /// Half of the relative speed is the disagreement: 0.03 m/s.
-    const FAST: (f64, f64) = (0.005, 0.06);
-
-    #[test]
-    fn reached_is_the_first_instant_from_which_both_tolerances_hold_to_the_end() {
-        let s = summary(&[FAR, FAST, GOOD, GOOD, GOOD, GOOD, GOOD], JUDGE);
-        assert_eq!((s.reached_at_s, s.held_s, s.end_s), (Some(0.5), Some(1.0), 1.5));
-    }
-
-    #[test]
-    fn a_formation_held_shorter_than_asked_is_not_reached() {
-        let s = summary(&[FAR, FAR, FAR, GOOD, GOOD, GOOD, GOOD], JUDGE);
-        assert_eq!((s.reached_at_s, s.held_s), (None, Some(0.75)));
-        let patient = Arrival { hold_s: 0.75, ..JUDGE };
-        assert_eq!(summary(&[FAR, FAR, FAR, GOOD, GOOD, GOOD, GOOD], patient).reached_at_s, Some(0.75));
-    }
-
-    #[test]
-    fn a_formation_that_is_lost_again_is_not_reached_however_long_it_was_held() {
-        for lost in [FAR, FAST] {
-            let mut course = vec![GOOD; 100];
-            course.push(lost);
-            let s = summary(&course, JUDGE);
-            assert_eq!((s.reached_at_s, s.held_s), (None, None));
-            course.extend([GOOD; 5]);
-            assert_eq!(summary(&course, JUDGE).reached_at_s, Some(25.25), "regained counts from then on");
-        }
-    }
-
-    #[test]
-    fn rounding_of_times_does_not_cost_the_hold() {
-        let (legs, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&legs, &graph, JUDGE);
-        let swarm = Swarm::at_rest(legs[0].formation.slots_m.clone());
-        for time_s in [9.0_f64.next_up(), 10.0] {
-            let control = Rows::zeros(2);
-            metrics.observe(&Sample {
-                time_s,
-                step: 0,
-                swarm: &swarm,
-                control: &control,
-                separation: None,
-                energy: None,
-                peaks: crate::record::Peaks::default(),
-                channels: &[],
-            });
-        }
-        assert_eq!(metrics.finish().reached_at_s, Some(9.0_f64.next_up()));
-    }
-
-    #[test]
-    fn a_state_that_is_not_a_number_is_never_within_tolerance() {
-        let s = summary(&[GOOD, GOOD, GOOD, GOOD, GOOD, (f64::NAN, 0.0)], JUDGE);
-        assert_eq!(s.reached_at_s, None);
-        assert!(s.max_edge_error_m.is_nan());
-        let s = summary(&[GOOD, GOOD, GOOD, GOOD, GOOD, (0.0, f64::NAN)], JUDGE);
-        assert_eq!(s.reached_at_s, None);
-    }
-
-    #[test]
-    fn no_samples_reach_nothing() {
-        let s = summary(&[], JUDGE);
-        assert_eq!((s.samples, s.reached_at_s, s.energy_initial), (0, None, None));
-        assert_eq!(summary(&[], Arrival { hold_s: 0.0, ..JUDGE }).reached_at_s, None);
-    }
-
-    #[test]
-    fn the_numbers_are_those_of_the_samples() {
-        let (legs, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&legs, &graph, JUDGE);
-        let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.5, 0.0, 0.0]));
-        swarm.velocities_m_s = Rows::from_row_slice(&[3.0, 4.0, 0.0, 3.0, 4.2, 0.0]);
-        for (k, (energy, u)) in [(2.0, 0.5), (3.0, 2.0), (1.0, 1.0)].into_iter().enumerate() {
-            let control = Rows::from_row_slice(&[0.6 * u, 0.8 * u, 0.0, 0.0, 0.0, -0.1]);
-            metrics.observe(&Sample {
-                time_s: k as f64,
-                step: k as u64,
-                swarm: &swarm,
-                control: &control,
-                separation: None,
-                energy: Some(energy),
-                peaks: crate::record::Peaks::default(),
-                channels: &[],
-            });
-        }
-        assert!((metrics.edge_error_m() - 0.5).abs() < ROUNDING);
-        let s = metrics.finish();
-        assert_eq!((s.samples, s.end_s), (3, 2.0));
-        for (found, expected) in [
-            (s.max_edge_error_m, 0.5),
-            // Each of the two is a quarter of a metre from its place in the best fit.
-            (s.rms_position_error_m, 0.25),
-            (s.disagreement_m_s, 0.1),
-            (s.common_m_s, 3.0_f64.hypot(4.1)),
-            (s.peak_control_m_s2, 2.0),
-            (s.final_control_m_s2, 1.0),
-        ] {
-            assert!((found - expected).abs() < ROUNDING, "{found} instead of {expected}");
-        }
-        assert_eq!((s.energy_initial, s.energy_final, s.energy_max), (Some(2.0), Some(1.0), Some(3.0)));
-        assert_eq!(s.energy_max_over_initial, Some(1.5));
-    }
-
-    #[test]
-    fn a_start_without_energy_has_no_ratio() {
-        let (legs, graph) = pair_of_vehicles();
-        let mut metrics = Metrics::new(&legs, &graph, JUDGE);
-        let (swarm, control) = (Swarm::at_rest(legs[0].formation.slots_m.clone()), Rows::zeros(2));
-        metrics.observe(&Sample {
-            time_s: 0.0,
-            step: 0,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: Some(0.0),
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
-        assert_eq!(metrics.finish().energy_max_over_initial, None);
-    }
-}
+mod tests;

@@ -1,0 +1,51 @@
+//! A reference under laws that know no links: every vehicle knows it, since nobody could hear of it.
+
+use nalgebra::Vector3;
+
+use super::error::ParameterError;
+use super::interface::Controls;
+use super::setting::Setting;
+use crate::graph::Pinning;
+use crate::target::Reference;
+
+/// What vehicles know of a reference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Carried {
+    /// Whether there is one.
+    is_guided: bool,
+    /// Whether they are told how it accelerates.
+    is_fed: bool,
+}
+
+impl Carried {
+    /// Of a scenario.
+    ///
+    /// # Errors
+    /// [`ParameterError::ReferenceNotHeard`] where some do not know the reference.
+    pub(super) fn new(setting: &Setting<'_>) -> Result<Self, ParameterError> {
+        let Some(guidance) = setting.guidance else { return Ok(Self { is_guided: false, is_fed: false }) };
+        match guidance.known_by {
+            Pinning::All => Ok(Self { is_guided: true, is_fed: guidance.feed_forward }),
+            Pinning::Nobody | Pinning::Listed(_) | Pinning::Leader(_) => Err(ParameterError::ReferenceNotHeard),
+        }
+    }
+
+    pub(super) fn controls(self) -> Controls {
+        if self.is_guided { Controls::Places } else { Controls::Displacements }
+    }
+
+    /// r'' as far as it is told \[m/s^2\].
+    pub(super) fn fed_m_s2(self, reference: &Reference) -> Vector3<f64> {
+        if self.is_fed { reference.acceleration_m_s2 } else { Vector3::zeros() }
+    }
+
+    /// What vehicles need beside states over links.
+    pub(super) fn needs(self) -> &'static [&'static str] {
+        const SEES: &str = "each sees who is near and how fast it moves";
+        if self.is_guided {
+            &["all share a compass, know where they are and know the reference", SEES]
+        } else {
+            &["all share a compass and know where they are", SEES]
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The legs of a flight as it was flown: when each began, and who went to which slot.
+
+use super::Leg;
+use crate::formation::Formation;
+
+/// Legs with the times at which they began and at which vehicles were assigned to their slots anew, as the flight tells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Course {
+    /// From when on \[s\] each leg, from 0, is under way, but for the first.
+    begun: Vec<(f64, usize)>,
+    /// From when on \[s\] vehicles go to these slots; the first from the start.
+    assigned: Vec<(f64, Vec<Leg>)>,
+}
+
+impl Course {
+    /// A flight through these legs.
+    #[must_use]
+    pub fn new(legs: &[Leg]) -> Self {
+        Self { begun: Vec::new(), assigned: vec![(f64::NEG_INFINITY, legs.to_vec())] }
+    }
+
+    /// A leg, from 0, began at a time \[s\] that is not before that of another.
+    pub fn begin(&mut self, leg: usize, time_s: f64) {
+        self.begun.push((time_s, leg));
+    }
+
+    /// From a time \[s\] on, not before that of another assignment, vehicle i goes to the slot that was vehicle `slots[i]`'s on
+    /// the leg under way and those that follow it ([`assign_anew`]). What is no order of the vehicles changes nothing.
+    pub fn assign(&mut self, slots: &[usize], time_s: f64) {
+        let leg = self.leg_at(time_s);
+        let Some((_, legs)) = self.assigned.last() else { return };
+        let mut legs = legs.clone();
+        if assign_anew(&mut legs, leg, slots) {
+            self.assigned.push((time_s, legs));
+        }
+    }
+
+    /// Number of legs.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.assigned.first().map_or(0, |(_, legs)| legs.len())
+    }
+
+    /// The leg that is under way at a time \[s\], from 0.
+    #[must_use]
+    pub fn leg_at(&self, time_s: f64) -> usize {
+        let begun = self.begun[..self.begun.partition_point(|&(from_s, _)| from_s <= time_s)].last();
+        begun.map_or(0, |&(_, leg)| leg).min(self.count().saturating_sub(1))
+    }
+
+    /// The slots of the leg that is under way at a time \[s\], as vehicles are assigned to them then; none where there is no
+    /// leg.
+    #[must_use]
+    pub fn formation_at(&self, time_s: f64) -> Option<&Formation> {
+        let assigned = self.assigned.partition_point(|&(from_s, _)| from_s <= time_s);
+        let (_, legs) = self.assigned.get(assigned.checked_sub(1)?)?;
+        legs.get(self.leg_at(time_s)).map(|leg| &leg.formation)
+    }
+}
+
+/// Gives vehicle i the slot that is vehicle `slots[i]`'s on a leg, from 0, and on those that follow it as long as vehicles are
+/// interchangeable there. Whether that is an order of the vehicles: nothing changes where it is not.
+pub fn assign_anew(legs: &mut [Leg], leg: usize, slots: &[usize]) -> bool {
+    let count = legs.get(leg).map_or(0, |leg| leg.formation.count());
+    let mut taken = vec![false; count];
+    let is_order = slots.len() == count
+        && slots.iter().all(|&slot| taken.get_mut(slot).is_some_and(|taken| !std::mem::replace(taken, true)));
+    if is_order {
+        let (under_way, later) = legs[leg..].split_at_mut(1);
+        let follow = later.iter_mut().take_while(|leg| leg.interchangeable && leg.formation.count() == count);
+        under_way.iter_mut().chain(follow).for_each(|leg| leg.formation = leg.formation.reordered(slots));
+    }
+    is_order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn legs(interchangeable: [bool; 3]) -> Vec<Leg> {
+        interchangeable.map(|interchangeable| Leg { interchangeable, ..Leg::first(Formation::line(3, 2.0)) }).to_vec()
+    }
+
+    /// x of the slots at a time.
+    fn slots(course: &Course, time_s: f64) -> Vec<f64> {
+        course.formation_at(time_s).expect("a leg").slots_m.column(0).iter().copied().collect()
+    }
+
+    #[test]
+    fn a_leg_is_under_way_from_its_beginning_to_that_of_the_next() {
+        let mut course = Course::new(&[legs([false; 3]), legs([false; 3])].concat());
+        course.begin(1, 2.0);
+        course.begin(2, 2.0);
+        course.begin(3, 5.0);
+        assert_eq!([0.0, 1.9, 2.0, 4.9, 5.0, 9.0].map(|time_s| course.leg_at(time_s)), [0, 0, 2, 2, 3, 3]);
+        course.begin(9, 10.0);
+        assert_eq!((course.leg_at(11.0), course.count()), (5, 6), "there is no tenth leg");
+        assert_eq!(Course::default().formation_at(0.0), None);
+    }
+
+    #[test]
+    fn who_is_assigned_anew_goes_to_another_slot_from_then_on_and_on_the_legs_that_follow_on_from_it() {
+        let mut course = Course::new(&legs([true, true, false]));
+        let given = slots(&course, 0.0);
+        course.assign(&[2, 0, 1], 3.0);
+        assert_eq!(slots(&course, 2.9), given);
+        let anew = [given[2], given[0], given[1]];
+        assert_eq!(slots(&course, 3.0), anew);
+        course.begin(1, 5.0);
+        assert_eq!(slots(&course, 5.0), anew, "interchangeable there too");
+        course.assign(&[1, 0, 2], 6.0);
+        assert_eq!(slots(&course, 6.0), [anew[1], anew[0], anew[2]]);
+        course.begin(2, 7.0);
+        assert_eq!(slots(&course, 7.0), given, "given slots are those of the file");
+    }
+
+    #[test]
+    fn what_is_no_order_of_the_vehicles_changes_nothing() {
+        for wrong in [&[0, 1][..], &[0, 1, 1], &[0, 1, 3], &[0, 1, 2, 0]] {
+            let mut course = Course::new(&legs([true; 3]));
+            course.assign(wrong, 1.0);
+            assert_eq!(course, Course::new(&legs([true; 3])), "{wrong:?}");
+        }
+        assert!(!assign_anew(&mut [], 0, &[0]));
+    }
+}
