@@ -83,12 +83,7 @@ impl Kernel {
         self.add_pulls_in(self.bands.clone().as_mut(), positions_m, &mut Rows::zeros(positions_m.nrows()))
     }
 
-    fn add_pulls_in(
-        &self,
-        bands: Option<&mut Bands>,
-        positions_m: &Rows,
-        sums: &mut Rows,
-    ) -> Result<f64, OutOfDomain> {
+    fn add_pulls_in(&self, bands: Option<&mut Bands>, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
         let (axes, sums) = (columns(positions_m), columns_mut(sums));
         let add =
             |rows: Range<usize>, sums: [&mut [f64]; 3]| self.arch.dispatch(AddPulls { kernel: self, rows, axes, sums });

@@ -45,7 +45,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
             }
             PlantTable { kind: PlantKind::Ideal, .. } => PlantSpec::Ideal,
         },
-        time: document.time,
+        time: document.time.complete(count, document.arrival.hold_s),
         arrival: document.arrival,
         breathing: document.breathing,
         name: document.name.unwrap_or_default(),

@@ -50,6 +50,8 @@ mod template;
 #[cfg(feature = "files")]
 mod text;
 mod time;
+#[cfg(feature = "files")]
+mod time_table;
 mod validate;
 #[cfg(feature = "files")]
 mod values;
