@@ -1,7 +1,8 @@
-//! Time of one evaluation of each law, its energy and its certificate, on one core.
+//! Time of one evaluation of each law, its energy and its certificate, on one core unless threads are named.
 //!
 //! Run with `cargo bench --bench law`. The throughput of a control is in directed pairs (twice the edges), so its
-//! inverse is the time a directed pair takes.
+//! inverse is the time a directed pair takes; that of the displacement law is in vehicles, and its time holds the look for near
+//! pairs as it is in a flight: `cargo bench --bench law -- displacement`.
 
 use std::hint::black_box;
 
@@ -9,8 +10,11 @@ use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use tautline::formation::Formation;
 use tautline::graph::Graph;
-use tautline::law::{EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law};
+use tautline::law::{
+    DisplacementKeys, DisplacementLaw, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, Setting,
+};
 use tautline::observation::Observation;
+use tautline::space::KeptPairs;
 use tautline::swarm::{Rows, Swarm};
 
 /// Vehicles on a sphere with about two metres to their neighbours, at rest lengths of about one.
@@ -40,7 +44,10 @@ fn laws(criterion: &mut Criterion) {
         for (graph_name, graph) in [("complete", Graph::complete(count)), ("ring", Graph::ring(count))] {
             let at = Observation::exact(&swarm, &graph, &formation);
             let mut law = edge_tension(&graph, &formation);
-            control(&mut group, &format!("edge-tension {graph_name}"), &at, &mut law);
+            pool(1).install(|| control(&mut group, &format!("edge-tension {graph_name}"), &at, &mut law));
+            if count == 1000 && graph.is_complete() {
+                pool(2).install(|| control(&mut group, "edge-tension complete, 2 threads", &at, &mut law));
+            }
             let mut law = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
             control(&mut group, &format!("laplacian {graph_name}"), &at, &mut law);
         }
@@ -53,5 +60,36 @@ fn laws(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, laws);
+fn pool(threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
+}
+
+/// A square grid of 2 m, moved a little by a third of a metre at most, on its way to one of 1.6 m.
+fn displacement(criterion: &mut Criterion) {
+    const DELTA_M: f64 = 1.0;
+    for count in [1000, 10_000, 100_000] {
+        let mut group = criterion.benchmark_group(format!("displacement/{count}"));
+        group.sample_size(10).throughput(Throughput::Elements(count as u64));
+        let (formation, grid) = (Formation::grid(count, 1.6), Formation::grid(count, 2.0).slots_m);
+        let moved = |i: usize, axis: usize| [0.2, 0.25, 0.0][axis] * ((3 * i + axis) as f64).sin();
+        let mut swarm = Swarm::at_rest(Rows::from_fn(count, |i, axis| grid[(i, axis)] + moved(i, axis)));
+        swarm.velocities_m_s = &swarm.positions_m * 0.01;
+        for (name, graph) in [("star", Graph::star(count)), ("complete", Graph::complete(count))] {
+            let setting = Setting::new(&graph, &formation, DELTA_M, 0.1);
+            let mut law = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
+            let range_m = law.sensing_range_m().expect("it senses");
+            let (mut near, mut control) = (KeptPairs::default(), Rows::zeros(count));
+            group.bench_function(name, |bencher| {
+                bencher.iter(|| {
+                    near.update(black_box(&swarm.positions_m), range_m);
+                    let exact = Observation::exact(black_box(&swarm), &graph, &formation);
+                    law.command(&Observation { near: near.pairs(), ..exact }, &mut control)
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, laws, displacement);
 criterion_main!(benches);

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
-use crate::record::{Sink, StateHash};
+use crate::record::{Sink, StateHash, beside};
 use crate::report::{Findings, Hulls, Performance, Report, Run, Verification};
 use crate::scenario::{PlantSpec, Scenario};
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
@@ -17,19 +17,23 @@ use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 ///
 /// # Errors
 /// [`SimError`]; what was recorded up to then stays recorded.
-pub fn run(scenario: &Scenario, sink: &mut impl Sink) -> Result<Report, SimError> {
+pub fn run(scenario: &Scenario, sink: &mut (impl Sink + Send)) -> Result<Report, SimError> {
     run_while(scenario, &Preflight::of(scenario)?, sink, &mut |_| ControlFlow::Continue(()))
 }
 
+/// From this many vehicles on samples are recorded in a thread of their own; below, handing them over costs more.
+const BESIDE_FROM: usize = 512;
+
 /// As [`run`], with what is known before the first step; `carry_on` is asked after each step with the number of steps
-/// flown and ends the flight with [`ControlFlow::Break`].
+/// flown and ends the flight with [`ControlFlow::Break`]. A large swarm's samples are recorded in a thread of their own where
+/// there are threads at hand, unless the sink [looks at steps](Sink::looks_at_steps).
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_while(
     scenario: &Scenario,
     preflight: &Preflight,
-    sink: &mut dyn Sink,
+    sink: &mut (dyn Sink + Send),
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, SimError> {
     let parts = Parts::of(scenario)?;
@@ -38,8 +42,13 @@ pub fn run_while(
         .free_by(freedom)
         .carried_by(scenario.reference.as_ref());
     let mut state_hash = StateHash::new();
+    let is_beside = scenario.count() >= BESIDE_FROM && rayon::current_num_threads() > 1 && !sink.looks_at_steps();
     let mut sinks = (sink, (&mut metrics, &mut state_hash));
-    let flight = sim::fly(scenario, parts, &mut sinks, carry_on)?;
+    let flight = if is_beside {
+        beside(&mut sinks, |sink| sim::fly(scenario, parts, sink, carry_on))?
+    } else {
+        sim::fly(scenario, parts, &mut sinks, carry_on)?
+    };
     Ok(report(scenario, preflight, &flight, &metrics, state_hash.finish()))
 }
 

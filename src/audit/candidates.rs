@@ -6,6 +6,8 @@
 //! within its budget of its reference position, a pair left out stays farther apart than R. The distance from a fixed point is
 //! convex along a straight line, so it is enough to look at the ends of each step.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use crate::swarm::{Rows, row, separation};
@@ -19,6 +21,13 @@ const RADIUS_OVER_BOUND: f64 = 1.25;
 const SPARE_OVER_RADIUS: f64 = 0.125;
 /// Relative widening of every reach, far above rounding (1e-16) and far below what costs anything.
 const ROUNDING: f64 = 1e-9;
+/// Width of a column over half of what a vehicle reaches on average: wider ones hold more that is not near, narrower ones are
+/// shared by more.
+const COLUMN_OVER_REACH: f64 = 6.0;
+/// Most strips that an axis is divided into: numbers of columns fit in 32 bits.
+const MOST_STRIPS: f64 = 30_000.0;
+/// Most columns that a vehicle reaches into on average; where it would be more, there is one column.
+const MOST_ENTRIES: usize = 4;
 
 /// The list of near pairs and what it is good for.
 #[derive(Clone, Debug)]
@@ -28,15 +37,21 @@ pub(super) struct Candidates {
     reference_m: Rows,
     budget_m: Vec<f64>,
     pairs: Vec<[u32; 2]>,
+    columns: Columns,
     reaches: Vec<Reach>,
 }
 
-/// Half of the condition for two vehicles to be listed, and its extent along the axis of the sort.
+/// Half of the condition for two vehicles to be listed, in one of the columns that it extends into.
 #[derive(Clone, Copy, Debug)]
 struct Reach {
+    column: u32,
+    /// Its ends along the column \[m\].
     low: f64,
     high: f64,
+    across_m: f64,
     half_m: f64,
+    /// The first of its columns along both axes across.
+    first: [u32; 2],
     vehicle: u32,
 }
 
@@ -67,7 +82,8 @@ impl Candidates {
     /// Of so many vehicles.
     pub(super) fn new(n: usize) -> Self {
         let reference_m = Rows::zeros(n);
-        Self { radius_m: None, reference_m, budget_m: Vec::new(), pairs: Vec::new(), reaches: Vec::new() }
+        let columns = Columns::default();
+        Self { radius_m: None, reference_m, budget_m: Vec::new(), pairs: Vec::new(), columns, reaches: Vec::new() }
     }
 
     /// The pairs to be swept for the straight motion between two instants, `None` for all: every pair that is not among
@@ -106,28 +122,40 @@ impl Candidates {
         self.radius_m = self.collect_pairs().then_some(radius_m);
     }
 
-    /// Sorts the vehicles by the lower end of their reach along the axis on which the swarm is longest.
+    /// Enters the vehicles in the columns that they reach into, in order of their lower ends along the columns.
     fn sort_reaches(&mut self, radius_m: f64) {
-        let extents = self.reference_m.column_iter().map(|column| column.max() - column.min());
-        let axis = Vector3::from_iterator(extents).imax();
-        let along = self.reference_m.column(axis);
+        let columns = Columns::of(&self.reference_m, self.budget_m.iter().map(|budget_m| half_m(radius_m, *budget_m)));
         self.reaches.clear();
-        self.reaches.extend(along.iter().zip(&self.budget_m).zip(0..).map(|((&x, &budget_m), vehicle)| {
-            let half_m = (radius_m / 2.0 + budget_m) * (1.0 + ROUNDING);
-            let rounding_m = 4.0 * f64::EPSILON * (x.abs() + half_m);
-            Reach { low: x - half_m - rounding_m, high: x + half_m + rounding_m, half_m, vehicle }
-        }));
-        self.reaches.sort_unstable_by(|a, b| a.low.total_cmp(&b.low));
+        for (i, &budget_m) in self.budget_m.iter().enumerate() {
+            let (half_m, position_m) = (half_m(radius_m, budget_m), row(&self.reference_m, i));
+            let (low, high) = ends(position_m[columns.axes[0]], half_m);
+            let (across_m, [across, deep]) = (position_m[columns.axes[1]], columns.span(position_m, half_m));
+            let first = [across.start, deep.start];
+            #[expect(clippy::cast_possible_truncation, reason = "the auditor has fewer than 2^32 vehicles")]
+            let vehicle = i as u32;
+            for deep in deep {
+                let column = |across: u32| columns.number([across, deep]);
+                let reach = |column| Reach { column, low, high, across_m, half_m, first, vehicle };
+                self.reaches.extend(across.clone().map(column).map(reach));
+            }
+        }
+        self.reaches.sort_unstable_by(|a, b| a.column.cmp(&b.column).then(a.low.total_cmp(&b.low)));
+        self.columns = columns;
     }
 
     /// Lists the pairs within reach of each other in the order of pairs; `false` if that is more than half of all.
     fn collect_pairs(&mut self) -> bool {
-        let limit = pair_count(self.reaches.len()) / 2;
+        let limit = pair_count(self.budget_m.len()) / 2;
         self.pairs.clear();
         for (k, a) in self.reaches.iter().enumerate() {
-            for b in self.reaches[k + 1..].iter().take_while(|b| b.low <= a.high) {
+            for b in self.reaches[k + 1..].iter().take_while(|b| b.column == a.column && b.low <= a.high) {
+                let reach_m = a.half_m + b.half_m;
+                // Two who share columns meet in the first of them.
+                if (a.across_m - b.across_m).abs() > reach_m || self.columns.shared(a.first, b.first) != a.column {
+                    continue;
+                }
                 let (i, j) = (a.vehicle.min(b.vehicle), a.vehicle.max(b.vehicle));
-                if separation(&self.reference_m, i as usize, j as usize) <= a.half_m + b.half_m {
+                if separation(&self.reference_m, i as usize, j as usize) <= reach_m {
                     self.pairs.push([i, j]);
                 }
             }
@@ -137,6 +165,70 @@ impl Candidates {
         }
         self.pairs.sort_unstable();
         true
+    }
+}
+
+fn half_m(radius_m: f64, budget_m: f64) -> f64 {
+    (radius_m / 2.0 + budget_m) * (1.0 + ROUNDING)
+}
+
+/// Where a reach begins and ends along an axis \[m\].
+fn ends(at_m: f64, half_m: f64) -> (f64, f64) {
+    let rounding_m = 4.0 * f64::EPSILON * (at_m.abs() + half_m);
+    (at_m - half_m - rounding_m, at_m + half_m + rounding_m)
+}
+
+/// The space of a swarm in columns along the axis on which it is longest.
+#[derive(Clone, Copy, Debug, Default)]
+struct Columns {
+    /// Along the columns, across them, and across both.
+    axes: [usize; 3],
+    /// Where the first column begins across, and how wide columns are \[m\].
+    low_m: [f64; 2],
+    width_m: f64,
+    counts: [u32; 2],
+}
+
+impl Columns {
+    /// Columns for vehicles that reach so far: wide enough that few reach into several, and only one where many do.
+    fn of(positions_m: &Rows, half_m: impl ExactSizeIterator<Item = f64> + Clone) -> Self {
+        let count = half_m.len();
+        let mut axes = [0, 1, 2];
+        let extent_m = [0, 1, 2].map(|axis: usize| {
+            let column = positions_m.column(axis);
+            column.max() - column.min()
+        });
+        axes.sort_by(|&a, &b| extent_m[b].total_cmp(&extent_m[a]));
+        let low_m = [axes[1], axes[2]].map(|axis| positions_m.column(axis).min());
+        let width_m = COLUMN_OVER_REACH * half_m.clone().sum::<f64>() / count.max(1) as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded by both")]
+        let strips = |axis: usize| (extent_m[axis] / width_m).clamp(1.0, MOST_STRIPS) as u32;
+        let columns = Self { axes, low_m, width_m, counts: [strips(axes[1]), strips(axes[2])] };
+        let entries = half_m.enumerate().map(|(i, half_m)| {
+            let [across, deep] = columns.span(row(positions_m, i), half_m);
+            across.len() * deep.len()
+        });
+        if entries.sum::<usize>() > MOST_ENTRIES * count { Self { counts: [1, 1], ..columns } } else { columns }
+    }
+
+    /// The columns that a reach touches, along both axes across. Which one a place is in grows with the place, rounded as it
+    /// may be, so two reaches that overlap share one.
+    fn span(&self, position_m: Vector3<f64>, half_m: f64) -> [Range<u32>; 2] {
+        [0, 1].map(|k| {
+            let (low_m, high_m) = ends(position_m[self.axes[k + 1]], half_m);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+            let strip = |at_m: f64| (((at_m - self.low_m[k]) / self.width_m) as u32).min(self.counts[k] - 1);
+            strip(low_m)..strip(high_m) + 1
+        })
+    }
+
+    fn number(&self, [across, deep]: [u32; 2]) -> u32 {
+        deep * self.counts[0] + across
+    }
+
+    /// The first column that two share whose first ones are these.
+    fn shared(&self, a: [u32; 2], b: [u32; 2]) -> u32 {
+        self.number([a[0].max(b[0]), a[1].max(b[1])])
     }
 }
 
@@ -188,6 +280,30 @@ mod tests {
         let pairs = listed(&mut Candidates::new(100), &start, &thrown, SPACING_M).unwrap();
         assert!((1..100).all(|j| pairs.contains(&[0, j])));
         assert_eq!(pairs.len(), 99 + 98);
+    }
+
+    #[test]
+    fn columns_find_whoever_one_sweep_finds_in_the_plane_in_space_and_around_one_that_flies_far() {
+        for (axes, thrown_m) in [(2, 0.0), (3, 0.0), (3, 40.0), (3, 1e6)] {
+            let place = |k: usize, axis: usize| {
+                let step = [0.754_877_666, 0.569_840_290, 0.819_172_513][axis];
+                if axis < axes { 50.0 * (step * k as f64).fract() } else { 0.0 }
+            };
+            let start = Rows::from_fn(900, place);
+            let end = Rows::from_fn(900, |k, axis| {
+                place(k, axis) + if k == 7 { thrown_m } else { 0.3 * (k as f64 + axis as f64).sin() }
+            });
+            let mut candidates = Candidates::new(900);
+            candidates.cover(&start, &end, 1.5).expect("a list");
+            let found = candidates.pairs.clone();
+            assert!(candidates.columns.counts[0] > 3 || thrown_m > 1e3, "{:?}", candidates.columns);
+            let radius_m = candidates.radius_m.expect("a list");
+            let halves: Vec<_> = candidates.budget_m.iter().map(|&budget_m| half_m(radius_m, budget_m)).collect();
+            let near = |i: usize, j: usize| separation(&start, i, j) <= halves[i] + halves[j];
+            let pairs = (0..900_u32).flat_map(|i| (i + 1..900).map(move |j| [i, j]));
+            let expected: Vec<_> = pairs.filter(|&[i, j]| near(i as usize, j as usize)).collect();
+            assert_eq!(found, expected, "{axes} {thrown_m}");
+        }
     }
 
     #[test]

@@ -159,7 +159,7 @@ fn fly(
     folder: &OutFolder,
     console: Console,
     interrupted: &AtomicBool,
-    watchers: &mut dyn Sink,
+    watchers: &mut (dyn Sink + Send),
 ) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;

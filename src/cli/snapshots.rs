@@ -70,6 +70,10 @@ impl Sink for Watched {
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         self.timeline.as_mut().map_or(Ok(()), |timeline| timeline.event(event))
     }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
 }
 
 /// A picture as PNG, small enough for a page with so many.

@@ -237,6 +237,10 @@ impl Sink for RunHistory {
         self.note(event);
         Ok(())
     }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
 }
 
 impl Span {

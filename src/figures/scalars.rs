@@ -6,7 +6,7 @@ use super::distances::quantile;
 use super::figure::Figure;
 use super::history::{FEW_VEHICLES, RunHistory, Span};
 use super::svg::{INK, PALETTE, Stroke};
-use crate::formation::largest_edge_error_m;
+use crate::formation::{edges_looked_at, largest_edge_error_m};
 use crate::graph::Graph;
 use crate::record::Event;
 use crate::target::{Course, Leg};
@@ -76,7 +76,7 @@ pub fn energy(history: &RunHistory, title: &str) -> Figure {
 pub fn shape_error(history: &RunHistory, legs: &[Leg], graph: &Graph, allowed_m: Option<f64>, title: &str) -> Figure {
     let count = history.vehicles();
     let fits = !legs.is_empty() && legs.iter().all(|leg| leg.formation.count() == count) && graph.count() == count;
-    let instants = history.spread((DISTANCES / graph.edge_count().max(1)).max(FEWEST_INSTANTS));
+    let instants = history.spread((DISTANCES / edges_looked_at(graph).max(1)).max(FEWEST_INSTANTS));
     let mut course = Course::new(legs);
     for turn in &history.turns {
         match turn {

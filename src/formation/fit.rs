@@ -75,15 +75,20 @@ pub fn best_rigid_motion(positions_m: &Rows, formation: &Formation) -> Option<Ri
 #[must_use]
 pub fn procrustes_rms_m(positions_m: &Rows, formation: &Formation) -> f64 {
     let Some(fit) = Fit::new(positions_m, formation) else { return f64::NAN };
-    let count = positions_m.nrows();
     // Summing the residuals keeps the digits that |P|^2 + |H|^2 - 2 tr S would cancel near a perfect fit.
-    let sum: f64 = (0..count)
-        .map(|i| {
-            let slot = row(&formation.slots_m, i) - fit.slots_centre;
-            (row(positions_m, i) - fit.positions_centre - fit.rotation * slot).norm_squared()
-        })
-        .sum();
-    (sum / count as f64).sqrt()
+    let sum: f64 = fit.residuals_m(positions_m, formation).map(|residual_m| residual_m.norm_squared()).sum();
+    (sum / positions_m.nrows() as f64).sqrt()
+}
+
+/// The distances \[m\] of the two positions that are farthest from their slots after [`best_rigid_motion`], added; NaN where
+/// there is none. Allocates nothing.
+pub(super) fn two_farthest_m(positions_m: &Rows, formation: &Formation) -> f64 {
+    let Some(fit) = Fit::new(positions_m, formation) else { return f64::NAN };
+    let distances_m = fit.residuals_m(positions_m, formation).map(|residual_m| residual_m.norm());
+    let (first, second) = distances_m.fold((0.0_f64, 0.0_f64), |(first, second), distance_m| {
+        (first.max(distance_m), second.max(first.min(distance_m)))
+    });
+    first + second
 }
 
 struct Fit {
@@ -93,6 +98,18 @@ struct Fit {
 }
 
 impl Fit {
+    /// From each slot as it is laid to its position \[m\].
+    fn residuals_m<'a>(
+        &'a self,
+        positions_m: &'a Rows,
+        formation: &'a Formation,
+    ) -> impl Iterator<Item = Vector3<f64>> + 'a {
+        (0..positions_m.nrows()).map(move |i| {
+            let slot = row(&formation.slots_m, i) - self.slots_centre;
+            row(positions_m, i) - self.positions_centre - self.rotation * slot
+        })
+    }
+
     fn new(positions_m: &Rows, formation: &Formation) -> Option<Self> {
         let slots_m = &formation.slots_m;
         let count = positions_m.nrows();

@@ -193,3 +193,27 @@ fn what_is_free_to_be_turned_fits_turned_and_what_is_not_does_not() {
         assert!(error_m(&Rows::zeros(5), freedom).is_nan());
     }
 }
+
+#[test]
+fn of_too_many_pairs_the_error_is_bounded_and_nothing_where_the_shape_is_right() {
+    let count = 1500;
+    let (formation, graph) = (Formation::grid(count, 2.0), Graph::complete(count));
+    assert!(edges_looked_at(&graph) == count && edges_looked_at(&Graph::complete(1414)) == 1414 * 1413 / 2);
+    assert_eq!(edges_looked_at(&Graph::star(count)), count - 1);
+    let all_pairs = |positions_m: &Rows| {
+        let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+        let error = |(i, j)| (separation(positions_m, i, j) - formation.desired_distance(i, j)).abs();
+        pairs.map(error).fold(0.0, f64::max)
+    };
+    let bound = |positions_m: &Rows| largest_edge_error_m(positions_m, &formation, &graph);
+    let turned = Rows::from_fn(count, |i, axis| 7.0 + formation.slots_m[(i, [1, 0, 2][axis])]);
+    assert!(bound(&turned) < 1e-10, "a turned and mirrored grid is that grid");
+    let wider = &formation.slots_m * 1.1;
+    assert!((bound(&wider) / all_pairs(&wider) - 1.0).abs() < 0.02, "its corners are off in opposite directions");
+    let shaken = Rows::from_fn(count, |i, axis| formation.slots_m[(i, axis)] + 0.1 * ((3 * i + axis) as f64).sin());
+    let (exact, bound_m) = (all_pairs(&shaken), bound(&shaken));
+    assert!(exact <= bound_m && bound_m < 2.0 * exact, "{exact} {bound_m}");
+    let mut lost = shaken;
+    lost[(3, 1)] = f64::NAN;
+    assert!(bound(&lost).is_nan() && bound(&Rows::zeros(7)).is_nan());
+}

@@ -109,15 +109,24 @@ impl Graph {
 
     /// A bound on the largest eigenvalue of M: for nobody pinned N where the graph is complete, otherwise the largest sum of
     /// the degrees of two vehicles that are joined (Anderson and Morley 1985), which is exact for stars and for rings of even
-    /// N; one more where somebody is pinned. A leader takes none away from it.
+    /// N; one more where somebody is pinned. Where there is a leader, that without it and one more for who hears it, if this
+    /// is less: 1 for a star that is led from its middle.
     #[must_use]
     pub fn largest_eigenvalue_bound(&self, pinning: &Pinning) -> f64 {
         let pinned = if matches!(pinning, Pinning::All | Pinning::Listed(_)) { 1.0 } else { 0.0 };
         if self.is_complete() {
             return if self.count() < 2 { pinned } else { self.count() as f64 + pinned };
         }
-        let degrees = self.degrees();
-        self.edges().map(|(i, j)| degrees[i] + degrees[j]).max().unwrap_or_default() as f64 + pinned
+        let mut degrees = self.degrees();
+        let whole = self.edges().map(|(i, j)| degrees[i] + degrees[j]).max().unwrap_or_default() as f64 + pinned;
+        let Some(leader) = pinning.leader() else { return whole };
+        let leads = |(i, j): &(usize, usize)| *i == leader || *j == leader;
+        for (i, j) in self.edges().filter(leads) {
+            degrees[i] -= 1;
+            degrees[j] -= 1;
+        }
+        let followers = self.edges().filter(|edge| !leads(edge)).map(|(i, j)| degrees[i] + degrees[j]);
+        whole.min(followers.max().unwrap_or_default() as f64 + 1.0)
     }
 
     /// Number of neighbours of each vehicle.
@@ -338,6 +347,9 @@ mod tests {
         assert_eq!(Graph::ring(5).pinned_connectivity(&Pinning::Listed(Vec::new())), 0.0);
         let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
         assert_eq!(apart.pinned_connectivity(&Pinning::All), 0.0);
+        let star = Graph::star(9);
+        let bounds = [Pinning::Leader(0), Pinning::Leader(3), Pinning::All].map(|p| star.largest_eigenvalue_bound(&p));
+        assert_eq!(bounds, [1.0, 9.0, 10.0], "whoever hears a leader in the middle hears nobody else");
     }
 
     #[test]

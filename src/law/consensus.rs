@@ -100,13 +100,25 @@ pub(super) fn add_heard(
 }
 
 /// Adds to the row of each vehicle what it makes of every other that is near, from where it sees itself apart \[m\]:
-/// `push(i, j, apart_m)` gives that and the potential of the pair. The sum of these over the near pairs is the result.
+/// `push(i, j, apart_m)` gives that and the potential of the pair, and the opposite push for the opposite way. The sum of the
+/// potentials over the near pairs is the result.
 pub(super) fn add_pushes(
     at: &Observation<'_>,
     sums: &mut Rows,
     push: impl Fn(usize, usize, Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError>,
 ) -> Result<f64, LawError> {
     let mut potential = 0.0;
+    if let Some(swarm) = at.shared() {
+        // Two who see each other where they are push each other alike.
+        for &(i, j) in at.near {
+            let (pushed, of_pair) = push(i, j, row(&swarm.positions_m, i) - row(&swarm.positions_m, j))?;
+            let (of_i, of_j) = (row(sums, i) + pushed, row(sums, j) - pushed);
+            set_row(sums, i, of_i);
+            set_row(sums, j, of_j);
+            potential = (potential + 0.5 * of_pair) + 0.5 * of_pair;
+        }
+        return Ok(potential);
+    }
     for &(a, b) in at.near {
         for (i, j) in [(a, b), (b, a)] {
             let (pushed, of_pair) = push(i, j, row(&at.own.positions_m, i) - at.seen(i, j).position_m)?;

@@ -6,8 +6,11 @@
 //! nor on the level of optimisation.
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 
+use super::bands::Bands;
 use super::tension;
 use crate::graph::Graph;
 use crate::swarm::Rows;
@@ -19,6 +22,9 @@ const BLOCK: usize = 32;
 /// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. Around
 /// this number both ways take the same time.
 const LISTED_UP_TO: usize = 16;
+/// From this many vehicles on all threads at hand share the rows of the complete graph, in bands. Sums of bands differ from
+/// those of all rows in their last bits, so this number is a part of what the bits of a flight rest on.
+const BANDED_FROM: usize = 640;
 
 type Lanes = [f64; LANES];
 
@@ -29,6 +35,7 @@ pub(super) struct Kernel {
     edges: Edges,
     /// 1/K of each edge, in row order.
     inverse_k_per_m: Vec<f64>,
+    bands: Option<Bands>,
     arch: pulp::Arch,
 }
 
@@ -51,7 +58,9 @@ impl Kernel {
         } else {
             Edges::Listed(graph.edges().map(|(i, j)| [i, j]).collect())
         };
-        Self { delta_m, edges, inverse_k_per_m, arch: pulp::Arch::new() }
+        let is_banded = matches!(edges, Edges::All(BANDED_FROM..));
+        let bands = is_banded.then(|| Bands::new(graph.count()));
+        Self { delta_m, edges, inverse_k_per_m, bands, arch: pulp::Arch::new() }
     }
 
     /// 1/K of each edge in row order \[1/m\].
@@ -62,20 +71,35 @@ impl Kernel {
     /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\], and
     /// returns (1/alpha) sum of V over all edges, which costs next to nothing here.
     /// Both tables have a row for each vehicle of the graph.
-    pub(super) fn add_pulls(&self, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
-        self.arch.dispatch(AddPulls { kernel: self, axes: columns(positions_m), sums: columns_mut(sums) })
+    pub(super) fn add_pulls(&mut self, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
+        let mut bands = self.bands.take();
+        let potential = self.add_pulls_in(bands.as_mut(), positions_m, sums);
+        self.bands = bands;
+        potential
     }
 
     /// (1/alpha) sum of V over all edges.
     pub(super) fn potential(&self, positions_m: &Rows) -> Result<f64, OutOfDomain> {
-        self.add_pulls(positions_m, &mut Rows::zeros(positions_m.nrows()))
+        self.add_pulls_in(self.bands.clone().as_mut(), positions_m, &mut Rows::zeros(positions_m.nrows()))
+    }
+
+    fn add_pulls_in(&self, bands: Option<&mut Bands>, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
+        let (axes, sums) = (columns(positions_m), columns_mut(sums));
+        let add =
+            |rows: Range<usize>, sums: [&mut [f64]; 3]| self.arch.dispatch(AddPulls { kernel: self, rows, axes, sums });
+        match bands {
+            Some(bands) => bands.add_to(sums, |rows, sums| add(rows, sums).ok()).ok_or(OutOfDomain),
+            None => add(0..positions_m.nrows(), sums),
+        }
     }
 }
 
-/// Arguments of [`Kernel::add_pulls`].
+/// Adds the pulls of the edges from these rows of the complete graph to later ones, or of all edges that are listed.
 struct AddPulls<'a> {
     kernel: &'a Kernel,
+    rows: Range<usize>,
     axes: [&'a [f64]; 3],
+    /// From the first of the rows on.
     sums: [&'a mut [f64]; 3],
 }
 
@@ -84,12 +108,13 @@ impl WithSimd for AddPulls<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let Self { kernel, axes, mut sums } = self;
+        let Self { kernel, rows, axes, mut sums } = self;
         let mut block = Block::new(kernel.delta_m);
         let mut potential = [0.0; LANES];
         match &kernel.edges {
             Edges::All(count) => {
-                for (i, row) in rows(*count, &kernel.inverse_k_per_m) {
+                let start = rows.start;
+                for (i, row) in with_values(rows, *count, &kernel.inverse_k_per_m) {
                     let mut of_own = [[0.0; LANES]; 3];
                     for (c, inverse) in row.chunks(BLOCK).enumerate() {
                         let first = i + 1 + c * BLOCK;
@@ -102,12 +127,12 @@ impl WithSimd for AddPulls<'_> {
                                     of_own[axis][k] += lanes[k];
                                 }
                             }
-                            let theirs = &mut sums[axis][first..first + inverse.len()];
+                            let theirs = &mut sums[axis][first - start..][..inverse.len()];
                             theirs.iter_mut().zip(pulls).for_each(|(sum, pull)| *sum -= pull);
                         }
                     }
                     for axis in 0..3 {
-                        sums[axis][i] += total(of_own[axis]);
+                        sums[axis][i - start] += total(of_own[axis]);
                     }
                 }
             }
@@ -128,10 +153,12 @@ impl WithSimd for AddPulls<'_> {
     }
 }
 
-/// Each vehicle of the complete graph with the values of its edges to all later ones.
+/// Each of these vehicles of the complete graph with the values of its edges to all later ones.
 #[inline(always)]
-fn rows(count: usize, mut values: &[f64]) -> impl Iterator<Item = (usize, &[f64])> {
-    (0..count).map(move |i| {
+fn with_values(rows: Range<usize>, count: usize, values: &[f64]) -> impl Iterator<Item = (usize, &[f64])> {
+    let edges_before = rows.start * (2 * count - rows.start).saturating_sub(1) / 2;
+    let mut values = &values[edges_before..];
+    rows.map(move |i| {
         let (row, rest) = values.split_at(count - i - 1);
         values = rest;
         (i, row)

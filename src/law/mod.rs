@@ -4,6 +4,7 @@
 //! the laws that scenarios may name. A law of your own implements [`Law`] and is flown like the built-in ones
 //! (see `examples/own_law.rs`).
 
+mod bands;
 mod carried;
 mod cbf_qp;
 mod certificate;

@@ -53,6 +53,14 @@ macro_rules! laws {
     };
 }
 
+impl LawSpec {
+    /// Whether the law keeps numbers of each edge of a complete graph, which itself takes no memory for them.
+    #[must_use]
+    pub fn keeps_edges(&self) -> bool {
+        matches!(self, Self::EdgeTension(_))
+    }
+}
+
 laws! {
     /// Distances as springs with a barrier at delta: collision-free on the complete graph.
     EdgeTension(EdgeTensionKeys),

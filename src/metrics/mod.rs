@@ -264,6 +264,10 @@ impl Sink for Metrics<'_> {
         }
         Ok(())
     }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
 }
 
 /// The larger number; NaN where either is, which `f64::max` would hide.

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::formation::affine_dimension;
 use crate::law::{Controls, Law, LegBound, ParameterError, Void};
-use crate::scenario::{LARGEST, Scenario};
+use crate::scenario::{LARGEST, Scenario, TimeSpec};
 use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
@@ -79,6 +79,12 @@ pub struct Preflight {
     /// Steps are flown in parts where the law's fastest rate asks for shorter ones: these are at least so long \[s\], see
     /// [`Preflight::of`].
     pub dt_max_s: Option<f64>,
+    /// No step is flown in parts longer than this \[s\]: the links alone ask for it, wherever vehicles are.
+    pub dt_links_s: Option<f64>,
+    /// Samples that are recorded.
+    pub samples: u64,
+    /// What their positions, velocities and commands take in the recording, which holds little else \[bytes\].
+    pub recording_bytes: u64,
     /// Dimension of the smallest flat that holds the start and its relative velocities: 0 point, 1 line, 2 plane, 3 space.
     pub start_dimension: usize,
     /// Smallest distance of two vehicles at the start, less delta \[m\].
@@ -222,6 +228,9 @@ impl Preflight {
                 let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
                 scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
             }),
+            dt_links_s: links_step_s(law.as_ref(), scenario),
+            samples: scenario.time.samples(),
+            recording_bytes: scenario.time.samples() * TimeSpec::BYTES_PER_VEHICLE * scenario.count() as u64,
             start_dimension: motion_dimension(&scenario.start),
             start_margin_m: margin(&scenario.start.positions_m),
             formation_dimension,
@@ -406,12 +415,18 @@ impl Preflight {
 
 /// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be
 /// shorter still.
+/// Longest step that the links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
+fn links_step_s(law: &dyn Law, scenario: &Scenario) -> Option<f64> {
+    let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.a22_per_s)?;
+    (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| scenario.time.max_rate_dt / rate_per_s)
+}
+
 fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     let time = &scenario.time;
     let halvings = i32::try_from(time.max_halvings).unwrap_or(i32::MAX);
     let shortest_s = time.dt_s * 0.5_f64.powi(halvings);
-    let needed_s = time.max_rate_dt / law.fastest_rate_per_s(Some(f64::INFINITY), scenario.a22_per_s)?;
-    (scenario.plant.holds_commands() && shortest_s > needed_s).then(|| {
+    let needed_s = links_step_s(law, scenario)?;
+    (shortest_s > needed_s).then(|| {
         format!(
             "The law's links ask for steps of {} s, and the shortest that time.dt_s and time.max_halvings allow are {} s: what would \
              be flown is not the motion of the law. Shorten time.dt_s, add links, or lower the law's gains.",

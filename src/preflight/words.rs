@@ -69,6 +69,7 @@ impl Preflight {
         let rest = [
             ("needs", self.needs_line()),
             ("step", self.step_line()),
+            ("recording", self.recording_line()),
             ("start", self.start_line()),
             ("formation", self.formation_line()),
             ("rigidity", self.rigidity_line()),
@@ -117,19 +118,28 @@ impl Preflight {
     }
 
     fn step_line(&self) -> String {
-        let parts = match self.dt_max_s {
-            Some(dt_max_s) if dt_max_s >= self.dt_s => "short enough for the law",
-            Some(_) => {
-                return format!(
-                    "{} s, flown in parts down to {} s where the law asks for it",
-                    significant(self.dt_s),
-                    significant(self.dt_max_s.unwrap_or_default())
-                );
-            }
-            None if self.barrier_m.is_some() => "flown in parts where a clearance shrinks too fast",
-            None => "what the law needs depends on how near vehicles come",
+        let dt_s = significant(self.dt_s);
+        let links = match self.dt_links_s {
+            Some(links_s) if links_s < self.dt_s => format!("; the links ask for {} s at most", significant(links_s)),
+            _ => String::new(),
         };
-        format!("{} s, {parts}", significant(self.dt_s))
+        match self.dt_max_s {
+            Some(dt_max_s) if dt_max_s >= self.dt_s => format!("{dt_s} s, short enough for the law"),
+            Some(dt_max_s) => {
+                format!("{dt_s} s, flown in parts down to {} s where the law asks for it{links}", significant(dt_max_s))
+            }
+            None if self.barrier_m.is_some() => {
+                format!("{dt_s} s, flown in parts where a clearance shrinks too fast{links}")
+            }
+            None => format!("{dt_s} s, what the law needs depends on how near vehicles come{links}"),
+        }
+    }
+
+    fn recording_line(&self) -> String {
+        /// Bytes of a MB.
+        const MB: f64 = 1e6;
+        let samples = counted(self.samples, "sample", "samples");
+        format!("{samples}, {:.1} MB of numbers", self.recording_bytes as f64 / MB)
     }
 
     fn start_line(&self) -> String {

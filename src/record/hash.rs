@@ -51,6 +51,10 @@ impl Sink for StateHash {
     fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
         Ok(())
     }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
 }
 
 fn append_rows(bytes: &mut Vec<u8>, rows: &Rows) {

@@ -3,10 +3,12 @@
 //! [`mcap`] writes and reads `run.mcap`. A recorder knows the state of a swarm and nothing of laws, plants or judges.
 //! Several recorders of one run are joined as a pair: `(first, (second, third))` is a recorder again.
 
+mod beside;
 mod hash;
 #[cfg(feature = "recordings")]
 pub mod mcap;
 
+pub use beside::beside;
 pub use hash::{StateHash, sha256_hex};
 
 use std::sync::Arc;
@@ -115,6 +117,24 @@ pub struct OwnedSample {
 }
 
 impl OwnedSample {
+    /// Becomes a copy of another sample, in the memory that it has.
+    pub(crate) fn copy_from(&mut self, sample: &Sample<'_>) {
+        let copy = |to: &mut Rows, from: &Rows| {
+            if to.nrows() == from.nrows() {
+                to.copy_from(from);
+            } else {
+                to.clone_from(from);
+            }
+        };
+        copy(&mut self.swarm.positions_m, &sample.swarm.positions_m);
+        copy(&mut self.swarm.velocities_m_s, &sample.swarm.velocities_m_s);
+        copy(&mut self.control, sample.control);
+        let &Sample { time_s, step, separation, energy, peaks, .. } = sample;
+        (self.time_s, self.step, self.separation) = (time_s, step, separation);
+        (self.energy, self.peaks) = (energy, peaks);
+        sample.channels.clone_into(&mut self.channels);
+    }
+
     /// The same sample by reference.
     #[must_use]
     pub fn as_sample(&self) -> Sample<'_> {
@@ -314,6 +334,11 @@ pub trait Sink {
 
     /// Looks at the end of a step, for what is folded over all of them. One that ends a flight may be told twice.
     fn step(&mut self, _step: &Step<'_>) {}
+
+    /// Whether it looks at steps. One that says no is not told of them where it records [`beside`] the flight.
+    fn looks_at_steps(&self) -> bool {
+        true
+    }
 }
 
 /// Keeps nothing.
@@ -324,6 +349,10 @@ impl Sink for () {
 
     fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
         Ok(())
+    }
+
+    fn looks_at_steps(&self) -> bool {
+        false
     }
 }
 
@@ -338,6 +367,10 @@ impl<R: Sink + ?Sized> Sink for &mut R {
 
     fn step(&mut self, step: &Step<'_>) {
         (**self).step(step);
+    }
+
+    fn looks_at_steps(&self) -> bool {
+        (**self).looks_at_steps()
     }
 }
 
@@ -356,6 +389,10 @@ impl<A: Sink, B: Sink> Sink for (A, B) {
     fn step(&mut self, step: &Step<'_>) {
         self.0.step(step);
         self.1.step(step);
+    }
+
+    fn looks_at_steps(&self) -> bool {
+        self.0.looks_at_steps() || self.1.looks_at_steps()
     }
 }
 

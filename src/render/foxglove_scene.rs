@@ -24,6 +24,8 @@ use crate::swarm::{Pair, Rows, row, separation};
 pub const SCENE_HZ: f64 = 5.0;
 /// Most edges that are in a scene.
 const MOST_EDGES: usize = 300;
+/// Most vehicles that are, but for those that are too close to another.
+const MOST_VEHICLES: usize = 2000;
 /// Width of an edge \[m\].
 const EDGE_M: f64 = 0.03;
 /// Side of the plate that stands for a half-space \[m\].
@@ -34,6 +36,7 @@ const ROUNDING_S: f64 = 1e-6;
 /// Makes `foxglove.SceneUpdate` messages on `/scene`: vehicles as balls, keep-out shells, edges in the colour of their
 /// tension, in the colours of [`Theme::Dark`], [`SCENE_HZ`] times a second.
 ///
+/// Of more than 2000 vehicles so many are shown, evenly chosen, and those that are closer than delta to another.
 /// A scene takes some 230 bytes for each vehicle, of which a half is its shell, and 140 for each edge (none where there
 /// are more than 300), so beside 72 bytes for each vehicle and sample at 60 Hz a recording grows by less than a third,
 /// and one of few vehicles by a half.
@@ -68,7 +71,10 @@ impl FoxgloveScene {
         for pair in self.violated.iter().filter(|pair| pair.second() < count) {
             (alarm[pair.first()], alarm[pair.second()]) = (true, true);
         }
-        let hulls = (0..count).map(|k| {
+        // The share of the vehicles up to this one passes a whole number at those that are chosen.
+        let share = |k: usize| k * MOST_VEHICLES / count;
+        let is_shown = |k: &usize| count <= MOST_VEHICLES || alarm[*k] || share(*k) < share(*k + 1);
+        let hulls = (0..count).filter(is_shown).map(|k| {
             let colour = if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
             sphere(positions_m, k, self.radius_m[k], colour)
         });
@@ -76,7 +82,7 @@ impl FoxgloveScene {
             Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
             _ => None,
         });
-        let shells = (0..count).map(|k| {
+        let shells = (0..count).filter(is_shown).map(|k| {
             let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
             sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15))
         });
@@ -294,6 +300,25 @@ mod tests {
         assert_eq!(red(&mut scene, 1.0), [true, true, false]);
         scene.note(&Event::ViolationEnded { pair, time_s, min_m });
         assert_eq!(red(&mut scene, 2.0), [false; 3]);
+    }
+
+    #[test]
+    fn a_scene_of_many_vehicles_holds_some_of_them_and_those_that_are_too_close() {
+        let count = 4001;
+        let formation = crate::formation::Formation::grid(count, 3.0);
+        let start = Swarm::at_rest(formation.slots_m.clone());
+        let scenario = Scenario::new("many", start.clone(), formation, 2.0, 1.0);
+        let mut scene = FoxgloveScene::of(&scenario);
+        let shown = |time_s: f64, scene: &mut FoxgloveScene| {
+            let bytes = message(scene, time_s, &start).expect("a message");
+            SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities[0].spheres.len()
+        };
+        assert_eq!(shown(0.0, &mut scene), 2 * MOST_VEHICLES);
+        for first in [0, 2, 3, 4000] {
+            scene.note(&Event::ViolationBegan { pair: Pair::new(first, (first + 1) % count), time_s: 0.5 });
+        }
+        let more = shown(1.0, &mut scene) / 2 - MOST_VEHICLES;
+        assert!((2..=4).contains(&more), "of 0 to 4 and 4000 some are shown anyway: {more}");
     }
 
     #[test]

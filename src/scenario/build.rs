@@ -20,7 +20,7 @@ use crate::swarm::{Rows, Swarm, set_row};
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
-    check_memory(count, edge_count(&document.graph.kind, count))?;
+    check_memory(count, edge_count(&document, count))?;
     check_lists(&document, count)?;
     let space = space(&document)?;
     let (law, delta_m) = (document.law.kind.complete(document.swarm.a22_per_s), document.law.delta_m);
@@ -51,7 +51,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
             }
             PlantTable { kind: PlantKind::Ideal, .. } => PlantSpec::Ideal,
         },
-        time: document.time,
+        time: document.time.complete(count, document.arrival.hold_s),
         arrival: document.arrival,
         breathing: document.breathing,
         name: document.name.unwrap_or_default(),
@@ -142,9 +142,10 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
     Ok(Swarm { positions_m, velocities_m_s })
 }
 
-/// Number of edges, at most, without making them.
-fn edge_count(kind: &GraphKind, count: usize) -> u128 {
-    match kind {
+/// Number of edges, at most, that memory will be taken for, without making them.
+fn edge_count(document: &Document, count: usize) -> u128 {
+    match &document.graph.kind {
+        GraphKind::Complete {} if !document.law.kind.keeps_edges() => 0,
         GraphKind::Complete {} => pair_count(count),
         GraphKind::Star {} | GraphKind::Ring {} | GraphKind::Path {} => count as u128,
         GraphKind::Edges { edges } => edges.len() as u128,

@@ -14,7 +14,7 @@ use super::reference::ReferenceTable;
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
 use super::shapes::{HelixKeys, SpacingKeys, VKeys};
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
-use super::time::TimeSpec;
+use super::time_table::TimeTable;
 use super::values::{Edge, PerVehicle, Point};
 use crate::law::LawSpec;
 use crate::target::{Arrival, Breathing};
@@ -58,7 +58,7 @@ pub(super) struct Document {
     #[serde(default)]
     pub(super) plant: PlantTable,
     /// Duration and rates.
-    pub(super) time: TimeSpec,
+    pub(super) time: TimeTable,
     /// What counts as a reached formation.
     #[serde(default, rename(serialize = "judge"))]
     pub(super) arrival: Arrival,

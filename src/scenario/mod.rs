@@ -55,6 +55,8 @@ mod template;
 #[cfg(feature = "files")]
 mod text;
 mod time;
+#[cfg(feature = "files")]
+mod time_table;
 mod validate;
 #[cfg(feature = "files")]
 mod values;

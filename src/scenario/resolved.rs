@@ -110,7 +110,7 @@ impl From<&Scenario> for Document {
                 },
             },
             plant: PlantTable { kind, precision },
-            time: scenario.time,
+            time: scenario.time.into(),
             arrival: scenario.arrival,
             breathing: scenario.breathing,
         }

@@ -1,42 +1,31 @@
 //! Duration and rates of a flight.
 
-#[cfg(feature = "schema")]
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 /// Duration and rates.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeSpec {
-    /// Length of the flight in s.
+    /// Length of the flight \[s\].
     pub duration_s: f64,
-    /// Physics step in s; the law is asked once a step. A step that is too long for the law is flown in parts.
-    #[serde(default = "TimeSpec::default_dt_s")]
+    /// Physics step \[s\]; the law is asked once a step. A step that is too long for the law is flown in parts.
     pub dt_s: f64,
-    /// Samples recorded per second of flight in Hz, at most one a step.
-    #[serde(default = "TimeSpec::default_record_hz")]
+    /// Samples recorded per second of flight \[Hz\], at most one a step.
     pub record_hz: f64,
     /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
     /// step as it is.
-    #[serde(default = "TimeSpec::default_max_halvings")]
     pub max_halvings: u32,
     /// Largest product of a step and the law's fastest rate at the present state; a step that is longer is flown in halves.
-    #[serde(default = "TimeSpec::default_max_rate_dt", skip_serializing_if = "TimeSpec::is_default_max_rate_dt")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub max_rate_dt: f64,
-    /// How often the law is asked in Hz, at most once a step, where vehicles hold each command in between as a real
+    /// How often the law is asked \[Hz\], at most once a step, where vehicles hold each command in between as a real
     /// controller makes them do. Unless given, commands stand for continuous control.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     pub control_hz: Option<f64>,
 }
 
 impl TimeSpec {
     /// Default step \[s\].
     pub const DEFAULT_DT_S: f64 = 1.0 / 240.0;
-    /// Default recording rate \[Hz\].
+    /// Default recording rate \[Hz\]; a scenario file of many vehicles has a lower one, which keeps its recording bounded.
     pub const DEFAULT_RECORD_HZ: f64 = 60.0;
+    /// Numbers of a vehicle in a sample: position, velocity and command \[bytes\].
+    pub const BYTES_PER_VEHICLE: u64 = 72;
     /// Default number of halvings.
     pub const DEFAULT_MAX_HALVINGS: u32 = 10;
 
@@ -46,27 +35,6 @@ impl TimeSpec {
 
     /// Part of a step, or of a recording period, that is rounding: two products of the same times differ by less.
     const ROUNDING: f64 = 1e-6;
-
-    fn default_dt_s() -> f64 {
-        Self::DEFAULT_DT_S
-    }
-
-    fn default_record_hz() -> f64 {
-        Self::DEFAULT_RECORD_HZ
-    }
-
-    fn default_max_halvings() -> u32 {
-        Self::DEFAULT_MAX_HALVINGS
-    }
-
-    fn default_max_rate_dt() -> f64 {
-        Self::DEFAULT_MAX_RATE_DT
-    }
-
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
-    fn is_default_max_rate_dt(max_rate_dt: &f64) -> bool {
-        *max_rate_dt == Self::DEFAULT_MAX_RATE_DT
-    }
 
     /// A flight of this length \[s\] with the default rates.
     #[must_use]
@@ -111,6 +79,16 @@ impl TimeSpec {
         step == self.steps() || self.begins_period(step, self.record_hz)
     }
 
+    /// Number of samples that are recorded, the start among them, where no step is shorter than a recording period: else one a
+    /// step.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        let periods = (self.steps() as f64 * (self.dt_s * self.record_hz).min(1.0) + Self::ROUNDING).floor();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the number of steps")]
+        let periods = periods as u64;
+        1 + periods + u64::from(!self.begins_period(self.steps(), self.record_hz))
+    }
+
     /// Whether the law is asked at the end of step `k`: after every step, or at the first at or after each period of
     /// `control_hz`.
     #[must_use]
@@ -131,7 +109,9 @@ mod tests {
     use crate::scenario::MAX_STEPS;
 
     fn recorded(time: TimeSpec) -> Vec<u64> {
-        (0..=time.steps()).filter(|&step| time.records(step)).collect()
+        let recorded: Vec<_> = (0..=time.steps()).filter(|&step| time.records(step)).collect();
+        assert_eq!(time.samples(), recorded.len() as u64);
+        recorded
     }
 
     #[test]

@@ -45,13 +45,22 @@ pub struct Distance {
 }
 
 impl Distance {
-    /// Of a swarm from a formation that is free to be moved so from where the reference has carried it: O(edges).
+    /// Of a swarm from a formation that is free to be moved so from where the reference has carried it: O(edges), and no more than
+    /// [`largest_edge_error_m`] looks at.
     #[must_use]
     pub fn of(swarm: &Swarm, formation: &Formation, reference: &Reference, graph: &Graph, freedom: Freedom) -> Self {
+        Self {
+            max_edge_error_m: largest_edge_error_m(&swarm.positions_m, formation, graph),
+            ..Self::but_for_edges(swarm, formation, reference, freedom)
+        }
+    }
+
+    /// The same in O(N), without any error of edges.
+    fn but_for_edges(swarm: &Swarm, formation: &Formation, reference: &Reference, freedom: Freedom) -> Self {
         let (positions_m, velocities_m_s) = (&swarm.positions_m, &swarm.velocities_m_s);
         let relative_m_s = |i: usize| (row(velocities_m_s, i) - reference.velocity_m_s).norm();
         Self {
-            max_edge_error_m: largest_edge_error_m(positions_m, formation, graph),
+            max_edge_error_m: 0.0,
             rms_position_error_m: rms_position_error_m(positions_m, formation, reference.position_m, freedom),
             disagreement_m_s: match freedom {
                 Freedom::Fixed => (0..swarm.count()).map(relative_m_s).fold(0.0, f64::max),
@@ -68,6 +77,22 @@ impl Distance {
 }
 
 impl Arrival {
+    /// Whether a swarm is within the limits of a formation, as [`Arrival::is_within`] says of its [`Distance::of`] it. What takes
+    /// O(edges) is looked at last.
+    #[must_use]
+    pub fn holds(
+        &self,
+        swarm: &Swarm,
+        formation: &Formation,
+        reference: &Reference,
+        graph: &Graph,
+        freedom: Freedom,
+    ) -> bool {
+        let but_for_edges = Distance::but_for_edges(swarm, formation, reference, freedom);
+        self.is_within(&but_for_edges)
+            && largest_edge_error_m(&swarm.positions_m, formation, graph) <= self.edge_error_m
+    }
+
     /// Whether everything is within the limits at this instant; never where a number is not finite.
     #[must_use]
     pub fn is_within(&self, distance: &Distance) -> bool {

@@ -3,7 +3,7 @@
 use dyn_clone::DynClone;
 
 use super::breathing::{Breather, Breathing, Change};
-use super::{Arrival, Begins, CurrentTarget, Distance, Leg, Target, assign_anew};
+use super::{Arrival, Begins, CurrentTarget, Leg, Target, assign_anew};
 use crate::formation::{Formation, Freedom};
 use crate::graph::Graph;
 use crate::swarm::Swarm;
@@ -95,11 +95,8 @@ impl Schedule {
             Begins::At(from_s) => time_s >= from_s,
             Begins::Reached if self.breather.as_ref().is_some_and(|breather| !breather.is_closed()) => false,
             Begins::Reached => {
-                let distance = {
-                    let Target { formation, ref reference, .. } = target.view();
-                    Distance::of(sensed, formation, reference, &self.links, self.freedom)
-                };
-                let within = self.arrival.is_within(&distance);
+                let Target { formation, ref reference, .. } = target.view();
+                let within = self.arrival.holds(sensed, formation, reference, &self.links, self.freedom);
                 self.within_since_s = within.then(|| self.within_since_s.unwrap_or(time_s));
                 self.within_since_s.is_some_and(|since_s| self.arrival.is_held(since_s, time_s))
             }

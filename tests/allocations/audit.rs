@@ -1,8 +1,11 @@
 //! The step of the audit takes no memory once its lists have grown to the swarm.
 
+use nalgebra::Vector3;
 use stats_alloc::Region;
-use tautline::audit::Auditor;
+use tautline::audit::recorded::{Settings, audit};
+use tautline::audit::{Auditor, Status};
 use tautline::swarm::Rows;
+use tautline::track::{Item, Sample};
 
 use crate::ALLOCATOR;
 
@@ -35,5 +38,35 @@ pub(crate) fn a_step_of_a_warm_auditor_allocates_nothing() {
         let region = Region::new(ALLOCATOR);
         fly(1);
         assert_eq!(region.change().allocations + region.change().reallocations, 0, "{n} vehicles");
+    }
+}
+
+/// A grid that drifts, each vehicle a little its own way, seen three times.
+fn recorded(side: usize) -> (Vec<String>, Vec<Item>) {
+    let count = side * side;
+    let items = (0..3).flat_map(|k| {
+        (0..count).map(move |vehicle| {
+            let (column, line) = ((vehicle % side) as f64, (vehicle / side) as f64);
+            let own = 0.3 * (vehicle as f64).sin();
+            let time_s = f64::from(k);
+            let position_m = Vector3::new(SPACING_M * column + own + 0.1 * time_s, SPACING_M * line - own, 0.0);
+            Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
+        })
+    });
+    ((1..=count).map(|number| number.to_string()).collect(), items.collect())
+}
+
+pub(crate) fn a_recording_is_judged_in_memory_for_its_vehicles_and_not_for_their_pairs() {
+    /// A vehicle with its name, segments, extents, and four times over what lists leave behind as they grow.
+    const MOST_BYTES_EACH: usize = 4000;
+    for side in [20, 80] {
+        let (names, items) = recorded(side);
+        let region = Region::new(ALLOCATOR);
+        let outcome = audit(&names, &items, Settings::delta(DELTA_M)).unwrap();
+        let bytes = region.change().bytes_allocated + region.change().bytes_reallocated.unsigned_abs();
+        assert_eq!(outcome.status, Status::Clear);
+        let each = bytes / names.len();
+        println!("a recording of {} vehicles is judged in {each} bytes each", names.len());
+        assert!(each < MOST_BYTES_EACH, "{each} bytes for each of {} vehicles", names.len());
     }
 }

@@ -19,6 +19,7 @@ fn main() {
     laws::a_law_that_senses_allocates_nothing_once_its_lists_have_grown();
     space::a_search_of_near_pairs_that_has_grown_allocates_nothing();
     audit::a_step_of_a_warm_auditor_allocates_nothing();
+    audit::a_recording_is_judged_in_memory_for_its_vehicles_and_not_for_their_pairs();
     step_loop::the_loop_allocates_nothing_per_step();
     println!("a step allocates nothing");
 }

@@ -6,4 +6,5 @@ mod browser;
 mod figures;
 mod opened;
 mod page;
+mod scale;
 mod validation;

@@ -26,6 +26,8 @@ use crate::swarm::Pair;
 
 /// With more pairs left than this for each vehicle a window is halved.
 const PAIRS_PER_VEHICLE: usize = 4;
+/// With more pairs left than this in one that is not halved they are swept before others are looked for.
+const MOST_LISTED: usize = 1 << 20;
 /// A window is not halved below so many segments for each vehicle, unless there are curves in it.
 const FEWEST_SEGMENTS: usize = 4;
 /// A window is not halved more often than this.
@@ -116,14 +118,21 @@ impl Windows {
             let fine = segments < FEWEST_SEGMENTS * count && !curved;
             let middle_s = 0.5 * (window.from_s + window.to_s);
             let whole = fine || halvings == MOST_HALVINGS || !(window.from_s < middle_s && middle_s < window.to_s);
-            let most = if whole { usize::MAX } else { PAIRS_PER_VEHICLE * count };
-            if !self.collect(results, most) {
+            let most = if whole { MOST_LISTED } else { PAIRS_PER_VEHICLE * count };
+            let mut done = self.collect(results, 0, most);
+            if !whole && done < count {
                 self.halve(vehicles, Interval { to_s: middle_s, ..window }, halvings + 1, results);
                 self.halve(vehicles, Interval { from_s: middle_s, ..window }, halvings + 1, results);
                 return;
             }
-            for near in &self.near {
-                self.sweep_vehicles(vehicles, near, window, results);
+            loop {
+                for near in &self.near {
+                    self.sweep_vehicles(vehicles, near, window, results);
+                }
+                if done == count {
+                    break;
+                }
+                done = self.collect(results, done, most);
             }
         }
         self.sweep_obstacles(vehicles, window, results);
@@ -152,23 +161,21 @@ impl Windows {
         let mut rough = Results { closest: mem::take(closest), ..Results::default() };
         let count = self.extents.len();
         let pairs = |apart: u32| (0..).zip(apart..).take(count.saturating_sub(apart as usize));
-        let mut neighbours = (1..=FIRST_NEIGHBOURS).flat_map(pairs);
-        while rough.closest.threshold == f64::INFINITY
-            && let Some((a, b)) = neighbours.next()
-        {
+        for (a, b) in (1..=FIRST_NEIGHBOURS).flat_map(pairs) {
             self.sweep_vehicles(vehicles, &Near::new(&self.extents, a, b), window, &mut rough);
         }
         *closest = rough.closest;
     }
 
-    /// Lists the pairs that could matter; `false` if they are more than `most`.
-    fn collect(&mut self, results: &Results, most: usize) -> bool {
+    /// Lists the pairs that could matter of the extents from one on with later ones, until they are more than `most`; returns
+    /// the extent that follows.
+    fn collect(&mut self, results: &Results, from: usize, most: usize) -> usize {
         let Self { extents, near, limits, .. } = self;
         near.clear();
         let radius = extents.iter().map(|extent| extent.radius).fold(0.0, f64::max);
         let threshold = results.closest.threshold;
         let reach = threshold.max(limits.of_vehicles(radius, radius));
-        for (k, a) in (0_u32..).zip(extents.iter()) {
+        for (k, a) in (0_u32..).zip(extents.iter()).skip(from) {
             let until = a.high[0] + reach;
             for (l, b) in (k + 1..).zip(extents[k as usize + 1..].iter()).take_while(|(_, b)| b.low[0] <= until) {
                 let aside = (a.low[1] - b.high[1])
@@ -183,10 +190,10 @@ impl Windows {
                 }
             }
             if near.len() > most {
-                return false;
+                return k as usize + 1;
             }
         }
-        true
+        extents.len()
     }
 
     fn sweep_vehicles(&self, vehicles: &[Vehicle], near: &Near, window: Interval, results: &mut Results) {

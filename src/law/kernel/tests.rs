@@ -10,8 +10,9 @@ const DELTA_M: f64 = 0.1;
 /// A kernel on the distances of a formation, and a swarm that is spread out otherwise.
 fn fixture(graph: &Graph) -> (Kernel, Rows, Formation) {
     let count = graph.count();
-    let formation = Formation::sphere(count, 3.0);
-    let mut positions_m = Formation::sphere(count, 4.0).slots_m;
+    let wider = if count < BANDED_FROM { 1.0 } else { 10.0 };
+    let formation = Formation::sphere(count, 3.0 * wider);
+    let mut positions_m = Formation::sphere(count, 4.0 * wider).slots_m;
     for i in 0..count {
         positions_m[(i, 0)] += libm::sin(i as f64);
         positions_m[(i, 2)] *= 1.5;
@@ -32,7 +33,7 @@ fn graphs() -> Vec<Graph> {
 #[test]
 fn the_sums_are_those_of_the_tension_edge_by_edge() {
     for graph in graphs() {
-        let (kernel, positions_m, formation) = fixture(&graph);
+        let (mut kernel, positions_m, formation) = fixture(&graph);
         let (mut expected, mut sizes, mut potential) = (Rows::zeros(graph.count()), vec![0.0; graph.count()], 0.0);
         for (i, j) in graph.edges() {
             let tension = tension(&formation, i, j);
@@ -58,12 +59,12 @@ fn the_sums_are_those_of_the_tension_edge_by_edge() {
 #[test]
 fn the_bits_do_not_depend_on_the_vector_instructions() {
     for graph in graphs() {
-        let (kernel, positions_m, _) = fixture(&graph);
+        let (mut kernel, positions_m, _) = fixture(&graph);
         let (mut dispatched, mut baseline) = (Rows::zeros(graph.count()), Rows::zeros(graph.count()));
         let potential = kernel.add_pulls(&positions_m, &mut dispatched);
-        let axes = columns(&positions_m);
+        let (axes, rows) = (columns(&positions_m), 0..graph.count());
         // Called without dispatch, this is the code for the oldest processor of the target.
-        let add_pulls = AddPulls { kernel: &kernel, axes, sums: columns_mut(&mut baseline) };
+        let add_pulls = AddPulls { kernel: &kernel, rows, axes, sums: columns_mut(&mut baseline) };
         assert_eq!(potential, add_pulls.with_simd(pulp::Scalar));
         assert!(potential.is_ok());
         assert_eq!(dispatched, baseline);
@@ -76,7 +77,7 @@ fn the_bits_are_the_same_in_every_build() {
     const FINGERPRINT: u64 = 0x9e37_5d5d_f36d_abe2;
     let mut fingerprint = 0_u64;
     for graph in graphs() {
-        let (kernel, positions_m, _) = fixture(&graph);
+        let (mut kernel, positions_m, _) = fixture(&graph);
         let mut sums = Rows::zeros(graph.count());
         let potential = kernel.add_pulls(&positions_m, &mut sums).unwrap_or(f64::NAN);
         for number in sums.iter().chain([&potential]) {
@@ -89,7 +90,7 @@ fn the_bits_are_the_same_in_every_build() {
 #[test]
 fn one_pair_out_of_domain_is_noticed_wherever_it_is() {
     for graph in [Graph::complete(7), Graph::complete(43)] {
-        let (kernel, positions_m, _) = fixture(&graph);
+        let (mut kernel, positions_m, _) = fixture(&graph);
         for (i, j) in graph.edges() {
             let mut touching = positions_m.clone();
             let beside = row(&touching, i) + nalgebra::Vector3::new(0.0, 0.5 * DELTA_M, 0.0);
@@ -103,5 +104,41 @@ fn one_pair_out_of_domain_is_noticed_wherever_it_is() {
             far[(i, 2)] = 1e200;
             assert_eq!(kernel.potential(&far), Err(OutOfDomain));
         }
+    }
+}
+
+#[test]
+fn the_bits_of_bands_do_not_depend_on_the_number_of_threads_and_are_those_of_their_rows() {
+    let graph = Graph::complete(BANDED_FROM);
+    let (mut kernel, positions_m, _) = fixture(&graph);
+    let mut whole = Rows::zeros(graph.count());
+    let (axes, rows) = (columns(&positions_m), 0..graph.count());
+    let add_pulls = AddPulls { kernel: &kernel, rows, axes, sums: columns_mut(&mut whole) };
+    let potential = add_pulls.with_simd(pulp::Scalar).expect("far apart");
+
+    let mut on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let mut sums = Rows::zeros(graph.count());
+        let found = pool.install(|| kernel.add_pulls(&positions_m, &mut sums)).expect("far apart");
+        assert_eq!(kernel.potential(&positions_m), Ok(found));
+        (sums, found)
+    };
+    let one = on(1);
+    assert!([2, 3, 7].into_iter().all(|threads| on(threads) == one));
+    assert!((one.1 - potential).abs() <= SUM_ROUNDING * potential);
+    // Pulls of a row cancel: rounding counts against the sum of their sizes, 640 of up to 1 each.
+    let largest = (&one.0 - &whole).amax();
+    assert!(largest > 0.0 && largest < SUM_ROUNDING * BANDED_FROM as f64, "{largest:e}");
+}
+
+#[test]
+fn one_pair_out_of_domain_is_noticed_in_every_band() {
+    let (mut kernel, positions_m, _) = fixture(&Graph::complete(BANDED_FROM));
+    for i in (0..BANDED_FROM).step_by(20) {
+        let mut touching = positions_m.clone();
+        let beside = row(&touching, i) + nalgebra::Vector3::new(0.0, 0.5 * DELTA_M, 0.0);
+        set_row(&mut touching, (i + 7) % BANDED_FROM, beside);
+        assert_eq!(kernel.add_pulls(&touching, &mut Rows::zeros(BANDED_FROM)), Err(OutOfDomain), "{i}");
+        assert_eq!(kernel.potential(&touching), Err(OutOfDomain));
     }
 }

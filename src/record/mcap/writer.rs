@@ -181,6 +181,10 @@ impl Sink for McapRecorder {
         self.write(Own::Events as usize, event.time_s(), &EventMessage::from(event))?;
         self.flush_if_due(event.time_s())
     }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
 }
 
 fn open(path: &Path) -> io::Result<Out> {

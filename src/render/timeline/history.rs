@@ -362,6 +362,10 @@ impl Sink for Timeline {
         self.note(event);
         Ok(())
     }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
 }
 
 /// The nearer of two approaches, the earlier one among equals.

@@ -1,0 +1,97 @@
+//! Large swarms: what is looked at, kept and recorded grows with the number of vehicles, and not with that of pairs.
+
+use std::ops::ControlFlow;
+
+use tautline::audit::Status;
+use tautline::figures::{Criteria, RunHistory, of_run};
+use tautline::preflight::Preflight;
+use tautline::record::mcap::{Header, McapRecorder};
+use tautline::run::run_while;
+use tautline::scenario::{Scenario, Source};
+
+const MANY: usize = 20_000;
+
+/// A grid of 2 m that contracts to 1.6 m, as large as `count`, for a few steps.
+fn grid(count: usize, more: &str) -> String {
+    format!(
+        "name = \"grid\"\nswarm.count = {count}\nstart = {{ shape = \"grid\", spacing_m = 2.0 }}\n\
+         formation = {{ shape = \"grid\", spacing_m = 1.6 }}\narrival.hold_s = 0.01\n\
+         time = {{ duration_s = 0.0125, record_hz = 120 }}\n{more}"
+    )
+}
+
+const ALL: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\n";
+const LED: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\ngraph.kind = \"star\"\nreference = { kind = \"rest\", leader = 1 }\n";
+
+fn read(toml: &str) -> Scenario {
+    let source = Source::Text { name: "test".to_owned(), text: toml.to_owned() };
+    Scenario::read(&source, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehicle() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, more) in [("all", ALL), ("led", LED)] {
+        let scenario = read(&grid(MANY, more));
+        let preflight = Preflight::of(&scenario).expect("a law");
+        let path = folder.path().join(name);
+        let header = Header::new(name, "", scenario.count(), scenario.delta_m);
+        let (mut recorder, mut history) = (McapRecorder::create(&path, &header).expect("created"), RunHistory::new());
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+        let fly = || {
+            let sink = &mut (&mut recorder, &mut history);
+            run_while(&scenario, &preflight, sink, &mut |_| ControlFlow::Continue(()))
+        };
+        let report = threads.install(fly).expect("a flight");
+        assert_eq!((report.audit.status, report.run.steps), (Status::Clear, 3), "{name}: whole steps, none in parts");
+        // Four neighbours each at 2 m, and four at 2.83 m.
+        let swept = report.audit.pairs_checked as f64 / (4 * MANY) as f64;
+        assert!((2.0..=8.0).contains(&swept), "{name}: {swept} pairs a vehicle and step");
+        recorder.finish().expect("written");
+        let (bytes, numbers) = (std::fs::metadata(&path).expect("written").len(), preflight.recording_bytes);
+        assert_eq!((preflight.samples, numbers), (3, 3 * 72 * MANY as u64));
+        assert!((numbers..numbers + 4096).contains(&bytes), "{name}: {bytes} for {numbers}");
+
+        let shape = Some((&scenario.legs[..], &scenario.graph));
+        let criteria = Criteria { delta_m: 1.0, certified_m: None, shape, edge_error_m: None, disagreement_m_s: None };
+        for figure in of_run(&history, &criteria) {
+            let bytes = figure.svg.len();
+            assert!(bytes < 150_000, "{name}: {bytes} of {}", figure.name);
+        }
+    }
+}
+
+#[test]
+fn a_law_without_numbers_of_edges_takes_no_memory_for_those_of_a_complete_graph() {
+    let scenario = read(&grid(40_000, ALL));
+    assert_eq!(scenario.graph.edge_count(), 799_980_000);
+    scenario.validate().expect("the same answer");
+    let text = grid(40_000, "law = { kind = \"edge-tension\", delta_m = 1.0 }\n");
+    let refused = Scenario::read(&Source::Text { name: "test".to_owned(), text }, &[]).expect_err("too much memory");
+    assert!(refused.message().contains("40000 vehicles with 799980000 edges would take"), "{refused}");
+}
+
+#[test]
+fn what_is_recorded_of_many_vehicles_is_bounded_unless_a_rate_is_given() {
+    let of = |count: usize, time: &str| {
+        let text = grid(count, ALL).replace("duration_s = 0.0125, record_hz = 120", time);
+        let preflight = Preflight::of(&read(&text.replace("hold_s = 0.01", "hold_s = 1.0"))).expect("a law");
+        (preflight.samples, preflight.recording_bytes)
+    };
+    assert_eq!(of(500, "duration_s = 60"), (3601, 3601 * 72 * 500));
+    assert_eq!(of(20_000, "duration_s = 60"), (721, 721 * 72 * 20_000));
+    assert_eq!(of(20_000, "duration_s = 60, record_hz = 60").0, 3601);
+}
+
+#[test]
+fn the_steps_that_a_star_asks_for_are_told_and_a_leader_in_its_middle_asks_for_none() {
+    let star = format!("{ALL}graph.kind = \"star\"\n");
+    let told = |more: &str| Preflight::of(&read(&grid(1000, more))).expect("a law").text();
+    let said = told(&star);
+    // 0.5/(sigma c mu): sigma = 1, c = 1/s, mu = N.
+    assert!(said.contains("the links ask for 0.0005 s at most"), "{said}");
+    for more in [ALL, LED] {
+        let said = told(more);
+        assert!(!said.contains("the links ask"), "{said}");
+    }
+}
