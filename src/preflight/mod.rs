@@ -6,6 +6,7 @@
 
 mod numbers;
 mod rigidity;
+mod warning;
 mod words;
 
 use serde::Serialize;
@@ -18,6 +19,7 @@ use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
 
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
+pub use warning::{Code, Warning};
 
 /// A velocity margin up to this part of its two terms is rounding of eigenvalues, not damping.
 const MARGIN_ROUNDING: f64 = 1e-12;
@@ -112,67 +114,6 @@ pub struct LegPromise {
     pub certified_m: Option<f64>,
     /// The energy does not exceed this \[m^2/s^2\].
     pub energy_bound: f64,
-}
-
-/// Something that stands in the way of a flight.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Warning {
-    /// Stable name.
-    pub code: Code,
-    /// A sentence or two, with the remedy where there is one.
-    pub message: String,
-}
-
-/// What a [`Warning`] is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Code {
-    /// Relative velocities are not damped.
-    RelativeVelocityUnstable,
-    /// The start lies on a line that the law never leaves, and the formation does not.
-    StartOnLine,
-    /// The start lies in a plane that the law never leaves, and the formation does not.
-    StartInPlane,
-    /// Steps cannot be made as short as the law's links ask for.
-    StepTooLong,
-    /// By the end the swarm has drifted so far that numbers do not tell its positions apart.
-    DriftUnresolved,
-    /// Nothing is certified about separations.
-    NoCertificate,
-    /// The formation can be bent without changing the length of an edge to first order.
-    NotRigid,
-    /// A flat formation in space: nothing resists motion out of its flat to first order.
-    FlatFormationInSpace,
-    /// The swarm's mean velocity grows by itself.
-    CommonModeUnstable,
-}
-
-impl Code {
-    /// Every code, the worst first.
-    pub const ALL: [Self; 9] = [
-        Self::RelativeVelocityUnstable,
-        Self::StartOnLine,
-        Self::StartInPlane,
-        Self::StepTooLong,
-        Self::DriftUnresolved,
-        Self::NoCertificate,
-        Self::NotRigid,
-        Self::FlatFormationInSpace,
-        Self::CommonModeUnstable,
-    ];
-
-    /// Whether the flight cannot do what it is for: the formation is out of reach, or nothing may be called stable.
-    #[must_use]
-    pub fn refuses(self) -> bool {
-        matches!(
-            self,
-            Self::RelativeVelocityUnstable
-                | Self::StartOnLine
-                | Self::StartInPlane
-                | Self::StepTooLong
-                | Self::DriftUnresolved
-        )
-    }
 }
 
 impl Preflight {

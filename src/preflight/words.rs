@@ -1,32 +1,8 @@
 //! A pre-flight check in words: one line, and a table.
 
 use super::numbers::{rate, significant};
-use super::{Code, LegPromise, Preflight, Warning};
+use super::{LegPromise, Preflight};
 use crate::text::{at_least, counted, table};
-
-impl Code {
-    /// The stable name, such as `start-on-line`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::RelativeVelocityUnstable => "relative-velocity-unstable",
-            Self::StartOnLine => "start-on-line",
-            Self::StartInPlane => "start-in-plane",
-            Self::StepTooLong => "step-too-long",
-            Self::DriftUnresolved => "drift-unresolved",
-            Self::NoCertificate => "no-certificate",
-            Self::NotRigid => "not-rigid",
-            Self::FlatFormationInSpace => "flat-formation-in-space",
-            Self::CommonModeUnstable => "common-mode-unstable",
-        }
-    }
-}
-
-impl std::fmt::Display for Warning {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "warning [{}]: {}", self.code.name(), self.message)
-    }
-}
 
 impl Preflight {
     /// The check in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings`,
