@@ -7,8 +7,8 @@ use super::draw_list::{Ball, Line, Scene, single};
 use crate::space::{Obstacle, Shape};
 
 /// Balls that a capsule is made of: so many a radius, and no more than this in all.
-const BALLS_A_RADIUS: f64 = 6.0;
-const MOST_BALLS: f64 = 1500.0;
+const BALLS_A_RADIUS: f64 = 24.0;
+const MOST_BALLS: f64 = 3000.0;
 /// Lines across each side of a box, and of a plane.
 const HATCHES: u32 = 12;
 /// Opacity of lines across a side, and of its rims.
