@@ -332,7 +332,7 @@ fn interchangeable_vehicles_that_are_stuck_go_to_other_slots_and_need_no_breath(
         simulation.step();
     }
     let saved = simulation.save();
-    let mut go_on = |simulation: &mut Simulation| {
+    let go_on = |simulation: &mut Simulation| {
         while simulation.time_s() < assignment.time_s + 3.0 {
             simulation.step();
         }

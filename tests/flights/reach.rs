@@ -2,8 +2,8 @@
 //! other's way, without a violation and with no more energy than was promised.
 //!
 //! 2 random starts of each case of up to 30 vehicles, and 6 of the 60 orderings of the pentagon;
-//! `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach -- --nocapture` flies 20 of every case, all orderings, and
-//! prints the table of docs/validation.md. Rapier at its defaults, a22 = 0.1 1/s; a flight ends once the formation has been
+//! `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture --include-ignored` flies 20 of every
+//! case, all orderings, and prints the table of docs/validation.md. Rapier at its defaults, a22 = 0.1 1/s; a flight ends once the formation has been
 //! held for as long as it must be, or after 300 s.
 
 use tautline::audit::Status;
@@ -235,7 +235,7 @@ fn a_sphere_of_30_is_reached_on_every_graph() {
 }
 
 #[test]
-#[ignore = "minutes: TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach -- --nocapture --include-ignored"]
+#[ignore = "minutes: TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture --include-ignored"]
 fn a_grid_of_100_is_reached() {
     reach(Slots::Grid(100), "100 in a grid", &DENSE_GRAPHS, starts_asked_for().unwrap_or(2));
 }
@@ -265,7 +265,7 @@ fn a_sphere_of_100_is_reached() {
 }
 
 #[test]
-#[ignore = "an hour: see a_grid_of_100_is_reached"]
+#[ignore = "ten minutes: see a_grid_of_100_is_reached"]
 fn a_cube_of_500_is_reached() {
     reach(Slots::Cube(500), "500 in a cube", &DENSE_GRAPHS[..2], starts_asked_for().unwrap_or(2));
 }
