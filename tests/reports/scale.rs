@@ -9,7 +9,7 @@ use tautline::record::mcap::{Header, McapRecorder};
 use tautline::run::run_while;
 use tautline::scenario::{Scenario, Source};
 
-const MANY: usize = 20_000;
+const MANY: usize = 10_000;
 
 /// A grid of 2 m that contracts to 1.6 m, as large as `count`, for a few steps.
 fn grid(count: usize, more: &str) -> String {
