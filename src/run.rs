@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
-use crate::record::{Sink, StateHash, beside};
+use crate::record::{Sink, StateHash, record_beside};
 use crate::report::{Findings, Hulls, Performance, Report, Run, Verification};
 use crate::scenario::{PlantSpec, Scenario};
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
@@ -45,7 +45,7 @@ pub fn run_while(
     let is_beside = scenario.count() >= BESIDE_FROM && rayon::current_num_threads() > 1 && !sink.looks_at_steps();
     let mut sinks = (sink, (&mut metrics, &mut state_hash));
     let flight = if is_beside {
-        beside(&mut sinks, |sink| sim::fly(scenario, parts, sink, carry_on))?
+        record_beside(&mut sinks, |sink| sim::fly(scenario, parts, sink, carry_on))?
     } else {
         sim::fly(scenario, parts, &mut sinks, carry_on)?
     };

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Rotation3};
 use proptest::prelude::*;
 
 use super::*;
+use crate::graph::Graph;
 
 /// Rounding of a fit, relative to the extent of the shape: sums of a few dozen products in double precision.
 const FIT_TOLERANCE: f64 = 1e-13;

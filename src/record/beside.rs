@@ -27,7 +27,7 @@ struct Beside {
 ///
 /// # Errors
 /// The first error of the recorder, which the flight meets at something that it hands over later, or at its end.
-pub fn beside<T, E: From<RecordError>>(
+pub fn record_beside<T, E: From<RecordError>>(
     sink: &mut (dyn Sink + Send),
     fly: impl FnOnce(&mut dyn Sink) -> Result<T, E>,
 ) -> Result<T, E> {
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn everything_arrives_in_its_order() {
         let mut times = Times::default();
-        assert_eq!(beside(&mut times, told).expect("recorded"), 20);
+        assert_eq!(record_beside(&mut times, told).expect("recorded"), 20);
         assert_eq!(times.0, (0..40).map(|k| 0.5 * f64::from(k)).collect::<Vec<_>>());
     }
 
@@ -142,7 +142,7 @@ mod tests {
     fn an_error_of_the_recorder_ends_the_flight_and_is_told_even_at_its_very_end() {
         for failing_s in [0.0, 7.5, 19.5] {
             let mut times = Times(Vec::new(), Some(failing_s));
-            let error = beside(&mut times, told).expect_err("a full disk");
+            let error = record_beside(&mut times, told).expect_err("a full disk");
             assert_eq!(error.to_string(), "cannot write run.mcap: the disk is full");
             assert_eq!(times.0.last().map_or(0.0, |last| last + 0.5), failing_s);
         }

@@ -8,7 +8,7 @@ mod hash;
 #[cfg(feature = "recordings")]
 pub mod mcap;
 
-pub use beside::beside;
+pub use beside::record_beside;
 pub use hash::{StateHash, sha256_hex};
 
 use std::sync::Arc;
@@ -335,7 +335,7 @@ pub trait Sink {
     /// Looks at the end of a step, for what is folded over all of them. One that ends a flight may be told twice.
     fn step(&mut self, _step: &Step<'_>) {}
 
-    /// Whether it looks at steps. One that says no is not told of them where it records [`beside`] the flight.
+    /// Whether it looks at steps. One that says no is not told of them where it records beside the flight ([`record_beside`]).
     fn looks_at_steps(&self) -> bool {
         true
     }

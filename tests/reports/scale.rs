@@ -9,7 +9,7 @@ use tautline::record::mcap::{Header, McapRecorder};
 use tautline::run::run_while;
 use tautline::scenario::{Scenario, Source};
 
-const MANY: usize = 20_000;
+const MANY: usize = 10_000;
 
 /// A grid of 2 m that contracts to 1.6 m, as large as `count`, for a few steps.
 fn grid(count: usize, more: &str) -> String {
@@ -50,7 +50,7 @@ fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehic
         recorder.finish().expect("written");
         let (bytes, numbers) = (std::fs::metadata(&path).expect("written").len(), preflight.recording_bytes);
         assert_eq!((preflight.samples, numbers), (3, 3 * 72 * MANY as u64));
-        assert!((numbers..numbers + 4096).contains(&bytes), "{name}: {bytes} for {numbers}");
+        assert!((numbers..numbers + 8192).contains(&bytes), "{name}: {bytes} for {numbers}");
 
         let shape = Some((&scenario.legs[..], &scenario.graph));
         let criteria = Criteria { delta_m: 1.0, certified_m: None, shape, edge_error_m: None, disagreement_m_s: None };
@@ -89,7 +89,7 @@ fn the_steps_that_a_star_asks_for_are_told_and_a_leader_in_its_middle_asks_for_n
     let told = |more: &str| Preflight::of(&read(&grid(1000, more))).expect("a law").text();
     let said = told(&star);
     // 0.5/(sigma c mu): sigma = 1, c = 1/s, mu = N.
-    assert!(said.contains("the links ask for 0.0005 s at most"), "{said}");
+    assert!(said.contains("the links ask for 0.000500 s at most"), "{said}");
     for more in [ALL, LED] {
         let said = told(more);
         assert!(!said.contains("the links ask"), "{said}");
