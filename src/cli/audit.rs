@@ -286,7 +286,9 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
     let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
-    own_obstacles.iter().for_each(|own| own.bind(&mut outcome, &settings));
+    if let Some(own) = own_obstacles {
+        own.bind(&mut outcome, &settings);
+    }
     arguments.check_count(&outcome, &settings)?;
     let between = arguments.between(curves, own.as_ref());
     let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);

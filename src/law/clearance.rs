@@ -1,10 +1,12 @@
 //! The one-sided tension between vehicles and the surfaces of obstacles at rest.
 
-use super::error::LawError;
+use super::error::{LawError, ParameterError};
+use super::setting::Setting;
 use super::tension::{EdgeTension, TensionError};
 use crate::observation::Observation;
 use crate::space::Obstacle;
 use crate::swarm::{Rows, row, set_row};
+use crate::target::Leg;
 
 /// The edge tension on the room that a vehicle has from an obstacle: its distance from the surface less the clearance. It
 /// pushes while that is less than a range, and without bound as it vanishes.
@@ -71,4 +73,28 @@ impl ClearanceTension {
     pub(super) fn least_room_m(&self, energy: f64) -> f64 {
         self.tension.push_side_root(energy)
     }
+}
+
+/// The least room that a slot of any leg has from an obstacle \[m\], where slots are places that stay.
+pub(super) fn slot_room_m(setting: &Setting<'_>) -> Result<f64, ParameterError> {
+    let Some(guidance) = setting.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
+        return Ok(f64::INFINITY);
+    };
+    let place_m = guidance.motion.at(0.0).position_m;
+    let mut least_m = f64::INFINITY;
+    let later = setting.later.iter().map(|Leg { formation, .. }| formation);
+    for formation in std::iter::once(setting.formation).chain(later) {
+        for vehicle in 0..formation.count() {
+            for (obstacle, solid) in setting.obstacles.iter().enumerate() {
+                let (room_m, _) = solid.room_m(row(&formation.slots_m, vehicle) + place_m);
+                if room_m <= 0.0 {
+                    let clearance_m = solid.clearance_m;
+                    let distance_m = room_m + clearance_m;
+                    return Err(ParameterError::ObstacleOverSlot { vehicle, obstacle, distance_m, clearance_m });
+                }
+                least_m = least_m.min(room_m);
+            }
+        }
+    }
+    Ok(least_m)
 }

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, LegBound, Void};
-use super::clearance::ClearanceTension;
+use super::clearance::{ClearanceTension, slot_room_m};
 use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
 use super::error::{LawError, ParameterError};
 use super::interface::{Controls, Law, VelocityMargin};
@@ -18,7 +18,7 @@ use crate::graph::Pinning;
 use crate::observation::Observation;
 use crate::space::{NearPairs, Obstacle};
 use crate::swarm::{Pair, Rows, row, set_row};
-use crate::target::{Leg, ReferenceMotion, Target};
+use crate::target::{Guidance, ReferenceMotion, Target};
 
 /// Keys of `[law]` with `kind = "displacement"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -108,8 +108,8 @@ pub struct DisplacementLaw {
     a22_per_s: f64,
     /// Whether `r'' - a22 r'` is fed forward to those who follow.
     is_fed: bool,
-    /// Whether nothing would have to be.
-    needs_no_feed: bool,
+    /// Why nothing is certified from any start.
+    voids: Vec<Void>,
     /// Least eigenvalue of the pinned Laplacian, and a bound on its largest.
     connectivity: f64,
     largest: f64,
@@ -119,8 +119,6 @@ pub struct DisplacementLaw {
     rest_at_most_m: f64,
     /// Between vehicles and obstacles, where there are any.
     clearance: Option<ClearanceTension>,
-    /// Whether a reference that moves carries the swarm.
-    is_carried: bool,
     /// Whether there are two vehicles at all.
     has_pairs: bool,
     /// That of the target that R is taken from.
@@ -166,14 +164,13 @@ impl DisplacementLaw {
         };
         Ok(Self {
             clearance,
-            is_carried: guidance.is_some_and(|guidance| !guidance.motion.is_at_rest()),
             largest: links.largest_eigenvalue_bound(&pulls.pinning),
             pulls,
             keys,
             delta_m,
             a22_per_s,
             is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
-            needs_no_feed: guidance.is_none_or(|guidance| needs_no_feed(&guidance.motion, a22_per_s)),
+            voids: voids(setting),
             connectivity,
             tension,
             rest_at_most_m,
@@ -272,30 +269,6 @@ fn nearest_slots(formation: &Formation, delta_m: f64) -> (Pair, f64) {
     formation.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
 }
 
-/// The least room that a slot of any leg has from an obstacle \[m\], where slots are places that stay.
-fn slot_room_m(setting: &Setting<'_>) -> Result<f64, ParameterError> {
-    let Some(guidance) = setting.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
-        return Ok(f64::INFINITY);
-    };
-    let place_m = guidance.motion.at(0.0).position_m;
-    let mut least_m = f64::INFINITY;
-    let later = setting.later.iter().map(|Leg { formation, .. }| formation);
-    for formation in std::iter::once(setting.formation).chain(later) {
-        for vehicle in 0..formation.count() {
-            for (obstacle, solid) in setting.obstacles.iter().enumerate() {
-                let (room_m, _) = solid.room_m(row(&formation.slots_m, vehicle) + place_m);
-                if room_m <= 0.0 {
-                    let clearance_m = solid.clearance_m;
-                    let distance_m = room_m + clearance_m;
-                    return Err(ParameterError::ObstacleOverSlot { vehicle, obstacle, distance_m, clearance_m });
-                }
-                least_m = least_m.min(room_m);
-            }
-        }
-    }
-    Ok(least_m)
-}
-
 fn tension_between(
     formation: &Formation,
     keys: &DisplacementKeys,
@@ -303,6 +276,21 @@ fn tension_between(
 ) -> Result<EdgeTension, ParameterError> {
     let (pair, rest_m) = nearest_slots(formation, delta_m);
     EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })
+}
+
+/// Why nothing is certified from any start: followers are not told how their reference moves, a swarm is carried past obstacles
+/// that stand, or its absolute velocity, which counts among them, is fed.
+fn voids(setting: &Setting<'_>) -> Vec<Void> {
+    let &Setting { guidance, obstacles, a22_per_s, .. } = setting;
+    let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed(&of.motion, a22_per_s);
+    let is_carried = guidance.is_some_and(|of| !of.motion.is_at_rest());
+    let is_driven = guidance.is_none() && a22_per_s > 0.0;
+    let reasons = [
+        (guidance.is_some_and(is_unfed), Void::ReferenceNotFed),
+        (!obstacles.is_empty() && is_carried, Void::CarriedPastObstacles),
+        (!obstacles.is_empty() && is_driven, Void::VelocityUndamped),
+    ];
+    reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
 }
 
 /// Whether a vehicle on the reference stays on it by itself.
@@ -374,13 +362,10 @@ impl Law for DisplacementLaw {
             (last.and_then(|last| last.certified_m), last.and_then(|last| last.certified_room_m));
         let legs = if ahead.is_empty() { Vec::new() } else { legs };
         let closes_in = ahead.iter().any(|formation| self.rest_for(formation).1 < self.tension.rest_m());
-        let has_obstacles = self.clearance.is_some();
-        let is_fed_energy = has_obstacles && !self.is_guided() && self.a22_per_s > 0.0;
-        Certificate { certified_m, certified_room_m, energy_initial: Some(energy), void: Vec::new(), legs }
-            .void_where(closes_in, Void::TargetChanges)
-            .void_where(has_obstacles && self.is_carried, Void::CarriedPastObstacles)
-            .void_where(is_fed_energy, Void::VelocityUndamped)
-            .void_where(!self.is_fed && !self.needs_no_feed, Void::ReferenceNotFed)
+        let promised =
+            Certificate { certified_m, certified_room_m, energy_initial: Some(energy), void: Vec::new(), legs }
+                .void_where(closes_in, Void::TargetChanges);
+        self.voids.iter().fold(promised, |promised, &void| promised.void_where(true, void))
     }
 
     fn controls(&self) -> Controls {

@@ -87,7 +87,7 @@ fn among(seed: u64) -> Scenario {
 #[test]
 fn no_random_flight_among_obstacles_breaks_what_was_certified() {
     let flights = std::env::var("TAUTLINE_RANDOM_OBSTACLES").map_or(20, |n| n.parse().expect("a number"));
-    let (mut tightest, mut near, mut worst_rise) = (f64::INFINITY, 0, 0.0_f64);
+    let (mut tightest, mut near, mut worst_rise) = (f64::INFINITY, 0_u64, 0.0_f64);
     for seed in 0..flights {
         let scenario = among(seed);
         scenario.validate().unwrap_or_else(|error| panic!("seed {seed}: {error}"));
@@ -104,7 +104,7 @@ fn no_random_flight_among_obstacles_breaks_what_was_certified() {
         assert_eq!((flight.audit.status, clearance.status), (Status::Clear, Status::Clear), "seed {seed}");
         assert_eq!(clearance.parry.disagreements, 0, "seed {seed}");
         tightest = tightest.min((room_m - certified_room_m) / scenario.delta_m);
-        near += usize::from(room_m < 0.1 * scenario.delta_m);
+        near += u64::from(room_m < 0.1 * scenario.delta_m);
         let rise = flight.energy_rise.expect("an energy");
         worst_rise = worst_rise.max((rise.to - rise.from) / rise.from);
     }
@@ -113,7 +113,7 @@ fn no_random_flight_among_obstacles_breaks_what_was_certified() {
          certificate {tightest:.3e} delta, largest rise of energy {worst_rise:.1e}"
     );
     assert!(worst_rise < 1e-6, "{worst_rise}");
-    assert!(4 * near > flights as usize, "{near}: obstacles were hardly in the way");
+    assert!(4 * near > flights, "{near}: obstacles were hardly in the way");
 }
 
 /// The law of a scenario that was not told of the obstacles flies through them: the judge sees it, and nothing is certified.

@@ -42,7 +42,9 @@ impl<'a> SceneBuilder<'a> {
         let mut alarmed = vec![false; timeline.count()];
         let now_s = frame.time_s;
         let too_near: Vec<_> = timeline.too_near_by(now_s).filter(|near| near.to_s >= now_s).collect();
-        too_near.iter().for_each(|near| alarmed[near.vehicle] = true);
+        for near in &too_near {
+            alarmed[near.vehicle] = true;
+        }
         for (Violation { pair, .. }, _) in &violated {
             (alarmed[pair.first()], alarmed[pair.second()]) = (true, true);
         }
