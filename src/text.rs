@@ -14,7 +14,11 @@ pub(crate) fn at_least(number: f64, decimals: u8) -> String {
     let places = usize::from(decimals);
     let shown = fixed(number, places);
     match shown.parse::<f64>() {
-        Ok(rounded) if rounded > number => fixed(rounded - 0.1_f64.powi(i32::from(decimals)), places),
+        Ok(rounded) if rounded > number => {
+            let lower = fixed(rounded - 0.1_f64.powi(i32::from(decimals)), places);
+            // Rounding to zero from below is no number below zero.
+            if number >= 0.0 { lower.trim_start_matches('-').to_owned() } else { lower }
+        }
         _ => shown,
     }
 }

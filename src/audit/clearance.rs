@@ -7,7 +7,7 @@ use super::obstacle::{Obstacle, ObstacleError};
 use super::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use super::pair_sweep::PairSweep;
 use super::parry::KeepOut;
-use super::results::Results;
+use super::results::{ClosestPairs, Results};
 use super::segment::Segment;
 use super::sweep::{Interval, MIN_LIMIT_M};
 use crate::swarm::{Rows, row};
@@ -59,7 +59,7 @@ pub struct ClearanceFinding<'a> {
 pub struct ClearanceOutcome {
     /// The verdict.
     pub status: Status,
-    /// The closest approaches of different vehicles and obstacles, at most ten, closest first.
+    /// The approaches of different vehicles and obstacles that came closest to their limits, at most ten, the least room first.
     pub closest: Vec<Approach>,
     /// Every violation, in the order of their beginning.
     pub violations: Vec<Violation<ObjectPair>>,
@@ -93,7 +93,7 @@ impl ClearanceAuditor {
             distances_m: vec![0.0; vehicles * obstacles.len()],
             is_below: vec![false; vehicles * obstacles.len()],
             least_room_m: f64::INFINITY,
-            results: Results::default(),
+            results: Results { obstacles: ClosestPairs::to_limits(), ..Results::default() },
             began: Vec::new(),
             ended: Vec::new(),
             refused: 0,
@@ -141,7 +141,7 @@ impl ClearanceAuditor {
             let pair = ObjectPair::Obstacle { vehicle, obstacle: index };
             let rounding_m = ROUNDING * ((from - place_m).norm() + (to - place_m).norm() + limit_m);
             let least_m = 0.5 * (start_m + end_m - moved_m) - rounding_m;
-            let cutoff = self.results.obstacles.cutoff(pair);
+            let cutoff = self.results.obstacles.cutoff(pair, limit_m);
             if least_m >= limit_m.max(cutoff) {
                 continue;
             }
@@ -163,6 +163,12 @@ impl ClearanceAuditor {
                 self.ended.extend(last);
             }
         }
+    }
+
+    /// The approaches that came closest to their limits so far, the least room first.
+    #[must_use]
+    pub fn closest(&self) -> &[Approach] {
+        &self.results.obstacles.kept
     }
 
     /// The verdict over everything judged.
@@ -269,7 +275,9 @@ mod tests {
             ways in prop::collection::vec(prop::collection::vec(prop::array::uniform3(-6.0..6.0_f64), 12), 1..4),
             clearance_m in 0.05..1.5_f64,
         ) {
-            let obstacles: Vec<_> = one_of_each().into_iter().map(|shape| standing(shape, clearance_m)).collect();
+            let limit_m = |k: usize| clearance_m * (1.0 + 2.0 * k as f64);
+            let obstacles: Vec<_> =
+                one_of_each().into_iter().enumerate().map(|(k, shape)| standing(shape, limit_m(k))).collect();
             let mut auditor = ClearanceAuditor::new(ways.len(), &obstacles).unwrap();
             for k in 0..12 {
                 let rows: Vec<_> = ways.iter().flat_map(|way| way[k]).collect();
@@ -280,10 +288,11 @@ mod tests {
                 way.windows(2).map(|ends| swept_distance_m(obstacle, ends[0].into(), ends[1].into())).fold(f64::INFINITY, f64::min)
             };
             let all: Vec<_> = ways.iter().flat_map(|way| obstacles.iter().map(|o| swept(way, o))).collect();
-            let least = all.iter().copied().fold(f64::INFINITY, f64::min);
-            prop_assert!((outcome.closest[0].lower_m - least).abs() < 1e-12);
-            prop_assert_eq!(outcome.status == Status::Violation, least < clearance_m);
-            let too_close = all.iter().filter(|&&m| m < clearance_m).count();
+            let rooms = all.iter().enumerate().map(|(k, m)| m - limit_m(k % obstacles.len()));
+            let least = rooms.clone().fold(f64::INFINITY, f64::min);
+            prop_assert!((outcome.closest[0].lower_m - outcome.closest[0].limit_m - least).abs() < 1e-12);
+            prop_assert_eq!(outcome.status == Status::Violation, least < 0.0);
+            let too_close = rooms.filter(|&room_m| room_m < 0.0).count();
             let mut pairs: Vec<_> = outcome.violations.iter().map(|violation| violation.pair).collect();
             pairs.sort_unstable();
             pairs.dedup();

@@ -113,6 +113,21 @@ impl Obstacle {
         }
     }
 
+    /// The same with all lengths so many times as long.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let shape = match self.shape {
+            Shape::Ball { radius_m } => Shape::Ball { radius_m: radius_m * factor },
+            Shape::Box { half_m, yaw_rad } => Shape::Box { half_m: half_m * factor, yaw_rad },
+            Shape::Capsule { from_m, to_m, radius_m } => {
+                Shape::Capsule { from_m: from_m * factor, to_m: to_m * factor, radius_m: radius_m * factor }
+            }
+            Shape::HalfSpace { normal } => Shape::HalfSpace { normal },
+        };
+        let path = self.path.iter().map(|&(time_s, place_m)| (time_s, place_m * factor)).collect();
+        Self { name: self.name.clone(), shape, clearance_m: self.clearance_m.map(|m| m * factor), path }
+    }
+
     /// Its way, without an end.
     pub(super) fn segments(&self) -> Vec<Segment> {
         let (Some(&(_, first)), Some(&(last_s, last))) = (self.path.first(), self.path.last()) else {

@@ -10,22 +10,35 @@ pub(super) const KEPT: usize = 10;
 #[derive(Clone, Debug)]
 pub(super) struct ClosestPairs {
     pub(super) kept: Vec<Approach>,
-    /// What a pair that is not among them must come below to be.
+    /// What a pair that is not among them must come below to be: a distance, or what it has beyond its limit.
     pub(super) threshold: f64,
+    /// Whether they are the closest to their limits, which differ, and not to each other.
+    beyond_limit: bool,
 }
 
 impl Default for ClosestPairs {
     fn default() -> Self {
-        Self { kept: Vec::with_capacity(KEPT + 1), threshold: f64::INFINITY }
+        Self { kept: Vec::with_capacity(KEPT + 1), threshold: f64::INFINITY, beyond_limit: false }
     }
 }
 
 impl ClosestPairs {
-    /// What this pair must come below to change anything: where its distance is known by bounds that lie apart, the upper
-    /// one can still fall.
-    pub(super) fn cutoff(&self, pair: ObjectPair) -> f64 {
+    /// Those that are closest to their limits.
+    pub(super) fn to_limits() -> Self {
+        Self { beyond_limit: true, ..Self::default() }
+    }
+
+    /// What is compared of an approach.
+    fn key(&self, approach: &Approach) -> f64 {
+        if self.beyond_limit { approach.lower_m - approach.limit_m } else { approach.lower_m }
+    }
+
+    /// The distance that this pair must come below to change anything: where its distance is known by bounds that lie apart,
+    /// the upper one can still fall.
+    pub(super) fn cutoff(&self, pair: ObjectPair, limit_m: f64) -> f64 {
         let known = self.kept.iter().find(|kept| kept.pair == pair);
-        known.map_or(self.threshold, |kept| if kept.is_known() { kept.lower_m } else { kept.upper_m })
+        let to_be_kept = if self.beyond_limit { self.threshold + limit_m } else { self.threshold };
+        known.map_or(to_be_kept, |kept| if kept.is_known() { kept.lower_m } else { kept.upper_m })
     }
 
     /// Keeps those of which something holds; from then on any pair can be among the closest.
@@ -36,6 +49,7 @@ impl ClosestPairs {
 
     /// Keeps the closer of two approaches of one pair, and the closest pairs.
     pub(super) fn offer(&mut self, approach: Approach) {
+        let key = self.key(&approach);
         match self.kept.iter_mut().find(|kept| kept.pair == approach.pair) {
             Some(kept) => {
                 let upper_m = kept.upper_m.min(approach.upper_m);
@@ -44,17 +58,19 @@ impl ClosestPairs {
                 }
                 kept.upper_m = upper_m;
             }
-            None if approach.lower_m < self.threshold => self.kept.push(approach),
+            None if key < self.threshold => self.kept.push(approach),
             None => return,
         }
-        self.kept.sort_by(|a, b| {
-            a.lower_m.total_cmp(&b.lower_m).then(a.upper_m.total_cmp(&b.upper_m)).then(a.pair.cmp(&b.pair))
+        let mut kept = std::mem::take(&mut self.kept);
+        kept.sort_by(|a, b| {
+            self.key(a).total_cmp(&self.key(b)).then(a.upper_m.total_cmp(&b.upper_m)).then(a.pair.cmp(&b.pair))
         });
-        self.kept.truncate(KEPT);
+        kept.truncate(KEPT);
+        self.kept = kept;
         if let [.., last] = self.kept[..]
             && self.kept.len() == KEPT
         {
-            self.threshold = last.lower_m;
+            self.threshold = self.key(&last);
         }
     }
 }
@@ -99,8 +115,16 @@ mod tests {
         closest.offer(approach(11, 8.0));
         closest.offer(approach(11, 8.5));
         closest.offer(approach(0, 19.0));
-        assert_eq!(closest.cutoff(approach(11, 0.0).pair), 8.0);
-        assert_eq!(closest.cutoff(approach(0, 0.0).pair), 18.0);
+        assert_eq!(closest.cutoff(approach(11, 0.0).pair, 1.0), 8.0);
+        assert_eq!(closest.cutoff(approach(0, 0.0).pair, 1.0), 18.0);
+        let far = Approach { limit_m: 30.0, ..approach(50, 31.0) };
+        closest.offer(far);
+        assert!(!closest.kept.contains(&far), "others are closer to each other");
+        let mut to_limits = ClosestPairs::to_limits();
+        (0..12).for_each(|k| to_limits.offer(approach(k, 20.0 - k as f64)));
+        assert_eq!((to_limits.threshold, to_limits.cutoff(far.pair, 30.0)), (17.0, 47.0));
+        to_limits.offer(far);
+        assert_eq!(to_limits.kept[0], far, "it is the closest to its limit");
         let kept: Vec<_> = closest.kept.iter().map(|kept| kept.lower_m).collect();
         assert_eq!(kept, [8.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0]);
     }

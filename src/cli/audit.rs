@@ -295,9 +295,13 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
-    let is_passed_over = arguments.obstacles.is_none() && own_obstacles.is_none();
-    if is_passed_over && own.as_ref().is_some_and(|own| own.has_obstacles) {
-        notes.push("the obstacles that were flown past are not judged: lengths are not metres here".to_owned());
+    if own_obstacles.is_none() && own.as_ref().is_some_and(|own| !own.obstacles.obstacles.is_empty()) {
+        let why = if arguments.obstacles.is_some() {
+            "--obstacles names others"
+        } else {
+            "they have no place among ellipsoids"
+        };
+        notes.push(format!("the obstacles that were flown past are not judged: {why}"));
     }
     notes.extend(own_obstacles.map(|own| {
         let names: Vec<_> = own.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();

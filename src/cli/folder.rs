@@ -60,11 +60,14 @@ impl OutFolder {
         }
         // Known before the work begins, and before anything old is taken away.
         try_to_write_in(&self.path).map_err(|error| machine(&self.path, &error))?;
-        // From here on the old report would describe something else.
-        match fs::remove_file(&report) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(machine(&report, &error)),
-            _ => Ok(lock),
+        // From here on the old report and its page would describe something else.
+        for old in [&report, &report.with_extension("html")] {
+            match fs::remove_file(old) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(machine(old, &error)),
+                _ => {}
+            }
         }
+        Ok(lock)
     }
 }
 

@@ -39,6 +39,9 @@ fn parse(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
         Failure::input(format!("{}, line {line}: {message}", path.display()), OBSTACLE_HELP)
     };
     let document: Document = toml::from_str(text).map_err(|error| wrong(error.message().to_owned(), error.span()))?;
+    if document.obstacle.is_empty() {
+        return Err(wrong("there is no [[obstacle]]".to_owned(), None));
+    }
     let obstacles: Result<Vec<_>, _> = document
         .obstacle
         .into_iter()

@@ -24,10 +24,8 @@ pub(super) struct OwnRecording {
     pub(super) has_every_step: bool,
     /// Most steps between two of its samples.
     pub(super) most_steps: u64,
-    /// What it was flown past; nothing where its lengths are taken for others than they are.
+    /// What it was flown past.
     pub(super) obstacles: OwnObstacles,
-    /// Whether there were obstacles at all.
-    pub(super) has_obstacles: bool,
     /// The law that was flown, where it is not the scenario's.
     other_law: Option<String>,
 }
@@ -49,8 +47,7 @@ impl OwnRecording {
             has_every_step: is_straight,
             most_steps: 0,
             other_law: None,
-            has_obstacles: scenario.as_ref().is_some_and(|scenario| !scenario.obstacles.is_empty()),
-            obstacles: scenario.as_ref().filter(|_| scale == 1.0).map(OwnObstacles::of).unwrap_or_default(),
+            obstacles: scenario.as_ref().map(|scenario| OwnObstacles::of(scenario, scale)).unwrap_or_default(),
         };
         let mut before: Option<OwnedSample> = None;
         let mut near = Near::default();
@@ -71,7 +68,7 @@ impl OwnRecording {
                     near.end(pair, time_s, min_m * scale, own.delta_m, before.as_ref());
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
-                Entry::Event(event) => own.obstacles.note(&event),
+                Entry::Event(event) => own.obstacles.note(&event, scale),
             }
         }
         own.violations.append(&mut near.ended);

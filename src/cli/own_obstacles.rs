@@ -1,7 +1,7 @@
 //! What a recording of `tautline run` says of the obstacles that were flown past.
 
 use crate::audit::recorded::{Approach, ObjectPair, Outcome, Settings};
-use crate::audit::{self, Obstacle, Status, Undecided, Violation};
+use crate::audit::{Obstacle, Status, Undecided, Violation};
 use crate::record::Event;
 use crate::scenario::Scenario;
 use crate::sim;
@@ -12,18 +12,26 @@ pub(super) struct OwnObstacles {
     /// As its scenario has them.
     pub(super) obstacles: Vec<Obstacle>,
     told: Vec<Violation<ObjectPair>>,
+    /// The closest approaches that the run saw.
+    closest: Vec<Approach>,
 }
 
 impl OwnObstacles {
-    pub(super) fn of(scenario: &Scenario) -> Self {
-        Self { obstacles: scenario.obstacles.iter().map(sim::judged).collect(), told: Vec::new() }
+    /// Those of a scenario, with lengths that are taken for `scale` times as long.
+    pub(super) fn of(scenario: &Scenario, scale: f64) -> Self {
+        let obstacles = scenario.obstacles.iter().map(|obstacle| sim::judged(obstacle).scaled(scale)).collect();
+        Self { obstacles, ..Self::default() }
     }
 
-    /// Takes note of what the run saw.
-    pub(super) fn note(&mut self, event: &Event) {
+    fn limit_m(&self, obstacle: usize) -> f64 {
+        self.obstacles.get(obstacle).and_then(|of| of.clearance_m).unwrap_or(f64::MAX)
+    }
+
+    /// Takes note of what the run saw, in lengths that are taken for `scale` times as long.
+    pub(super) fn note(&mut self, event: &Event, scale: f64) {
         match *event {
             Event::ObstacleViolationBegan { vehicle, obstacle, time_s } => {
-                let limit_m = self.obstacles.get(obstacle).and_then(|of| of.clearance_m).unwrap_or(f64::MAX);
+                let limit_m = self.limit_m(obstacle);
                 self.told.push(Violation {
                     pair: ObjectPair::Obstacle { vehicle, obstacle },
                     from_s: time_s,
@@ -36,8 +44,13 @@ impl OwnObstacles {
             Event::ObstacleViolationEnded { vehicle, obstacle, time_s, min_m } => {
                 let pair = ObjectPair::Obstacle { vehicle, obstacle };
                 if let Some(told) = self.told.iter_mut().rev().find(|told| told.pair == pair) {
-                    (told.to_s, told.min_m) = (time_s, told.min_m.min(min_m));
+                    (told.to_s, told.min_m) = (time_s, told.min_m.min(min_m * scale));
                 }
+            }
+            Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m } => {
+                let (pair, lower_m) = (ObjectPair::Obstacle { vehicle, obstacle }, distance_m * scale);
+                let limit_m = self.limit_m(obstacle);
+                self.closest.push(Approach { pair, lower_m, upper_m: lower_m, time_s, limit_m });
             }
             _ => {}
         }
@@ -46,18 +59,20 @@ impl OwnObstacles {
     /// Nothing between samples counts where every step is a sample.
     pub(super) fn forget_what_was_seen(&mut self) {
         self.told.clear();
+        self.closest.clear();
     }
 
     /// Adds to what was found in a recording what the run saw between its samples: a violation, or a time that cannot be
-    /// told where heights count and are not known.
+    /// told where heights count and are not known; and how close vehicles came.
     pub(super) fn bind(&self, outcome: &mut Outcome, settings: &Settings) {
         let Some(&(first_s, last_s)) = outcome.span_s.as_ref() else { return };
+        let offset_s = |outcome: &Outcome, pair: ObjectPair| {
+            let ObjectPair::Obstacle { vehicle, .. } = pair else { return None };
+            outcome.presence.get(vehicle).copied().flatten()?;
+            Some(settings.vehicles.get(&outcome.name(vehicle)).map_or(0.0, |of| of.offset_s))
+        };
         for told in &self.told {
-            let ObjectPair::Obstacle { vehicle, .. } = told.pair else { continue };
-            if outcome.presence.get(vehicle).copied().flatten().is_none() {
-                continue;
-            }
-            let offset_s = settings.vehicles.get(&outcome.name(vehicle)).map_or(0.0, |of| of.offset_s);
+            let Some(offset_s) = offset_s(outcome, told.pair) else { continue };
             let (from_s, to_s) = ((told.from_s + offset_s).max(first_s), (told.to_s + offset_s).min(last_s));
             let is_found =
                 |found: &Violation<ObjectPair>| found.pair == told.pair && found.from_s <= to_s && from_s <= found.to_s;
@@ -73,17 +88,33 @@ impl OwnObstacles {
                 }
                 continue;
             }
-            outcome.violations.push(Violation { from_s, to_s, min_at_s: from_s, ..*told });
-            let approach = Approach { pair, lower_m: min_m, upper_m: min_m, time_s: from_s, limit_m };
-            let known = outcome.obstacles.iter_mut().find(|known| known.pair == pair);
-            match known {
-                Some(known) if known.lower_m > min_m => *known = approach,
-                Some(_) => {}
-                None => outcome.obstacles.push(approach),
-            }
+            outcome.violations.push(Violation { from_s, to_s, min_at_s: f64::midpoint(from_s, to_s), ..*told });
             outcome.status = Status::Violation;
         }
+        for told in self.closest.iter().filter(|_| settings.above_m.is_none()) {
+            let Some(offset_s) = offset_s(outcome, told.pair) else { continue };
+            let time_s = told.time_s + offset_s;
+            if (first_s..=last_s).contains(&time_s) {
+                offer(Approach { time_s, ..*told }, outcome);
+            }
+        }
         outcome.violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.pair.cmp(&b.pair)));
-        outcome.obstacles.sort_by(|a: &audit::Approach, b| a.lower_m.total_cmp(&b.lower_m));
+        outcome.obstacles.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m));
+    }
+}
+
+/// Takes the closest approach of a vehicle to an obstacle, where it is closer than was found: in the list, and in the
+/// violation that lasts then.
+fn offer(told: Approach, outcome: &mut Outcome) {
+    match outcome.obstacles.iter_mut().find(|known| known.pair == told.pair) {
+        Some(known) if known.lower_m > told.lower_m => *known = told,
+        Some(_) => {}
+        None => outcome.obstacles.push(told),
+    }
+    let lasts = |found: &&mut Violation<ObjectPair>| {
+        found.pair == told.pair && (found.from_s..=found.to_s).contains(&told.time_s) && told.lower_m <= found.min_m
+    };
+    if let Some(found) = outcome.violations.iter_mut().find(lasts) {
+        (found.min_m, found.min_at_s) = (told.lower_m, told.time_s);
     }
 }

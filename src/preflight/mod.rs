@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::formation::affine_dimension;
 use crate::law::{Controls, Law, LegBound, ParameterError, Void};
-use crate::scenario::{LARGEST, Scenario, TimeSpec};
+use crate::scenario::{LARGEST, MAX_HALVINGS, Scenario, TimeSpec};
 use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
@@ -105,6 +105,9 @@ pub struct Preflight {
     links_all: bool,
     #[serde(skip)]
     barrier_m: Option<f64>,
+    /// The shortest part that a step may be flown in \[s\].
+    #[serde(skip)]
+    dt_shortest_s: f64,
 }
 
 /// What is certified from the beginning of a leg to the beginning of the next.
@@ -181,6 +184,7 @@ impl Preflight {
             controls: law.controls(),
             links_all: scenario.graph.is_complete(),
             barrier_m: law.barrier_m(),
+            dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
         let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
         if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {

@@ -102,7 +102,13 @@ impl Preflight {
         match self.dt_max_s {
             Some(dt_max_s) if dt_max_s >= self.dt_s => format!("{dt_s} s, short enough for the law"),
             Some(dt_max_s) => {
-                format!("{dt_s} s, flown in parts down to {} s where the law asks for it{links}", significant(dt_max_s))
+                let down = significant(dt_max_s.max(self.dt_shortest_s));
+                let least = if dt_max_s < self.dt_shortest_s {
+                    format!(" (time.max_halvings; as near as is certified it could ask for {})", significant(dt_max_s))
+                } else {
+                    String::new()
+                };
+                format!("{dt_s} s, flown in parts down to {down} s where the law asks for it{least}{links}")
             }
             None if self.barrier_m.is_some() => {
                 format!("{dt_s} s, flown in parts where a clearance shrinks too fast{links}")

@@ -4,11 +4,13 @@
 //! Several recorders of one run are joined as a pair: `(first, (second, third))` is a recorder again.
 
 mod beside;
+mod error;
 mod hash;
 #[cfg(feature = "recordings")]
 pub mod mcap;
 
 pub use beside::record_beside;
+pub use error::{ReadFault, RecordError};
 pub use hash::{StateHash, sha256_hex};
 
 use std::sync::Arc;
@@ -205,6 +207,17 @@ pub enum Event {
         /// Smallest distance from its surface within \[m\], below zero within.
         min_m: f64,
     },
+    /// The closest that a vehicle came to an obstacle in the whole flight, of those with the least room. Told at its end.
+    ObstacleApproach {
+        /// The vehicle, from 0.
+        vehicle: usize,
+        /// The obstacle, from 0.
+        obstacle: usize,
+        /// When \[s\].
+        time_s: f64,
+        /// Distance from its surface \[m\], below zero within.
+        distance_m: f64,
+    },
     /// The flight is under another law than the scenario's. Told at its start.
     OtherLaw {
         /// When \[s\].
@@ -306,6 +319,7 @@ impl Event {
             | Self::ViolationEnded { time_s, .. }
             | Self::ObstacleViolationBegan { time_s, .. }
             | Self::ObstacleViolationEnded { time_s, .. }
+            | Self::ObstacleApproach { time_s, .. }
             | Self::OtherLaw { time_s, .. }
             | Self::LegBegan { time_s, .. }
             | Self::Breath { time_s, .. }
@@ -394,86 +408,4 @@ impl<A: Sink, B: Sink> Sink for (A, B) {
     fn looks_at_steps(&self) -> bool {
         self.0.looks_at_steps() || self.1.looks_at_steps()
     }
-}
-
-/// Why a sample could not be kept, or a recording not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordError {
-    /// The file could not be written.
-    #[error("cannot write {path}: {source}")]
-    Write {
-        /// The file.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The system could not read the file.
-    #[error("cannot read {path}: {source}")]
-    Open {
-        /// The file.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The file was read, and its content is not a recording or is damaged.
-    #[error("{path} is not a recording that can be read: {fault}")]
-    Read {
-        /// The file.
-        path: String,
-        /// What is wrong with it.
-        fault: ReadFault,
-    },
-}
-
-/// What is wrong with the content of a recording.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ReadFault {
-    /// The file has no bytes.
-    #[error("the file is empty")]
-    Empty,
-    /// The file does not begin as MCAP files do.
-    #[error("it is not an MCAP file")]
-    NotMcap,
-    /// A channel that every recording has is missing.
-    #[error("it has no {topic} channel with a message definition of this program")]
-    NoChannel {
-        /// The channel's topic.
-        topic: &'static str,
-    },
-    /// A channel has the expected topic and another message definition or encoding.
-    #[error("its {topic} channel holds {found} instead of {expected} in cdr encoding")]
-    ForeignChannel {
-        /// The channel's topic.
-        topic: &'static str,
-        /// Schema and encoding that were found.
-        found: String,
-        /// Schema that was expected.
-        expected: &'static str,
-    },
-    /// A record is longer than any recording needs.
-    #[error("the record at byte {offset} claims {bytes} bytes, more than the limit of {limit}")]
-    TooLong {
-        /// Where in the file.
-        offset: u64,
-        /// The length that it claims \[bytes\].
-        bytes: u64,
-        /// The limit \[bytes\].
-        limit: u64,
-    },
-    /// A record contradicts its checksum or the format.
-    #[error("the record at byte {offset} is damaged: {reason}")]
-    Damaged {
-        /// Where in the file.
-        offset: u64,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A message does not hold what its channel promises.
-    #[error("a {topic} message is wrong: {reason}")]
-    Message {
-        /// The channel's topic.
-        topic: String,
-        /// What is wrong with it.
-        reason: String,
-    },
 }

@@ -41,16 +41,20 @@ pub(crate) struct ObstacleTable {
     /// What it is called.
     pub(crate) name: String,
     /// A ball around its place.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Ball"))]
     ball: Option<Ball>,
     /// A box around its place, upright.
-    #[serde(rename = "box", skip_serializing_if = "Option::is_none")]
+    #[serde(rename = "box", default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Cuboid"))]
     cuboid: Option<Cuboid>,
     /// Everything within a radius of a straight line.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Capsule"))]
     capsule: Option<Capsule>,
     /// Everything behind a plane through its place.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "HalfSpace"))]
     half_space: Option<HalfSpace>,
     /// Its place in m; the origin for a capsule or a half-space unless given.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -4,11 +4,14 @@
 //! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
 
 use super::error::ScenarioError;
-use super::limits::first_within;
+use super::limits::{CONTACT_PREDICTION_M, first_within};
 use super::spec::{PlantSpec, Precision, Scenario};
 use crate::law::{Certificate, Law, Void};
 use crate::swarm::{Rows, mean_row, row};
 use crate::target::BreathingMode;
+
+/// Largest rounding of the surface of an obstacle, as a share of the distance at which the engine looks for contacts.
+const SURFACE_RESOLUTION: f64 = 0.1;
 
 /// Largest error of a22 by the engine's rounding, as a share of a22.
 const DAMPING_RESOLUTION: f64 = 0.01;
@@ -164,6 +167,21 @@ impl Scenario {
                 "in single precision and steps of {dt_s} s, a22 = {} 1/s is off by {drift_per_s:.1e} 1/s",
                 self.a22_per_s
             ));
+        }
+        let from_m = mean_row(&self.start.positions_m);
+        for (number, obstacle) in self.obstacles.iter().enumerate() {
+            let reach_m = (obstacle.place_m - from_m).norm() + obstacle.shape.reach_m();
+            let off_m = SINGLE.epsilon() * reach_m;
+            if off_m > SURFACE_RESOLUTION * CONTACT_PREDICTION_M {
+                return Err(ScenarioError::new(format!(
+                    "in single precision the surface of obstacle `{}`, up to {reach_m:.3e} m from the middle of the swarm, may \
+                     be off by {off_m:.1e} m",
+                    obstacle.name
+                ))
+                .with_help("set plant.precision to \"double\"")
+                .at_entry("obstacle", number)
+                .at("plant.precision"));
+            }
         }
         let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
         match first_within(&self.start.positions_m, rounded_m) {

@@ -93,6 +93,10 @@ fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
     if name.trim().is_empty() {
         return Err(ScenarioError::new("the name of an obstacle is empty").with_help("give it one"));
     }
+    if name.trim().parse::<u64>().is_ok() {
+        return Err(ScenarioError::new(format!("an obstacle is named `{name}`, as a vehicle is"))
+            .with_help("give it a name that is no number"));
+    }
     let lengths = |what: &str, numbers: &[f64]| {
         numbers
             .iter()

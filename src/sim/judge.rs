@@ -104,6 +104,18 @@ impl Judge {
         Ok(())
     }
 
+    /// Who came closest to which obstacle so far.
+    pub(super) fn closest_to_obstacles(&self) -> impl Iterator<Item = Event> + '_ {
+        let closest = self.clearance.iter().flat_map(ClearanceAuditor::closest);
+        closest.filter_map(|approach| match approach.pair {
+            ObjectPair::Obstacle { vehicle, obstacle } => {
+                let (time_s, distance_m) = (approach.time_s, approach.lower_m);
+                Some(Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m })
+            }
+            ObjectPair::Vehicles(_) => None,
+        })
+    }
+
     /// Whether the move from `start` to `end` takes more than half of some pair's clearance above the law's barrier, or of what
     /// a vehicle has beyond an obstacle's clearance where the law keeps clear of obstacles.
     pub(super) fn refuses(&mut self, law: &dyn Law, links: &Graph, start: &Swarm, path: &Path, end: &Swarm) -> bool {

@@ -35,7 +35,6 @@ const SIDE_BY_SIDE_FROM: usize = 512;
 ///     simulation.step();
 /// }
 /// let saved = simulation.save();
-/// simulation.step();
 /// simulation.load(&saved, None);
 /// assert_eq!(simulation.time_s(), 1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -178,12 +177,9 @@ impl Simulation {
         }
         let step = self.steps + 1;
         let flown = self.advance(step).and_then(|()| Ok(self.resolution.check(&self.state, step)?));
-        let completed = flown.is_ok() && step == self.scenario.time.steps();
         self.sample_is_due = flown.is_ok() && self.scenario.time.records(step);
-        self.end_on(flown);
-        if completed {
-            self.ending = Some(Ending::Completed);
-        }
+        let is_last = step == self.scenario.time.steps();
+        self.end_on(flown.and_then(|()| if is_last { Err(Ending::Completed) } else { Ok(()) }));
     }
 
     /// Ends the flight here because the caller wants it; one that has ended stays as it ended.
@@ -193,10 +189,11 @@ impl Simulation {
         }
     }
 
-    /// Ends the flight where it cannot go on; its last instant is recorded, unless it has been.
+    /// Ends the flight where it is over or cannot go on; its last instant is recorded, unless it has been.
     fn end_on(&mut self, flown: Result<(), Ending>) {
         if let Err(ending) = flown {
-            self.sample_is_due = self.judge.closest.is_some();
+            self.sample_is_due |= ending != Ending::Completed && self.judge.closest.is_some();
+            self.events.extend(self.judge.closest_to_obstacles());
             self.ending = Some(ending);
         }
     }

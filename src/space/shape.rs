@@ -34,6 +34,17 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// How far its points are from its place at most \[m\], as far as it has an end.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        match *self {
+            Self::Ball { radius_m } => radius_m,
+            Self::Box { half_m, .. } => half_m.norm(),
+            Self::Capsule { from_m, to_m, radius_m } => from_m.norm().max(to_m.norm()) + radius_m,
+            Self::HalfSpace { .. } => 0.0,
+        }
+    }
+
     /// Distance of a point from the surface \[m\], below zero within, and the unit normal of the surface point that is
     /// nearest, pointing out: the direction in which the distance grows by one metre a metre. The point is given from the
     /// obstacle's place \[m\].

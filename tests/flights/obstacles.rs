@@ -1,6 +1,6 @@
 //! Flights among obstacles: what is certified holds, the judge sees what the law ignores, hulls do not pass.
 //!
-//! 20 random flights in continuous time; `TAUTLINE_RANDOM_OBSTACLES=1000 cargo test --release --test flights obstacles --
+//! 12 random flights in continuous time; `TAUTLINE_RANDOM_OBSTACLES=1000 cargo test --release --test flights obstacles --
 //! --nocapture` flies 1,000 and prints what docs/validation.md says of them.
 
 use nalgebra::Vector3;
@@ -86,7 +86,7 @@ fn among(seed: u64) -> Scenario {
 
 #[test]
 fn no_random_flight_among_obstacles_breaks_what_was_certified() {
-    let flights = std::env::var("TAUTLINE_RANDOM_OBSTACLES").map_or(20, |n| n.parse().expect("a number"));
+    let flights = std::env::var("TAUTLINE_RANDOM_OBSTACLES").map_or(12, |n| n.parse().expect("a number"));
     let (mut tightest, mut near, mut worst_rise) = (f64::INFINITY, 0_u64, 0.0_f64);
     for seed in 0..flights {
         let scenario = among(seed);

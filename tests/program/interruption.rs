@@ -32,7 +32,19 @@ impl Underway {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder for the run");
         let child = Command::new(TAUTLINE)
-            .args(["run", "--json", "--quiet", "--out", "out", "--set", DRAG, "--set", FOREVER])
+            .args([
+                "run",
+                "--json",
+                "--quiet",
+                "--out",
+                "out",
+                "--set",
+                DRAG,
+                "--set",
+                FOREVER,
+                "--set",
+                "time.record_hz=60",
+            ])
             .current_dir(folder.path())
             .env("XDG_RUNTIME_DIR", folder.path())
             .stdin(Stdio::null())

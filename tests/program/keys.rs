@@ -70,6 +70,7 @@ fn assert_documented(section: &str, commands: &[&[&str]]) {
         let units = [("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_per_s", "1/s"), ("_m", "m"), ("_s", "s")];
         match units.iter().find(|(suffix, _)| key.ends_with(suffix)) {
             Some((_, expected)) => assert_eq!(unit, *expected, "{key}"),
+            None if key.ends_with("_bytes") => assert_eq!(unit, "B", "{key}"),
             None => assert!(["-", "m^2/s^2"].contains(&unit), "{key}: {unit}"),
         }
     }

@@ -95,8 +95,14 @@ fn a_flight_among_obstacles_is_checked_flown_reported_and_audited_with_them() {
     let other = ran(&folder, &["audit", "out/among/run.mcap", "--obstacles", "other.toml"]);
     assert_eq!(other.exit, Some(1), "others than its own, where a slot is: {}", other.out);
     assert!(other.out.contains("tree") && !other.out.contains("tower"), "{}", other.out);
-    let scaled = ran(&folder, &["audit", "out/among/run.mcap", "--scale", "2", "--delta", "1"]);
-    assert!(scaled.err.contains("are not judged: lengths are not metres"), "{}", scaled.err);
+    assert!(other.err.contains("are not judged: --obstacles names others"), "{}", other.err);
+    let scaled = json(&ran(&folder, &["audit", "out/among/run.mcap", "--scale", "2", "--json"]));
+    let least_m = |audit: &Value| audit["obstacles"]["closest"][0]["lower_m"].as_f64().expect("m");
+    assert!((least_m(&scaled) - 2.0 * least_m(&audit)).abs() < 1e-9, "obstacles are scaled as positions are");
+    assert!((least_m(&audit) - min_m).abs() < 1e-12, "what the run saw between samples counts");
+    fs::write(folder.path().join("none.toml"), "").expect("a file");
+    let none = ran(&folder, &["audit", "out/among/run.mcap", "--obstacles", "none.toml"]);
+    assert!(none.exit == Some(2) && none.err.contains("there is no [[obstacle]]"), "{}", none.err);
 
     // What the recording holds is the scenario, obstacles to the last bit.
     let held = ran(&folder, &["list", "--show", "out/among/run.mcap"]).out;
@@ -154,6 +160,7 @@ fn what_is_wrong_with_an_obstacle_is_said_with_its_place_and_remedy() {
             "finite",
         ),
         (SCENARIO.replace("\"wall\"", "\"tower\""), "two obstacles are named `tower`", "name of its own"),
+        (SCENARIO.replace("\"wall\"", "\"2\""), "an obstacle is named `2`, as a vehicle is", "no number"),
         (SCENARIO.replace("\"wall\"", "\"\""), "the name of an obstacle is empty", "give it one"),
         (
             instead("[[obstacle]]\nname = \"tower\"\nball = { radius_m = 1.0 }\n"),

@@ -200,7 +200,8 @@ impl Windows {
         let (a, b) = (&self.extents[near.first as usize], &self.extents[near.second as usize]);
         let (a, b) = if a.vehicle < b.vehicle { (a, b) } else { (b, a) };
         let pair = ObjectPair::Vehicles(Pair::new(a.vehicle, b.vehicle));
-        let (limit, cutoff) = (self.limits.of_vehicles(a.radius, b.radius), results.closest.cutoff(pair));
+        let limit = self.limits.of_vehicles(a.radius, b.radius);
+        let cutoff = results.closest.cutoff(pair, limit);
         if near.may_come_within(limit.max(cutoff * (1.0 - TIE))) {
             let (may_violate, keep_out) = (near.may_come_within(limit), KeepOut::new(limit));
             PairSweep { pair, target: Target::Origin, keep_out, cutoff, may_violate, above: self.limits.above }.judge(
@@ -219,7 +220,7 @@ impl Windows {
             for extent in self.extents.iter().filter(|extent| !extent.grounded) {
                 let pair = ObjectPair::Obstacle { vehicle: extent.vehicle, obstacle: index };
                 let limit = self.limits.of_obstacle(obstacle, extent.radius);
-                let (cutoff, chord) = (results.obstacles.cutoff(pair), &extent.chord);
+                let (cutoff, chord) = (results.obstacles.cutoff(pair, limit), &extent.chord);
                 let between = obstacle.shape.closest(chord.from - place.from, chord.to - place.to).0;
                 let least = between - chord.stray - place.stray;
                 if least < limit.max(cutoff * (1.0 - TIE)) {

@@ -243,6 +243,12 @@ impl From<&Event> for EventMessage<&'static str> {
                 *min_m,
                 format!("vehicle {} is clear of obstacle {} again after {min_m} m", vehicle + 1, obstacle + 1),
             ),
+            Event::ObstacleApproach { vehicle, obstacle, distance_m, .. } => (
+                "obstacle-approach",
+                [vehicle + 1, obstacle + 1],
+                *distance_m,
+                format!("vehicle {} came to {distance_m} m from obstacle {} at the closest", vehicle + 1, obstacle + 1),
+            ),
             Event::OtherLaw { name, .. } => ("other-law", NO_PAIR, f64::NAN, name.clone()),
             Event::LegBegan { leg, .. } => {
                 ("leg-began", NO_PAIR, (leg + 1) as f64, format!("leg {} of the flight began", leg + 1))
@@ -289,6 +295,10 @@ impl EventMessage<String> {
             "obstacle-violation-ended" => {
                 let [vehicle, obstacle] = self.vehicle_and_obstacle()?;
                 Event::ObstacleViolationEnded { vehicle, obstacle, time_s, min_m: self.value }
+            }
+            "obstacle-approach" => {
+                let [vehicle, obstacle] = self.vehicle_and_obstacle()?;
+                Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m: self.value }
             }
             "engine-contact" => Event::EngineContact { pair: pair()?, time_s },
             "hulls-hit" => Event::HullsHit { pair: pair()?, time_s, closing_m_s: self.value },
