@@ -179,7 +179,7 @@ impl Simulation {
         let flown = self.advance(step).and_then(|()| Ok(self.resolution.check(&self.state, step)?));
         self.sample_is_due = flown.is_ok() && self.scenario.time.records(step);
         let is_last = step == self.scenario.time.steps();
-        self.end_on(flown.and_then(|()| if is_last { Err(Ending::Completed) } else { Ok(()) }));
+        self.end_on(flown.and(if is_last { Err(Ending::Completed) } else { Ok(()) }));
     }
 
     /// Ends the flight here because the caller wants it; one that has ended stays as it ended.
