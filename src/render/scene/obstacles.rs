@@ -11,9 +11,10 @@ const BALLS_A_RADIUS: f64 = 24.0;
 const MOST_BALLS: f64 = 3000.0;
 /// Lines across each side of a box, and of a plane.
 const HATCHES: u32 = 12;
-/// Opacity of lines across a side, and of its rims.
+/// Opacity of lines across a side, of its rims, and of lines of a plane.
 const HATCH: f32 = 0.35;
 const RIM: f32 = 0.95;
+const PLANE: f32 = 0.18;
 
 impl SceneBuilder<'_> {
     fn solids(&self) -> &[Obstacle] {
@@ -52,7 +53,7 @@ impl SceneBuilder<'_> {
                         let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
                         let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
                         let of = |k: usize, share: f64| turned * Vector3::ith(k, half_m[k] * share);
-                        self.hatched(RIM, place + of(axis, sign), of(u, 1.0), of(v, 1.0), lines);
+                        self.hatched([RIM, HATCH], place + of(axis, sign), of(u, 1.0), of(v, 1.0), lines);
                     }
                 }
                 Shape::HalfSpace { normal } => {
@@ -61,7 +62,7 @@ impl SceneBuilder<'_> {
                     let foot = centre - normal * (centre - place).dot(&normal);
                     let least = normal.iamin();
                     let u = normal.cross(&Vector3::ith(least, 1.0)).normalize() * reach_m;
-                    self.hatched(HATCH, foot, u, normal.cross(&u), lines);
+                    self.hatched([PLANE; 2], foot, u, normal.cross(&u), lines);
                 }
                 Shape::Ball { .. } | Shape::Capsule { .. } => {}
             }
@@ -69,12 +70,19 @@ impl SceneBuilder<'_> {
     }
 
     /// A flat piece around its middle, from minus to plus two vectors.
-    fn hatched(&self, rim: f32, middle: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>, lines: &mut Vec<Line>) {
+    fn hatched(
+        &self,
+        [rim, hatch]: [f32; 2],
+        middle: Vector3<f64>,
+        u: Vector3<f64>,
+        v: Vector3<f64>,
+        lines: &mut Vec<Line>,
+    ) {
         let (colour, width_px) = (self.view.theme.obstacle(), 1.4 * self.view.unit_px());
         for k in 0..=HATCHES {
             let share = 2.0 * f64::from(k) / f64::from(HATCHES) - 1.0;
             let is_rim = k == 0 || k == HATCHES;
-            let strength = if is_rim { rim } else { HATCH };
+            let strength = if is_rim { rim } else { hatch };
             let mut line = |from, to| lines.push(Line::new([from, to], colour.at(strength), width_px));
             line(middle + u * share - v, middle + u * share + v);
             if is_rim {
