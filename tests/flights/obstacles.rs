@@ -1,7 +1,7 @@
 //! Flights among obstacles: what is certified holds, the judge sees what the law ignores, hulls do not pass.
 //!
-//! 12 random flights in continuous time; `TAUTLINE_RANDOM_OBSTACLES=1000 cargo test --release --test flights obstacles --
-//! --nocapture` flies 1,000 and prints what docs/validation.md says of them.
+//! 12 random flights in continuous time; `TAUTLINE_RANDOM_OBSTACLES=500 cargo test --release --test flights obstacles --
+//! --nocapture` flies 500 and prints what docs/validation.md says of them.
 
 use nalgebra::Vector3;
 use tautline::audit::Status;
