@@ -118,3 +118,68 @@ fn offer(told: Approach, outcome: &mut Outcome) {
         (found.min_m, found.min_at_s) = (told.lower_m, told.time_s);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::audit::Shape;
+    use crate::audit::recorded::audit;
+    use crate::track::{Item, Sample};
+
+    const BALL: ObjectPair = ObjectPair::Obstacle { vehicle: 0, obstacle: 0 };
+
+    /// What a run saw between two samples 10 s apart, that straight lines do not: 0.2 m from the ball for 2 s, and 0.1 m
+    /// while it lasted.
+    fn seen() -> OwnObstacles {
+        let ball = Obstacle {
+            name: "ball".to_owned(),
+            shape: Shape::Ball { radius_m: 1.0 },
+            clearance_m: Some(0.5),
+            path: vec![(0.0, Vector3::zeros())],
+        };
+        let mut own = OwnObstacles { obstacles: vec![ball], ..OwnObstacles::default() };
+        let (vehicle, obstacle) = (0, 0);
+        own.note(&Event::ObstacleViolationBegan { vehicle, obstacle, time_s: 4.0 }, 1.0);
+        own.note(&Event::ObstacleViolationEnded { vehicle, obstacle, time_s: 6.0, min_m: 0.2 }, 1.0);
+        own.note(&Event::ObstacleApproach { vehicle, obstacle, time_s: 5.5, distance_m: 0.1 }, 1.0);
+        own
+    }
+
+    /// Two that stand 4 m beside the ball at both samples, asked about with the ball.
+    fn judged(own: &OwnObstacles, asked: Settings) -> Outcome {
+        let at = |vehicle: usize, time_s: f64| {
+            let position_m = Vector3::new(5.0, 9.0 * vehicle as f64, 1.0);
+            Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
+        };
+        let items: Vec<_> = [(0, 0.0), (1, 0.0), (0, 10.0), (1, 10.0)].map(|(k, time_s)| at(k, time_s)).into();
+        let settings = Settings { delta_m: Some(1.0), obstacles: own.obstacles.clone(), ..asked };
+        let names = ["1".to_owned(), "2".to_owned()];
+        let mut outcome = audit(&names, &items, settings.clone()).expect("judged");
+        assert_eq!(outcome.status, Status::Clear, "straight lines see nothing");
+        own.bind(&mut outcome, &settings);
+        outcome
+    }
+
+    #[test]
+    fn what_the_run_saw_of_obstacles_between_samples_is_a_violation_with_its_deepest_approach() {
+        let outcome = judged(&seen(), Settings::default());
+        let [found] = outcome.violations[..] else { panic!("{outcome:?}") };
+        assert_eq!((outcome.status, found.pair, found.from_s, found.to_s), (Status::Violation, BALL, 4.0, 6.0));
+        assert_eq!((found.min_m, found.min_at_s, outcome.obstacles[0].lower_m), (0.1, 5.5, 0.1));
+        let mut every_step = seen();
+        every_step.forget_what_was_seen();
+        assert_eq!(judged(&every_step, Settings::default()).status, Status::Clear, "nothing is between its samples");
+    }
+
+    #[test]
+    fn only_the_window_and_the_vehicles_that_are_asked_about_count_and_heights_leave_it_open() {
+        let before = Settings { to_s: Some(3.0), ..Settings::default() };
+        assert_eq!(judged(&seen(), before).status, Status::Clear);
+        let other = Settings { only: Some(["2".to_owned()].into()), ..Settings::default() };
+        assert_eq!(judged(&seen(), other).status, Status::Clear);
+        let heights = judged(&seen(), Settings { above_m: Some(0.5), ..Settings::default() });
+        assert_eq!((heights.status, heights.undecided.len()), (Status::Undecided, 1));
+    }
+}

@@ -236,3 +236,14 @@ fn a_saved_flight_among_obstacles_goes_on_with_the_same_bits() {
     let again = again.finish();
     assert_eq!((once.last, once.clearance), (again.last, again.clearance));
 }
+
+/// Steps far too long for the law's rate, at a wall: what would take more than half of the room is undone and flown in halves.
+#[test]
+fn a_step_that_takes_more_than_half_of_the_room_is_flown_in_halves() {
+    let mut scenario = builtin("obstacles", &["time.duration_s=6", "time.max_rate_dt=1e6", "time.dt_s=0.05"]);
+    scenario.start.velocities_m_s.column_mut(0).fill(20.0);
+    let (flight, log) = fly(&scenario);
+    assert_eq!(flight.ending, Ending::Completed);
+    assert_eq!(flight.clearance.expect("obstacles").status, Status::Clear);
+    assert!(log.events.iter().any(|event| matches!(event, Event::StepRefined { .. })));
+}

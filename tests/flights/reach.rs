@@ -1,9 +1,9 @@
 //! Given slots are reached under the displacement law: on any connected graph, with breaths where vehicles stand in each
 //! other's way, without a violation and with no more energy than was promised.
 //!
-//! 2 random starts of each case of up to 30 vehicles, and 6 of the 60 orderings of the pentagon;
-//! `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture --include-ignored` flies 20 of every
-//! case, all orderings, and prints the table of docs/validation.md. Rapier at its defaults, a22 = 0.1 1/s; a flight ends once the formation has been
+//! 2 random starts of each case, 6 of the 60 orderings of the pentagon, and 16 or 27 vehicles where the case is of 100 or 500,
+//! which `sh tests/run.sh --long` flies; `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture`
+//! flies 20 of every case in full, all orderings, and prints the table of docs/validation.md. Rapier at its defaults, a22 = 0.1 1/s; a flight ends once the formation has been
 //! held for as long as it must be, or after 300 s.
 
 use tautline::audit::Status;
@@ -31,6 +31,12 @@ const ENERGY_ROUNDING: f64 = 1e-3;
 /// Starts of each case, where a number is asked for.
 fn starts_asked_for() -> Option<u64> {
     std::env::var("TAUTLINE_REACH_STARTS").ok().map(|n| n.parse().expect("a number"))
+}
+
+/// Of the two numbers of vehicles the second where there is time for it.
+fn vehicles(few: usize, all: usize) -> usize {
+    let is_thorough = starts_asked_for().is_some() || std::env::var_os("TAUTLINE_LONG").is_some();
+    if is_thorough { all } else { few }
 }
 
 /// Slots to be reached by so many vehicles.
@@ -184,8 +190,12 @@ fn judge(name: &str, scenarios: impl Iterator<Item = Scenario>) -> Vec<String> {
 
 /// Flies random starts to slots on each of these graphs.
 fn reach(slots: Slots, name: &str, graphs: &[&str], starts: u64) {
-    let case =
-        |graph: &&str| judge(&format!("{name}, {graph}"), (0..starts).map(|seed| slots.scenario(graph, "given", seed)));
+    let case = |graph: &&str| {
+        judge(
+            &format!("{} {name}, {graph}", slots.count()),
+            (0..starts).map(|seed| slots.scenario(graph, "given", seed)),
+        )
+    };
     let wrong: Vec<String> = graphs.iter().flat_map(case).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
@@ -226,27 +236,26 @@ fn the_pentagon_is_reached_from_every_order_of_its_vehicles() {
 
 #[test]
 fn a_circle_of_12_is_reached_on_every_graph() {
-    reach(Slots::Circle(12), "12 on a circle", &ALL_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Circle(12), "on a circle", &ALL_GRAPHS, starts_asked_for().unwrap_or(2));
 }
 
 #[test]
 fn a_sphere_of_30_is_reached_on_every_graph() {
-    reach(Slots::Sphere(30), "30 on a sphere", &ALL_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Sphere(30), "on a sphere", &ALL_GRAPHS, starts_asked_for().unwrap_or(2));
 }
 
 #[test]
-#[ignore = "minutes: TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture --include-ignored"]
 fn a_grid_of_100_is_reached() {
-    reach(Slots::Grid(100), "100 in a grid", &DENSE_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Grid(vehicles(16, 100)), "in a grid", &DENSE_GRAPHS, starts_asked_for().unwrap_or(2));
 }
 
 #[test]
-#[ignore = "minutes: see a_grid_of_100_is_reached"]
 fn a_grid_of_100_is_reached_by_interchangeable_vehicles() {
     let starts = starts_asked_for().unwrap_or(2);
+    let slots = Slots::Grid(vehicles(16, 100));
     let case = |assignment: &str| {
-        let scenarios = (0..starts).map(|seed| Slots::Grid(100).scenario("complete", assignment, seed));
-        judge(&format!("100 in a grid, complete, {assignment}"), scenarios)
+        let scenarios = (0..starts).map(|seed| slots.scenario("complete", assignment, seed));
+        judge(&format!("{} in a grid, complete, {assignment}", slots.count()), scenarios)
     };
     let wrong = [case("when-stalled"), case("optimal")].concat();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -255,24 +264,22 @@ fn a_grid_of_100_is_reached_by_interchangeable_vehicles() {
 /// What is left over: on a path of 100 vehicles stand in each other's way through eight breaths. Nothing is broken there
 /// either. Steps are up to 34 times shorter, so two starts are enough.
 #[test]
-#[ignore = "twenty minutes: see a_grid_of_100_is_reached"]
 fn a_grid_of_100_is_reached_on_a_ring_and_on_a_path_nothing_is_broken() {
-    reach(Slots::Grid(100), "100 in a grid", &["ring"], 2);
-    let scenarios = (0..2).map(|seed| Slots::Grid(100).scenario("path", "given", seed));
-    let wrong = judge("100 in a grid, path", scenarios);
+    let slots = Slots::Grid(vehicles(16, 100));
+    reach(slots, "in a grid", &["ring"], 2);
+    let scenarios = (0..2).map(|seed| slots.scenario("path", "given", seed));
+    let wrong = judge(&format!("{} in a grid, path", slots.count()), scenarios);
     assert!(wrong.iter().all(|said| said.contains("not reached")), "{}", wrong.join("\n"));
 }
 
 #[test]
-#[ignore = "minutes: see a_grid_of_100_is_reached"]
 fn a_sphere_of_100_is_reached() {
-    reach(Slots::Sphere(100), "100 on a sphere", &DENSE_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Sphere(vehicles(16, 100)), "on a sphere", &DENSE_GRAPHS, starts_asked_for().unwrap_or(2));
 }
 
 #[test]
-#[ignore = "ten minutes: see a_grid_of_100_is_reached"]
 fn a_cube_of_500_is_reached() {
-    reach(Slots::Cube(500), "500 in a cube", &DENSE_GRAPHS[..2], starts_asked_for().unwrap_or(2));
+    reach(Slots::Cube(vehicles(27, 500)), "in a cube", &DENSE_GRAPHS[..2], starts_asked_for().unwrap_or(2));
 }
 
 /// Negative twin: some do not arrive without a breath.
