@@ -27,16 +27,7 @@ impl State {
         let time_s = f64::from(k) / RECORD_HZ;
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 2.5, time_s });
         let (swarm, control) = (&self.swarm, &self.control);
-        Sample {
-            time_s,
-            step: u64::from(4 * k),
-            swarm,
-            control,
-            separation,
-            energy: Some(1.0),
-            peaks: tautline::record::Peaks::default(),
-            channels: &[],
-        }
+        Sample { separation, energy: Some(1.0), ..Sample::new(time_s, u64::from(4 * k), swarm, control) }
     }
 
     fn write(&self, path: &Path) {

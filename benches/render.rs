@@ -31,16 +31,7 @@ fn timeline(count: usize) -> Timeline {
             set_row(&mut swarm.positions_m, vehicle, place + Vector3::new(0.2 * wave, 0.0, 1.0 + wave));
         }
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 2.8, time_s });
-        timeline.take(&Sample {
-            time_s,
-            step: u64::from(k),
-            swarm: &swarm,
-            control: &control,
-            separation,
-            energy: None,
-            peaks: tautline::record::Peaks::default(),
-            channels: &[],
-        });
+        timeline.take(&Sample { separation, ..Sample::new(time_s, u64::from(k), &swarm, &control) });
     }
     timeline
 }

@@ -318,14 +318,9 @@ mod tests {
             let control = Rows::from_row_slice(&[value, 0.0, 0.0, 0.0, 1.0, 0.0]);
             let separation = ClosestApproach { pair: Pair::new(0, 1), separation_m: value, time_s };
             history.observe(&Sample {
-                time_s,
-                step: k,
-                swarm: &swarm,
-                control: &control,
                 separation: Some(separation),
                 energy: Some(value),
-                peaks: crate::record::Peaks::default(),
-                channels: &[],
+                ..Sample::new(time_s, k, &swarm, &control)
             });
         }
         history
@@ -372,16 +367,7 @@ mod tests {
     fn samples_of_another_swarm_and_numbers_that_are_not_finite_are_passed_over() {
         let mut history = history(3, |k| if k == 1 { f64::NAN } else { 3.0 });
         let (swarm, control) = (Swarm::at_rest(Rows::zeros(5)), Rows::zeros(0));
-        history.observe(&Sample {
-            time_s: 9.0,
-            step: 9,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        history.observe(&Sample::new(9.0, 9, &swarm, &control));
         assert_eq!((history.samples(), history.end_s()), (3, 0.02));
         assert_eq!(history.closest().map(|closest| closest.separation_m), Some(3.0));
         assert_eq!(history.extent(0), Some((0.0, 3.0)));

@@ -18,16 +18,7 @@ fn summary(course: &[(f64, f64)], judge: Arrival) -> Summary {
         let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0 + error_m, 0.0, 0.0]));
         swarm.velocities_m_s[(1, 0)] = *relative_m_s;
         let time_s = 0.25 * k as f64;
-        metrics.observe(&Sample {
-            time_s,
-            step: k as u64,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        metrics.observe(&Sample::new(time_s, k as u64, &swarm, &control));
     }
     metrics.finish()
 }
@@ -72,16 +63,7 @@ fn a_leg_is_held_up_to_the_time_at_which_the_next_begins() {
     for (next_s, reached_at_s) in [(1.0, Some(0.0)), (0.99, None)] {
         let mut metrics = Metrics::new(&legs, &graph, JUDGE);
         for (step, time_s) in [0.0, 0.5, 0.98].into_iter().enumerate() {
-            metrics.observe(&Sample {
-                time_s,
-                step: step as u64,
-                swarm: &swarm,
-                control: &control,
-                separation: None,
-                energy: None,
-                peaks: crate::record::Peaks::default(),
-                channels: &[],
-            });
+            metrics.observe(&Sample::new(time_s, step as u64, &swarm, &control));
         }
         metrics.event(&Event::LegBegan { leg: 1, time_s: next_s }).expect("kept");
         assert_eq!(metrics.ended_legs(), [LegSummary { ended_at_s: next_s, reached_at_s }]);
@@ -95,16 +77,7 @@ fn who_is_assigned_anew_is_judged_by_the_new_slot() {
     let swapped = Swarm::at_rest(legs[0].formation.reordered(&[1, 0]).slots_m);
     let mut metrics = Metrics::new(&legs, &graph, JUDGE).free_by(Freedom::Translation);
     let look = |metrics: &mut Metrics<'_>| {
-        metrics.observe(&Sample {
-            time_s: 0.0,
-            step: 0,
-            swarm: &swapped,
-            control: &Rows::zeros(2),
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        metrics.observe(&Sample::new(0.0, 0, &swapped, &Rows::zeros(2)));
         metrics.finish().rms_position_error_m
     };
     assert!((look(&mut metrics) - 3.0).abs() < ROUNDING);
@@ -119,16 +92,7 @@ fn rounding_of_times_does_not_cost_the_hold() {
     let swarm = Swarm::at_rest(legs[0].formation.slots_m.clone());
     for time_s in [9.0_f64.next_up(), 10.0] {
         let control = Rows::zeros(2);
-        metrics.observe(&Sample {
-            time_s,
-            step: 0,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        metrics.observe(&Sample::new(time_s, 0, &swarm, &control));
     }
     assert_eq!(metrics.finish().reached_at_s, Some(9.0_f64.next_up()));
 }
@@ -157,16 +121,7 @@ fn the_numbers_are_those_of_the_samples() {
     swarm.velocities_m_s = Rows::from_row_slice(&[3.0, 4.0, 0.0, 3.0, 4.2, 0.0]);
     for (k, (energy, u)) in [(2.0, 0.5), (3.0, 2.0), (1.0, 1.0)].into_iter().enumerate() {
         let control = Rows::from_row_slice(&[0.6 * u, 0.8 * u, 0.0, 0.0, 0.0, -0.1]);
-        metrics.observe(&Sample {
-            time_s: k as f64,
-            step: k as u64,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: Some(energy),
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        metrics.observe(&Sample { energy: Some(energy), ..Sample::new(k as f64, k as u64, &swarm, &control) });
     }
     assert!((metrics.edge_error_m() - 0.5).abs() < ROUNDING);
     let s = metrics.finish();
@@ -191,15 +146,6 @@ fn a_start_without_energy_has_no_ratio() {
     let (legs, graph) = pair_of_vehicles();
     let mut metrics = Metrics::new(&legs, &graph, JUDGE);
     let (swarm, control) = (Swarm::at_rest(legs[0].formation.slots_m.clone()), Rows::zeros(2));
-    metrics.observe(&Sample {
-        time_s: 0.0,
-        step: 0,
-        swarm: &swarm,
-        control: &control,
-        separation: None,
-        energy: Some(0.0),
-        peaks: crate::record::Peaks::default(),
-        channels: &[],
-    });
+    metrics.observe(&Sample { energy: Some(0.0), ..Sample::new(0.0, 0, &swarm, &control) });
     assert_eq!(metrics.finish().energy_max_over_initial, None);
 }

@@ -88,16 +88,7 @@ mod tests {
         let swarm = Swarm::at_rest(Rows::from_row_slice(positions));
         let control = Rows::from_row_slice(control);
         let mut hash = StateHash::new();
-        hash.observe(&Sample {
-            time_s: 0.5,
-            step: 1,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        hash.observe(&Sample::new(0.5, 1, &swarm, &control));
         hash.finish()
     }
 

@@ -66,6 +66,15 @@ pub struct Sample<'a> {
     pub channels: &'a [Channel],
 }
 
+impl<'a> Sample<'a> {
+    /// An instant of which nothing is known but states and commands.
+    #[must_use]
+    pub fn new(time_s: f64, step: u64, swarm: &'a Swarm, control: &'a Rows) -> Self {
+        let peaks = Peaks::default();
+        Self { time_s, step, swarm, control, separation: None, energy: None, peaks, channels: &[] }
+    }
+}
+
 /// The end of one step, recorded or not; at first the start.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a> {

@@ -234,16 +234,7 @@ mod tests {
 
     fn message(scene: &mut FoxgloveScene, time_s: f64, swarm: &Swarm) -> Option<Vec<u8>> {
         let control = Rows::zeros(swarm.count());
-        let sample = Sample {
-            time_s,
-            step: 0,
-            swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        };
+        let sample = Sample::new(time_s, 0, swarm, &control);
         let mut bytes = Vec::new();
         scene.message(&sample, &mut bytes).expect("encoded").then_some(bytes)
     }

@@ -120,14 +120,9 @@ fn samples(count: usize, rise_m_s: f64, near_m: f64, take: &mut dyn FnMut(&Sampl
             time_s,
         });
         take(&Sample {
-            time_s,
-            step: u64::from(k),
-            swarm: &swarm,
-            control: &control,
             separation: closest,
             energy: Some(4.0 - 0.3 * time_s),
-            peaks: tautline::record::Peaks::default(),
-            channels: &[],
+            ..Sample::new(time_s, u64::from(k), &swarm, &control)
         });
     }
 }
@@ -330,14 +325,9 @@ fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
         let place = |i: usize, axis: usize| (i * (axis + 1)) as f64 + 50.0 * f64::from(k * k) * (i as f64 + 1.0).sin();
         let swarm = Swarm::at_rest(Rows::from_fn(count, |i, axis| place(i, axis).sin() * 100.0));
         history.observe(&Sample {
-            time_s: f64::from(k),
-            step: u64::from(k),
-            swarm: &swarm,
-            control: &control,
             separation: Some(ClosestApproach { pair: Pair::new(4321, 4999), separation_m: 1.0, time_s: 7.0 }),
             energy: Some(f64::from(k % 7)),
-            peaks: tautline::record::Peaks::default(),
-            channels: &[],
+            ..Sample::new(f64::from(k), u64::from(k), &swarm, &control)
         });
     }
     let (formation, graph) = (Formation::line(count, 4.0), Graph::path(count));

@@ -147,16 +147,7 @@ fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
     for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
         swarm.positions_m[(4, 0)] += 30e3 * time_s;
         let control = Rows::zeros(5);
-        timeline.take(&Sample {
-            time_s,
-            step: step as u64,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: tautline::record::Peaks::default(),
-            channels: &[],
-        });
+        timeline.take(&Sample::new(time_s, step as u64, &swarm, &control));
     }
     let view = View {
         layers: Layers { edges: true, ..Layers::NONE },
@@ -263,16 +254,7 @@ fn crossing() -> Timeline {
         }
         let separation = Some(ClosestApproach { pair: Pair::new(0, 2), separation_m: 3.0 - 0.4 * time_s, time_s });
         let control = Rows::zeros(5);
-        timeline.take(&Sample {
-            time_s,
-            step: u64::from(k),
-            swarm: &swarm,
-            control: &control,
-            separation,
-            energy: None,
-            peaks: tautline::record::Peaks::default(),
-            channels: &[],
-        });
+        timeline.take(&Sample { separation, ..Sample::new(time_s, u64::from(k), &swarm, &control) });
     }
     timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 2), time_s: 2.0 });
     timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 2), time_s: 3.0, min_m: 1.8 });

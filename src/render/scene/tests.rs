@@ -20,16 +20,7 @@ fn timeline() -> Timeline {
         swarm.positions_m.column_mut(0).add_scalar_mut(time_s);
         let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 3.0 - 0.1 * time_s, time_s });
         let control = Rows::zeros(4);
-        timeline.take(&Sample {
-            time_s,
-            step: u64::from(k),
-            swarm: &swarm,
-            control: &control,
-            separation,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        timeline.take(&Sample { separation, ..Sample::new(time_s, u64::from(k), &swarm, &control) });
     }
     timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 4.0 });
     timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: 6.0, min_m: 1.5 });
@@ -223,29 +214,11 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
     }
     let mut alone = Timeline::new("alone", 1);
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[f64::NAN, 0.0, 0.0]));
-    alone.take(&Sample {
-        time_s: 0.0,
-        step: 0,
-        swarm: &swarm,
-        control: &Rows::zeros(1),
-        separation: None,
-        energy: None,
-        peaks: crate::record::Peaks::default(),
-        channels: &[],
-    });
+    alone.take(&Sample::new(0.0, 0, &swarm, &Rows::zeros(1)));
     assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
     let far = Swarm::at_rest(Rows::from_row_slice(&[5e6, 4e6, 100.0]));
     let mut far_away = Timeline::new("far", 1);
-    far_away.take(&Sample {
-        time_s: 0.0,
-        step: 0,
-        swarm: &far,
-        control: &Rows::zeros(1),
-        separation: None,
-        energy: None,
-        peaks: crate::record::Peaks::default(),
-        channels: &[],
-    });
+    far_away.take(&Sample::new(0.0, 0, &far, &Rows::zeros(1)));
     assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
 }
 
@@ -284,16 +257,7 @@ fn what_is_too_small_to_see_is_a_dot() {
     for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
         swarm.positions_m[(1, 1)] = time_s;
         let control = Rows::zeros(2);
-        timeline.take(&Sample {
-            time_s,
-            step: step as u64,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        timeline.take(&Sample::new(time_s, step as u64, &swarm, &control));
     }
     let scene = scene(&timeline, 0.0, &camera("top"));
     let at = scene.camera.project(Vector3::zeros()).expect("ahead");
@@ -330,16 +294,7 @@ fn of_many_vehicles_those_that_are_too_close_are_named() {
     timeline.delta_m = Some(1.0);
     let control = Rows::zeros(100);
     for time_s in [0.0, 1.0] {
-        timeline.take(&Sample {
-            time_s,
-            step: 0,
-            swarm: &swarm,
-            control: &control,
-            separation: None,
-            energy: None,
-            peaks: crate::record::Peaks::default(),
-            channels: &[],
-        });
+        timeline.take(&Sample::new(time_s, 0, &swarm, &control));
     }
     timeline.note(&Event::ViolationBegan { pair: Pair::new(98, 99), time_s: 0.5 });
     let named = |time_s| {
@@ -359,16 +314,7 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
     let mut timeline = Timeline::new("tower", 4);
     timeline.delta_m = Some(2.0);
     let control = Rows::zeros(4);
-    timeline.take(&Sample {
-        time_s: 0.0,
-        step: 0,
-        swarm: &swarm,
-        control: &control,
-        separation: None,
-        energy: None,
-        peaks: crate::record::Peaks::default(),
-        channels: &[],
-    });
+    timeline.take(&Sample::new(0.0, 0, &swarm, &control));
     let numbers = |view: &View| {
         let scene = scene(&timeline, 0.0, view);
         let number = |text: &str| text.trim_end_matches(" m").parse::<f64>().is_ok();

@@ -13,16 +13,7 @@ fn sample(timeline: &mut Timeline, time_s: f64, x: f64, separation_m: f64) {
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, x, 0.0, 0.0]));
     let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m, time_s: time_s - 0.5 });
     let control = Rows::zeros(2);
-    timeline.take(&Sample {
-        time_s,
-        step: 0,
-        swarm: &swarm,
-        control: &control,
-        separation,
-        energy: None,
-        peaks: crate::record::Peaks::default(),
-        channels: &[],
-    });
+    timeline.take(&Sample { separation, ..Sample::new(time_s, 0, &swarm, &control) });
 }
 
 #[test]
@@ -269,16 +260,7 @@ fn pairs_that_the_flight_does_not_have_are_passed_over() {
     let swarm = Swarm::at_rest(Rows::zeros(1));
     let (pair, time_s) = (Pair::new(3, 9), 0.0);
     let separation = Some(ClosestApproach { pair, separation_m: 1.0, time_s });
-    timeline.take(&Sample {
-        time_s,
-        step: 0,
-        swarm: &swarm,
-        control: &Rows::zeros(1),
-        separation,
-        energy: None,
-        peaks: crate::record::Peaks::default(),
-        channels: &[],
-    });
+    timeline.take(&Sample { separation, ..Sample::new(time_s, 0, &swarm, &Rows::zeros(1)) });
     timeline.note(&Event::ViolationBegan { pair, time_s });
     assert_eq!((timeline.closest(), timeline.violations().len()), (None, 0));
     assert!(timeline.at(0.0).expect("a frame").nearest.is_none());
