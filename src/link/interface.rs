@@ -3,6 +3,7 @@
 use dyn_clone::DynClone;
 
 use crate::observation::Others;
+use crate::record::Channel;
 use crate::swarm::{Rows, Swarm};
 
 /// What lies between truth and law.
@@ -36,6 +37,14 @@ pub trait Link: DynClone + Send {
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
     }
+
+    /// What is known of it for every vehicle: a channel each, without values yet.
+    fn channels(&self) -> Vec<Channel> {
+        Vec::new()
+    }
+
+    /// Writes the present values into channels of [`Link::channels`], in their order.
+    fn write_channels(&self, _channels: &mut [Channel]) {}
 
     /// Begins its random numbers anew.
     fn reseed(&mut self, _seed: u64) {}

@@ -10,6 +10,7 @@ pub use path::Path;
 
 use dyn_clone::DynClone;
 
+use crate::record::Channel;
 use crate::swarm::{Pair, Rows, Swarm};
 
 /// What moves a swarm, however it is realised: p'' = a22 v + u (equation (1)) for the point vehicles.
@@ -49,6 +50,14 @@ pub trait Plant: DynClone + Send {
     /// Appends the pairs whose solid hulls pushed each other apart in the last [`Plant::advance`]. A plant of points
     /// appends nothing.
     fn hull_contacts(&self, _contacts: &mut Vec<HullContact>) {}
+
+    /// What is known of its vehicles beside position and velocity: a channel each, without values yet.
+    fn channels(&self) -> Vec<Channel> {
+        Vec::new()
+    }
+
+    /// Writes the present values into channels of [`Plant::channels`], in their order.
+    fn write_channels(&self, _channels: &mut [Channel]) {}
 
     /// Begins its random numbers anew.
     fn reseed(&mut self, _seed: u64) {}

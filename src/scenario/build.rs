@@ -54,6 +54,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         time: document.time.complete(count, document.arrival.hold_s),
         arrival: document.arrival,
         breathing: document.breathing,
+        noise_seed: document.noise.seed,
         name: document.name.unwrap_or_default(),
         space,
         law,

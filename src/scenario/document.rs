@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::laws::Laws;
+use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 #[cfg(feature = "shapes")]
@@ -66,6 +67,9 @@ pub(super) struct Document {
     /// law.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) breathing: Breathing,
+    /// Chance in flight.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) noise: NoiseTable,
 }
 
 /// The vehicles.

@@ -26,6 +26,8 @@ mod laws;
 mod legs;
 mod limits;
 #[cfg(feature = "files")]
+mod noise;
+#[cfg(feature = "files")]
 mod obstacles;
 #[cfg(feature = "files")]
 mod overrides;

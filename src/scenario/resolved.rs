@@ -11,6 +11,7 @@ use super::document::{
     PlantTable, StartTable, SwarmTable,
 };
 use super::laws::Laws;
+use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Scenario, Space};
@@ -113,6 +114,7 @@ impl From<&Scenario> for Document {
             time: scenario.time.into(),
             arrival: scenario.arrival,
             breathing: scenario.breathing,
+            noise: NoiseTable { seed: scenario.noise_seed },
         }
     }
 }

@@ -57,6 +57,8 @@ pub struct Scenario {
     pub arrival: Arrival,
     /// When slots are spread to let vehicles past each other, under laws that allow it.
     pub breathing: Breathing,
+    /// Seed of every random number that is drawn in flight.
+    pub noise_seed: u64,
 }
 
 /// The space that a swarm lives in.
@@ -122,6 +124,7 @@ impl Scenario {
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
             breathing: Breathing::default(),
+            noise_seed: 0,
             start,
             legs: vec![Leg::first(formation)],
             obstacles: Vec::new(),

@@ -53,7 +53,17 @@ impl Scenario {
         self.check_time()?;
         self.check_arrival()?;
         self.check_breathing()?;
+        self.check_noise()?;
         self.check_resolution()
+    }
+
+    fn check_noise(&self) -> Result<(), ScenarioError> {
+        if i64::try_from(self.noise_seed).is_ok() {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!("a seed of {}, which a scenario file cannot hold", self.noise_seed))
+            .with_help(format!("it is at most {}", i64::MAX))
+            .at("noise.seed"))
     }
 
     fn check_breathing(&self) -> Result<(), ScenarioError> {

@@ -5,6 +5,7 @@
 //! stands for continuous time and asks the law all the way along. The audit sweeps every step, the step that a refusal
 //! shortened too. A step allocates nothing.
 
+mod channels;
 mod controller;
 mod ending;
 mod judge;

@@ -7,6 +7,7 @@ use crate::feedback::Feedback;
 #[cfg(feature = "ideal")]
 use crate::law::LawError;
 use crate::plant::{HullContact, Path, Plant, PlantError, rapier};
+use crate::record::Channel;
 use crate::scenario::{PlantSpec, Scenario};
 use crate::swarm::{Pair, Rows, Swarm};
 
@@ -111,6 +112,24 @@ impl Motion {
     pub(super) fn reseed(&mut self, seed: u64) {
         match self {
             Self::Sampled(plant) => plant.reseed(seed),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(_) => {}
+        }
+    }
+
+    /// What is known of the vehicles beside position and velocity.
+    pub(super) fn channels(&self) -> Vec<Channel> {
+        match self {
+            Self::Sampled(plant) => plant.channels(),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(_) => Vec::new(),
+        }
+    }
+
+    /// Writes its present values.
+    pub(super) fn write_channels(&self, channels: &mut [Channel]) {
+        match self {
+            Self::Sampled(plant) => plant.write_channels(channels),
             #[cfg(feature = "ideal")]
             Self::Continuous(_) => {}
         }

@@ -1,24 +1,20 @@
 //! A flight that is advanced step by step.
 
-use std::time::{Duration, Instant};
+mod step;
 
+use super::channels::Channels;
 use super::controller::Controller;
-use super::ending::{Breakdown, Ending, Flight, MAX_BEND_M, Performance, SimError};
+use super::ending::{Breakdown, Ending, Flight, Performance, SimError};
 use super::judge::{Judge, Judged};
 use super::motion::Motion;
 use super::parts::Parts;
 use super::resolution::Resolution;
 use super::watch::Watch;
-use crate::feedback::Feedback as _;
 use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Peaks, Sample};
-use crate::scenario::{MAX_HALVINGS, Scenario};
-use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
-
-/// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
-/// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
-const SIDE_BY_SIDE_FROM: usize = 512;
+use crate::scenario::Scenario;
+use crate::swarm::{Rows, Swarm, first_row_not_finite};
 
 /// A flight under way: law, link, supervisor, vehicles and judge, with everything that any of them remembers.
 ///
@@ -63,6 +59,7 @@ pub struct Simulation {
     watch: Watch,
     /// Since the last sample.
     peaks: Peaks,
+    channels: Channels,
     sample_is_due: bool,
     ending: Option<Ending>,
     pub(super) performance: Performance,
@@ -100,6 +97,7 @@ impl Simulation {
         motion.observe(&mut state);
         let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());
         let other_law = flies_another.then(|| Event::OtherLaw { time_s: 0.0, name: law.name().to_owned() });
+        let channels = Channels::of(&motion, link.as_ref());
         let mut simulation = Self {
             controller: Controller::new(scenario, law, link, supervisor)?,
             motion,
@@ -117,6 +115,7 @@ impl Simulation {
             energy: None,
             watch: Watch::default(),
             peaks: Peaks::default(),
+            channels,
             sample_is_due: false,
             ending: None,
             performance: Performance::default(),
@@ -238,6 +237,7 @@ impl Simulation {
         if !std::mem::take(&mut self.sample_is_due) {
             return None;
         }
+        self.channels.write(&self.motion, self.controller.link.as_ref());
         Some(Sample {
             time_s: self.time_s,
             step: self.steps,
@@ -246,7 +246,7 @@ impl Simulation {
             separation: self.judge.closest.take(),
             energy: self.energy,
             peaks: std::mem::take(&mut self.peaks),
-            channels: &[],
+            channels: self.channels.all(),
         })
     }
 
@@ -286,163 +286,5 @@ impl Simulation {
             last: self.state,
             performance: self.performance,
         }
-    }
-
-    /// Flies one step, in halves where it is refused.
-    fn advance(&mut self, step: u64) -> Result<(), Ending> {
-        let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
-        let mut shortest = whole;
-        let flown = self.fly_parts(step, whole, &mut shortest);
-        if shortest < whole && shortest != self.shortest {
-            let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
-            let dt_s = length_s * (shortest as f64 / whole as f64);
-            self.events.push(Event::StepRefined { time_s, dt_s });
-        }
-        self.shortest = shortest;
-        flown
-    }
-
-    /// Longest step that is honest at the present state \[s\]. Continuous time chooses its own.
-    fn longest_step_s(&self) -> f64 {
-        let (law, nearest_m) = (&self.controller.law, self.judge.nearest_m);
-        let rate_per_s = law.fastest_rate_per_s(Some(nearest_m), self.scenario.a22_per_s);
-        let rate_per_s = match law.obstacle_rate_squared(self.judge.room_m) {
-            0.0 => rate_per_s,
-            squared => rate_per_s.map(|rate_per_s| (rate_per_s.powi(2) + squared).sqrt()),
-        };
-        rate_per_s
-            .filter(|_| self.motion.holds_commands())
-            .map_or(f64::INFINITY, |rate_per_s| self.scenario.time.max_rate_dt / rate_per_s)
-    }
-
-    /// Flies the `whole` parts of a step, as many at once as are honest and not refused; the fewest at once are
-    /// `shortest`.
-    fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<(), Ending> {
-        let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
-        let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
-        let (mut flown, mut part) = (0, whole);
-        while flown < whole {
-            let longest_s = self.longest_step_s();
-            while part > 1 && seconds(part) > longest_s {
-                part /= 2;
-                *shortest = part.min(*shortest);
-            }
-            self.move_vehicles(step, seconds(part))?;
-            let bend_m = self.path.bend_m();
-            if part > 1 && (bend_m > MAX_BEND_M || self.is_refused()) {
-                self.motion.restore(&self.state);
-                self.controller.link.forget_after(self.time_s);
-                part /= 2;
-                *shortest = part.min(*shortest);
-                continue;
-            }
-            if bend_m > MAX_BEND_M {
-                return Err(Breakdown::Bent { step, bend_m }.into());
-            }
-            flown += part;
-            let from_s = self.time_s;
-            if flown == whole {
-                self.steps = step;
-                self.time_s = self.scenario.time.end_s(step);
-            } else {
-                self.time_s = begin_s + seconds(flown);
-            }
-            std::mem::swap(&mut self.state, &mut self.next);
-            self.judge_and_command(Some((step, from_s)), flown == whole)?;
-            while part < whole && flown.is_multiple_of(2 * part) {
-                part *= 2;
-            }
-        }
-        Ok(())
-    }
-
-    /// Moves the vehicles from `state` to `next`.
-    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<(), Ending> {
-        let began = Instant::now();
-        let is_held = self.overruled || self.scenario.time.control_hz.is_some();
-        let held = is_held.then_some(&self.control);
-        let interval = (step, self.time_s, dt_s);
-        self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
-        self.performance.physics += began.elapsed();
-        match self.next.first_not_finite() {
-            Some(vehicle) => Err(Breakdown::StateNotFinite { step, vehicle }.into()),
-            None => Ok(()),
-        }
-    }
-
-    fn is_refused(&mut self) -> bool {
-        let Controller { law, links, .. } = &self.controller;
-        self.judge.refuses(law.as_ref(), links, &self.state, &self.path, &self.next)
-    }
-
-    /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
-    /// Between whole steps a command that is held for a period of its own is kept.
-    fn judge_and_command(&mut self, step: Option<(u64, f64)>, is_whole: bool) -> Result<(), Ending> {
-        let (number, from_s) = step.unwrap_or((0, self.time_s));
-        let refused = |why| Ending::from(Breakdown::Audit { step: number, why });
-        for (after_s, positions_m) in self.path.passed() {
-            self.judge.sweep(from_s + after_s, positions_m, &mut self.events).map_err(refused)?;
-        }
-        self.controller.accept(self.time_s, &self.state);
-        self.controller.link.settle(self.time_s);
-        let time = &self.scenario.time;
-        let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));
-        if time.control_hz.is_some() {
-            self.motion.apply(&self.control, &mut self.state);
-        }
-        let Self { judge, controller, state, control, time_s, events, .. } = self;
-        let (state, time_s): (&Swarm, f64) = (state, *time_s);
-        let mut audit = || {
-            let began = Instant::now();
-            let positions_m = &state.positions_m;
-            let judged = match step {
-                None => judge.start(time_s, positions_m, events),
-                Some(_) => judge.sweep(time_s, positions_m, events),
-            };
-            (judged, began.elapsed())
-        };
-        let mut act = || {
-            let began = Instant::now();
-            (controller.act(time_s, state, is_asked.then_some(control)), began.elapsed())
-        };
-        let side_by_side = state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
-        let ((judged, audit_time), (commanded, law_time)) =
-            if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
-        self.performance.audit += audit_time;
-        let Self { watch, scenario, controller, state, certificate, events, .. } = self;
-        watch.look(scenario, controller, (time_s, state), certificate, events);
-        let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
-        judged.map_err(refused)?;
-        self.judge.note_engine_contacts(&self.motion, self.time_s, &mut self.events);
-        self.judge.note_bounces(&self.motion, from_s, &mut self.events);
-        commanded
-    }
-
-    /// Asks the law about the present state.
-    fn ask(&mut self) -> Result<(), Ending> {
-        let began = Instant::now();
-        let commanded = self.controller.command(self.time_s, &self.state, &mut self.control);
-        self.hold(self.steps, commanded.map_err(Ending::from), began.elapsed())
-    }
-
-    /// Lets the vehicles hold the command from now on, where there is one.
-    fn hold(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
-        self.performance.law += took;
-        let checked = commanded.and_then(|()| match first_row_not_finite(&self.control) {
-            Some(vehicle) => Err(Breakdown::CommandNotFinite { step, vehicle }.into()),
-            None => Ok(()),
-        });
-        if checked.is_err() {
-            (self.control, self.energy) = (Rows::zeros(0), None);
-            return checked;
-        }
-        self.motion.apply(&self.control, &mut self.state);
-        if let Some(vehicle) = self.state.first_not_finite() {
-            return Err(Breakdown::StateNotFinite { step, vehicle }.into());
-        }
-        self.energy = self.controller.energy(self.time_s, &self.state);
-        self.watch.take(self.controller.target.view().revision, self.energy);
-        self.peaks.take(largest_row_norm(&self.control), self.energy);
-        Ok(())
     }
 }
