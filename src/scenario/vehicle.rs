@@ -20,12 +20,13 @@ use super::error::ScenarioError;
 #[cfg(feature = "files")]
 use super::files;
 use super::limits::positive;
-use super::spec::Scenario;
+use super::spec::{Scenario, Space};
 #[cfg(feature = "files")]
 use super::suggest::suggest;
+use crate::space::{Obstacle, Shape};
 #[cfg(feature = "files")]
 use crate::vehicle::{self, MODELS, Misread, Model};
-use crate::vehicle::{Airframe, ModelError, Quadrotor};
+use crate::vehicle::{Airframe, Fleet, Ground, ModelError, Quadrotor};
 
 /// Default rate of the attitude loop \[Hz\].
 pub const DEFAULT_ATTITUDE_HZ: f64 = 500.0;
@@ -215,6 +216,17 @@ fn read(path: &PathBuf) -> Result<Model, ScenarioError> {
 }
 
 impl Scenario {
+    /// Its quadrotors at the start, trimmed for hover; none where vehicles are points.
+    #[must_use]
+    pub fn fleet(&self) -> Option<Fleet> {
+        let ground = |obstacle: &Obstacle| match obstacle.shape {
+            Shape::HalfSpace { normal } => Some(Ground { place_m: obstacle.place_m, normal: normal.normalize() }),
+            _ => None,
+        };
+        let grounds: Vec<_> = self.obstacles.iter().filter_map(ground).collect();
+        Some(Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane))
+    }
+
     /// Makes every vehicle one of these, with the mass, the hull and the default rates of its kind. Points of a quadrotor's mass
     /// have no drag of their own.
     pub fn set_airframe(&mut self, airframe: Airframe) {

@@ -70,13 +70,12 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Of a quadrotor, above these planes where it feels any; none where its rotors cannot set thrust and torques each by
-    /// itself ([`Model::check`]).
+    /// Of a quadrotor, above these planes where it feels any. Rotors of a model that [`Model::check`] refuses are not mixed.
     #[must_use]
-    pub fn new(quadrotor: &Quadrotor, grounds: &[Ground]) -> Option<Self> {
+    pub fn new(quadrotor: &Quadrotor, grounds: &[Ground]) -> Self {
         let (model, curve) = (quadrotor.model.clone(), RotorCurve::of(&quadrotor.model));
-        Some(Self {
-            mixer: Mixer::new(&model)?,
+        Self {
+            mixer: Mixer::new(&model).unwrap_or_default(),
             attitude: Attitude::of(&model),
             inertia_kg_m2: model.inertia_kg_m2.into(),
             hover_rpm: curve.speed_rpm(0.25 * model.weight_n()),
@@ -84,7 +83,7 @@ impl Dynamics {
             grounds: if quadrotor.ground_effect { grounds.to_vec() } else { Vec::new() },
             downwash: quadrotor.downwash,
             model,
-        })
+        }
     }
 
     /// Its numbers.

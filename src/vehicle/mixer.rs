@@ -7,8 +7,8 @@ use super::model::Model;
 /// Determinant, with lengths in arms, from which four rotors set thrust and torques each by itself.
 const LEAST_DETERMINANT: f64 = 1e-3;
 
-/// The shares of each rotor in a thrust and in the torques about the body's axes.
-#[derive(Clone, Debug, PartialEq)]
+/// The shares of each rotor in a thrust and in the torques about the body's axes; by default none.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mixer {
     /// Thrust of each rotor for a unit of all thrust, with no torque.
     lift: Vector4<f64>,
