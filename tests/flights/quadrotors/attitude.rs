@@ -76,7 +76,8 @@ fn manoeuvre(time_s: f64, _: &State) -> Vector3<f64> {
 
 #[test]
 fn the_engine_comes_to_the_solution_of_order_8_at_second_order() {
-    for name in ["crazyflie", "hummingbird"] {
+    // What is left at 500 Hz after a second, in m and m/s: more where rotors are faster.
+    for (name, left) in [("crazyflie", 2e-4), ("hummingbird", 5e-3)] {
         let start = |hz: f64| {
             let (scenario, mut fleet) = alone(model(name), hz);
             fleet.states[0].rates_rad_s = Vector3::new(3.0, -2.0, 4.0);
@@ -84,14 +85,14 @@ fn the_engine_comes_to_the_solution_of_order_8_at_second_order() {
             (scenario, fleet)
         };
         let run = |plant: &mut dyn Quadrotors, hz: f64| fly(plant, (1.0, 1.0 / hz), &mut manoeuvre);
-        let (_, fleet) = start(250.0);
-        let exact = run(&mut continuous::Quadrotors::new(fleet), 250.0);
-        let errors = [250.0, 500.0, 1000.0, 2000.0, 4000.0].map(|hz| {
-            let (scenario, fleet) = start(250.0);
+        let (_, fleet) = start(500.0);
+        let exact = run(&mut continuous::Quadrotors::new(fleet), 500.0);
+        let errors = [500.0, 1000.0, 2000.0, 4000.0, 8000.0].map(|hz| {
+            let (scenario, fleet) = start(500.0);
             let found = run(rapier::quadrotors(&scenario, Precision::Double, fleet).as_mut(), hz);
             (found.position_m - exact.position_m).norm() + (found.velocity_m_s - exact.velocity_m_s).norm()
         });
-        assert!(errors[1] <= 2e-4, "{name}: {errors:?} m and m/s");
+        assert!(errors[0] <= left, "{name}: {errors:?} m and m/s");
         assert!(orders(&errors).iter().all(|order| (1.9..2.1).contains(order)), "{name}: {errors:?}");
     }
 }

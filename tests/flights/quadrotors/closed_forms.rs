@@ -46,8 +46,8 @@ fn a_fall_in_air_comes_to_the_terminal_speed_at_second_order() {
     let (terminal_m_s, _) = fallen(&dragged(1.0), 1e3);
     assert!((state.velocity_m_s.z + terminal_m_s).abs() <= 1e-9, "{}", state.velocity_m_s);
     // A drag that pushes: faster than in a vacuum.
-    let pushed = open_loop(dragged(-1.0), &still, STILL, (1.0, 1.0 / 500.0));
-    assert!(-pushed.velocity_m_s.z > GRAVITY_M_S2 && speed_m_s < 0.5 * GRAVITY_M_S2);
+    let pushed = open_loop(dragged(-1.0), &still, STILL, (0.5, 1.0 / 500.0));
+    assert!(-pushed.velocity_m_s.z > 0.5 * GRAVITY_M_S2, "{}", pushed.velocity_m_s);
 }
 
 #[test]
@@ -151,9 +151,9 @@ fn in_a_steady_wind_it_hovers_at_the_tilt_whose_tangent_is_drag_over_weight() {
         let (scenario, mut fleet) = alone(model.clone(), 500.0);
         fleet.wind_m_s[(0, 0)] = wind_m_s;
         let expected = tilt_in_wind(&model, fleet.dynamics.hover_rpm(), wind_m_s);
-        let hold = &mut |_, state: &State| -4.0 * state.position_m - 4.0 * state.velocity_m_s;
+        let hold = &mut |_, state: &State| -state.position_m - 2.0 * state.velocity_m_s;
         let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet.clone());
-        let state = fly(plant.as_mut(), (20.0, 1.0 / 500.0), hold);
+        let state = fly(plant.as_mut(), (40.0, 1.0 / 500.0), hold);
         let up = state.attitude * Vector3::z();
         assert!((-up.x / up.z - expected).abs() <= 1e-9, "{} at {wind_m_s} m/s, {expected}", -up.x / up.z);
         assert!(state.velocity_m_s.norm() <= 1e-9 && up.y == 0.0, "{}", state.velocity_m_s);

@@ -7,7 +7,7 @@ mod rotation;
 
 use nalgebra::{Vector3, Vector4};
 use tautline::formation::Formation;
-use tautline::plant::{Path, Plant as _, Quadrotors, rapier};
+use tautline::plant::{Path, Quadrotors, rapier};
 use tautline::scenario::{Precision, Scenario};
 use tautline::swarm::{Rows, Swarm, set_row};
 use tautline::vehicle::{self, Airframe, Fleet, MODELS, Model, Quadrotor, State};

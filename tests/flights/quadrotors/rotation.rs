@@ -114,13 +114,13 @@ fn a_triaxial_top_follows_jacobis_functions_and_keeps_momentum_and_energy() {
     };
     let (momentum, energy) = measures(begin);
     let mut energies = Vec::new();
-    let errors = [500.0, 1000.0, 2000.0].map(|hz| {
+    let errors = [1000.0, 2000.0, 4000.0].map(|hz| {
         let rates = spun(model.clone(), begin, 2.0, hz).rates_rad_s;
         let (found_momentum, found_energy) = measures(rates);
         assert!((found_momentum / momentum - 1.0).abs() <= 1e-12, "|L| is kept: {found_momentum}, {momentum}");
         energies.push((found_energy / energy - 1.0).abs());
         (rates - triaxial(&model, begin, 2.0)).norm()
     });
-    assert!(errors[0] <= 0.02 && orders(&errors).iter().all(|order| (1.9..2.1).contains(order)), "{errors:?}");
+    assert!(errors[0] <= 5e-4 && orders(&errors).iter().all(|order| (1.9..2.1).contains(order)), "{errors:?}");
     assert!(energies[0] <= 1e-4 && energies[2] < energies[0] / 10.0, "energy is off by {energies:?}");
 }
