@@ -138,10 +138,10 @@ impl Plant for Fliers {
 
     fn restore(&mut self, _swarm: &Swarm) {
         self.fleet.go_back();
-        for (&handle, state) in self.handles.iter().zip(&self.fleet.states) {
+        for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
-            body.set_translation(reals(state.position_m - self.origin_m), true);
-            body.set_rotation(rotation(&state.attitude), true);
+            body.set_translation(reals(row(&self.began_m, i)), true);
+            body.set_rotation(rotation(&self.fleet.states[i].attitude), true);
         }
     }
 
@@ -162,9 +162,10 @@ impl Plant for Fliers {
     }
 }
 
+/// As the engine has it, which keeps its length: the same numbers go back into it.
 fn attitude(rotation: Rotation) -> UnitQuaternion<f64> {
     let [x, y, z, w] = rotation.to_array().map(double);
-    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+    UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
 }
 
 fn rotation(attitude: &UnitQuaternion<f64>) -> Rotation {

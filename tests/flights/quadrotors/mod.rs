@@ -4,6 +4,7 @@ mod attitude;
 mod closed_forms;
 mod flights;
 mod rotation;
+mod scenarios;
 
 use nalgebra::{Vector3, Vector4};
 use tautline::formation::Formation;
