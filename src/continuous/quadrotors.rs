@@ -29,7 +29,8 @@ pub struct Quadrotors {
 impl Quadrotors {
     /// At the start of a fleet.
     #[must_use]
-    pub fn new(fleet: Fleet) -> Self {
+    pub fn new(mut fleet: Fleet) -> Self {
+        fleet.feel();
         Self { fleet }
     }
 
@@ -145,7 +146,7 @@ impl Flow<'_> {
                 rotors_rpm: lag.after(self.before.states[i].rotors_rpm, self.before.asked_rpm(i)),
             };
         }
-        fleet.blow();
+        fleet.feel();
     }
 }
 
@@ -155,7 +156,7 @@ impl ODE<f64, Vec<f64>> for Flow<'_> {
         let fleet = self.fleet.borrow();
         for (i, rates) in rates.chunks_exact_mut(NUMBERS).enumerate() {
             let state = &fleet.states[i];
-            let (acceleration_m_s2, turning_rad_s2) = fleet.dynamics.accelerations(state, &fleet.wrench(i));
+            let (acceleration_m_s2, turning_rad_s2) = fleet.dynamics.accelerations(state, fleet.wrench(i));
             // The solver's own quaternion, of whatever length.
             let own = &numbers[NUMBERS * i + 6..];
             let attitude = Quaternion::new(own[0], own[1], own[2], own[3]);

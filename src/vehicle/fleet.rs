@@ -3,7 +3,7 @@
 use nalgebra::{Vector3, Vector4};
 
 use super::downwash::Downwash;
-use super::dynamics::{Dynamics, Ground, State, Wrench};
+use super::dynamics::{Drift, Dynamics, Ground, State, Wrench};
 use super::model::Quadrotor;
 use crate::record::Channel;
 use crate::swarm::{Rows, Swarm, row, set_row};
@@ -33,8 +33,18 @@ pub struct Fleet {
     attitude_hz: f64,
     clock: Clock,
     jets: Vec<Downwash>,
+    wrenches: Vec<Wrench>,
     /// As it was before the last [`Fleet::remember`].
-    before: (Vec<State>, Vec<Vector4<f64>>, Clock),
+    before: Before,
+}
+
+/// What goes back where a step is taken back.
+#[derive(Clone, Debug, Default)]
+struct Before {
+    states: Vec<State>,
+    asked_rpm: Vec<Vector4<f64>>,
+    wrenches: Vec<Wrench>,
+    clock: Clock,
 }
 
 /// Time flown, and how many attitude samples have been taken.
@@ -53,8 +63,9 @@ impl Fleet {
         let state = |i: usize| dynamics.trimmed(row(&start.positions_m, i), row(&start.velocities_m_s, i));
         let states: Vec<_> = (0..count).map(state).collect();
         let asked_rpm = vec![Vector4::repeat(dynamics.hover_rpm()); count];
-        Self {
-            before: (states.clone(), asked_rpm.clone(), Clock::default()),
+        let mut fleet = Self {
+            before: Before::default(),
+            wrenches: vec![Wrench::default(); count],
             states,
             wind_m_s: Rows::zeros(count),
             asked_rpm,
@@ -64,7 +75,10 @@ impl Fleet {
             clock: Clock::default(),
             jets: Vec::with_capacity(if quadrotor.downwash { 4 * count } else { 0 }),
             dynamics,
-        }
+        };
+        fleet.feel();
+        fleet.remember();
+        fleet
     }
 
     /// Number of vehicles N.
@@ -80,16 +94,20 @@ impl Fleet {
 
     /// Keeps what there is, for [`Fleet::go_back`].
     pub fn remember(&mut self) {
-        self.before.0.clone_from(&self.states);
-        self.before.1.clone_from(&self.asked_rpm);
-        self.before.2 = self.clock;
+        let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
+        before.states.clone_from(states);
+        before.asked_rpm.clone_from(asked_rpm);
+        before.wrenches.clone_from(wrenches);
+        before.clock = *clock;
     }
 
     /// Becomes again what it was at the last [`Fleet::remember`].
     pub fn go_back(&mut self) {
-        self.states.clone_from(&self.before.0);
-        self.asked_rpm.clone_from(&self.before.1);
-        self.clock = self.before.2;
+        let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
+        states.clone_from(&before.states);
+        asked_rpm.clone_from(&before.asked_rpm);
+        wrenches.clone_from(&before.wrenches);
+        *clock = before.clock;
     }
 
     /// Lets the attitude loops run where they are due, and says after how many seconds they are due again.
@@ -132,17 +150,27 @@ impl Fleet {
         self.asked_rpm[vehicle]
     }
 
-    /// Finds what rotors blow at the present states.
-    pub fn blow(&mut self) {
-        self.dynamics.jets(self.states.iter(), &mut self.jets);
+    /// What acts on each beside gravity at the present states.
+    pub fn feel(&mut self) {
+        let Self { dynamics, states, wind_m_s, jets, wrenches, .. } = self;
+        dynamics.jets(states.iter(), jets);
+        for (i, (state, wrench)) in states.iter().zip(wrenches).enumerate() {
+            *wrench = dynamics.wrench(state, row(wind_m_s, i), dynamics.down_m_s(i, state, jets));
+        }
     }
 
-    /// What acts on a vehicle beside gravity, in the air of the last [`Fleet::blow`].
+    /// What acted on a vehicle beside gravity at the last [`Fleet::feel`].
     #[must_use]
-    pub fn wrench(&self, vehicle: usize) -> Wrench {
-        let state = &self.states[vehicle];
-        let air_m_s = self.dynamics.air_m_s(vehicle, state, row(&self.wind_m_s, vehicle), &self.jets);
-        self.dynamics.wrench(state, &air_m_s)
+    pub fn wrench(&self, vehicle: usize) -> &Wrench {
+        &self.wrenches[vehicle]
+    }
+
+    /// The second half of a step that began with these drifts, with what acts now.
+    pub fn complete(&mut self, drifts: &[Drift], dt_s: f64) {
+        let Self { dynamics, states, wrenches, .. } = self;
+        for ((state, wrench), drift) in states.iter_mut().zip(wrenches).zip(drifts) {
+            dynamics.end(state, drift, wrench, dt_s);
+        }
     }
 
     /// Writes where they are and how fast they move.

@@ -41,6 +41,10 @@ impl Mixer {
     #[must_use]
     pub fn thrusts_n(&self, lift_n: f64, torque_n_m: Vector3<f64>) -> Vector4<f64> {
         let [roll, pitch, yaw] = &self.turns;
+        let all = roll * torque_n_m.x + pitch * torque_n_m.y + yaw * torque_n_m.z + self.lift * lift_n;
+        if all.iter().all(|thrust_n| (0.0..=self.most_n).contains(thrust_n)) {
+            return all;
+        }
         let level = roll * torque_n_m.x + pitch * torque_n_m.y;
         let level = level * self.largest_share(&Vector4::zeros(), &level);
         let yaw = yaw * torque_n_m.z;

@@ -18,7 +18,8 @@ pub(super) struct Fliers {
 }
 
 impl Fliers {
-    pub(super) fn new(scenario: &Scenario, fleet: Fleet) -> Self {
+    pub(super) fn new(scenario: &Scenario, mut fleet: Fleet) -> Self {
+        fleet.feel();
         let mut world = empty_world();
         let origin_m = mean_row(&scenario.start.positions_m);
         let (model, inertia_kg_m2) = (fleet.dynamics.model(), fleet.dynamics.inertia_kg_m2());
@@ -48,10 +49,9 @@ impl Fliers {
 
     /// Half of the kick, and what the engine is to drift with.
     fn begin(&mut self, dt_s: f64) {
-        self.fleet.blow();
         self.drifts.clear();
         for (i, &handle) in self.handles.iter().enumerate() {
-            let drift = self.fleet.dynamics.begin(&self.fleet.states[i], &self.fleet.wrench(i), dt_s);
+            let drift = self.fleet.dynamics.begin(&self.fleet.states[i], self.fleet.wrench(i), dt_s);
             let body = &mut self.world.bodies[handle];
             set_row(&mut self.drift_m_s, i, drift.velocity_m_s);
             set_row(&mut self.began_m, i, doubles(body.translation()));
@@ -78,11 +78,9 @@ impl Fliers {
             }
             self.fleet.dynamics.predict(state, drift);
         }
-        self.fleet.blow();
-        for (i, drift) in self.drifts.iter().enumerate() {
-            let wrench = self.fleet.wrench(i);
-            self.fleet.dynamics.end(&mut self.fleet.states[i], drift, &wrench, dt_s);
-        }
+        // Also what begins the next step: it differs from what the velocities make of it by the square of the step.
+        self.fleet.feel();
+        self.fleet.complete(&self.drifts, dt_s);
     }
 }
 

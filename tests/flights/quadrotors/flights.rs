@@ -199,7 +199,7 @@ fn rotors_blow_on_a_vehicle_below_and_on_none_beside() {
     let push = |place_m: Vector3<f64>, downwash: bool| {
         let at = [0.0, 0.0, 0.0, place_m.x, place_m.y, place_m.z];
         let (_, mut fleet) = two(&at, &[0.0; 6], &|quadrotor| quadrotor.downwash = downwash);
-        fleet.blow();
+        fleet.feel();
         let weight_n = fleet.dynamics.model().weight_n();
         (1.0 - fleet.wrench(1).force_n.z / weight_n, 1.0 - fleet.wrench(0).force_n.z / weight_n)
     };
