@@ -10,6 +10,7 @@ mod loop_claims;
 mod missions;
 mod obstacles;
 mod plant_claims;
+mod quadrotors;
 mod random_scenarios;
 mod reach;
 mod reference_flights;
