@@ -55,6 +55,10 @@ impl Scenario {
         self.check_arrival()?;
         self.check_breathing()?;
         self.check_noise()?;
+        self.check_sensing()?;
+        self.check_network()?;
+        self.check_actuation()?;
+        self.check_failures()?;
         self.check_resolution()
     }
 
