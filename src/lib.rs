@@ -75,3 +75,4 @@ mod text;
 pub mod track;
 #[cfg(feature = "reports")]
 pub mod validate;
+pub mod wind;
