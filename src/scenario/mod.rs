@@ -62,6 +62,11 @@ mod time_table;
 mod validate;
 #[cfg(feature = "files")]
 mod values;
+#[cfg(feature = "files")]
+mod vehicle;
+mod weather;
+#[cfg(feature = "files")]
+mod wind;
 
 pub use error::{Field, Place, ScenarioError};
 pub use limits::{

@@ -16,6 +16,8 @@ use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Scenario, Space};
 use super::values::{Edge, PerVehicle, Point};
+use super::vehicle::VehicleTable;
+use super::wind::WindTable;
 use crate::swarm::Rows;
 use crate::target::{Begins, Leg};
 
@@ -69,7 +71,7 @@ impl Scenario {
 
 impl From<&Scenario> for Document {
     fn from(scenario: &Scenario) -> Self {
-        let law = scenario.law.clone().complete(scenario.a22_per_s);
+        let law = scenario.law.clone().complete(scenario.velocity_coefficient_per_s());
         let (kind, precision) = match scenario.plant {
             PlantSpec::Rapier(precision) => (PlantKind::Rapier, Some(precision)),
             PlantSpec::Ideal => (PlantKind::Ideal, None),
@@ -83,6 +85,8 @@ impl From<&Scenario> for Document {
                 hull_radius_m: per_vehicle(&scenario.hull_radius_m),
                 a22_per_s: scenario.a22_per_s,
             },
+            vehicle: VehicleTable { drag_per_s: scenario.drag_per_s },
+            wind: WindTable::of(&scenario.wind),
             start: StartTable {
                 positions_m: Some(scenario.points(&scenario.start.positions_m)),
                 velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),
