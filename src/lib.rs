@@ -51,6 +51,8 @@ pub mod formation;
 pub mod graph;
 pub mod law;
 pub mod link;
+#[cfg(feature = "reports")]
+pub mod margin;
 pub mod metrics;
 pub mod observation;
 pub mod plant;

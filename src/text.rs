@@ -71,6 +71,23 @@ pub(crate) fn significant(number: f64, digits: u8) -> String {
     format!("{number:.decimals$}")
 }
 
+/// Rows of cells as columns.
+pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
+    let columns = rows.first().map_or(0, Vec::len);
+    let widths: Vec<_> = (0..columns).map(|k| rows.iter().map(|row| row[k].len()).max().unwrap_or(0)).collect();
+    let mut text = String::new();
+    for row in rows {
+        let mut line = String::new();
+        for (cell, width) in row.iter().zip(&widths) {
+            // Writing to a string cannot fail.
+            let _ = write!(line, "{cell:<width$}  ");
+        }
+        text += line.trim_end();
+        text.push('\n');
+    }
+    text
+}
+
 /// Decimals that the multiples of a step of 1, 2 or 5 times a power of ten need, at most so many.
 pub(crate) fn decimals_of(step: f64, most: u8) -> usize {
     /// Rounding must not take a step for the next smaller power.

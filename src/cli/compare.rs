@@ -5,19 +5,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::console::{self, Console};
-use super::folder::try_to_write_in;
-use super::outputs;
+use super::outputs::{self, is_standard_output, write};
 use super::run::interruption;
 use super::scenario::ScenarioArguments;
 #[cfg(feature = "viewer")]
 use super::worst;
 use super::{Exit, Failure};
 use crate::compare::{CompareError, ComparePage, Comparison, Plan, Watch};
-use crate::report::write_atomically;
 use crate::scenario::{Override, Source, Template};
 
-/// The name that stands for standard output.
-const STANDARD_OUTPUT: &str = "-";
 /// Largest seed that a scenario file can say, less the most runs.
 const LAST_SEED: u64 = i64::MAX as u64 - MOST_RUNS;
 /// Most starts under each law.
@@ -80,39 +76,6 @@ impl CompareArguments {
         all.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
     }
 
-    /// Refuses outputs that would replace the scenario, each other, or without `--force` a file of an earlier comparison,
-    /// and places that cannot be written to, before an hour of flights.
-    fn check_outputs(&self) -> Result<(), Failure> {
-        let (piped, files): (Vec<_>, Vec<_>) = self.outputs().partition(|(_, file)| is_standard_output(file));
-        if let [(first, _), (second, _), ..] = piped[..] {
-            let message = format!("{first} and {second} are both to go to standard output");
-            return Err(Failure::input(message, "write one of them into a file"));
-        }
-        let scenario = Path::new(&self.what.scenario);
-        let inputs: Vec<_> = scenario.is_file().then_some(("the scenario", scenario)).into_iter().collect();
-        outputs::check(&inputs, &files)?;
-        for (option, file) in files {
-            let shown = file.display();
-            if file.is_dir() {
-                let help = format!("give {option} a file within it");
-                return Err(Failure::input(format!("{shown} is a directory"), help));
-            }
-            if file.is_file() && !self.force {
-                return Err(Failure::input(
-                    format!("{shown} exists"),
-                    "overwrite it with --force, or write another file",
-                ));
-            }
-            let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file());
-            let folder = file.parent().unwrap_or(Path::new(""));
-            if is_new_or_plain && let Err(error) = try_to_write_in(folder) {
-                let message = format!("cannot write {shown}: {error}");
-                return Err(Failure::machine(message).with_help(format!("give {option} a file that can be written")));
-            }
-        }
-        Ok(())
-    }
-
     /// The command that compares the same again, for a shell.
     fn command(&self, plan: &Plan) -> String {
         let laws: Vec<_> = plan.laws().iter().map(|law| law.name.as_str()).collect();
@@ -138,7 +101,7 @@ impl CompareArguments {
 pub(super) fn compare(arguments: &CompareArguments) -> Result<Exit, Failure> {
     let data_on_stdout = arguments.outputs().any(|(_, file)| is_standard_output(file));
     let console = Console { data_on_stdout, quiet: arguments.quiet };
-    arguments.check_outputs()?;
+    outputs::check_new(&arguments.what.scenario, arguments.outputs(), arguments.force)?;
     let overrides = arguments.what.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
     let template = Template::read(&Source::resolve(&arguments.what.scenario)?, &overrides)?;
     let names = arguments.laws.clone().unwrap_or_else(|| template.compared());
@@ -199,18 +162,6 @@ fn leave(arguments: &CompareArguments, plan: &Plan, comparison: &Comparison, con
         console.say(&format!("wrote {}", file.display()));
     }
     Ok(())
-}
-
-fn is_standard_output(file: &Path) -> bool {
-    file == Path::new(STANDARD_OUTPUT)
-}
-
-/// Writes a file whole, or to standard output.
-fn write(file: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    if is_standard_output(file) {
-        return console::data(&String::from_utf8_lossy(bytes));
-    }
-    Ok(write_atomically(file, bytes)?)
 }
 
 impl From<CompareError> for Failure {

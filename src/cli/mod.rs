@@ -19,6 +19,7 @@ mod events;
 mod export;
 mod folder;
 mod list;
+mod margin;
 mod obstacles;
 mod outputs;
 mod own;
@@ -71,6 +72,8 @@ enum Command {
     Validate(validate::ValidateArguments),
     /// Fly the same starts under several laws and set them side by side.
     Compare(compare::CompareArguments),
+    /// Find how much of one key a scenario survives: where between two values its verdict turns.
+    Margin(margin::MarginArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
     Export(export::ExportArguments),
     /// Draw a recording: pictures, films and contact sheets, without a screen.
@@ -128,6 +131,7 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
+        Command::Margin(arguments) => margin::margin(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),

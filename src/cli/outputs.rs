@@ -4,7 +4,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use super::Failure;
+use super::folder::try_to_write_in;
+use super::{Failure, console};
+use crate::report::write_atomically;
+
+/// The name that stands for standard output.
+const STANDARD_OUTPUT: &str = "-";
 
 /// A file and what it is called: `--events`, or `the recording`.
 pub(super) type Called<'a> = (&'static str, &'a Path);
@@ -24,6 +29,52 @@ pub(super) fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(),
         taken.insert(place, option);
     }
     Ok(())
+}
+
+/// Refuses outputs of a command about a scenario that would replace it, each other, or without `--force` a file that is
+/// there, and places that cannot be written to, before an hour of flights.
+pub(super) fn check_new<'a>(
+    scenario: &str,
+    outputs: impl Iterator<Item = Called<'a>>,
+    force: bool,
+) -> Result<(), Failure> {
+    let (piped, files): (Vec<_>, Vec<_>) = outputs.partition(|(_, file)| is_standard_output(file));
+    if let [(first, _), (second, _), ..] = piped[..] {
+        let message = format!("{first} and {second} are both to go to standard output");
+        return Err(Failure::input(message, "write one of them into a file"));
+    }
+    let scenario = Path::new(scenario);
+    let inputs: Vec<_> = scenario.is_file().then_some(("the scenario", scenario)).into_iter().collect();
+    check(&inputs, &files)?;
+    for (option, file) in files {
+        let shown = file.display();
+        if file.is_dir() {
+            let help = format!("give {option} a file within it");
+            return Err(Failure::input(format!("{shown} is a directory"), help));
+        }
+        if file.is_file() && !force {
+            return Err(Failure::input(format!("{shown} exists"), "overwrite it with --force, or write another file"));
+        }
+        let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file());
+        let folder = file.parent().unwrap_or(Path::new(""));
+        if is_new_or_plain && let Err(error) = try_to_write_in(folder) {
+            let message = format!("cannot write {shown}: {error}");
+            return Err(Failure::machine(message).with_help(format!("give {option} a file that can be written")));
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn is_standard_output(file: &Path) -> bool {
+    file == Path::new(STANDARD_OUTPUT)
+}
+
+/// Writes a file whole, or to standard output.
+pub(super) fn write(file: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    if is_standard_output(file) {
+        return console::data(&String::from_utf8_lossy(bytes));
+    }
+    Ok(write_atomically(file, bytes)?)
 }
 
 /// Where a file is or will be, through links and folders that are yet to be made. `None` for what is no file, such as a

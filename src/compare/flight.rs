@@ -32,6 +32,8 @@ pub struct FlightRow {
     pub seed: u64,
     /// How it went.
     pub outcome: Outcome,
+    /// Whether `tautline run` would say pass.
+    pub pass: bool,
     /// Codes by which `tautline check` refuses it; it was flown all the same.
     pub refused: Vec<String>,
     /// Why it ended before its time.
@@ -89,6 +91,7 @@ impl FlightRow {
         Self {
             seed,
             outcome: Outcome::of(&report),
+            pass: report.verdict.pass,
             refused: report.verdict.refused,
             ended_early: report.run.ended_early,
             reached: report.formation.reached && report.legs.iter().all(|leg| leg.reached_at_s.is_some()),

@@ -1,12 +1,10 @@
 //! The comparison in words: a table for the terminal, and what one must know to read it.
 
-use std::fmt::Write as _;
-
 use super::flight::Outcome;
 use super::measures::{ARRIVALS, COSTS, Cell, OUTCOMES};
 use super::plan::JITTER;
 use super::result::{Comparison, LawRow};
-use crate::text::{counted, metres, significant};
+use crate::text::{aligned, counted, metres, significant};
 
 /// Most law names that a line of the table holds, each with a number and its interval.
 const SIDE_BY_SIDE: usize = 3;
@@ -106,21 +104,4 @@ fn on_one_line(Cell { value, interval }: Cell) -> String {
 
 fn row(name: &str, unit: &str, cells: impl Iterator<Item = String>) -> Vec<String> {
     [name.to_owned(), unit.to_owned()].into_iter().chain(cells).collect()
-}
-
-/// Rows of cells as columns.
-fn aligned(rows: &[Vec<String>]) -> String {
-    let columns = rows.first().map_or(0, Vec::len);
-    let widths: Vec<_> = (0..columns).map(|k| rows.iter().map(|row| row[k].len()).max().unwrap_or(0)).collect();
-    let mut text = String::new();
-    for row in rows {
-        let mut line = String::new();
-        for (cell, width) in row.iter().zip(&widths) {
-            // Writing to a string cannot fail.
-            let _ = write!(line, "{cell:<width$}  ");
-        }
-        text += line.trim_end();
-        text.push('\n');
-    }
-    text
 }

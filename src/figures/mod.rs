@@ -14,6 +14,7 @@
 //! | [`smallest`] | the smallest distance of all of a recording |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
 //! | [`convergence`] | an integrator's error over its step |
+//! | [`margin`](margin()) | the share of flights that show something over the values of a key |
 //!
 //! [`of_run`] draws every one that a run has data for. All of them draw a [`RunHistory`], which watches a run or reads a
 //! recording in bounded memory, and never fail for what is in it: what is not a finite number breaks a line, and a
@@ -29,6 +30,7 @@ mod convergence;
 mod distances;
 mod figure;
 mod history;
+mod margin;
 mod paths;
 mod recorded;
 mod run;
@@ -41,6 +43,7 @@ pub use convergence::{Step, convergence};
 pub use distances::distances;
 pub use figure::Figure;
 pub use history::RunHistory;
+pub use margin::{Share, margin};
 pub use paths::{paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
 pub use run::{Criteria, NAMES_OF_RUN, of_run};

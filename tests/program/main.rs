@@ -12,6 +12,7 @@ mod doors;
 mod exports;
 mod interruption;
 mod keys;
+mod margin;
 mod obstacles;
 mod reads;
 mod references;

@@ -1,0 +1,53 @@
+//! Shares of flights over the values of a key.
+
+use super::axis::Axis;
+use super::chart::{Chart, Line, Mark};
+use super::figure::Figure;
+use super::svg::{Marker, PALETTE, SOFT_INK, Stroke};
+
+/// The flights of one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// The value.
+    pub value: f64,
+    /// The share that showed what was asked, from 0 to 1.
+    pub share: f64,
+    /// Its interval.
+    pub low: f64,
+    /// Its interval.
+    pub high: f64,
+}
+
+/// Shares of flights that show something (`does`) over the values of a key, with their 95 % intervals and the bracket in which
+/// the verdict turns. The axis is logarithmic where asked.
+#[must_use]
+pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>, logarithmic: bool) -> Figure {
+    let values = shares.iter().map(|share| share.value);
+    let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
+    let mut chart = Chart::new(x, Axis::spanning(&format!("share that {does}"), 0.0, 1.0, 5.0));
+    for share in shares {
+        let interval = vec![(share.value, share.low), (share.value, share.high)];
+        chart.lines.push(Line { points: interval, stroke: Stroke::solid(PALETTE[0], 1.2), label: None });
+    }
+    let marks = shares.iter().enumerate().map(|(k, share)| Mark {
+        at: (share.value, share.share),
+        marker: Marker::Ring,
+        colour: PALETTE[0],
+        radius: 3.5,
+        text: None,
+        label: (k == 0).then(|| "with its 95 % interval".to_owned()),
+    });
+    chart.marks.extend(marks);
+    for (k, side) in bracket.into_iter().flatten().enumerate() {
+        chart.lines.push(Line {
+            points: vec![(side, 0.0), (side, 1.0)],
+            stroke: Stroke::dashed(SOFT_INK, 1.0),
+            label: (k == 0).then(|| "the verdict turns in between".to_owned()),
+        });
+    }
+    let description = match bracket {
+        Some([low, high]) => format!("The share that {does} over {key}; the verdict turns between {low} and {high}."),
+        None => format!("The share that {does} over {key}; the verdict does not turn."),
+    };
+    chart.figure("margin", &format!("Share that {does}"), &description)
+}

@@ -1,0 +1,18 @@
+//! How much of one key a verdict survives: where between two values it turns, by bisection over seeded flights.
+//!
+//! [`Plan`] says what is flown, [`Plan::search`] flies it on all threads, and a [`Margin`] holds the bracket and every value
+//! that was tried, which it says as JSON, CSV, a page and a table.
+
+mod csv;
+mod html;
+mod plan;
+mod result;
+mod search;
+mod words;
+
+pub use html::MarginPage;
+pub use plan::{Asked, MarginError, Plan, Range};
+pub use result::{Flown, Margin, Probe, Question, SCHEMA_VERSION, Turn};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,235 @@
+//! What is flown.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
+
+use super::result::{Flown, Margin, Probe, Question};
+use super::search::{Found, Halving, search};
+use crate::compare::{Watch, fly, in_parallel};
+use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
+use crate::sim::SimError;
+
+/// A start without randomness is moved by up to this part of delta along each axis, where it is flown more than once.
+pub(super) const JITTER: f64 = 0.05;
+/// Steps between two looks at the progress.
+const PROGRESS_EVERY: u64 = 64;
+
+/// Between which values a verdict is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The first.
+    pub from: f64,
+    /// The last.
+    pub to: f64,
+    /// Values, evenly spaced with both ends, that are looked at first; at least 2.
+    pub scan: usize,
+    /// Times that the interval in which the verdict turns is halved.
+    pub halvings: u32,
+    /// Values are spaced and halved by their ratio, and not by their difference.
+    pub logarithmic: bool,
+}
+
+/// What is asked of each value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Asked {
+    /// What a flight has to show.
+    pub question: Question,
+    /// Flights of each value.
+    pub runs: u64,
+    /// Seed of the first; run k, from 0, has this plus k.
+    pub seed: u64,
+}
+
+/// A key of a scenario, the values between which a verdict is looked for, and what is asked of each.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    source: Source,
+    overrides: Vec<Override>,
+    template: Template,
+    key: String,
+    range: Range,
+    asked: Asked,
+    /// Overrides for what is drawn in each run.
+    jitter: Option<String>,
+}
+
+/// Why there is no such search.
+#[derive(Debug, thiserror::Error)]
+pub enum MarginError {
+    /// Values between which nothing can be looked for.
+    #[error("{0}")]
+    Range(String),
+    /// A value with which the scenario cannot be flown.
+    #[error("with {set}: {error}")]
+    Scenario {
+        /// The key and the value.
+        set: String,
+        /// What is wrong.
+        error: ScenarioError,
+    },
+    /// A value with which law or judge do not exist.
+    #[error("with {set}: {error}")]
+    Flight {
+        /// The key and the value.
+        set: String,
+        /// What is wrong.
+        error: SimError,
+    },
+}
+
+impl Range {
+    fn check(&self) -> Result<(), MarginError> {
+        let Self { from, to, logarithmic, .. } = *self;
+        let wrong = |why: String| Err(MarginError::Range(why));
+        if !from.is_finite() || !to.is_finite() {
+            return wrong(format!("a range from {from} to {to}"));
+        }
+        if from == to {
+            return wrong(format!("both ends of the range are {from}"));
+        }
+        if logarithmic && (from <= 0.0 || to <= 0.0) {
+            return wrong(format!("a logarithmic range from {from} to {to}"));
+        }
+        Ok(())
+    }
+
+    pub(super) fn scale(&self) -> Halving {
+        if self.logarithmic { Halving::Ratio } else { Halving::Difference }
+    }
+}
+
+impl Plan {
+    /// A search over `key`. Flown more than once, a start without randomness gets a jitter of 5 % of delta along each axis,
+    /// and run k has the seed `seed` + k for start and noise; flown once, everything but the key is as the file says.
+    ///
+    /// The source must be one that can be read again: standard input is read by [`Source::resolve`] once.
+    ///
+    /// # Errors
+    /// [`MarginError`] for a range that is none, and where the scenario cannot be flown at one of its ends.
+    pub fn new(
+        source: Source,
+        overrides: &[Override],
+        key: &str,
+        range: Range,
+        asked: Asked,
+    ) -> Result<Self, MarginError> {
+        range.check()?;
+        let as_it_is = |error| MarginError::Scenario { set: "the keys as they are".to_owned(), error };
+        let template = Template::read(&source, overrides).map_err(as_it_is)?;
+        let is_drawn = asked.runs > 1 && !template.start_is_random();
+        let jitter = is_drawn.then(|| format!("start.jitter_m={:?}", JITTER * template.own().delta_m));
+        let plan = Self { source, overrides: overrides.to_vec(), template, key: key.to_owned(), range, asked, jitter };
+        for value in [range.from, range.to] {
+            plan.scenario(value, 0)?;
+        }
+        Ok(plan)
+    }
+
+    /// The scenario without any value of the key.
+    #[must_use]
+    pub fn own(&self) -> &Scenario {
+        self.template.own()
+    }
+
+    /// The key.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        &self.key
+    }
+
+    /// Between which values.
+    #[must_use]
+    pub fn range(&self) -> Range {
+        self.range
+    }
+
+    /// What is asked.
+    #[must_use]
+    pub fn asked(&self) -> Asked {
+        self.asked
+    }
+
+    /// Whether a start without randomness is moved.
+    #[must_use]
+    pub fn jitters(&self) -> bool {
+        self.jitter.is_some()
+    }
+
+    /// Steps of all flights, as far as a turn is found and they are flown to their end.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        let values = self.range.scan as u64 + u64::from(self.range.halvings);
+        self.own().time.steps().saturating_mul(values.saturating_mul(self.asked.runs))
+    }
+
+    /// The overrides that fly run `run` with a value of the key.
+    #[must_use]
+    pub fn sets(&self, value: f64, run: u64) -> Vec<String> {
+        let mut sets = vec![format!("{}={value:?}", self.key)];
+        if self.asked.runs > 1 {
+            let seed = self.asked.seed.saturating_add(run);
+            sets.extend([format!("start.seed={seed}"), format!("noise.seed={seed}")]);
+            sets.extend(self.jitter.clone());
+        }
+        sets
+    }
+
+    /// The flight of a run with a value of the key.
+    ///
+    /// # Errors
+    /// [`MarginError::Scenario`] where it cannot be flown.
+    pub fn scenario(&self, value: f64, run: u64) -> Result<Scenario, MarginError> {
+        let set = || format!("{} = {value}", self.key);
+        let sets = self.sets(value, run);
+        let parsed = sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>();
+        let read = parsed.and_then(|more| Scenario::read(&self.source, &[self.overrides.as_slice(), &more].concat()));
+        read.map_err(|error| MarginError::Scenario { set: set(), error })
+    }
+
+    /// Flies values until the bracket is found, each value's runs on so many threads; the result is the same for any number
+    /// of them. None where it was interrupted before both ends were flown.
+    ///
+    /// # Errors
+    /// [`MarginError`] for the first flight that does not exist.
+    pub fn search(&self, threads: usize, watch: Watch<'_>) -> Result<Option<Margin>, MarginError> {
+        let mut probes: Vec<Probe> = Vec::new();
+        let found = search(self.range, &mut |value| {
+            let probe = self.probe(value, threads, watch)?;
+            let holds = probe.as_ref().map(Probe::holds);
+            probes.extend(probe);
+            Ok::<_, MarginError>(holds)
+        })?;
+        let interrupted = watch.interrupted.load(Ordering::Relaxed);
+        probes.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let found = found.filter(|found| !matches!(found, Found::Even(_)) || !interrupted);
+        Ok(found.map(|found| Margin::new(self, probes, &found, interrupted)))
+    }
+
+    /// All runs of one value; none where they were interrupted.
+    fn probe(&self, value: f64, threads: usize, watch: Watch<'_>) -> Result<Option<Probe>, MarginError> {
+        let runs = usize::try_from(self.asked.runs).unwrap_or(usize::MAX);
+        let flown = in_parallel(runs, threads, &|run| self.one(value, run as u64, watch));
+        let flown = flown.into_iter().collect::<Result<Option<Vec<_>>, _>>()?;
+        Ok(flown.map(|flights| Probe::new(value, self.asked.question, flights)))
+    }
+
+    fn one(&self, value: f64, run: u64, watch: Watch<'_>) -> Result<Option<Flown>, MarginError> {
+        let stops = || watch.interrupted.load(Ordering::Relaxed);
+        if stops() {
+            return Ok(None);
+        }
+        let scenario = self.scenario(value, run)?;
+        let mut told = 0;
+        let mut carry_on = |step: u64| {
+            if step.is_multiple_of(PROGRESS_EVERY) {
+                (watch.flown)(step - told);
+                told = step;
+            }
+            if stops() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let row = fly(&scenario, self.asked.seed.saturating_add(run), &mut carry_on);
+        (watch.flown)(scenario.time.steps().saturating_sub(told));
+        let row = row.map_err(|error| MarginError::Flight { set: format!("{} = {value}", self.key), error })?;
+        Ok(row.map(|row| Flown::new(&row)))
+    }
+}

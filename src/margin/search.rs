@@ -1,0 +1,77 @@
+//! Where between two values an answer turns.
+
+use super::plan::Range;
+
+/// How an interval is halved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Halving {
+    /// At the middle.
+    Difference,
+    /// At the geometric middle.
+    Ratio,
+}
+
+/// What a search comes to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Found {
+    /// The answer is the same at every value that was looked at.
+    Even(bool),
+    /// The answer turns between two values.
+    Turn {
+        /// The last with the answer of the range's beginning.
+        before: f64,
+        /// The first with the other.
+        after: f64,
+        /// The answer of the range's beginning.
+        was: bool,
+        /// How often the answer turned among the values that were looked at first.
+        turns: usize,
+    },
+}
+
+impl Halving {
+    /// The place `share` of the way between two values, from 0 to 1.
+    pub(super) fn between(self, from: f64, to: f64, share: f64) -> f64 {
+        match self {
+            Self::Difference => from + (to - from) * share,
+            Self::Ratio => from * libm::pow(to / from, share),
+        }
+    }
+}
+
+/// Asks at evenly spaced values, then halves the first interval in which the answer turns. An answer that is not given ends
+/// the search with what is known then; nothing where that is not the answer at both ends of an interval.
+pub(super) fn search<E>(range: Range, ask: &mut dyn FnMut(f64) -> Result<Option<bool>, E>) -> Result<Option<Found>, E> {
+    let (halving, count) = (range.scale(), range.scan.max(2));
+    let mut scanned: Vec<(f64, bool)> = Vec::with_capacity(count);
+    for k in 0..count {
+        let value = match k {
+            0 => range.from,
+            _ if k + 1 == count => range.to,
+            _ => halving.between(range.from, range.to, k as f64 / (count - 1) as f64),
+        };
+        match ask(value)? {
+            Some(answer) => scanned.push((value, answer)),
+            None => break,
+        }
+    }
+    let Some(&(_, was)) = scanned.first() else { return Ok(None) };
+    let turns = scanned.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
+    let Some(turn) = scanned.windows(2).find(|pair| pair[0].1 != pair[1].1) else {
+        return Ok(Some(Found::Even(was)).filter(|_| scanned.len() == count));
+    };
+    let (mut before, mut after) = (turn[0].0, turn[1].0);
+    for _ in 0..range.halvings {
+        let middle = halving.between(before, after, 0.5);
+        // Neighbouring numbers have nothing between them.
+        if middle == before || middle == after {
+            break;
+        }
+        match ask(middle)? {
+            Some(answer) if answer == was => before = middle,
+            Some(_) => after = middle,
+            None => break,
+        }
+    }
+    Ok(Some(Found::Turn { before, after, was, turns }))
+}

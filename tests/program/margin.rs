@@ -1,0 +1,104 @@
+//! `tautline margin`: the bracket is that of single flights, and what is wrong is said first.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+/// A search that turns: the pentagon is left alone until it has had time to arrive.
+const SEARCH: [&str; 8] = ["pentagon", "--key", "time.duration_s", "--from", "30", "--to", "40", "--quiet"];
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+fn margin(folder: &Path, more: &[&str]) -> Value {
+    let Ran { exit, out, err } = ran(folder, &[&["margin"], &SEARCH[..], more, &["--json", "-"]].concat());
+    assert_eq!(exit, Some(0), "{err}");
+    serde_json::from_str(&out).expect("JSON")
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[test]
+fn both_sides_of_the_bracket_are_what_run_says_of_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let found = margin(folder.path(), &["--scan", "3", "--halvings", "3"]);
+    assert_eq!(found["turn"]["holds_below"], Value::Bool(false), "{found}");
+    let [low, high] = [0, 1].map(|k| number(&found["turn"]["bracket"][k]));
+    assert_eq!(high - low, 5.0 / 8.0, "an interval of 5 s, halved three times");
+    for (value, passes) in [(low, false), (high, true)] {
+        let set = format!("time.duration_s={value:?}");
+        let flown = ran(folder.path(), &["run", "pentagon", "--set", &set, "--json", "--no-snapshots", "--force"]);
+        let report: Value = serde_json::from_str(&flown.out).expect("a report");
+        assert_eq!((flown.exit, &report["verdict"]["pass"]), (Some(i32::from(!passes)), &Value::Bool(passes)), "{set}");
+        let probes = found["probes"].as_array().expect("a list");
+        let probe = probes.iter().find(|probe| number(&probe["value"]) == value).expect("it was tried");
+        assert_eq!(probe["flights"][0]["state_hash"], report["run"]["state_hash"]);
+        assert_eq!(probe["held"]["count"], Value::from(u64::from(passes)));
+    }
+}
+
+#[test]
+fn a_page_and_a_table_are_left_and_the_same_whatever_the_threads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let files = |name: &str, threads: &str| {
+        let [csv, html] = ["csv", "html"].map(|kind| format!("{name}.{kind}"));
+        let more = ["--scan", "2", "--halvings", "1", "--threads", threads, "--csv", &csv, "--html", &html];
+        let ran = ran(folder.path(), &[&["margin"], &SEARCH[..], &more].concat());
+        assert_eq!(ran.exit, Some(0), "{}", ran.err);
+        [csv, html].map(|file| std::fs::read_to_string(folder.path().join(file)).expect("written"))
+    };
+    let [csv, html] = files("one", "1");
+    assert_eq!([&csv, &html], files("two", "2").each_ref());
+    assert_eq!(csv.lines().count(), 4);
+    for part in
+        ["<svg", "the verdict turns in between", "tautline margin pentagon --key time.duration_s", "tautline run"]
+    {
+        assert!(html.contains(part), "{part}");
+    }
+}
+
+#[test]
+fn a_verdict_that_holds_nowhere_is_exit_1_and_everywhere_exit_0() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let asked = |from: &str, to: &str| {
+        let key = ["margin", "pentagon", "--key", "time.duration_s", "--from", from, "--to", to, "--scan", "2"];
+        ran(folder.path(), &key)
+    };
+    let nowhere = asked("2", "3");
+    assert_eq!(nowhere.exit, Some(1));
+    assert!(nowhere.out.contains("fails at any value of time.duration_s tried, from 2 to 3"), "{}", nowhere.out);
+    let everywhere = asked("40", "41");
+    assert_eq!(everywhere.exit, Some(0));
+    assert!(everywhere.out.contains("passes at every value of time.duration_s tried"), "{}", everywhere.out);
+}
+
+#[test]
+fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("there.json"), "").expect("a file");
+    let key = |key: &'static str, from: &'static str, to: &'static str| {
+        vec!["margin", "pentagon", "--key", key, "--from", from, "--to", to]
+    };
+    let with = |more: &[&'static str]| [key("law.alpha", "1", "2"), more.to_vec()].concat();
+    for (arguments, said) in [
+        (key("law.alfa", "1", "2"), "alfa"),
+        (key("law.alpha", "1", "1"), "both ends of the range are 1"),
+        (key("law.alpha", "nan", "1"), "NaN"),
+        (key("law.alpha", "-1", "1"), "law.alpha = -1"),
+        (key("law..alpha", "1", "2"), "is not a key"),
+        (with(&["--log", "--from", "-1"]), "cannot be used multiple times"),
+        (with(&["--json", "there.json"]), "there.json exists"),
+        (with(&["--json", "-", "--csv", "-"]), "both to go to standard output"),
+        (with(&["--runs", "0"]), "0 is not in 1.."),
+        (with(&["--scan", "1"]), "1 is not in 2.."),
+    ] {
+        let Ran { exit, err, .. } = ran(folder.path(), &arguments);
+        assert_eq!(exit, Some(2), "{arguments:?}: {err}");
+        assert!(err.contains(said), "{arguments:?}: {err}");
+    }
+}
