@@ -77,4 +77,5 @@ mod text;
 pub mod track;
 #[cfg(feature = "reports")]
 pub mod validate;
+pub mod vehicle;
 pub mod wind;

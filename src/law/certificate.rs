@@ -58,6 +58,8 @@ pub enum Void {
     WindUnbounded,
     /// The wind pushes the leader off the reference that its followers are told.
     LeaderBlown,
+    /// Vehicles are bodies that tilt and whose rotors lag: no command is carried out at once.
+    NotAPoint,
     /// The vehicles are not told how the reference that they follow moves.
     ReferenceNotFed,
     /// There are obstacles, and the law does not keep clear of them.
@@ -136,6 +138,7 @@ impl Void {
             Self::Windblown => "windblown",
             Self::WindUnbounded => "wind-unbounded",
             Self::LeaderBlown => "leader-blown",
+            Self::NotAPoint => "not-a-point",
             Self::ReferenceNotFed => "reference-not-fed",
             Self::ObstaclesUnknown => "obstacles-unknown",
             Self::CarriedPastObstacles => "carried-past-obstacles",
@@ -174,6 +177,9 @@ impl fmt::Display for Void {
             Self::LeaderBlown => {
                 f.write_str("The wind pushes the leader off the reference: its followers are told another motion.")
             }
+            Self::NotAPoint => f.write_str(
+                "The vehicles are no points: they tilt and their rotors lag before a command is carried out (vehicle.model).",
+            ),
             Self::ReferenceNotFed => {
                 f.write_str("The vehicles are not told how their reference moves (reference.feed_forward).")
             }
@@ -234,6 +240,7 @@ mod tests {
             Void::Windblown,
             Void::WindUnbounded,
             Void::LeaderBlown,
+            Void::NotAPoint,
             Void::ReferenceNotFed,
             Void::ObstaclesUnknown,
             Void::CarriedPastObstacles,
@@ -254,6 +261,7 @@ mod tests {
             "windblown",
             "wind-unbounded",
             "leader-blown",
+            "not-a-point",
             "reference-not-fed",
             "obstacles-unknown",
             "carried-past-obstacles",
@@ -267,7 +275,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[15].to_string(),
+            reasons[16].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

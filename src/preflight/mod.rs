@@ -50,6 +50,9 @@ pub struct Preflight {
     pub energy_initial: Option<f64>,
     /// Separation below which no pair ever comes \[m\].
     pub certified_m: Option<f64>,
+    /// Up to when \[s\]; null where it holds for ever, or nothing is certified. Where a wind blows on it is the end of the flight, or
+    /// when what the wind may have added leaves too little to be told from delta.
+    pub certified_until_s: Option<f64>,
     /// What every vehicle keeps beyond the clearance of every obstacle \[m\], where there are obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified_room_m: Option<f64>,
@@ -152,6 +155,7 @@ impl Preflight {
             common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()),
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
+            certified_until_s: certificate.certified_until_s,
             certified_room_m: certificate.certified_room_m,
             start_room_m: least_room(&scenario.obstacles, &scenario.start.positions_m).map(|(room_m, ..)| room_m),
             legs: certificate
@@ -191,7 +195,11 @@ impl Preflight {
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
         let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
-        if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {
+        if scenario.wind.is_still()
+            && certificate.void == [Void::GraphNotComplete]
+            && found.velocity_margin_per_s.is_some()
+            && undamped.is_none()
+        {
             found.certified_edges_m = law.linked_separation_m(&start);
         }
         let trap = if found.trap_dimension() == Some(2) { Code::StartInPlane } else { Code::StartOnLine };

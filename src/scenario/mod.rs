@@ -18,7 +18,7 @@ mod document;
 #[cfg(feature = "shapes")]
 mod drawn;
 mod error;
-#[cfg(feature = "shapes")]
+#[cfg(feature = "files")]
 mod files;
 #[cfg(feature = "files")]
 mod laws;
@@ -62,7 +62,6 @@ mod time_table;
 mod validate;
 #[cfg(feature = "files")]
 mod values;
-#[cfg(feature = "files")]
 mod vehicle;
 mod weather;
 #[cfg(feature = "files")]
@@ -88,3 +87,4 @@ pub(crate) use start::{offset, random, scatter};
 #[cfg(feature = "files")]
 pub use template::{Draw, NamedLaw, Template};
 pub use time::TimeSpec;
+pub use vehicle::{DEFAULT_ATTITUDE_HZ, QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};

@@ -83,12 +83,14 @@ impl Scenario {
         away_m.fold(0.0, f64::max) + guidance.motion.reach_m(duration_s)
     }
 
-    /// The precision that tells positions apart to the end of the flight, which a scenario file gets where it names none.
+    /// The precision that tells positions apart to the end of the flight, which a scenario file gets where it names none. It is
+    /// double for bodies that turn: an attitude is the sum of many small steps.
     #[cfg(feature = "files")]
     #[must_use]
     pub fn needed_precision(&self) -> Precision {
         let spacing_m = self.drift_in(SINGLE, self.velocity_coefficient_per_s()).spacing_m;
-        if self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
+        let is_point = self.airframe.quadrotor().is_none();
+        if is_point && self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
             Precision::Single
         } else {
             Precision::Double
@@ -129,7 +131,9 @@ impl Scenario {
     /// delta.
     #[must_use]
     pub fn as_far_as_told(&self, promised: Certificate) -> Certificate {
-        let promised = promised.void_where(self.time.control_hz.is_some(), Void::CommandsHeld);
+        let promised = promised
+            .void_where(self.time.control_hz.is_some(), Void::CommandsHeld)
+            .void_where(self.airframe.quadrotor().is_some(), Void::NotAPoint);
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
         promised.void_where(unresolved, Void::Unresolved)
     }

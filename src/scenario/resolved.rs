@@ -85,7 +85,7 @@ impl From<&Scenario> for Document {
                 hull_radius_m: per_vehicle(&scenario.hull_radius_m),
                 a22_per_s: scenario.a22_per_s,
             },
-            vehicle: VehicleTable { drag_per_s: scenario.drag_per_s },
+            vehicle: VehicleTable::from(scenario),
             wind: WindTable::of(&scenario.wind),
             start: StartTable {
                 positions_m: Some(scenario.points(&scenario.start.positions_m)),

@@ -14,6 +14,7 @@ use crate::observation::Observation;
 use crate::space::Obstacle;
 use crate::swarm::{Rows, Swarm};
 use crate::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
+use crate::vehicle::Airframe;
 use crate::wind::{Wind, WindSpec};
 
 /// Default mass of a vehicle \[kg\].
@@ -28,6 +29,8 @@ pub struct Scenario {
     pub name: String,
     /// Positions \[m\] and velocities \[m/s\] at time 0.
     pub start: Swarm,
+    /// What kind of body each vehicle is; [`Scenario::set_airframe`] changes what depends on it too.
+    pub airframe: Airframe,
     /// Whether the swarm lives in the plane z = 0 or in space.
     pub space: Space,
     /// Mass of each vehicle \[kg\].
@@ -118,6 +121,7 @@ impl Scenario {
         let is_flat = flat(&start.positions_m) && flat(&start.velocities_m_s) && formation.is_in_plane_z0();
         Self {
             name: name.to_owned(),
+            airframe: Airframe::Point,
             space: if is_flat { Space::Plane } else { Space::Volume },
             mass_kg: vec![DEFAULT_MASS_KG; count],
             hull_radius_m: vec![DEFAULT_HULL_RADIUS_M; count],

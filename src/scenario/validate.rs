@@ -44,6 +44,7 @@ impl Scenario {
         check_memory(self.count(), if takes_none { 0 } else { self.graph.edge_count() as u128 })?;
         self.check_law()?;
         self.check_vehicles()?;
+        self.check_airframe()?;
         self.check_motion()?;
         self.check_separations()?;
         self.check_reference()?;

@@ -1,16 +1,272 @@
-//! `[vehicle]` of the scenario file.
+//! The table `[vehicle]`: what kind of body a vehicle is; and what a scenario must be for such bodies to be flown.
+
+#[cfg(feature = "files")]
+use std::fmt;
+#[cfg(feature = "files")]
+use std::path::{Path, PathBuf};
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+#[cfg(feature = "files")]
+use serde::de::value::MapAccessDeserializer;
+#[cfg(feature = "files")]
+use serde::de::{MapAccess, Visitor};
+#[cfg(feature = "files")]
+use serde::{Deserialize, Deserializer, Serialize};
 
-/// What carries out commands.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[cfg(feature = "files")]
+use super::error::Place;
+use super::error::ScenarioError;
+#[cfg(feature = "files")]
+use super::files;
+use super::limits::positive;
+use super::spec::Scenario;
+#[cfg(feature = "files")]
+use super::suggest::suggest;
+#[cfg(feature = "files")]
+use crate::vehicle::{self, MODELS, Misread, Model};
+use crate::vehicle::{Airframe, ModelError, Quadrotor};
+
+/// Default rate of the attitude loop \[Hz\].
+pub const DEFAULT_ATTITUDE_HZ: f64 = 500.0;
+/// Default step of quadrotors \[s\].
+pub const QUADROTOR_DT_S: f64 = 1.0 / 500.0;
+/// Default rate at which quadrotors are given commands \[Hz\].
+pub const QUADROTOR_CONTROL_HZ: f64 = 100.0;
+
+/// A step may be longer than a period by this part of it, which is rounding.
+const ROUNDING: f64 = 1e-6;
+
+#[cfg(feature = "files")]
+const MODEL: &str = "vehicle.model";
+#[cfg(feature = "files")]
+const POINT: &str = "point";
+
+/// What kind of body a vehicle is.
+#[cfg(feature = "files")]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct VehicleTable {
+    /// `point`, which carries out accelerations exactly; a quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, a file
+    /// in TOML that holds one, or its keys as a table.
+    model: ModelKey,
+    /// How often a quadrotor's attitude loop runs in Hz, at most once a step: 500 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    attitude_hz: Option<f64>,
+    /// Frequency that its attitude loop asks for in rad/s, in the place of the model's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    attitude_rad_s: Option<f64>,
+    /// Damping ratio that it asks for, in the place of the model's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    attitude_damping: Option<f64>,
+    /// Whether a quadrotor's thrust grows near a ground: a half-space among the obstacles. Not unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ground_effect: Option<bool>,
+    /// Whether its rotors blow on vehicles below. Not unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    downwash: Option<bool>,
     /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
-    /// p'' = a22 v + u + drag (W - v).
+    /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
+    #[serde(skip_serializing_if = "is_none")]
     #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
     pub(super) drag_per_s: f64,
+}
+
+#[cfg(feature = "files")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_none(drag_per_s: &f64) -> bool {
+    *drag_per_s == 0.0
+}
+
+/// A model by name, by file, or with all of its keys.
+#[cfg(feature = "files")]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(untagged)]
+enum ModelKey {
+    /// A built-in model, or the path of a file.
+    Named(String),
+    /// Its keys.
+    Given(Box<Model>),
+}
+
+#[cfg(feature = "files")]
+impl Default for ModelKey {
+    fn default() -> Self {
+        Self::Named(POINT.to_owned())
+    }
+}
+
+#[cfg(feature = "files")]
+impl<'de> Deserialize<'de> for ModelKey {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ModelVisitor;
+
+        impl<'de> Visitor<'de> for ModelVisitor {
+            type Value = ModelKey;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a model, the path of its file, or a table of its keys")
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<ModelKey, E> {
+                Ok(ModelKey::Named(name.to_owned()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<ModelKey, A::Error> {
+                Model::deserialize(MapAccessDeserializer::new(keys)).map(|model| ModelKey::Given(Box::new(model)))
+            }
+        }
+
+        deserializer.deserialize_any(ModelVisitor)
+    }
+}
+
+#[cfg(feature = "files")]
+impl VehicleTable {
+    /// Reads the file of a model that is named by one, relative to a folder.
+    pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+        if let ModelKey::Named(name) = &self.model
+            && name.contains(['/', '\\', '.'])
+        {
+            self.model = ModelKey::Given(Box::new(read(&folder.join(name))?));
+        }
+        Ok(())
+    }
+
+    /// Whether vehicles are points.
+    pub(super) fn is_point(&self) -> bool {
+        matches!(&self.model, ModelKey::Named(name) if name == POINT)
+    }
+
+    /// The body that it describes.
+    pub(super) fn airframe(&self) -> Result<Airframe, ScenarioError> {
+        if self.is_point() {
+            return self.point();
+        }
+        let mut model = match &self.model {
+            ModelKey::Given(model) => Model::clone(model),
+            ModelKey::Named(name) => {
+                let known = MODELS.map(|(known, _)| known);
+                let found =
+                    MODELS.iter().find(|(known, _)| known == name).and_then(|(_, text)| vehicle::read(text).ok());
+                found.ok_or_else(|| {
+                    let known: Vec<_> = std::iter::once(POINT).chain(known).collect();
+                    let help = format!("{}; a model of your own is the path of a file in TOML", suggest(name, &known));
+                    ScenarioError::new(format!("there is no model `{name}`")).with_help(help).at(MODEL)
+                })?
+            }
+        };
+        model.attitude_rad_s = self.attitude_rad_s.unwrap_or(model.attitude_rad_s);
+        model.attitude_damping = self.attitude_damping.unwrap_or(model.attitude_damping);
+        Ok(Airframe::Quadrotor(Box::new(Quadrotor {
+            model,
+            attitude_hz: self.attitude_hz.unwrap_or(DEFAULT_ATTITUDE_HZ),
+            ground_effect: self.ground_effect.unwrap_or_default(),
+            downwash: self.downwash.unwrap_or_default(),
+        })))
+    }
+
+    /// A point, which has none of what quadrotors have.
+    fn point(&self) -> Result<Airframe, ScenarioError> {
+        let given = [
+            ("vehicle.attitude_hz", self.attitude_hz.is_some()),
+            ("vehicle.attitude_rad_s", self.attitude_rad_s.is_some()),
+            ("vehicle.attitude_damping", self.attitude_damping.is_some()),
+            ("vehicle.ground_effect", self.ground_effect.is_some()),
+            ("vehicle.downwash", self.downwash.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(ScenarioError::new("a point has neither attitude nor rotors")
+                .with_help("leave this key out, or set vehicle.model to a quadrotor such as \"crazyflie\"")
+                .at(key)
+                .at(MODEL)),
+            None => Ok(Airframe::Point),
+        }
+    }
+}
+
+/// What was read stands there: a built-in model by its name, another one with its keys.
+#[cfg(feature = "files")]
+impl From<&Scenario> for VehicleTable {
+    fn from(scenario: &Scenario) -> Self {
+        let drag_per_s = scenario.drag_per_s;
+        let Some(quadrotor) = scenario.airframe.quadrotor() else { return Self { drag_per_s, ..Self::default() } };
+        let model = &quadrotor.model;
+        let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(text).ok()?)));
+        let is_it = |(_, other): &(&str, Model)| {
+            let (attitude_rad_s, attitude_damping) = (model.attitude_rad_s, model.attitude_damping);
+            Model { attitude_rad_s, attitude_damping, ..other.clone() } == *model
+        };
+        let name = built_in.into_iter().find(is_it).map(|(name, _)| name.to_owned());
+        Self {
+            model: name.map_or_else(|| ModelKey::Given(Box::new(model.clone())), ModelKey::Named),
+            attitude_hz: Some(quadrotor.attitude_hz),
+            attitude_rad_s: Some(model.attitude_rad_s),
+            attitude_damping: Some(model.attitude_damping),
+            ground_effect: Some(quadrotor.ground_effect),
+            downwash: Some(quadrotor.downwash),
+            drag_per_s,
+        }
+    }
+}
+
+/// Reads the file of a model.
+#[cfg(feature = "files")]
+fn read(path: &PathBuf) -> Result<Model, ScenarioError> {
+    let shown = path.display().to_string();
+    let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
+        ScenarioError::new(format!("{shown} is not UTF-8")).with_help("save the file as UTF-8 text").at(MODEL)
+    })?;
+    vehicle::read(&text).map_err(|Misread { message, help, span }| {
+        ScenarioError::new(message).with_help(help).with_place(Place::new(&shown, &text, span))
+    })
+}
+
+impl Scenario {
+    /// Makes every vehicle one of these, with the mass, the hull and the default rates of its kind. Points of a quadrotor's mass
+    /// have no drag of their own.
+    pub fn set_airframe(&mut self, airframe: Airframe) {
+        if let Some(quadrotor) = airframe.quadrotor() {
+            self.mass_kg.fill(quadrotor.model.mass_kg);
+            self.hull_radius_m.fill(quadrotor.model.hull_radius_m);
+            self.a22_per_s = 0.0;
+            self.time.dt_s = QUADROTOR_DT_S;
+            self.time.control_hz = Some(QUADROTOR_CONTROL_HZ);
+        }
+        self.airframe = airframe;
+    }
+
+    /// A body that can be flown, and an attitude loop that steps can follow.
+    pub(super) fn check_airframe(&self) -> Result<(), ScenarioError> {
+        let Some(Quadrotor { model, attitude_hz, .. }) = self.airframe.quadrotor() else { return Ok(()) };
+        let refuse = |ModelError { key, message, help }| {
+            let key = match key {
+                "attitude_rad_s" => "vehicle.attitude_rad_s",
+                "attitude_damping" => "vehicle.attitude_damping",
+                _ => "vehicle.model",
+            };
+            ScenarioError::new(message).with_help(help).at(key).at("vehicle.attitude_damping").at("vehicle.model")
+        };
+        positive("vehicle.attitude_hz", "the rate of the attitude loop", *attitude_hz)?;
+        model.check().map_err(refuse)?;
+        if attitude_hz * self.time.dt_s > 1.0 + ROUNDING {
+            return Err(ScenarioError::new(format!(
+                "an attitude loop of {attitude_hz} Hz runs more than once in a step of {} s",
+                self.time.dt_s
+            ))
+            .with_help(format!(
+                "reduce vehicle.attitude_hz to at most {}, or time.dt_s to at most {}",
+                1.0 / self.time.dt_s,
+                1.0 / attitude_hz
+            ))
+            .at("vehicle.attitude_hz")
+            .at("time.dt_s"));
+        }
+        model.check_attitude(0.5 / attitude_hz).map_err(|error| refuse(error).at("vehicle.attitude_hz"))
+    }
 }

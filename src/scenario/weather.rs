@@ -24,7 +24,13 @@ impl Scenario {
             .at("vehicle.drag_per_s")
             .at("time.dt_s"));
         }
-        if !self.wind.is_still() && drag_per_s == 0.0 {
+        if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
+            return Err(ScenarioError::new(format!("a drag of {drag_per_s} 1/s on vehicles that are no points"))
+                .with_help("leave it out: the drag of a quadrotor is that of its rotors and its body, in its model")
+                .at("vehicle.drag_per_s")
+                .at("vehicle.model"));
+        }
+        if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
             return Err(ScenarioError::new(
                 "a wind blows and the vehicles are points without drag, which do not feel it",
             )

@@ -17,3 +17,4 @@ mod rivals;
 mod scenario_files;
 mod shapes;
 mod simulation;
+mod wind;
