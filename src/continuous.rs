@@ -136,7 +136,9 @@ pub fn solve(
     let mut feedback = Exact { law, scenario, near: NearPairs::default() };
     let mut air = Air::of(scenario);
     let end_s = times_s.last().copied().unwrap_or_default();
-    air.iter_mut().for_each(|air| air.advance(end_s));
+    if let Some(air) = &mut air {
+        air.advance(end_s);
+    }
     let motion = FreeMotion { a22_per_s: scenario.velocity_coefficient_per_s(), air: air.as_ref(), end_s };
     let flow = Flow::new(&mut feedback, &scenario.start, motion, 0.0);
     let mut solver = Solver::begin(&flow, 0.0, &packed(&scenario.start), tolerances, FIRST_STEP_S)?;
@@ -194,7 +196,9 @@ impl Continuous {
         end: &mut Swarm,
         path: &mut Path,
     ) -> Result<(), IdealError> {
-        self.air.iter_mut().for_each(|air| air.advance(dt_s));
+        if let Some(air) = &mut self.air {
+            air.advance(dt_s);
+        }
         let motion = FreeMotion { a22_per_s: self.a22_per_s, air: self.air.as_ref(), end_s: dt_s };
         let flow = Flow::new(feedback, &self.swarm, motion, from_s);
         let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), self.step_s.min(dt_s))?;
@@ -219,7 +223,9 @@ impl Continuous {
     /// Goes back to a state that was observed before the last step.
     pub fn restore(&mut self, swarm: &Swarm) {
         self.swarm.clone_from(swarm);
-        self.air.iter_mut().for_each(Air::undo);
+        if let Some(air) = &mut self.air {
+            air.undo();
+        }
     }
 
     /// What is recorded beside states, without values yet.
@@ -235,7 +241,9 @@ impl Continuous {
 
     /// Begins its random numbers anew.
     pub fn reseed(&mut self, seed: u64) {
-        self.air.iter_mut().for_each(|air| air.reseed(seed));
+        if let Some(air) = &mut self.air {
+            air.reseed(seed);
+        }
     }
 }
 
@@ -284,7 +292,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         let mut undefined = None;
         while until_s - self.method.t() > RESOLUTION * until_s {
             let (time_s, free_step_s) = (self.method.t(), self.method.h());
-            let step_s = free_step_s.min(until_s - time_s);
+            let step_s = free_step_s.min(until_s - time_s).min(self.flow.smooth_s(time_s));
             if step_s <= RESOLUTION * until_s {
                 return Err(
                     undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })

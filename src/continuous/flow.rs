@@ -22,6 +22,11 @@ pub(super) struct FreeMotion<'a> {
 }
 
 impl FreeMotion<'_> {
+    /// How long the wind is smooth from a time of the solver on \[s\].
+    fn smooth_s(&self, time_s: f64) -> f64 {
+        self.air.map_or(f64::INFINITY, |air| air.smooth_s(self.end_s - time_s))
+    }
+
     /// Adds what the wind does at a time of the solver \[s\] to accelerations, an axis after the other.
     fn blow(&self, time_s: f64, accelerations: &mut [f64]) {
         let Some(air) = self.air else { return };
@@ -65,6 +70,11 @@ impl<'law> Flow<'law> {
 
     pub(super) fn take_failure(&self) -> Option<LawError> {
         self.scratch.borrow_mut().failure.take()
+    }
+
+    /// How long the right-hand side is smooth from a time on \[s\].
+    pub(super) fn smooth_s(&self, time_s: f64) -> f64 {
+        self.motion.smooth_s(time_s)
     }
 
     pub(super) fn longest_step_s(&self) -> f64 {

@@ -311,8 +311,8 @@ impl Law for EdgeTensionLaw {
     /// the same function, so the pair that may come closest is the one with the smallest K, and one root
     /// ([`EdgeTension::push_side_root`]) answers for all pairs.
     ///
-    /// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of |w_i - mean w|^2 / 4 to E: what
-    /// all feel alike changes nothing.
+    /// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of
+    /// `|w_i - mean w|^2`/4 to E: what all feel alike changes nothing.
     ///
     /// The promise is that of the proof: exact state, no delay, no saturation, no other disturbance, continuous time.
     /// Without pairs there is nothing to promise, and nothing void either.

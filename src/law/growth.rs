@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::setting::Blown;
+use crate::wind::Gust;
 
 /// Parts of a slope of a gust, over each of which its strength is taken for its largest.
 const PARTS: u32 = 1024;
@@ -16,8 +17,8 @@ pub(super) enum Frame {
     Ground,
 }
 
-/// An upper bound on an energy `E >= 1/2 sum |v~_i|^2` whose law keeps dE/dt <= -zeta sum |v~_i|^2 where nothing disturbs, under
-/// accelerations w. With |w|^2 = sum |w_i|^2 both
+/// An upper bound on an energy `E >= 1/2 sum |v~_i|^2` whose law keeps `dE/dt <= -zeta sum |v~_i|^2` where nothing disturbs, under
+/// accelerations w. With |w|^2 the sum of `|w_i|^2` both
 ///
 /// ```text
 /// dE/dt <= -zeta |v~|^2 + |v~| |w| <= |w|^2/(4 zeta)          reached by w = 2 zeta v~, as near as E's own decay is
@@ -118,7 +119,7 @@ fn groups(blown: &Blown<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
 
 /// The beginning, the end, and what gusts do in between, in order \[s\].
 fn corners_s(blown: &Blown<'_>) -> Vec<f64> {
-    let of_gusts = blown.wind.gusts.iter().flat_map(|gust| gust.corners_s());
+    let of_gusts = blown.wind.gusts.iter().flat_map(Gust::corners_s);
     let inside = of_gusts.filter(|&corner_s| corner_s > 0.0 && corner_s < blown.until_s);
     let mut corners_s: Vec<_> = inside.chain([0.0, blown.until_s]).collect();
     corners_s.sort_by(f64::total_cmp);

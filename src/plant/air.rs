@@ -54,6 +54,12 @@ impl Air {
         self.wind.air_at_m_s(vehicle, self.wind.now_s() - before_s).component_mul(&self.drag_per_s)
     }
 
+    /// How long the wind is smooth from so many seconds before now on \[s\].
+    pub(crate) fn smooth_s(&self, before_s: f64) -> f64 {
+        let time_s = self.wind.now_s() - before_s;
+        self.wind.next_turn_s(time_s) - time_s
+    }
+
     pub(crate) fn reseed(&mut self, seed: u64) {
         self.wind.reseed(seed);
     }

@@ -161,6 +161,7 @@ separation
   min_at_s
   min_pair
   certified_m
+  certified_until_s
   certificate_void
 audit
   status

@@ -60,6 +60,14 @@ impl Wind {
         self.now_s
     }
 
+    /// The next time \[s\] at which turbulence turns: up to then, but for where gusts begin and end, the wind is smooth.
+    #[must_use]
+    pub fn next_turn_s(&self, time_s: f64) -> f64 {
+        // A turn that is reached but for rounding is passed.
+        let turned = |_: &Turbulence| ((time_s * TURBULENCE_HZ + 1e-9).floor() + 1.0) / TURBULENCE_HZ;
+        self.turbulence.as_ref().map_or(f64::INFINITY, turned)
+    }
+
     /// Velocity of the air that a vehicle meets now \[m/s\].
     #[must_use]
     pub fn air_m_s(&self, vehicle: usize) -> Vector3<f64> {

@@ -3,7 +3,7 @@
 use tautline::continuous::{self, Tolerances};
 use tautline::formation::Formation;
 use tautline::law::Void;
-use tautline::plant::{Path, Plant as _, rapier};
+use tautline::plant::{Path, rapier};
 use tautline::record::StateHash;
 use tautline::scenario::{Override, PlantSpec, Precision, Scenario, Source, TimeSpec};
 use tautline::sim::Simulation;
@@ -199,7 +199,7 @@ fn no_flight_in_gusts_breaks_its_certificate() {
         let random = |k: u32| f64::from((flight * 7919 + k * 104_729 + 13) % 1009) / 1009.0 - 0.5;
         let graph = ["complete", "star", "ring"][flight as usize % 3];
         let mut scenario =
-            five(&format!("[graph]\nkind = \"{graph}\"\n[vehicle]\ndrag_per_s = 0.8\n[time]\nduration_s = 8.0"));
+            settled(&format!("[graph]\nkind = \"{graph}\"\n[vehicle]\ndrag_per_s = 0.8\n[time]\nduration_s = 8.0"));
         let gusts = (0..4).map(|k| {
             let met = (0..5).filter(|i| random(20 + 5 * k + i) > 0.0).map(|i| i as usize).collect();
             let velocity_m_s = 12.0 * Vector::new(random(k), random(k + 5), random(k + 10));

@@ -84,7 +84,7 @@ fn the_bound_under_a_push_is_reached_by_the_worst_one() -> Result<(), LawError> 
                 let mean = at.mean_velocity_m_s();
                 Rows::from_fn(7, |i, axis| gain * ZETA_PER_S * (at.velocities_m_s[(i, axis)] - mean[axis]))
             };
-            swarm = pushed(&swarm, 2e-3, &mut fed, &mut u, &w);
+            swarm = pushed(&swarm, 2.5e-4, &mut fed, &mut u, &w);
         }
         let gained = law.try_energy(&Observation::exact(&swarm, &links, &formation))? - before;
         let ratio = gained / (fed / (4.0 * ZETA_PER_S));

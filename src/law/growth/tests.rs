@@ -1,7 +1,7 @@
 //! The bound on an energy under a wind: reached where it can be, and never passed.
 
 use super::*;
-use crate::wind::{Gust, WindSpec};
+use crate::wind::WindSpec;
 
 fn gust(velocity_m_s: Vector3<f64>, vehicles: Option<Vec<usize>>) -> Gust {
     Gust { at_s: 1.0, rise_s: 2.0, hold_s: 1.0, fall_s: 2.0, velocity_m_s, vehicles }
