@@ -14,6 +14,7 @@ mod displacement;
 mod edge_tension;
 mod error;
 mod flocking;
+mod growth;
 mod half_spaces;
 mod interface;
 mod kernel;
@@ -37,7 +38,7 @@ pub use interface::{Controls, Law, VelocityMargin};
 pub use laplacian::{LaplacianKeys, LaplacianLaw};
 pub use orca::{OrcaKeys, OrcaLaw};
 pub use potential::{PotentialKeys, PotentialLaw};
-pub use setting::{Gain, Setting};
+pub use setting::{Blown, Gain, Setting};
 pub use spec::LawSpec;
 pub use tension::{EdgeTension, TensionError};
 

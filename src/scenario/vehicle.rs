@@ -70,6 +70,17 @@ pub(super) struct VehicleTable {
     /// Whether its rotors blow on vehicles below. Not unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     downwash: Option<bool>,
+    /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
+    /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
+    #[serde(skip_serializing_if = "is_none")]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
+    pub(super) drag_per_s: f64,
+}
+
+#[cfg(feature = "files")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_none(drag_per_s: &f64) -> bool {
+    *drag_per_s == 0.0
 }
 
 /// A model by name, by file, or with all of its keys.
@@ -184,7 +195,8 @@ impl VehicleTable {
 #[cfg(feature = "files")]
 impl From<&Scenario> for VehicleTable {
     fn from(scenario: &Scenario) -> Self {
-        let Some(quadrotor) = scenario.airframe.quadrotor() else { return Self::default() };
+        let drag_per_s = scenario.drag_per_s;
+        let Some(quadrotor) = scenario.airframe.quadrotor() else { return Self { drag_per_s, ..Self::default() } };
         let model = &quadrotor.model;
         let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(text).ok()?)));
         let is_it = |(_, other): &(&str, Model)| {
@@ -199,6 +211,7 @@ impl From<&Scenario> for VehicleTable {
             attitude_damping: Some(model.attitude_damping),
             ground_effect: Some(quadrotor.ground_effect),
             downwash: Some(quadrotor.downwash),
+            drag_per_s,
         }
     }
 }
@@ -224,7 +237,8 @@ impl Scenario {
             _ => None,
         };
         let grounds: Vec<_> = self.obstacles.iter().filter_map(ground).collect();
-        Some(Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane))
+        let fleet = Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane);
+        Some(if self.wind.is_still() { fleet } else { fleet.blown(self.air()) })
     }
 
     /// Makes every vehicle one of these, with the mass, the hull and the default rates of its kind. Points of a quadrotor's mass

@@ -7,6 +7,7 @@ use super::dynamics::{Drift, Dynamics, Ground, State, Wrench};
 use super::model::Quadrotor;
 use crate::record::Channel;
 use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::wind::Wind;
 
 /// Frequency of the loop that holds the height of a swarm in the plane z = 0 \[rad/s\]; it is critically damped.
 pub const HEIGHT_RAD_S: f64 = 2.0;
@@ -25,6 +26,8 @@ pub struct Fleet {
     pub states: Vec<State>,
     /// Velocity of the air around each, without what rotors blow \[m/s\].
     pub wind_m_s: Rows,
+    /// What makes it, where it is not the same all the time.
+    wind: Option<Wind>,
     asked_rpm: Vec<Vector4<f64>>,
     /// Accelerations that are commanded \[m/s^2\].
     commands: Rows,
@@ -68,6 +71,7 @@ impl Fleet {
             wrenches: vec![Wrench::default(); count],
             states,
             wind_m_s: Rows::zeros(count),
+            wind: None,
             asked_rpm,
             commands: Rows::zeros(count),
             holds_height,
@@ -79,6 +83,15 @@ impl Fleet {
         fleet.feel();
         fleet.remember();
         fleet
+    }
+
+    /// The same in a wind that is at the same instant.
+    #[must_use]
+    pub fn blown(mut self, wind: Wind) -> Self {
+        wind.write(&mut self.wind_m_s);
+        self.wind = Some(wind);
+        self.feel();
+        self
     }
 
     /// Number of vehicles N.
@@ -108,6 +121,42 @@ impl Fleet {
         asked_rpm.clone_from(&before.asked_rpm);
         wrenches.clone_from(&before.wrenches);
         *clock = before.clock;
+        if let Some(wind) = &mut self.wind {
+            wind.undo();
+            wind.write(&mut self.wind_m_s);
+        }
+    }
+
+    /// The wind at the end of a step \[s\], which [`Fleet::go_back`] takes back.
+    pub fn blow(&mut self, dt_s: f64) {
+        if let Some(wind) = &mut self.wind {
+            wind.advance(dt_s);
+            wind.write(&mut self.wind_m_s);
+        }
+    }
+
+    /// The wind at an instant of the step that [`Fleet::blow`] came to the end of, so many seconds before it.
+    pub fn blow_before(&mut self, before_s: f64) {
+        if let Some(wind) = &self.wind {
+            let time_s = wind.now_s() - before_s;
+            (0..self.states.len()).for_each(|i| set_row(&mut self.wind_m_s, i, wind.air_at_m_s(i, time_s)));
+        }
+    }
+
+    /// How long the wind is smooth from that instant on \[s\].
+    #[must_use]
+    pub fn smooth_s(&self, before_s: f64) -> f64 {
+        self.wind.as_ref().map_or(f64::INFINITY, |wind| {
+            let time_s = wind.now_s() - before_s;
+            wind.next_turn_s(time_s) - time_s
+        })
+    }
+
+    /// Begins its random numbers anew.
+    pub fn reseed(&mut self, seed: u64) {
+        if let Some(wind) = &mut self.wind {
+            wind.reseed(seed);
+        }
     }
 
     /// Lets the attitude loops run where they are due, and says after how many seconds they are due again.
@@ -181,22 +230,27 @@ impl Fleet {
         }
     }
 
-    /// The channels `attitude`, the quaternion that turns body into world, and `rotors`, the thrust of each \[N\].
+    /// The channels `attitude`, the quaternion that turns body into world, `rotors`, the thrust of each \[N\], and the wind's,
+    /// where one blows.
     #[must_use]
-    pub fn channels() -> Vec<Channel> {
-        let rotors = ["thrust_1_n", "thrust_2_n", "thrust_3_n", "thrust_4_n"];
-        vec![Channel::new("attitude", &["qw", "qx", "qy", "qz"]), Channel::new("rotors", &rotors)]
+    pub fn channels(&self) -> Vec<Channel> {
+        let attitude = Channel::new("attitude", &["qw", "qx", "qy", "qz"]);
+        let rotors = Channel::new("rotors", &["thrust_1_n", "thrust_2_n", "thrust_3_n", "thrust_4_n"]);
+        [attitude, rotors].into_iter().chain(self.wind.as_ref().map(|_| Wind::channel())).collect()
     }
 
     /// Writes the values of [`Fleet::channels`].
     pub fn write_channels(&self, channels: &mut [Channel]) {
-        let [attitude, rotors] = channels else { return };
+        let [attitude, rotors, rest @ ..] = channels else { return };
         attitude.values.clear();
         rotors.values.clear();
         for state in &self.states {
             let q = state.attitude.quaternion();
             attitude.values.extend([q.w, q.i, q.j, q.k]);
             rotors.values.extend(self.dynamics.thrusts_n(state).iter());
+        }
+        if let (Some(wind), [channel]) = (&self.wind, rest) {
+            wind.write_channel(channel);
         }
     }
 }
