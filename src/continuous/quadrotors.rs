@@ -151,6 +151,7 @@ impl Flow<'_> {
                     numbers[6], numbers[7], numbers[8], numbers[9],
                 )),
                 rates_rad_s: three(10),
+                shares: self.before.states[i].shares,
                 rotors_rpm: lag.after(self.before.states[i].rotors_rpm, self.before.asked_rpm(i)),
             };
         }

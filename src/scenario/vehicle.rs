@@ -3,7 +3,7 @@
 #[cfg(feature = "files")]
 use std::fmt;
 #[cfg(feature = "files")]
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -218,7 +218,7 @@ impl From<&Scenario> for VehicleTable {
 
 /// Reads the file of a model.
 #[cfg(feature = "files")]
-fn read(path: &PathBuf) -> Result<Model, ScenarioError> {
+fn read(path: &Path) -> Result<Model, ScenarioError> {
     let shown = path.display().to_string();
     let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
         ScenarioError::new(format!("{shown} is not UTF-8")).with_help("save the file as UTF-8 text").at(MODEL)
@@ -238,6 +238,7 @@ impl Scenario {
         };
         let grounds: Vec<_> = self.obstacles.iter().filter_map(ground).collect();
         let fleet = Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane);
+        let fleet = fleet.failing(self.rotor_failures());
         Some(if self.wind.is_still() { fleet } else { fleet.blown(self.air()) })
     }
 

@@ -37,8 +37,22 @@ pub struct Fleet {
     clock: Clock,
     jets: Vec<Downwash>,
     wrenches: Vec<Wrench>,
+    failures: Vec<RotorFailure>,
     /// As it was before the last [`Fleet::remember`].
     before: Before,
+}
+
+/// Rotors of which some or all thrust is lost, for the rest of the flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorFailure {
+    /// The vehicle, from 0.
+    pub vehicle: usize,
+    /// The rotor, from 0; where none is named all of them stop, as slowly as they follow anything.
+    pub rotor: Option<usize>,
+    /// From when on \[s\].
+    pub at_s: f64,
+    /// Share of its thrust that a rotor still gives.
+    pub share: f64,
 }
 
 /// What goes back where a step is taken back.
@@ -69,6 +83,7 @@ impl Fleet {
         let mut fleet = Self {
             before: Before::default(),
             wrenches: vec![Wrench::default(); count],
+            failures: Vec::new(),
             states,
             wind_m_s: Rows::zeros(count),
             wind: None,
@@ -91,6 +106,13 @@ impl Fleet {
         wind.write(&mut self.wind_m_s);
         self.wind = Some(wind);
         self.feel();
+        self
+    }
+
+    /// The same with rotors that fail.
+    #[must_use]
+    pub fn failing(mut self, failures: Vec<RotorFailure>) -> Self {
+        self.failures = failures;
         self
     }
 
@@ -159,9 +181,12 @@ impl Fleet {
         }
     }
 
-    /// Lets the attitude loops run where they are due, and says after how many seconds they are due again.
+    /// Lets rotors fail whose time has come and the attitude loops run where they are due; says after how many seconds either is
+    /// due again.
     pub fn run_attitude(&mut self) -> f64 {
         let Clock { time_s, samples } = self.clock;
+        let now_s = time_s + ROUNDING / self.attitude_hz;
+        let next_s = self.fail(now_s) - time_s;
         if time_s * self.attitude_hz + ROUNDING >= samples {
             self.clock.samples = (time_s * self.attitude_hz + ROUNDING).floor() + 1.0;
             for i in 0..self.count() {
@@ -169,7 +194,29 @@ impl Fleet {
                 self.asked_rpm[i] = self.dynamics.asked_rpm(&self.states[i], command_m_s2);
             }
         }
-        self.clock.samples / self.attitude_hz - time_s
+        for failure in self.failures.iter().filter(|failure| failure.rotor.is_none() && failure.at_s <= now_s) {
+            self.asked_rpm[failure.vehicle].fill(0.0);
+        }
+        next_s.min(self.clock.samples / self.attitude_hz - time_s)
+    }
+
+    /// Takes their thrust from rotors that have failed by a time \[s\], and says when the next does.
+    fn fail(&mut self, time_s: f64) -> f64 {
+        let (mut next_s, mut changed) = (f64::INFINITY, false);
+        for &RotorFailure { vehicle, rotor, at_s, share } in &self.failures {
+            if at_s > time_s {
+                next_s = next_s.min(at_s);
+            } else if let Some(rotor) = rotor
+                && self.states[vehicle].shares[rotor] > share
+            {
+                self.states[vehicle].shares[rotor] = share;
+                changed = true;
+            }
+        }
+        if changed {
+            self.feel();
+        }
+        next_s
     }
 
     /// Asks the rotors of each for these speeds from now on \[rpm\]: attitude loops run no more.
