@@ -5,8 +5,10 @@
 
 mod path;
 pub mod rapier;
+mod unicycle;
 
 pub use path::Path;
+pub use unicycle::Unicycles;
 
 use dyn_clone::DynClone;
 

@@ -18,3 +18,4 @@ mod rivals;
 mod scenario_files;
 mod shapes;
 mod simulation;
+mod unicycles;
