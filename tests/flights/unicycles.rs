@@ -44,7 +44,7 @@ fn flown(
 ) -> (Swarm, f64) {
     let (mut plant, mut state, mut path) = (Unicycles::new(unicycle, start), start.clone(), Path::default());
     let (dt_s, mut bend_m) = (duration_s / f64::from(steps), 0.0_f64);
-    let mut apply = |plant: &mut Unicycles, state: &mut Swarm, time_s: f64| {
+    let apply = |plant: &mut Unicycles, state: &mut Swarm, time_s: f64| {
         let u = command(time_s, row(&state.velocities_m_s, 0));
         plant.apply(&Rows::from_row_slice(u.as_slice()), state);
     };
