@@ -6,9 +6,11 @@
 mod air;
 mod path;
 pub mod rapier;
+mod unicycle;
 
 pub(crate) use air::Air;
 pub use path::Path;
+pub use unicycle::Unicycles;
 
 use dyn_clone::DynClone;
 

@@ -63,6 +63,7 @@ mod text;
 mod time;
 #[cfg(feature = "files")]
 mod time_table;
+mod unicycle;
 mod validate;
 #[cfg(feature = "files")]
 mod values;

@@ -91,7 +91,7 @@ impl Scenario {
     #[must_use]
     pub fn needed_precision(&self) -> Precision {
         let spacing_m = self.drift_in(SINGLE, self.velocity_coefficient_per_s()).spacing_m;
-        let is_point = self.airframe.quadrotor().is_none();
+        let is_point = self.airframe.is_point();
         if is_point && self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
             Precision::Single
         } else {
@@ -153,7 +153,7 @@ impl Scenario {
             (actuation.max_accel_m_s2.is_some(), Void::AccelerationLimited),
             (actuation.lag_s > 0.0, Void::AccelerationLate),
             (self.failures.iter().any(|failure| !failure.is_silent()), Void::VehicleFails),
-            (self.airframe.quadrotor().is_some(), Void::NotAPoint),
+            (!self.airframe.is_point(), Void::NotAPoint),
         ]
     }
 

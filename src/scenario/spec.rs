@@ -159,6 +159,15 @@ impl Scenario {
         }
     }
 
+    /// Precision of the physics engine, where one moves the vehicles: on straight lines within steps, and off what they hit.
+    #[must_use]
+    pub fn engine(&self) -> Option<Precision> {
+        match (&self.airframe, self.plant) {
+            (Airframe::Point | Airframe::Quadrotor(_), PlantSpec::Rapier(precision)) => Some(precision),
+            _ => None,
+        }
+    }
+
     /// Number of vehicles N.
     #[must_use]
     pub fn count(&self) -> usize {

@@ -6,7 +6,7 @@ use crate::continuous::{Continuous, IdealError, Quadrotors};
 use crate::feedback::Feedback;
 #[cfg(feature = "ideal")]
 use crate::law::LawError;
-use crate::plant::{HullContact, Path, Plant, PlantError, rapier};
+use crate::plant::{HullContact, Path, Plant, PlantError, Unicycles, rapier};
 use crate::record::Channel;
 use crate::scenario::{PlantSpec, Scenario};
 use crate::swarm::{Pair, Rows, Swarm};
@@ -46,6 +46,9 @@ impl Motion {
     /// What the scenario asks for, at its start.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
+        if let Some(unicycle) = scenario.airframe.unicycle() {
+            return Unicycles::new(*unicycle, &scenario.start).into();
+        }
         match scenario.plant {
             PlantSpec::Rapier(precision) => Self::Sampled(rapier::plant(scenario, precision)),
             #[cfg(feature = "ideal")]

@@ -18,4 +18,5 @@ mod rivals;
 mod scenario_files;
 mod shapes;
 mod simulation;
+mod unicycles;
 mod wind;
