@@ -15,6 +15,7 @@ mod legs;
 mod obstacles;
 pub mod page;
 pub mod recorded;
+mod vehicle;
 mod verdict;
 mod verification;
 mod words;
@@ -30,6 +31,7 @@ pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
+pub use vehicle::VehicleNumbers;
 pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 

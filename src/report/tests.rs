@@ -93,6 +93,7 @@ impl Case {
             audit: &self.audit,
             clearance: self.clearance.as_ref(),
             obstacles: &["tower".to_owned()],
+            vehicle: None,
             engine_contact_pairs: Some(0),
             hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
             summary: &self.summary,

@@ -133,6 +133,7 @@ impl Report {
         let mut rows: Vec<(String, String)> =
             vec![("separation".to_owned(), self.separation_line()), ("audit".to_owned(), self.audit_line())];
         rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
+        rows.extend(self.vehicle.iter().map(|vehicle| ("vehicle".to_owned(), vehicle.line())));
         rows.extend(super::legs::lines(&self.legs));
         let rest = [
             ("formation", self.formation_line()),
