@@ -19,3 +19,4 @@ mod scenario_files;
 mod shapes;
 mod simulation;
 mod unicycles;
+mod wind;
