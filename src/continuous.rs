@@ -15,6 +15,10 @@
 //! refused and tried again shorter. Where no step is short enough, the solution itself ends there, and the law's reason
 //! is the error.
 
+mod quadrotors;
+
+pub use quadrotors::Quadrotors;
+
 use std::cell::RefCell;
 
 use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinary};

@@ -77,3 +77,4 @@ mod text;
 pub mod track;
 #[cfg(feature = "reports")]
 pub mod validate;
+pub mod vehicle;

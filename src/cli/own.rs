@@ -9,7 +9,7 @@ use super::own_obstacles::OwnObstacles;
 use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, OwnedSample};
-use crate::scenario::{self, PlantSpec, Scenario};
+use crate::scenario::{self, Scenario};
 use crate::swarm::{ClosestApproach, Pair, row};
 
 /// A recording of ours.
@@ -39,7 +39,7 @@ impl OwnRecording {
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
         let scenario = Scenario::read(&source, &[]).ok();
-        let is_straight = scenario.as_ref().is_some_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
+        let is_straight = scenario.as_ref().is_some_and(|scenario| scenario.engine().is_some());
         let mut own = Self {
             delta_m: header.delta_m * scale,
             told: Vec::new(),

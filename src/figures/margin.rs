@@ -12,10 +12,8 @@ pub struct Share {
     pub value: f64,
     /// The share that showed what was asked, from 0 to 1.
     pub share: f64,
-    /// Its interval.
-    pub low: f64,
-    /// Its interval.
-    pub high: f64,
+    /// Its 95 % interval, where there is one.
+    pub interval: Option<[f64; 2]>,
 }
 
 /// Shares of flights that show something (`does`) over the values of a key, with their 95 % intervals and the bracket in which
@@ -26,8 +24,8 @@ pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>
     let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
     let mut chart = Chart::new(x, Axis::spanning(&format!("share that {does}"), 0.0, 1.0, 5.0));
     for share in shares {
-        let interval = vec![(share.value, share.low), (share.value, share.high)];
-        chart.lines.push(Line { points: interval, stroke: Stroke::solid(PALETTE[0], 1.2), label: None });
+        let ends = share.interval.into_iter().flatten().map(|end| (share.value, end));
+        chart.lines.push(Line { points: ends.collect(), stroke: Stroke::solid(PALETTE[0], 1.2), label: None });
     }
     let marks = shares.iter().enumerate().map(|(k, share)| Mark {
         at: (share.value, share.share),
@@ -35,7 +33,8 @@ pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>
         colour: PALETTE[0],
         radius: 3.5,
         text: None,
-        label: (k == 0).then(|| "with its 95 % interval".to_owned()),
+        label: (k == 0)
+            .then(|| if share.interval.is_some() { "with its 95 % interval" } else { "one flight" }.to_owned()),
     });
     chart.marks.extend(marks);
     for (k, side) in bracket.into_iter().flatten().enumerate() {

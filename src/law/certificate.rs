@@ -64,6 +64,8 @@ pub enum Void {
     CommandsFromOutside,
     /// Each command is held for a period of its own.
     CommandsHeld,
+    /// Vehicles are bodies that tilt and whose rotors lag: no command is carried out at once.
+    NotAPoint,
     /// The vehicles are not told how the reference that they follow moves.
     ReferenceNotFed,
     /// There are obstacles, and the law does not keep clear of them.
@@ -136,6 +138,7 @@ impl Void {
             Self::VehicleFails => "vehicle-fails",
             Self::CommandsFromOutside => "commands-from-outside",
             Self::CommandsHeld => "commands-held",
+            Self::NotAPoint => "not-a-point",
             Self::ReferenceNotFed => "reference-not-fed",
             Self::ObstaclesUnknown => "obstacles-unknown",
             Self::CarriedPastObstacles => "carried-past-obstacles",
@@ -174,6 +177,9 @@ impl fmt::Display for Void {
             Self::CommandsHeld => {
                 f.write_str("The vehicles hold each command while the swarm moves on (time.control_hz).")
             }
+            Self::NotAPoint => f.write_str(
+                "The vehicles are no points: they tilt and their rotors lag before a command is carried out (vehicle.model).",
+            ),
             Self::ReferenceNotFed => {
                 f.write_str("The vehicles are not told how their reference moves (reference.feed_forward).")
             }
@@ -237,6 +243,7 @@ mod tests {
             Void::VehicleFails,
             Void::CommandsFromOutside,
             Void::CommandsHeld,
+            Void::NotAPoint,
             Void::ReferenceNotFed,
             Void::ObstaclesUnknown,
             Void::CarriedPastObstacles,
@@ -261,6 +268,7 @@ mod tests {
             "vehicle-fails",
             "commands-from-outside",
             "commands-held",
+            "not-a-point",
             "reference-not-fed",
             "obstacles-unknown",
             "carried-past-obstacles",
@@ -274,7 +282,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[19].to_string(),
+            reasons[20].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

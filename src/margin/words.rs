@@ -12,9 +12,12 @@ pub(super) fn value(value: f64) -> String {
     value.to_string()
 }
 
-/// So many of so many, with the interval.
+/// So many of so many, with the interval of their share where there are several.
 pub(super) fn held(probe: &Probe) -> [String; 2] {
     let of = probe.held;
+    if of.of == 1 {
+        return [if of.count == 1 { "yes" } else { "no" }.to_owned(), String::new()];
+    }
     let interval = format!("({} to {})", at_most(of.low, SHARE_DIGITS), at_least(of.high, SHARE_DIGITS));
     [format!("{} of {}", of.count, of.of), interval]
 }
@@ -73,7 +76,8 @@ impl Margin {
     /// Every value that was tried, as a table.
     #[must_use]
     pub fn text(&self) -> String {
-        let names = [self.key.as_str(), self.question.words()[0], "95 % interval", "smallest separation [m]"];
+        let interval = if self.runs == 1 { "" } else { "95 % interval" };
+        let names = [self.key.as_str(), self.question.words()[0], interval, "smallest separation [m]"];
         let mut rows = vec![names.map(str::to_owned).to_vec()];
         rows.extend(self.probes.iter().map(|probe| {
             let [held, interval] = held(probe);

@@ -5,13 +5,16 @@
 
 mod path;
 pub mod rapier;
+mod unicycle;
 
 pub use path::Path;
+pub use unicycle::Unicycles;
 
 use dyn_clone::DynClone;
 
 use crate::record::Channel;
 use crate::swarm::{Pair, Rows, Swarm};
+use crate::vehicle::Fleet;
 
 /// What moves a swarm, however it is realised: p'' = a22 v + u (equation (1)) for the point vehicles.
 ///
@@ -65,6 +68,12 @@ pub trait Plant: DynClone + Send {
 
 dyn_clone::clone_trait_object!(Plant);
 
+/// A plant of quadrotors.
+pub trait Quadrotors: Plant {
+    /// They, as they are now.
+    fn fleet(&self) -> &Fleet;
+}
+
 /// Two hulls that pushed each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HullContact {
@@ -83,4 +92,7 @@ pub enum PlantError {
         /// The vehicle, from 0.
         vehicle: usize,
     },
+    /// No step is short enough to solve the equations of motion.
+    #[error("the equations of motion cannot be solved to their tolerances")]
+    Stalled,
 }

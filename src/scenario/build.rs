@@ -16,6 +16,7 @@ use super::time::TimeSpec;
 use super::values::{Edge, PerVehicle, Point, rows};
 use crate::graph::{Graph, GraphError};
 use crate::swarm::{Rows, Swarm, set_row};
+use crate::vehicle::Quadrotor;
 
 /// Completes a scenario, in double precision where none is given. It still has to be validated.
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
@@ -24,7 +25,8 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     check_memory(count, edge_count(&document, count))?;
     check_lists(&document, count)?;
     let space = space(&document)?;
-    let (law, delta_m) = (document.law.kind.complete(document.swarm.a22_per_s), document.law.delta_m);
+    let a22_per_s = document.a22_per_s();
+    let (law, delta_m) = (document.law.kind.complete(a22_per_s), document.law.delta_m);
     let reference = document.reference.map(|table| table.guidance(count, document.time.duration_s)).transpose()?;
     let mut start = start(&document.start, count, space, delta_m)?;
     if let (Some(guidance), None) = (&reference, &document.start.velocities_m_s)
@@ -32,18 +34,23 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     {
         set_row(&mut start.velocities_m_s, leader, guidance.motion.at(0.0).velocity_m_s);
     }
-    let hull_radius_m = per_vehicle(document.swarm.hull_radius_m, count);
+    let airframe = document.vehicle.airframe()?;
+    let (mass_kg, hull_radius_m) = match airframe.quadrotor() {
+        None => (document.swarm.mass_kg.clone(), document.swarm.hull_radius_m.clone()),
+        Some(Quadrotor { model, .. }) => (PerVehicle::All(model.mass_kg), PerVehicle::All(model.hull_radius_m)),
+    };
+    let hull_radius_m = per_vehicle(hull_radius_m, count);
     let clearance_m =
         hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m + CONTACT_PREDICTION_M));
     let obstacles = document.obstacle.iter().enumerate();
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
-    let time = document.time.complete(count, document.arrival.hold_s);
+    let time = document.time.complete(count, document.arrival.hold_s, &airframe);
     let control_hz = document.actuation.control_hz(time.control_hz)?;
     let mut scenario = Scenario {
         start,
-        mass_kg: per_vehicle(document.swarm.mass_kg, count),
+        mass_kg: per_vehicle(mass_kg, count),
         hull_radius_m,
-        a22_per_s: document.swarm.a22_per_s,
+        a22_per_s,
         legs: Vec::new(),
         obstacles,
         reference,
@@ -63,6 +70,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         breathing: document.breathing,
         noise_seed: document.noise.seed,
         name: document.name.unwrap_or_default(),
+        airframe,
         space,
         law,
         delta_m,

@@ -21,6 +21,7 @@ use super::shapes::{HelixKeys, SpacingKeys, VKeys};
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time_table::TimeTable;
 use super::values::{Edge, PerVehicle, Point};
+use super::vehicle::VehicleTable;
 use crate::law::LawSpec;
 use crate::target::{Arrival, Breathing};
 
@@ -36,6 +37,9 @@ pub(super) struct Document {
     /// The vehicles.
     #[serde(default)]
     pub(super) swarm: SwarmTable,
+    /// What kind of body they are: points unless given.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) vehicle: VehicleTable,
     /// Where they start.
     pub(super) start: StartTable,
     /// The slots that they shall reach.
@@ -101,13 +105,13 @@ pub(super) struct SwarmTable {
     /// slot has z = 0, otherwise 3.
     #[cfg_attr(feature = "schema", schemars(range(min = 2, max = 3)))]
     pub(super) dimensions: Option<u64>,
-    /// Mass in kg: one number for all vehicles or a list with one for each. Laws command accelerations, so it changes no
+    /// Mass of points in kg: one number for all vehicles or a list with one for each. Laws command accelerations, so it changes no
     /// motion until hulls touch; the ideal plant's vehicles are points and have no use for it.
     pub(super) mass_kg: PerVehicle,
-    /// Radius of the solid hull in m, for all vehicles or for each. The hulls of any two vehicles must fit within
+    /// Radius of the solid hull of points in m, for all vehicles or for each. The hulls of any two vehicles must fit within
     /// `law.delta_m`, so they change no motion until a pair is closer than that; the ideal plant has no hulls.
     pub(super) hull_radius_m: PerVehicle,
-    /// Velocity coefficient a22 of p'' = a22 v + u in 1/s: negative is drag, positive feeds energy in.
+    /// Velocity coefficient a22 of points, p'' = a22 v + u, in 1/s: negative is drag, positive feeds energy in.
     pub(super) a22_per_s: f64,
 }
 
@@ -360,6 +364,13 @@ pub(super) enum PlantKind {
     Rapier,
     /// The equation p'' = a22 v + u solved to 12 digits in continuous time: what Rapier is measured against.
     Ideal,
+}
+
+impl Document {
+    /// Velocity coefficient a22 \[1/s\] that laws know of: 0 for other bodies than points.
+    pub(super) fn a22_per_s(&self) -> f64 {
+        if self.vehicle.is_point() { self.swarm.a22_per_s } else { 0.0 }
+    }
 }
 
 impl Default for SwarmTable {

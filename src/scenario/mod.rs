@@ -20,7 +20,7 @@ mod document;
 mod drawn;
 mod error;
 mod failure;
-#[cfg(feature = "shapes")]
+#[cfg(feature = "files")]
 mod files;
 #[cfg(feature = "files")]
 mod laws;
@@ -63,9 +63,11 @@ mod text;
 mod time;
 #[cfg(feature = "files")]
 mod time_table;
+mod unicycle;
 mod validate;
 #[cfg(feature = "files")]
 mod values;
+mod vehicle;
 
 pub use actuation::ActuationSpec;
 pub use error::{Field, Place, ScenarioError};
@@ -91,3 +93,4 @@ pub(crate) use start::{offset, random, scatter};
 #[cfg(feature = "files")]
 pub use template::{Draw, NamedLaw, Template};
 pub use time::TimeSpec;
+pub use vehicle::{DEFAULT_ATTITUDE_HZ, QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};

@@ -82,12 +82,14 @@ impl Scenario {
         away_m.fold(0.0, f64::max) + guidance.motion.reach_m(duration_s)
     }
 
-    /// The precision that tells positions apart to the end of the flight, which a scenario file gets where it names none.
+    /// The precision that tells positions apart to the end of the flight, which a scenario file gets where it names none. It is
+    /// double for bodies that turn: an attitude is the sum of many small steps.
     #[cfg(feature = "files")]
     #[must_use]
     pub fn needed_precision(&self) -> Precision {
         let spacing_m = self.drift_in(SINGLE, self.a22_per_s).spacing_m;
-        if self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
+        let is_point = self.airframe.is_point();
+        if is_point && self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
             Precision::Single
         } else {
             Precision::Double
@@ -132,7 +134,7 @@ impl Scenario {
     }
 
     /// What voids any promise, and whether it is there.
-    fn imperfections(&self) -> [(bool, Void); 8] {
+    fn imperfections(&self) -> [(bool, Void); 9] {
         let Self { sensing, network, actuation, .. } = self;
         let is_late = sensing.latency_s > 0.0 || sensing.near_s() > 0.0 || sensing.rate_hz.is_some();
         let is_silent = self.failures.iter().any(Failure::is_silent);
@@ -145,6 +147,7 @@ impl Scenario {
             (actuation.max_accel_m_s2.is_some(), Void::AccelerationLimited),
             (actuation.lag_s > 0.0, Void::AccelerationLate),
             (self.failures.iter().any(|failure| !failure.is_silent()), Void::VehicleFails),
+            (!self.airframe.is_point(), Void::NotAPoint),
         ]
     }
 

@@ -16,6 +16,7 @@ use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Scenario, Space};
 use super::values::{Edge, PerVehicle, Point};
+use super::vehicle::VehicleTable;
 use crate::swarm::Rows;
 use crate::target::{Begins, Leg};
 
@@ -83,6 +84,7 @@ impl From<&Scenario> for Document {
                 hull_radius_m: per_vehicle(&scenario.hull_radius_m),
                 a22_per_s: scenario.a22_per_s,
             },
+            vehicle: VehicleTable::from(scenario),
             start: StartTable {
                 positions_m: Some(scenario.points(&scenario.start.positions_m)),
                 velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),

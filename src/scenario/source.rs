@@ -93,10 +93,9 @@ impl Scenario {
 }
 
 /// Reads the keys of a text, whose paths count from a folder.
-#[cfg_attr(not(feature = "shapes"), expect(unused_variables, reason = "no key is a path"))]
 pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, ScenarioError> {
-    #[cfg_attr(not(feature = "shapes"), expect(unused_mut, reason = "files are looked for"))]
     let mut document = text.decode()?;
+    document.vehicle.found_from(folder).map_err(|error| text.place(error))?;
     #[cfg(feature = "shapes")]
     find_files(&mut document, folder).map_err(|error| text.place(error))?;
     Ok(document)

@@ -18,6 +18,7 @@ use crate::observation::Observation;
 use crate::space::Obstacle;
 use crate::swarm::{Rows, Swarm};
 use crate::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
+use crate::vehicle::Airframe;
 
 /// Default mass of a vehicle \[kg\].
 pub const DEFAULT_MASS_KG: f64 = 1.0;
@@ -31,6 +32,8 @@ pub struct Scenario {
     pub name: String,
     /// Positions \[m\] and velocities \[m/s\] at time 0.
     pub start: Swarm,
+    /// What kind of body each vehicle is; [`Scenario::set_airframe`] changes what depends on it too.
+    pub airframe: Airframe,
     /// Whether the swarm lives in the plane z = 0 or in space.
     pub space: Space,
     /// Mass of each vehicle \[kg\].
@@ -125,6 +128,7 @@ impl Scenario {
         let is_flat = flat(&start.positions_m) && flat(&start.velocities_m_s) && formation.is_in_plane_z0();
         Self {
             name: name.to_owned(),
+            airframe: Airframe::Point,
             space: if is_flat { Space::Plane } else { Space::Volume },
             mass_kg: vec![DEFAULT_MASS_KG; count],
             hull_radius_m: vec![DEFAULT_HULL_RADIUS_M; count],
@@ -145,6 +149,15 @@ impl Scenario {
             legs: vec![Leg::first(formation)],
             obstacles: Vec::new(),
             reference: None,
+        }
+    }
+
+    /// Precision of the physics engine, where one moves the vehicles: on straight lines within steps, and off what they hit.
+    #[must_use]
+    pub fn engine(&self) -> Option<Precision> {
+        match (&self.airframe, self.plant) {
+            (Airframe::Point | Airframe::Quadrotor(_), PlantSpec::Rapier(precision)) => Some(precision),
+            _ => None,
         }
     }
 

@@ -67,7 +67,7 @@ impl Template {
         let (name, toml) = source.text()?;
         let text = Text { name: &name, toml: &toml, overrides };
         let document = decoded(&text, source.folder())?;
-        let a22_per_s = document.swarm.a22_per_s;
+        let a22_per_s = document.a22_per_s();
         let named = document.laws.iter().map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s)));
         let laws = named.collect();
         let start_is_random = is_random(&document);

@@ -5,6 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::time::TimeSpec;
+use super::vehicle::{QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
+use crate::vehicle::Airframe;
 
 /// Numbers of a recording that is made without being told how often, at most \[bytes\].
 const RECORDING_BYTES: f64 = (1_u64 << 30) as f64;
@@ -16,9 +18,11 @@ const RECORDING_BYTES: f64 = (1_u64 << 30) as f64;
 pub(super) struct TimeTable {
     /// Length of the flight in s.
     pub(super) duration_s: f64,
-    /// Physics step in s; the law is asked once a step. A step that is too long for the law is flown in parts.
-    #[serde(default = "TimeTable::default_dt_s")]
-    dt_s: f64,
+    /// Physics step in s; the law is asked once a step. A step that is too long for the law is flown in parts. Unless given
+    /// 1/240, and 1/500 for quadrotors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_DT_S)))]
+    dt_s: Option<f64>,
     /// Samples recorded per second of flight in Hz, at most one a step. Unless given 60, or as much less as it takes for a
     /// large swarm's recording to hold at most 1 GiB of numbers and arrivals still to be told.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -32,17 +36,14 @@ pub(super) struct TimeTable {
     #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     max_rate_dt: f64,
     /// How often the law is asked in Hz, at most once a step, where vehicles hold each command in between as a real
-    /// controller makes them do. Unless given, commands stand for continuous control.
+    /// controller makes them do. Unless given, commands of points stand for continuous control, and quadrotors are given 100 a
+    /// second.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     control_hz: Option<f64>,
 }
 
 impl TimeTable {
-    fn default_dt_s() -> f64 {
-        TimeSpec::DEFAULT_DT_S
-    }
-
     fn default_max_halvings() -> u32 {
         TimeSpec::DEFAULT_MAX_HALVINGS
     }
@@ -56,10 +57,16 @@ impl TimeTable {
         *max_rate_dt == TimeSpec::DEFAULT_MAX_RATE_DT
     }
 
-    /// Duration and rates of a flight of so many vehicles that are to keep what they have reached for `hold_s` seconds.
-    pub(super) fn complete(self, count: usize, hold_s: f64) -> TimeSpec {
+    /// Duration and rates of a flight of so many vehicles of this kind that are to keep what they have reached for `hold_s`
+    /// seconds.
+    pub(super) fn complete(self, count: usize, hold_s: f64, airframe: &Airframe) -> TimeSpec {
         let Self { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz } = self;
         let record_hz = record_hz.unwrap_or_else(|| default_record_hz(count, duration_s, hold_s));
+        let (default_dt_s, default_hz) = match airframe {
+            Airframe::Point | Airframe::Unicycle(_) => (TimeSpec::DEFAULT_DT_S, None),
+            Airframe::Quadrotor(_) => (QUADROTOR_DT_S, Some(QUADROTOR_CONTROL_HZ)),
+        };
+        let (dt_s, control_hz) = (dt_s.unwrap_or(default_dt_s), control_hz.or(default_hz));
         TimeSpec { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz }
     }
 }
@@ -67,7 +74,7 @@ impl TimeTable {
 impl From<TimeSpec> for TimeTable {
     fn from(time: TimeSpec) -> Self {
         let TimeSpec { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz } = time;
-        Self { duration_s, dt_s, record_hz: Some(record_hz), max_halvings, max_rate_dt, control_hz }
+        Self { duration_s, dt_s: Some(dt_s), record_hz: Some(record_hz), max_halvings, max_rate_dt, control_hz }
     }
 }
 
@@ -111,6 +118,6 @@ mod tests {
     #[test]
     fn what_is_given_is_kept() {
         let given = TimeSpec { record_hz: 240.0, ..TimeSpec::lasting(600.0) };
-        assert_eq!(TimeTable::from(given).complete(100_000, 1.0), given);
+        assert_eq!(TimeTable::from(given).complete(100_000, 1.0, &Airframe::Point), given);
     }
 }

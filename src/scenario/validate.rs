@@ -44,6 +44,7 @@ impl Scenario {
         check_memory(self.count(), if takes_none { 0 } else { self.graph.edge_count() as u128 })?;
         self.check_law()?;
         self.check_vehicles()?;
+        self.check_airframe()?;
         self.check_motion()?;
         self.check_separations()?;
         self.check_reference()?;
@@ -330,6 +331,12 @@ impl Scenario {
             self.delta_m
         ))
         .with_help(match 0.5 * (self.delta_m - CONTACT_PREDICTION_M) {
+            _ if self.airframe.quadrotor().is_some() => {
+                format!(
+                    "enlarge law.delta_m to at least {}: the hulls are those of the model",
+                    touching_m + CONTACT_PREDICTION_M
+                )
+            }
             largest_m if largest_m > 0.0 => {
                 format!("set swarm.hull_radius_m to at most {largest_m}, or enlarge law.delta_m")
             }

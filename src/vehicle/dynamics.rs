@@ -1,0 +1,281 @@
+//! Forces and torques on a quadrotor, and the two halves of a step of second order.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+
+use super::GRAVITY_M_S2;
+use super::attitude::Attitude;
+use super::downwash::Downwash;
+use super::mixer::Mixer;
+use super::model::{Model, Quadrotor};
+use super::rotor::{RotorCurve, RotorLag};
+
+/// Where a quadrotor is, how it moves and how fast its rotors turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    /// Centre of mass \[m\].
+    pub position_m: Vector3<f64>,
+    /// Its velocity \[m/s\].
+    pub velocity_m_s: Vector3<f64>,
+    /// Turns body into world.
+    pub attitude: UnitQuaternion<f64>,
+    /// Rates about the body's axes \[rad/s\].
+    pub rates_rad_s: Vector3<f64>,
+    /// Speed of each rotor \[rpm\].
+    pub rotors_rpm: Vector4<f64>,
+}
+
+/// What acts on a quadrotor beside gravity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Force in the world \[N\].
+    pub force_n: Vector3<f64>,
+    /// Torque about the body's axes \[N m\].
+    pub torque_n_m: Vector3<f64>,
+}
+
+/// A plane that thrust feels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// A point of it \[m\].
+    pub place_m: Vector3<f64>,
+    /// Its outward normal, of length 1.
+    pub normal: Vector3<f64>,
+}
+
+/// A step after its first half: what moves and turns the body over the whole of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    /// Velocity \[m/s\].
+    pub velocity_m_s: Vector3<f64>,
+    /// Angular velocity in the world \[rad/s\].
+    pub turn_rad_s: Vector3<f64>,
+    /// Angular momentum in the world \[kg m^2/s\].
+    momentum: Vector3<f64>,
+    /// What the first half added, of which the end is predicted.
+    kick_m_s: Vector3<f64>,
+    twist: Vector3<f64>,
+}
+
+/// The equations of motion of a quadrotor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dynamics {
+    model: Model,
+    inertia_kg_m2: Vector3<f64>,
+    /// Where each rotor is from the centre of mass \[m\].
+    arms_m: [Vector3<f64>; 4],
+    /// Torque about z over thrust of each \[m\].
+    reactions_m: [f64; 4],
+    /// Drag of a rotor over its speed \[N s/m/rpm\].
+    drag: Vector3<f64>,
+    parasitic_n_s2_m2: Vector3<f64>,
+    curve: RotorCurve,
+    mixer: Mixer,
+    attitude: Attitude,
+    hover_rpm: f64,
+    grounds: Vec<Ground>,
+    downwash: bool,
+}
+
+impl Dynamics {
+    /// Of a quadrotor, above these planes where it feels any. Rotors of a model that [`Model::check`] refuses are not mixed.
+    #[must_use]
+    pub fn new(quadrotor: &Quadrotor, grounds: &[Ground]) -> Self {
+        let (model, curve) = (quadrotor.model.clone(), RotorCurve::of(&quadrotor.model));
+        let hover_rpm = curve.speed_rpm(0.25 * model.weight_n());
+        Self {
+            mixer: Mixer::new(&model).unwrap_or_default(),
+            attitude: Attitude::of(&model),
+            inertia_kg_m2: model.inertia_kg_m2.into(),
+            arms_m: model.rotor_positions_m.map(|[x, y]| Vector3::new(x, y, 0.0)),
+            reactions_m: model.rotor_turns.map(|turn| turn.reaction() * model.torque_per_thrust_m),
+            drag: Vector3::from(model.rotor_drag_n_s_m) * (0.25 / hover_rpm),
+            parasitic_n_s2_m2: model.parasitic_drag_n_s2_m2.into(),
+            hover_rpm,
+            curve,
+            grounds: if quadrotor.ground_effect { grounds.to_vec() } else { Vec::new() },
+            downwash: quadrotor.downwash,
+            model,
+        }
+    }
+
+    /// Its numbers.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Moments of inertia about the body's axes \[kg m^2\].
+    #[must_use]
+    pub fn inertia_kg_m2(&self) -> Vector3<f64> {
+        self.inertia_kg_m2
+    }
+
+    /// Speed of a rotor that carries a quarter of the weight \[rpm\].
+    #[must_use]
+    pub fn hover_rpm(&self) -> f64 {
+        self.hover_rpm
+    }
+
+    /// Level at a place \[m\] with a velocity \[m/s\], rotors as in hover.
+    #[must_use]
+    pub fn trimmed(&self, position_m: Vector3<f64>, velocity_m_s: Vector3<f64>) -> State {
+        State {
+            position_m,
+            velocity_m_s,
+            attitude: UnitQuaternion::identity(),
+            rates_rad_s: Vector3::zeros(),
+            rotors_rpm: Vector4::repeat(self.hover_rpm),
+        }
+    }
+
+    /// Thrust of each rotor \[N\], with what the ground adds.
+    #[must_use]
+    pub fn thrusts_n(&self, state: &State) -> Vector4<f64> {
+        let mut thrusts_n = state.rotors_rpm.map(|speed_rpm| self.curve.thrust_n(speed_rpm));
+        if !self.grounds.is_empty() {
+            for (rotor, thrust_n) in thrusts_n.iter_mut().enumerate() {
+                *thrust_n *= self.ground_factor(state, rotor);
+            }
+        }
+        thrusts_n
+    }
+
+    /// Factor 1 + k (r/4h)^2 of the thrust of a rotor h above a ground, for h from the rotor's radius on; 1 where the rotor is
+    /// below it, or blows away from it.
+    fn ground_factor(&self, state: &State, rotor: usize) -> f64 {
+        let place_m = state.position_m + state.attitude * self.arms_m[rotor];
+        let up = state.attitude * Vector3::z();
+        let radius_m = self.model.rotor_radius_m;
+        let grounds = self.grounds.iter().filter(|ground| up.dot(&ground.normal) > 0.0);
+        grounds
+            .map(|ground| (place_m - ground.place_m).dot(&ground.normal))
+            .filter(|&height_m| height_m > 0.0)
+            .map(|height_m| 1.0 + self.model.ground_effect * (0.25 * radius_m / height_m.max(radius_m)).powi(2))
+            .fold(1.0, f64::max)
+    }
+
+    /// What acts on it beside gravity, in a wind \[m/s\] and in what others blow down on its rotors \[m/s\].
+    #[must_use]
+    pub fn wrench(&self, state: &State, wind_m_s: Vector3<f64>, down_m_s: [f64; 4]) -> Wrench {
+        let body = state.attitude.to_rotation_matrix().into_inner();
+        let (up, past_m_s) = (body.row(2).transpose(), body.tr_mul(&(state.velocity_m_s - wind_m_s)));
+        let thrusts_n = self.thrusts_n(state);
+        let (mut force_n, mut torque_n_m) = (Vector3::zeros(), Vector3::zeros());
+        for (rotor, arm_m) in self.arms_m.iter().enumerate() {
+            let rotor_m_s = past_m_s + state.rates_rad_s.cross(arm_m) + up * down_m_s[rotor];
+            let mut rotor_n = self.drag.component_mul(&rotor_m_s) * -state.rotors_rpm[rotor];
+            rotor_n.z += thrusts_n[rotor];
+            force_n += rotor_n;
+            torque_n_m += arm_m.cross(&rotor_n);
+            torque_n_m.z += self.reactions_m[rotor] * thrusts_n[rotor];
+        }
+        if self.parasitic_n_s2_m2 != Vector3::zeros() {
+            let past_m_s = past_m_s + up * (0.25 * down_m_s.iter().sum::<f64>());
+            force_n -= past_m_s.norm() * self.parasitic_n_s2_m2.component_mul(&past_m_s);
+        }
+        Wrench { force_n: body * force_n, torque_n_m }
+    }
+
+    /// How fast the rotors of others blow down on each rotor of a vehicle, from 0 \[m/s\].
+    #[must_use]
+    pub fn down_m_s(&self, vehicle: usize, state: &State, jets: &[Downwash]) -> [f64; 4] {
+        if jets.is_empty() {
+            return [0.0; 4];
+        }
+        self.arms_m.map(|arm_m| {
+            let place_m = state.position_m + state.attitude * arm_m;
+            let others = jets.iter().enumerate().filter(|(jet, _)| jet / 4 != vehicle);
+            others.map(|(_, jet)| jet.squared_m2_s2(place_m)).sum::<f64>().sqrt()
+        })
+    }
+
+    /// Writes the jets of all rotors of these vehicles, four each, where they blow on each other.
+    pub fn jets<'a>(&self, states: impl Iterator<Item = &'a State>, jets: &mut Vec<Downwash>) {
+        jets.clear();
+        if self.downwash {
+            for state in states {
+                let thrusts_n = self.thrusts_n(state);
+                jets.extend((0..4).map(|rotor| {
+                    let place_m = state.position_m + state.attitude * self.arms_m[rotor];
+                    Downwash::new(place_m, self.model.rotor_radius_m, thrusts_n[rotor])
+                }));
+            }
+        }
+    }
+
+    /// The rotor speeds \[rpm\] that carry out an acceleration \[m/s^2\] in this state, as far as the rotors can.
+    #[must_use]
+    pub fn asked_rpm(&self, state: &State, acceleration_m_s2: Vector3<f64>) -> Vector4<f64> {
+        let force_n = self.attitude.force_n(acceleration_m_s2);
+        let (lift_n, torque_n_m) = self.attitude.wrench(force_n, &state.attitude, state.rates_rad_s);
+        self.mixer.thrusts_n(lift_n, torque_n_m).map(|thrust_n| self.curve.speed_rpm(thrust_n))
+    }
+
+    /// How far rotors come towards the speeds that are asked for within a time \[s\].
+    #[must_use]
+    pub fn rotor_lag(&self, dt_s: f64) -> RotorLag {
+        RotorLag::over(&self.model, dt_s)
+    }
+
+    /// Rates of change: of the velocity \[m/s^2\], and of the rates about the body's axes \[rad/s^2\].
+    #[must_use]
+    pub fn accelerations(&self, state: &State, wrench: &Wrench) -> (Vector3<f64>, Vector3<f64>) {
+        let momentum = self.inertia_kg_m2.component_mul(&state.rates_rad_s);
+        let turning = wrench.torque_n_m - state.rates_rad_s.cross(&momentum);
+        (self.acceleration_m_s2(wrench), turning.component_div(&self.inertia_kg_m2))
+    }
+
+    fn acceleration_m_s2(&self, wrench: &Wrench) -> Vector3<f64> {
+        wrench.force_n / self.model.mass_kg - GRAVITY_M_S2 * Vector3::z()
+    }
+
+    /// The first half of a step: half of the kick of `wrench`, and the angular velocity in the middle of the step. With no
+    /// torque the angular momentum in the world stays what it is, which is the gyroscopic term.
+    #[must_use]
+    pub fn begin(&self, state: &State, wrench: &Wrench, dt_s: f64) -> Drift {
+        let kick_m_s = 0.5 * dt_s * self.acceleration_m_s2(wrench);
+        let twist = state.attitude * (0.5 * dt_s * wrench.torque_n_m);
+        let momentum = state.attitude * self.inertia_kg_m2.component_mul(&state.rates_rad_s) + twist;
+        let middle = turned(&state.attitude, self.turn_rad_s(&state.attitude, momentum), 0.5 * dt_s);
+        Drift {
+            velocity_m_s: state.velocity_m_s + kick_m_s,
+            turn_rad_s: self.turn_rad_s(&middle, momentum),
+            momentum,
+            kick_m_s,
+            twist,
+        }
+    }
+
+    /// Angular velocity in the world \[rad/s\] of an angular momentum \[kg m^2/s\].
+    fn turn_rad_s(&self, attitude: &UnitQuaternion<f64>, momentum: Vector3<f64>) -> Vector3<f64> {
+        attitude * attitude.inverse_transform_vector(&momentum).component_div(&self.inertia_kg_m2)
+    }
+
+    /// Velocity and rates as they are expected at the end of a drift, where place, attitude and rotors of `state` are.
+    pub fn predict(&self, state: &mut State, drift: &Drift) {
+        let momentum = drift.momentum + drift.twist;
+        state.velocity_m_s = drift.velocity_m_s + drift.kick_m_s;
+        state.rates_rad_s = state.attitude.inverse_transform_vector(&momentum).component_div(&self.inertia_kg_m2);
+    }
+
+    /// The second half of a step, with what acts at its end.
+    pub fn end(&self, state: &mut State, drift: &Drift, wrench: &Wrench, dt_s: f64) {
+        state.velocity_m_s = drift.velocity_m_s + 0.5 * dt_s * self.acceleration_m_s2(wrench);
+        let momentum = state.attitude.inverse_transform_vector(&drift.momentum) + 0.5 * dt_s * wrench.torque_n_m;
+        state.rates_rad_s = momentum.component_div(&self.inertia_kg_m2);
+    }
+
+    /// Adds to a drift what a hit changed of its velocity \[m/s\] and its angular velocity \[rad/s\].
+    pub fn hit(&self, drift: &mut Drift, attitude: &UnitQuaternion<f64>, by_m_s: Vector3<f64>, by_rad_s: Vector3<f64>) {
+        drift.velocity_m_s += by_m_s;
+        let by = attitude.inverse_transform_vector(&by_rad_s);
+        drift.momentum += attitude * self.inertia_kg_m2.component_mul(&by);
+    }
+}
+
+/// An attitude turned at an angular velocity in the world \[rad/s\] for a time \[s\], as the engine turns its bodies: by
+/// 2 atan(|w| t/2), which is |w| t to second order.
+fn turned(attitude: &UnitQuaternion<f64>, turn_rad_s: Vector3<f64>, dt_s: f64) -> UnitQuaternion<f64> {
+    let half = 0.5 * dt_s * turn_rad_s;
+    UnitQuaternion::new_normalize(Quaternion::new(1.0, half.x, half.y, half.z) * attitude.into_inner())
+}
