@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::certificate::{Certificate, Void};
 use super::clearance::{ClearanceTension, slot_room_m};
 use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
+use super::contact::in_contact;
 use super::error::{LawError, ParameterError};
 use super::growth::Growth;
 use super::interface::{Controls, Law, VelocityMargin};
@@ -20,7 +21,7 @@ use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
 use super::setting::{Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
-use crate::graph::{Graph, Pinning};
+use crate::graph::Pinning;
 use crate::observation::Observation;
 use crate::space::{NearPairs, Obstacle};
 use crate::swarm::{Pair, Rows, row, set_row};
@@ -266,17 +267,6 @@ fn nearest_slots(formation: &Formation, delta_m: f64) -> (Pair, f64) {
     formation.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
 }
 
-/// Largest eigenvalue, or a bound on it, of the Laplacian of the slots that are nearest to each other.
-fn largest_of_nearest(formation: &Formation) -> Option<f64> {
-    /// Distances that differ by less, relatively, are the same one.
-    const SAME: f64 = 1e-6;
-    let (_, nearest_m) = formation.min_distance()?;
-    let mut near = NearPairs::default();
-    near.update(&formation.slots_m, nearest_m * (1.0 + SAME));
-    let nearest = Graph::from_edges(formation.count(), near.pairs()).ok()?;
-    Some(nearest.largest_eigenvalue())
-}
-
 fn tension_between(
     formation: &Formation,
     keys: &DisplacementKeys,
@@ -343,15 +333,13 @@ impl Law for DisplacementLaw {
         self.promise_through(start, ahead)
     }
 
-    /// In contact, on the complete graph without a reference: the nearest slots' vehicles push each other with `V_R''` at R, which
-    /// adds at most its product with the largest eigenvalue of the Laplacian of who is nearest.
+    /// In contact on the complete graph without a reference.
     fn linear(&self, formation: &Formation) -> Option<Linear> {
         let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
         let lead = Mode { stiffness_per_s2: k, damping_per_s: c };
         let mut linear = self.pulls.linear(lead.times(self.scale()), lead);
         if self.pulls.graph.is_complete() && !self.is_guided() && self.has_pairs {
-            let pushes = self.tension.second_derivative(self.tension.rest_m()) * largest_of_nearest(formation)?;
-            linear.in_contact = Some(Mode { stiffness_per_s2: k + pushes, damping_per_s: c });
+            linear.in_contact = in_contact(lead, &self.tension, formation);
         }
         Some(linear)
     }

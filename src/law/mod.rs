@@ -10,6 +10,7 @@ mod cbf_qp;
 mod certificate;
 mod clearance;
 mod consensus;
+mod contact;
 mod displacement;
 mod edge_tension;
 mod error;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::hulls::Hulls;
-use super::vehicle::VehicleNumbers;
+use super::strain::VehicleNumbers;
 use crate::audit::{AuditOutcome, ClearanceOutcome, Status};
 use crate::law::Certificate;
 use crate::metrics::{LegSummary, Summary};

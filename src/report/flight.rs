@@ -9,7 +9,7 @@ use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
 use super::legs::{self, LegNumbers};
 use super::obstacles::Obstacles;
-use super::vehicle::VehicleNumbers;
+use super::strain::VehicleNumbers;
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use crate::audit::{self, Status};

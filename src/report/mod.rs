@@ -15,7 +15,8 @@ mod legs;
 mod obstacles;
 pub mod page;
 pub mod recorded;
-mod vehicle;
+mod strain;
+mod vehicles;
 mod verdict;
 mod verification;
 mod words;
@@ -31,7 +32,7 @@ pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
-pub use vehicle::VehicleNumbers;
+pub use strain::VehicleNumbers;
 pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 

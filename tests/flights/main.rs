@@ -5,7 +5,9 @@ mod flight;
 
 mod displacement;
 mod ideal_plant;
+mod imperfections;
 mod law_properties;
+mod links;
 mod loop_claims;
 mod missions;
 mod obstacles;

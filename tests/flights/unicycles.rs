@@ -162,6 +162,8 @@ fn what_a_unicycle_cannot_fly_is_refused_with_its_place_and_remedy() {
         ("vehicle.attitude_hz=100", "a unicycle has neither attitude nor rotors"),
         ("plant.kind=ideal", "no unicycles"),
         ("swarm.dimensions=3", "move in the plane"),
+        ("vehicle.drag_per_s=0.3", "does not feel the air"),
+        ("wind.mean_m_s=[1, 0]", "does not feel the air"),
         ("vehicle.model=point", "unknown"),
     ] {
         let source = Source::Text { name: "test".to_owned(), text: FLIGHT.to_owned() };
