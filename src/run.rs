@@ -101,22 +101,23 @@ fn report(
         ending => ending.reason(),
     };
     let wall_s = flight.performance.wall.as_secs_f64();
+    let in_metres = flight.in_metres.as_ref().unwrap_or(&flight.audit);
     let hulls = match scenario.plant {
-        PlantSpec::Rapier(_) => {
-            Hulls::solid(&flight.bounces, &flight.audit, &scenario.hull_radius_m, scenario.time.dt_s)
-        }
-        PlantSpec::Ideal => Hulls::of_points(&flight.audit, &scenario.hull_radius_m),
+        PlantSpec::Rapier(_) => Hulls::solid(&flight.bounces, in_metres, &scenario.hull_radius_m, scenario.time.dt_s),
+        PlantSpec::Ideal => Hulls::of_points(in_metres, &scenario.hull_radius_m),
     };
     Report::new(&Findings {
         scenario_name: &scenario.name,
         scenario_sha256: &scenario.sha256_hex(),
         delta_m: scenario.delta_m,
+        half_axes_m: scenario.half_axes_m(),
         judge: scenario.arrival,
         trap_dimension: preflight.trap_dimension(),
         formation_dimension: preflight.formation_dimension,
         refused: &preflight.refusing(),
         certificate: &flight.certificate,
         audit: &flight.audit,
+        in_metres: flight.in_metres.as_ref(),
         clearance: flight.clearance.as_ref(),
         obstacles: &scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect::<Vec<_>>(),
         engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))

@@ -38,8 +38,11 @@ mod reference;
 mod resolution;
 #[cfg(feature = "files")]
 mod resolved;
+#[cfg(feature = "files")]
+mod safety;
 #[cfg(feature = "schema")]
 mod schema;
+mod shape_of_safety;
 #[cfg(feature = "files")]
 mod shapes;
 #[cfg(feature = "files")]
@@ -81,7 +84,7 @@ pub use resolution::Drift;
 pub use schema::schema;
 #[cfg(feature = "files")]
 pub use source::{MAX_FILE_BYTES, Source};
-pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Scenario, Space};
+pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Safety, Scenario, Space};
 #[cfg(feature = "reports")]
 pub(crate) use start::{offset, random, scatter};
 #[cfg(feature = "files")]

@@ -268,7 +268,7 @@ fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vecto
         .friction(0.0)
         .collision_groups(among(HULL))
         .user_data(i as u128);
-    let keep_out = ColliderBuilder::ball(real(scenario.delta_m / 2.0))
+    let keep_out = ColliderBuilder::ball(real(scenario.metric().shortest_m(scenario.delta_m) / 2.0))
         .density(0.0)
         .collision_groups(among(KEEP_OUT))
         .solver_groups(InteractionGroups::none())
