@@ -16,6 +16,9 @@
 //! is the error.
 
 mod flow;
+mod quadrotors;
+
+pub use quadrotors::Quadrotors;
 
 use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinary};
 use differential_equations::ode::OrdinaryNumericalMethod as _;

@@ -4,12 +4,14 @@
 //! the age of the message) and what it *sees* (with a sensor of its own). Where every vehicle knows the true present
 //! state of every other, all of these are one table that nobody copies.
 
+use std::fmt;
+
 use nalgebra::Vector3;
 
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::space::Obstacle;
-use crate::swarm::{Swarm, row};
+use crate::swarm::{Rows, Swarm, row};
 use crate::target::Target;
 
 /// What a law is told at one instant. SI units, one inertial frame.
@@ -38,10 +40,33 @@ pub enum Others<'a> {
     /// Everybody knows what everybody knows of himself: [`Observation::own`] is all there is.
     Shared,
     /// Each vehicle holds its own picture of the others.
-    Held(&'a Held),
+    Held(&'a dyn Picture),
 }
 
-/// A picture of the swarm for each vehicle.
+/// What each vehicle knows of each other, however it is kept.
+pub trait Picture: fmt::Debug + Sync {
+    /// What vehicle `i` heard of vehicle `j` over a link; of one without a link whatever is at hand.
+    fn heard(&self, i: usize, j: usize) -> Neighbour;
+
+    /// What vehicle `i` sees of vehicle `j`.
+    fn seen(&self, i: usize, j: usize) -> Neighbour;
+
+    /// Whether it is of so many vehicles.
+    fn is_of(&self, count: usize) -> bool;
+
+    /// The first vehicle of which somebody holds what is not finite.
+    fn first_not_finite(&self) -> Option<usize> {
+        None
+    }
+
+    /// Where vehicles are found to be near each other, and by how much more than the sensing range apart \[m\] they may be
+    /// there who hold each other for near; their own states unless given.
+    fn near_from(&self) -> Option<(&Rows, f64)> {
+        None
+    }
+}
+
+/// A picture of the swarm for each vehicle, as tables: 100 bytes for every two vehicles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
     /// `heard[i]` has in row j what vehicle i last heard of vehicle j.
@@ -63,8 +88,31 @@ pub struct Neighbour {
     pub age_s: f64,
 }
 
+impl Picture for Held {
+    fn heard(&self, i: usize, j: usize) -> Neighbour {
+        Neighbour::of(&self.heard[i], j, self.ages_s[i][j])
+    }
+
+    fn seen(&self, i: usize, j: usize) -> Neighbour {
+        Neighbour::of(&self.seen[i], j, 0.0)
+    }
+
+    fn is_of(&self, count: usize) -> bool {
+        let Self { heard, ages_s, seen } = self;
+        let swarms = heard.iter().chain(seen);
+        [heard.len(), ages_s.len(), seen.len()].iter().all(|&length| length == count)
+            && ages_s.iter().all(|ages_s| ages_s.len() == count)
+            && swarms.flat_map(|swarm| [&swarm.positions_m, &swarm.velocities_m_s]).all(|rows| rows.nrows() == count)
+    }
+
+    fn first_not_finite(&self) -> Option<usize> {
+        self.heard.iter().chain(&self.seen).find_map(Swarm::first_not_finite)
+    }
+}
+
 impl Neighbour {
-    fn of(swarm: &Swarm, j: usize, age_s: f64) -> Self {
+    /// A row of a swarm.
+    pub(crate) fn of(swarm: &Swarm, j: usize, age_s: f64) -> Self {
         Self { position_m: row(&swarm.positions_m, j), velocity_m_s: row(&swarm.velocities_m_s, j), age_s }
     }
 }
@@ -99,7 +147,7 @@ impl<'a> Observation<'a> {
     pub fn heard(&self, i: usize, j: usize) -> Neighbour {
         match self.others {
             Others::Shared => Neighbour::of(self.own, j, 0.0),
-            Others::Held(held) => Neighbour::of(&held.heard[i], j, held.ages_s[i][j]),
+            Others::Held(held) => held.heard(i, j),
         }
     }
 
@@ -111,7 +159,7 @@ impl<'a> Observation<'a> {
     pub fn seen(&self, i: usize, j: usize) -> Neighbour {
         match self.others {
             Others::Shared => Neighbour::of(self.own, j, 0.0),
-            Others::Held(held) => Neighbour::of(&held.seen[i], j, 0.0),
+            Others::Held(held) => held.seen(i, j),
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash, record_beside};
 use crate::report::{Findings, Hulls, Performance, Report, Run, Verification};
-use crate::scenario::{PlantSpec, Scenario};
+use crate::scenario::Scenario;
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 
 /// Flies a scenario to its end, hands what is recorded to `sink`, and reports.
@@ -102,9 +102,10 @@ fn report(
     };
     let wall_s = flight.performance.wall.as_secs_f64();
     let in_metres = flight.in_metres.as_ref().unwrap_or(&flight.audit);
-    let hulls = match scenario.plant {
-        PlantSpec::Rapier(_) => Hulls::solid(&flight.bounces, in_metres, &scenario.hull_radius_m, scenario.time.dt_s),
-        PlantSpec::Ideal => Hulls::of_points(in_metres, &scenario.hull_radius_m),
+    let hulls = if scenario.engine().is_some() {
+        Hulls::solid(&flight.bounces, in_metres, &scenario.hull_radius_m, scenario.time.dt_s)
+    } else {
+        Hulls::of_points(in_metres, &scenario.hull_radius_m)
     };
     Report::new(&Findings {
         scenario_name: &scenario.name,
@@ -120,8 +121,7 @@ fn report(
         in_metres: flight.in_metres.as_ref(),
         clearance: flight.clearance.as_ref(),
         obstacles: &scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect::<Vec<_>>(),
-        engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))
-            .then_some(flight.engine_contacts.len() as u64),
+        engine_contact_pairs: scenario.engine().is_some().then_some(flight.engine_contacts.len() as u64),
         hulls: &hulls,
         summary: &metrics.finish(),
         legs: scenario.legs.len(),

@@ -28,6 +28,15 @@ impl Swarm {
         Self { positions_m, velocities_m_s }
     }
 
+    /// Takes the numbers of a swarm of as many vehicles, in the memory that is there.
+    ///
+    /// # Panics
+    /// If there are more vehicles, or fewer.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.positions_m.copy_from(&other.positions_m);
+        self.velocities_m_s.copy_from(&other.velocities_m_s);
+    }
+
     /// Number of vehicles N.
     #[must_use]
     pub fn count(&self) -> usize {

@@ -26,9 +26,12 @@ pub(super) struct Interval {
 }
 
 impl Interval {
-    /// The time at a fraction of the interval, exact at both ends; no difference of times is formed that could overflow.
+    /// The time at a fraction of the interval, exact at both ends and never earlier at a larger fraction, for every rounding
+    /// on its way is in order. Halves of times are taken, whose difference cannot overflow.
     pub(super) fn at(self, fraction: f64) -> f64 {
-        ((1.0 - fraction) * self.from_s + fraction * self.to_s).max(self.from_s).min(self.to_s)
+        let (from, to) = (0.5 * self.from_s, 0.5 * self.to_s);
+        let time_s = if fraction < 1.0 { 2.0 * (from + fraction * (to - from)) } else { self.to_s };
+        time_s.max(self.from_s).min(self.to_s)
     }
 }
 
@@ -173,6 +176,17 @@ mod tests {
             prop_assert!((found.separation_m() - exact).abs() <= resolution, "{} {exact}", found.separation_m());
             prop_assert!(found.squared <= motion.from_squared.min(motion.to_squared));
             prop_assert!((0.0..=1.0).contains(&found.at));
+        }
+
+        #[test]
+        fn times_of_an_interval_are_in_the_order_of_their_fractions(
+            from_s in -1e3..1e3_f64, length_s in 0.0..10.0_f64, fraction in 0.0..1.0_f64, near in 1..4_u32
+        ) {
+            let interval = Interval { from_s, to_s: from_s + length_s };
+            let next = (0..near).fold(fraction, |fraction: f64, _| fraction.next_up()).min(1.0);
+            prop_assert!(interval.at(fraction) <= interval.at(next));
+            prop_assert!(interval.at(next) <= interval.at(1.0));
+            prop_assert_eq!([interval.at(0.0), interval.at(1.0)], [interval.from_s, interval.to_s]);
         }
 
         #[test]

@@ -9,7 +9,7 @@ use super::own_obstacles::OwnObstacles;
 use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, OwnedSample};
-use crate::scenario::{self, PlantSpec, Scenario};
+use crate::scenario::{self, Scenario};
 use crate::swarm::{ClosestApproach, Pair, row};
 
 /// Scaled distance at which two equal ellipsoids touch.
@@ -45,7 +45,7 @@ impl OwnRecording {
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
         let scenario = Scenario::read(&source, &[]).ok();
-        let is_straight = scenario.as_ref().is_some_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
+        let is_straight = scenario.as_ref().is_some_and(|scenario| scenario.engine().is_some());
         let ellipsoid_m = scenario.as_ref().and_then(Scenario::half_axes_m).map(|axes| Vector3::from(axes) * scale);
         // What the run told is of lengths in which its delta is the width of an ellipsoid.
         let told_scale = if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS / header.delta_m } else { scale };

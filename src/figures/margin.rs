@@ -12,22 +12,27 @@ pub struct Share {
     pub value: f64,
     /// The share that showed what was asked, from 0 to 1.
     pub share: f64,
-    /// Its interval.
-    pub low: f64,
-    /// Its interval.
-    pub high: f64,
+    /// Its 95 % interval, where there is one.
+    pub interval: Option<[f64; 2]>,
 }
 
 /// Shares of flights that show something (`does`) over the values of a key, with their 95 % intervals and the bracket in which
-/// the verdict turns. The axis is logarithmic where asked.
+/// the verdict turns, and values that are `predicted`, each with what it is. The axis is logarithmic where asked.
 #[must_use]
-pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>, logarithmic: bool) -> Figure {
+pub fn margin(
+    shares: &[Share],
+    key: &str,
+    does: &str,
+    bracket: Option<[f64; 2]>,
+    predicted: &[(f64, String)],
+    logarithmic: bool,
+) -> Figure {
     let values = shares.iter().map(|share| share.value);
     let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
     let mut chart = Chart::new(x, Axis::spanning(&format!("share that {does}"), 0.0, 1.0, 5.0));
     for share in shares {
-        let interval = vec![(share.value, share.low), (share.value, share.high)];
-        chart.lines.push(Line { points: interval, stroke: Stroke::solid(PALETTE[0], 1.2), label: None });
+        let ends = share.interval.into_iter().flatten().map(|end| (share.value, end));
+        chart.lines.push(Line { points: ends.collect(), stroke: Stroke::solid(PALETTE[0], 1.2), label: None });
     }
     let marks = shares.iter().enumerate().map(|(k, share)| Mark {
         at: (share.value, share.share),
@@ -35,7 +40,8 @@ pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>
         colour: PALETTE[0],
         radius: 3.5,
         text: None,
-        label: (k == 0).then(|| "with its 95 % interval".to_owned()),
+        label: (k == 0)
+            .then(|| if share.interval.is_some() { "with its 95 % interval" } else { "one flight" }.to_owned()),
     });
     chart.marks.extend(marks);
     for (k, side) in bracket.into_iter().flatten().enumerate() {
@@ -44,6 +50,10 @@ pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>
             stroke: Stroke::dashed(SOFT_INK, 1.0),
             label: (k == 0).then(|| "the verdict turns in between".to_owned()),
         });
+    }
+    for (k, (value, what)) in predicted.iter().enumerate() {
+        let points = vec![(*value, 0.0), (*value, 1.0)];
+        chart.line(points, Stroke::dashed(PALETTE[1 + k % 2], 1.5), format!("predicted {what}"));
     }
     let description = match bracket {
         Some([low, high]) => format!("The share that {does} over {key}; the verdict turns between {low} and {high}."),

@@ -215,6 +215,15 @@ impl Graph {
         }
     }
 
+    /// Whether two vehicles are joined; none is joined to itself.
+    #[must_use]
+    pub fn has_edge(&self, i: usize, j: usize) -> bool {
+        match self.later_neighbours(i.min(j)) {
+            LaterNeighbours::All(later) => later.contains(&i.max(j)),
+            LaterNeighbours::Listed(later) => later.binary_search(&i.max(j)).is_ok(),
+        }
+    }
+
     /// Every edge once, as (i, j) with i < j, in row order.
     pub fn edges(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.count).flat_map(|i| self.later_neighbours(i).map(move |j| (i, j)))

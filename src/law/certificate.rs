@@ -48,6 +48,20 @@ pub enum Void {
     TargetChanges,
     /// What the vehicles know is not the true present state, or what they command does not arrive as given.
     InexactLink,
+    /// What vehicles know, their own state included, is some time old.
+    KnownLate,
+    /// What vehicles measure is off the truth.
+    KnownWrongly,
+    /// What vehicles hear of each other is some time old.
+    HeardLate,
+    /// Some of what vehicles send is not heard.
+    MessagesLost,
+    /// No vehicle is accelerated by more than a limit.
+    AccelerationLimited,
+    /// Vehicles are accelerated as they were commanded some time before.
+    AccelerationLate,
+    /// A vehicle does not do what the law commands.
+    VehicleFails,
     /// Accelerations came from outside in the place of the law's.
     CommandsFromOutside,
     /// Each command is held for a period of its own.
@@ -133,6 +147,13 @@ impl Void {
             Self::CommandLimited => "command-limited",
             Self::TargetChanges => "target-changes",
             Self::InexactLink => "inexact-link",
+            Self::KnownLate => "known-late",
+            Self::KnownWrongly => "known-wrongly",
+            Self::HeardLate => "heard-late",
+            Self::MessagesLost => "messages-lost",
+            Self::AccelerationLimited => "acceleration-limited",
+            Self::AccelerationLate => "acceleration-late",
+            Self::VehicleFails => "vehicle-fails",
             Self::CommandsFromOutside => "commands-from-outside",
             Self::CommandsHeld => "commands-held",
             Self::Windblown => "windblown",
@@ -166,6 +187,13 @@ impl fmt::Display for Void {
                 f.write_str("The target changes: what holds for the first leg need not for the next.")
             }
             Self::InexactLink => f.write_str("The vehicles do not know the true present state."),
+            Self::KnownLate => f.write_str("The vehicles know what is old: the swarm has moved on since it was measured (sensing.latency_s, sensing.rate_hz)."),
+            Self::KnownWrongly => f.write_str("The vehicles measure what is off the truth (sensing.position_noise_m, position_bias_m, velocity_noise_m_s)."),
+            Self::HeardLate => f.write_str("The vehicles hear of each other what is old when it arrives, and held until more comes (network.latency_s, network.rate_hz)."),
+            Self::MessagesLost => f.write_str("The network loses messages, and what was heard before stands for them (network.loss, network.failure, failure)."),
+            Self::AccelerationLimited => f.write_str("The vehicles are not accelerated by more than a limit, and what keeps two apart may be more (actuation.max_accel_m_s2)."),
+            Self::AccelerationLate => f.write_str("The acceleration follows the command with a lag (actuation.lag_s)."),
+            Self::VehicleFails => f.write_str("The flight goes on with a vehicle that fails and does not do what the law commands (failure)."),
             Self::CommandsFromOutside => f.write_str("The vehicles were commanded from outside."),
             Self::CommandsHeld => {
                 f.write_str("The vehicles hold each command while the swarm moves on (time.control_hz).")
@@ -235,6 +263,13 @@ mod tests {
             Void::CommandLimited,
             Void::TargetChanges,
             Void::InexactLink,
+            Void::KnownLate,
+            Void::KnownWrongly,
+            Void::HeardLate,
+            Void::MessagesLost,
+            Void::AccelerationLimited,
+            Void::AccelerationLate,
+            Void::VehicleFails,
             Void::CommandsFromOutside,
             Void::CommandsHeld,
             Void::Windblown,
@@ -256,6 +291,13 @@ mod tests {
             "command-limited",
             "target-changes",
             "inexact-link",
+            "known-late",
+            "known-wrongly",
+            "heard-late",
+            "messages-lost",
+            "acceleration-limited",
+            "acceleration-late",
+            "vehicle-fails",
             "commands-from-outside",
             "commands-held",
             "windblown",
@@ -275,7 +317,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[16].to_string(),
+            reasons[23].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::error::LawError;
 use super::interface::VelocityMargin;
 use crate::graph::Graph;
-use crate::observation::{Held, Neighbour, Observation, Others};
+use crate::observation::{Neighbour, Observation, Others};
 use crate::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 
 /// Whether a state is of `count` vehicles and finite.
@@ -70,10 +70,10 @@ pub(super) fn consensus_margin(count: usize, gain_per_s: f64, connectivity: f64,
 pub(super) fn check_observation(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
     check_state(count, at.own)?;
     if let Others::Held(held) = at.others {
-        let Held { heard, ages_s, seen } = held;
-        [heard.len(), ages_s.len(), seen.len()].into_iter().try_for_each(|found| check_count(count, found))?;
-        heard.iter().chain(seen).try_for_each(|swarm| check_state(count, swarm))?;
-        ages_s.iter().try_for_each(|ages_s| check_count(count, ages_s.len()))?;
+        if !held.is_of(count) {
+            return Err(LawError::Pictures { count });
+        }
+        held.first_not_finite().map_or(Ok(()), |vehicle| Err(LawError::NotFinite { vehicle }))?;
     }
     check_count(count, command.nrows())
 }

@@ -11,10 +11,12 @@ use serde::{Deserialize, Serialize};
 use super::certificate::{Certificate, Void};
 use super::clearance::{ClearanceTension, slot_room_m};
 use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
+use super::contact::in_contact;
 use super::error::{LawError, ParameterError};
 use super::growth::Growth;
 use super::interface::{Controls, Law, VelocityMargin};
 use super::memo::Memo;
+use super::modes::{Linear, Mode};
 use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
 use super::setting::{Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
@@ -339,6 +341,17 @@ impl Law for DisplacementLaw {
 
     fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
         self.promise_through(start, ahead)
+    }
+
+    /// In contact on the complete graph without a reference.
+    fn linear(&self, formation: &Formation) -> Option<Linear> {
+        let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
+        let lead = Mode { stiffness_per_s2: k, damping_per_s: c };
+        let mut linear = self.pulls.linear(lead.times(self.scale()), lead);
+        if self.pulls.graph.is_complete() && !self.is_guided() && self.has_pairs {
+            linear.in_contact = in_contact(lead, &self.tension, formation);
+        }
+        Some(linear)
     }
 
     fn controls(&self) -> Controls {

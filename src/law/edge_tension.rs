@@ -1,6 +1,7 @@
 //! The edge-tension law (8): vehicles joined by an edge are pulled to their desired distance and never let closer than
 //! delta.
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
@@ -13,12 +14,13 @@ use super::growth::{Frame, Grown, Growth};
 use super::interface::{Controls, Law, VelocityMargin};
 use super::kernel::Kernel;
 use super::memo::Memo;
+use super::modes::{Linear, Mode};
 use super::setting::{Blown, Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::Observation;
-use crate::swarm::{Pair, Rows, Swarm, separation};
+use crate::swarm::{Pair, Rows, Swarm, row, separation};
 use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "edge-tension"`.
@@ -295,6 +297,32 @@ impl Law for EdgeTensionLaw {
     /// rate 1/s, so the fastest rate is max(omega, 1/s).
     fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
         Some(self.tightest?.second_derivative(nearest_m?).sqrt().max(1.0))
+    }
+
+    /// On the complete graph relative velocities are all damped by 1 + a22, and the stiffnesses are the eigenvalues of 1/N times
+    /// the sum over edges of V'' in their directions: V' is 0 at the desired distance. 0 for rotations.
+    fn linear(&self, formation: &Formation) -> Option<Linear> {
+        /// Most vehicles for whom they are computed, in O(N^3).
+        const MOST: usize = 130;
+        let (count, EdgeTensionParameters { alpha, delta_m, a22_per_s }) = (self.graph.count(), self.parameters);
+        if !self.graph.is_complete() || !(2..=MOST).contains(&count) {
+            return None;
+        }
+        let mut stiffness = DMatrix::zeros(3 * count, 3 * count);
+        for (i, j) in self.graph.edges() {
+            let distance_m = formation.desired_distance(i, j);
+            let along = (row(&formation.slots_m, j) - row(&formation.slots_m, i)) / distance_m;
+            let curvature = EdgeTension::new(alpha, delta_m, distance_m).ok()?.second_derivative(distance_m);
+            let block = along * along.transpose() * (curvature / count as f64);
+            for (a, b, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
+                let mut part = stiffness.fixed_view_mut::<3, 3>(3 * a, 3 * b);
+                part += block * sign;
+            }
+        }
+        // Rounding of eigenvalues that are 0.
+        let stiffnesses = stiffness.symmetric_eigenvalues().map(|eigenvalue| eigenvalue.max(0.0));
+        let mode = |&stiffness_per_s2: &f64| Mode { stiffness_per_s2, damping_per_s: 1.0 + a22_per_s };
+        Some(Linear { free: stiffnesses.iter().map(mode).collect(), in_contact: None, heard: None })
     }
 
     fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {

@@ -53,6 +53,12 @@ pub enum LawError {
         /// The safety distance delta \[m\].
         delta_m: f64,
     },
+    /// What vehicles know of each other is of another swarm.
+    #[error("the law is for {count} vehicles and was given what others know of each other")]
+    Pictures {
+        /// Number of vehicles of the law.
+        count: usize,
+    },
     /// The state or the table of accelerations is of another swarm.
     #[error("the law is for {expected} vehicles and was given {found}")]
     WrongCount {

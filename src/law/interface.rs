@@ -4,6 +4,7 @@ use dyn_clone::DynClone;
 
 use super::certificate::{Certificate, Void};
 use super::error::LawError;
+use super::modes::Linear;
 use crate::formation::{Formation, Freedom};
 use crate::observation::Observation;
 use crate::swarm::Rows;
@@ -126,6 +127,11 @@ pub trait Law: DynClone + Send {
 
     /// How fast relative velocities are damped at least, on a graph of this algebraic connectivity.
     fn velocity_margin(&self, _connectivity: f64, _a22_per_s: f64) -> Option<VelocityMargin> {
+        None
+    }
+
+    /// Linear motion about the slots of a formation, where it is known.
+    fn linear(&self, _formation: &Formation) -> Option<Linear> {
         None
     }
 

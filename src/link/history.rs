@@ -12,19 +12,28 @@ use crate::swarm::Swarm;
 pub struct History {
     span_s: f64,
     states: VecDeque<(f64, Swarm)>,
+    /// Memory of states that were dropped.
+    spare: Vec<Swarm>,
 }
 
 impl History {
     /// Nothing yet; at least the last `span_s` seconds will be kept.
     #[must_use]
     pub fn new(span_s: f64) -> Self {
-        Self { span_s, states: VecDeque::new() }
+        Self { span_s, states: VecDeque::new(), spare: Vec::new() }
     }
 
     /// Adds the state at a time later than all before; at the same time it takes the place of the last.
     pub fn push(&mut self, time_s: f64, swarm: &Swarm) {
         self.forget_after(time_s.next_down());
-        self.states.push_back((time_s, swarm.clone()));
+        let state = match self.spare.pop() {
+            Some(mut state) => {
+                state.copy_from(swarm);
+                state
+            }
+            None => swarm.clone(),
+        };
+        self.states.push_back((time_s, state));
     }
 
     /// Drops what is older than the span before this time, which will not be taken back.
@@ -32,14 +41,14 @@ impl History {
         // The state before the span begins is needed to interpolate up to it.
         let oldest_s = time_s - self.span_s;
         while self.states.get(1).is_some_and(|(second_s, _)| *second_s <= oldest_s) {
-            self.states.pop_front();
+            self.spare.extend(self.states.pop_front().map(|(_, state)| state));
         }
     }
 
     /// Drops every state after this time.
     pub fn forget_after(&mut self, time_s: f64) {
         while self.states.back().is_some_and(|(last_s, _)| *last_s > time_s) {
-            self.states.pop_back();
+            self.spare.extend(self.states.pop_back().map(|(_, state)| state));
         }
     }
 
@@ -51,7 +60,7 @@ impl History {
             (Some((from_s, from)), Some((to_s, to))) => {
                 interpolate(from, to, to_s - from_s, (time_s - from_s) / (to_s - from_s), swarm);
             }
-            (Some((_, only)), None) | (None, Some((_, only))) => swarm.clone_from(only),
+            (Some((_, only)), None) | (None, Some((_, only))) => swarm.copy_from(only),
             (None, None) => {}
         }
     }

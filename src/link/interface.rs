@@ -16,7 +16,9 @@ pub trait Link: DynClone + Send {
     /// has happened.
     fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Sensed<'a>;
 
-    /// Changes the commanded accelerations \[m/s^2\], N x 3, into those that reach the vehicles.
+    /// Changes the commanded accelerations \[m/s^2\], N x 3, into those that reach the vehicles. At instants of a flight
+    /// at which no command is made this is told the one that is held; it may be told two at the same instant, of which the
+    /// last counts.
     fn actuate(&mut self, _time_s: f64, _command: &mut Rows) {}
 
     /// The swarm has come to this state, in the order of time.
@@ -46,6 +48,11 @@ pub trait Link: DynClone + Send {
     /// Writes the present values into channels of [`Link::channels`], in their order.
     fn write_channels(&self, _channels: &mut [Channel]) {}
 
+    /// What was sent over its network, where messages are sent one by one.
+    fn traffic(&self) -> Option<Traffic> {
+        None
+    }
+
     /// Begins its random numbers anew.
     fn reseed(&mut self, _seed: u64) {}
 }
@@ -59,6 +66,18 @@ pub struct Sensed<'a> {
     pub own: &'a Swarm,
     /// Vehicles of each other.
     pub others: Others<'a>,
+}
+
+/// What was sent over a network up to now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Traffic {
+    /// Messages, one for each who may hear it.
+    pub sent: u64,
+    /// Those of them that never arrive.
+    pub lost: u64,
+    /// The age \[s\] that 95 % of what vehicles hold of each other does not exceed, over all links, looked at whenever messages
+    /// are sent, to a hundredth.
+    pub age_p95_s: Option<f64>,
 }
 
 /// Nothing between truth and law.

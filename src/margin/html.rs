@@ -1,7 +1,7 @@
 //! The margin as a page.
 
 use super::result::Margin;
-use super::words::{held, value};
+use super::words::{held, prediction, value};
 use crate::figures::{Share, margin as figure};
 use crate::report::page::{self, Badge, Page, Render as _, Tone, noted, section};
 use crate::text::metres;
@@ -30,14 +30,14 @@ impl Margin {
         let shares = self.probes.iter().map(|probe| Share {
             value: probe.value,
             share: probe.held.share.unwrap_or(f64::NAN),
-            low: probe.held.low,
-            high: probe.held.high,
+            interval: (self.runs > 1).then_some([probe.held.low, probe.held.high]),
         });
         let chart = figure(
             &shares.collect::<Vec<_>>(),
             &self.key,
             self.question.words()[0],
             self.turn.map(|turn| turn.bracket),
+            &self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin)))).collect::<Vec<_>>(),
             self.logarithmic,
         );
         let rows = self.probes.iter().map(|probe| {
@@ -45,10 +45,11 @@ impl Margin {
             let min = probe.min_m.map_or_else(|| "-".to_owned(), metres);
             [value(probe.value).render(), noted(&held, &interval), min.render()]
         });
+        let caption = if self.runs == 1 { "One flight each" } else { "With 95 % intervals" };
         let columns = [self.key.as_str(), self.question.words()[0], "Smallest separation [m]"];
         let mut sections = vec![section("Where the verdict turns", &[page::figures(&[chart])])];
-        sections.push(section("Every value tried", &[page::numbers("With 95 % intervals", &columns, rows)]));
-        let notes = self.notes();
+        sections.push(section("Every value tried", &[page::numbers(caption, &columns, rows)]));
+        let notes = [self.predictions(), self.notes()].concat();
         if !notes.is_empty() {
             sections.push(section("What to know", &[page::list(&notes)]));
         }

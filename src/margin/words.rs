@@ -2,7 +2,8 @@
 
 use super::plan::JITTER;
 use super::result::{Margin, Probe};
-use crate::text::{aligned, at_least, at_most, counted, metres};
+use crate::preflight::{Bound, Near, PredictedMargin};
+use crate::text::{aligned, at_least, at_most, counted, metres, significant};
 
 /// Digits of a share.
 const SHARE_DIGITS: u8 = 2;
@@ -12,11 +13,21 @@ pub(super) fn value(value: f64) -> String {
     value.to_string()
 }
 
-/// So many of so many, with the interval.
+/// So many of so many, with the interval of their share where there are several.
 pub(super) fn held(probe: &Probe) -> [String; 2] {
     let of = probe.held;
+    if of.of == 1 {
+        return [if of.count == 1 { "yes" } else { "no" }.to_owned(), String::new()];
+    }
     let interval = format!("({} to {})", at_most(of.low, SHARE_DIGITS), at_least(of.high, SHARE_DIGITS));
     [format!("{} of {}", of.count, of.of), interval]
+}
+
+/// What is predicted, in words.
+pub(super) fn prediction(margin: &PredictedMargin) -> String {
+    let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
+    let state = if margin.state == Near::Free { "where nobody pushes" } else { "where the nearest are in contact" };
+    margin.value.map_or_else(|| format!("any {state}"), |value| format!("{bound} {} {state}", significant(value, 4)))
 }
 
 impl Margin {
@@ -70,10 +81,17 @@ impl Margin {
         [interrupted, turns, jitter].into_iter().flatten().collect()
     }
 
+    /// What linear theory predicts, a sentence each.
+    #[must_use]
+    pub fn predictions(&self) -> Vec<String> {
+        self.predicted.iter().map(|margin| format!("predicted by linear theory: {}", prediction(margin))).collect()
+    }
+
     /// Every value that was tried, as a table.
     #[must_use]
     pub fn text(&self) -> String {
-        let names = [self.key.as_str(), self.question.words()[0], "95 % interval", "smallest separation [m]"];
+        let interval = if self.runs == 1 { "" } else { "95 % interval" };
+        let names = [self.key.as_str(), self.question.words()[0], interval, "smallest separation [m]"];
         let mut rows = vec![names.map(str::to_owned).to_vec()];
         rows.extend(self.probes.iter().map(|probe| {
             let [held, interval] = held(probe);

@@ -6,14 +6,17 @@
 mod air;
 mod path;
 pub mod rapier;
+mod unicycle;
 
 pub(crate) use air::Air;
 pub use path::Path;
+pub use unicycle::Unicycles;
 
 use dyn_clone::DynClone;
 
 use crate::record::Channel;
 use crate::swarm::{Pair, Rows, Swarm};
+use crate::vehicle::Fleet;
 
 /// What moves a swarm, however it is realised: p'' = a22 v + u (equation (1)) for the point vehicles.
 ///
@@ -67,6 +70,12 @@ pub trait Plant: DynClone + Send {
 
 dyn_clone::clone_trait_object!(Plant);
 
+/// A plant of quadrotors.
+pub trait Quadrotors: Plant {
+    /// They, as they are now.
+    fn fleet(&self) -> &Fleet;
+}
+
 /// Two hulls that pushed each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HullContact {
@@ -85,4 +94,7 @@ pub enum PlantError {
         /// The vehicle, from 0.
         vehicle: usize,
     },
+    /// No step is short enough to solve the equations of motion.
+    #[error("the equations of motion cannot be solved to their tolerances")]
+    Stalled,
 }

@@ -4,6 +4,7 @@
 //! [`Preflight::of`] computes numbers from a scenario alone, without flying it, and says in [`Warning`]s what stands in
 //! the way. Its fields are the keys of `tautline check --json`.
 
+mod margins;
 mod numbers;
 mod rigidity;
 mod warning;
@@ -18,6 +19,7 @@ use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
 
+pub use margins::{Bound, Near, PredictedMargin};
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 pub use warning::{Code, Warning};
 
@@ -90,6 +92,9 @@ pub struct Preflight {
     pub dt_max_s: Option<f64>,
     /// No step is flown in parts longer than this \[s\]: the links alone ask for it, wherever vehicles are.
     pub dt_links_s: Option<f64>,
+    /// How late and how seldom the law may be asked near the formation, as linear theory predicts; none where it does not.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub margins: Vec<PredictedMargin>,
     /// Samples that are recorded.
     pub samples: u64,
     /// What their positions, velocities and commands take in the recording, which holds little else \[bytes\].
@@ -187,6 +192,7 @@ impl Preflight {
                 },
             ),
             dt_links_s: links_step_s(law.as_ref(), scenario),
+            margins: margins::margins(law.as_ref(), scenario),
             samples: scenario.time.samples(),
             recording_bytes: scenario.time.samples() * TimeSpec::BYTES_PER_VEHICLE * scenario.count() as u64,
             start_dimension: motion_dimension(&scenario.start),
@@ -214,6 +220,7 @@ impl Preflight {
             (trap, found.start_too_flat()),
             (Code::StepTooLong, step_too_long(law.as_ref(), scenario)),
             (Code::DriftUnresolved, found.drift_unresolved(scenario)),
+            (Code::BeyondMargin, margins::beyond(&found.margins, scenario)),
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
             (Code::FlatFormationInSpace, found.flat_formation_in_space()),

@@ -1,5 +1,6 @@
 //! A pre-flight check in words: one line, and a table.
 
+use super::margins;
 use super::numbers::{rate, significant};
 use super::{LegPromise, Preflight};
 use crate::text::{at_least, counted, seconds, table};
@@ -44,6 +45,7 @@ impl Preflight {
         rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
         let rest = [
             ("needs", self.needs_line()),
+            ("margins", margins::line(&self.margins).unwrap_or_else(|| "not known for this law and graph".to_owned())),
             ("step", self.step_line()),
             ("recording", self.recording_line()),
             ("start", self.start_line()),

@@ -16,6 +16,7 @@ mod legs;
 mod obstacles;
 pub mod page;
 pub mod recorded;
+mod vehicles;
 mod verdict;
 mod verification;
 mod words;

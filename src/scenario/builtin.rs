@@ -54,6 +54,11 @@ const ALL: &[Builtin] = &[
         toml: include_str!("../../assets/obstacles.toml"),
     },
     Builtin {
+        name: "crazyflies",
+        summary: "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear and reached, nothing certified",
+        toml: include_str!("../../assets/crazyflies.toml"),
+    },
+    Builtin {
         name: "gusts",
         summary: "rings in a turbulent wind with gusts on some of them: what all feel alike changes no distance, reached",
         toml: include_str!("../../assets/gusts.toml"),

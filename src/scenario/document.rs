@@ -7,11 +7,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::actuation::ActuationTable;
+use super::failure::Failure;
 use super::laws::Laws;
+use super::network::NetworkSpec;
 use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::safety::SafetyTable;
+use super::sensing::SensingSpec;
 #[cfg(feature = "shapes")]
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
 use super::shapes::{HelixKeys, SpacingKeys, VKeys};
@@ -80,6 +84,18 @@ pub(super) struct Document {
     /// law.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) breathing: Breathing,
+    /// What vehicles measure of themselves and of whoever is near.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) sensing: SensingSpec,
+    /// What vehicles hear of each other, and when.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) network: NetworkSpec,
+    /// How commands become accelerations.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) actuation: ActuationTable,
+    /// Vehicles of which a part fails.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) failure: Vec<Failure>,
     /// Chance in flight.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) noise: NoiseTable,

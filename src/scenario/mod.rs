@@ -5,6 +5,7 @@
 //! keys of the TOML; [`Scenario::resolved_toml`] writes the same document with nothing left to be derived. `builtin`
 //! holds the embedded scenarios.
 
+mod actuation;
 #[cfg(feature = "files")]
 mod build;
 #[cfg(feature = "files")]
@@ -18,6 +19,7 @@ mod document;
 #[cfg(feature = "shapes")]
 mod drawn;
 mod error;
+mod failure;
 #[cfg(feature = "files")]
 mod files;
 #[cfg(feature = "files")]
@@ -25,6 +27,7 @@ mod laws;
 #[cfg(feature = "files")]
 mod legs;
 mod limits;
+mod network;
 #[cfg(feature = "files")]
 mod noise;
 #[cfg(feature = "files")]
@@ -42,6 +45,7 @@ mod resolved;
 mod safety;
 #[cfg(feature = "schema")]
 mod schema;
+mod sensing;
 mod shape_of_safety;
 #[cfg(feature = "files")]
 mod shapes;
@@ -62,6 +66,7 @@ mod text;
 mod time;
 #[cfg(feature = "files")]
 mod time_table;
+mod unicycle;
 mod validate;
 #[cfg(feature = "files")]
 mod values;
@@ -70,11 +75,14 @@ mod weather;
 #[cfg(feature = "files")]
 mod wind;
 
+pub use actuation::ActuationSpec;
 pub use error::{Field, Place, ScenarioError};
+pub use failure::{Failure, FailureKind};
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,
 };
+pub use network::{LinkFailure, Missing, NearBy, NetworkSpec};
 #[cfg(feature = "program")]
 pub(crate) use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 #[cfg(feature = "files")]
@@ -82,6 +90,7 @@ pub use overrides::Override;
 pub use resolution::Drift;
 #[cfg(feature = "schema")]
 pub use schema::schema;
+pub use sensing::SensingSpec;
 #[cfg(feature = "files")]
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Safety, Scenario, Space};

@@ -3,7 +3,9 @@
 //! A plant counts positions from the middle of the start. Whatever moves the swarm as a whole (its mean velocity, which no
 //! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
 
+use super::actuation::ActuationSpec;
 use super::error::ScenarioError;
+use super::failure::Failure;
 use super::limits::{CONTACT_PREDICTION_M, first_within};
 use super::spec::{PlantSpec, Precision, Scenario};
 use crate::law::{Certificate, Law, Void};
@@ -89,7 +91,7 @@ impl Scenario {
     #[must_use]
     pub fn needed_precision(&self) -> Precision {
         let spacing_m = self.drift_in(SINGLE, self.velocity_coefficient_per_s()).spacing_m;
-        let is_point = self.airframe.quadrotor().is_none();
+        let is_point = self.airframe.is_point();
         if is_point && self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
             Precision::Single
         } else {
@@ -131,11 +133,37 @@ impl Scenario {
     /// delta.
     #[must_use]
     pub fn as_far_as_told(&self, promised: Certificate) -> Certificate {
-        let promised = promised
-            .void_where(self.time.control_hz.is_some(), Void::CommandsHeld)
-            .void_where(self.airframe.quadrotor().is_some(), Void::NotAPoint);
+        let promised =
+            self.imperfections().into_iter().fold(promised, |promised, (is, void)| promised.void_where(is, void));
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
         promised.void_where(unresolved, Void::Unresolved)
+    }
+
+    /// What voids any promise, and whether it is there.
+    fn imperfections(&self) -> [(bool, Void); 9] {
+        let Self { sensing, network, actuation, .. } = self;
+        let is_late = sensing.latency_s > 0.0 || sensing.near_s() > 0.0 || sensing.rate_hz.is_some();
+        let is_silent = self.failures.iter().any(Failure::is_silent);
+        [
+            (self.time.control_hz.is_some(), Void::CommandsHeld),
+            (is_late, Void::KnownLate),
+            (sensing.is_noisy(), Void::KnownWrongly),
+            (network.latency_s > 0.0 || network.rate_hz.is_some(), Void::HeardLate),
+            (network.loses() || is_silent, Void::MessagesLost),
+            (actuation.max_accel_m_s2.is_some(), Void::AccelerationLimited),
+            (actuation.lag_s > 0.0, Void::AccelerationLate),
+            (self.failures.iter().any(|failure| !failure.is_silent()), Void::VehicleFails),
+            (!self.airframe.is_point(), Void::NotAPoint),
+        ]
+    }
+
+    /// Whether vehicles know the true present state, and are accelerated as they are commanded.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.sensing.is_exact()
+            && self.network.is_exact()
+            && self.actuation == ActuationSpec::default()
+            && self.failures.is_empty()
     }
 
     /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.

@@ -120,6 +120,10 @@ impl From<&Scenario> for Document {
             time: scenario.time.into(),
             arrival: scenario.arrival,
             breathing: scenario.breathing,
+            sensing: scenario.sensing,
+            network: scenario.network.clone(),
+            actuation: scenario.actuation.into(),
+            failure: scenario.failures.clone(),
             noise: NoiseTable { seed: scenario.noise_seed },
         }
     }

@@ -6,6 +6,10 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::actuation::ActuationSpec;
+use super::failure::Failure;
+use super::network::NetworkSpec;
+use super::sensing::SensingSpec;
 use super::time::TimeSpec;
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -67,6 +71,14 @@ pub struct Scenario {
     pub arrival: Arrival,
     /// When slots are spread to let vehicles past each other, under laws that allow it.
     pub breathing: Breathing,
+    /// What vehicles measure.
+    pub sensing: SensingSpec,
+    /// What they hear of each other.
+    pub network: NetworkSpec,
+    /// How commands become accelerations.
+    pub actuation: ActuationSpec,
+    /// Vehicles of which a part fails.
+    pub failures: Vec<Failure>,
     /// Seed of every random number that is drawn in flight.
     pub noise_seed: u64,
 }
@@ -150,11 +162,24 @@ impl Scenario {
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
             breathing: Breathing::default(),
+            sensing: SensingSpec::default(),
+            network: NetworkSpec::default(),
+            actuation: ActuationSpec::default(),
+            failures: Vec::new(),
             noise_seed: 0,
             start,
             legs: vec![Leg::first(formation)],
             obstacles: Vec::new(),
             reference: None,
+        }
+    }
+
+    /// Precision of the physics engine, where one moves the vehicles: on straight lines within steps, and off what they hit.
+    #[must_use]
+    pub fn engine(&self) -> Option<Precision> {
+        match (&self.airframe, self.plant) {
+            (Airframe::Point | Airframe::Quadrotor(_), PlantSpec::Rapier(precision)) => Some(precision),
+            _ => None,
         }
     }
 

@@ -57,6 +57,10 @@ impl Scenario {
         self.check_arrival()?;
         self.check_breathing()?;
         self.check_noise()?;
+        self.check_sensing()?;
+        self.check_network()?;
+        self.check_actuation()?;
+        self.check_failures()?;
         self.check_resolution()
     }
 
@@ -334,6 +338,12 @@ impl Scenario {
             self.delta_m
         ))
         .with_help(match 0.5 * (least_m - CONTACT_PREDICTION_M) {
+            _ if self.airframe.quadrotor().is_some() => {
+                format!(
+                    "enlarge law.delta_m to at least {}: the hulls are those of the model",
+                    touching_m + CONTACT_PREDICTION_M
+                )
+            }
             largest_m if largest_m > 0.0 => {
                 format!("set swarm.hull_radius_m to at most {largest_m}, or enlarge law.delta_m")
             }

@@ -5,7 +5,7 @@ use crate::feedback::Feedback;
 use crate::graph::Graph;
 use crate::law::{Certificate, Law, LawError};
 use crate::link::Link;
-use crate::observation::Observation;
+use crate::observation::{Observation, Others};
 use crate::scenario::Scenario;
 use crate::space::{KeptPairs, Obstacle};
 use crate::swarm::{Rows, Swarm};
@@ -22,6 +22,8 @@ pub(super) struct Controller {
     pub(super) links: Graph,
     pub(super) obstacles: Vec<Obstacle>,
     near: KeptPairs,
+    /// What the law commanded last, N x 3 \[m/s^2\].
+    commanded: Rows,
 }
 
 impl Controller {
@@ -34,7 +36,8 @@ impl Controller {
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
         let (guidance, links) = (scenario.reference.clone(), scenario.graph.clone());
         let (obstacles, near) = (scenario.obstacles.clone(), KeptPairs::default());
-        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, near })
+        let commanded = Rows::zeros(scenario.count());
+        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, near, commanded })
     }
 
     /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
@@ -60,7 +63,12 @@ impl Controller {
         }
         let Some(command) = command else { return Ok(()) };
         if let Some(range_m) = self.law.sensing_range_m() {
-            self.near.update(&sensed.own.positions_m, range_m);
+            let from = match sensed.others {
+                Others::Shared => None,
+                Others::Held(picture) => picture.near_from(),
+            };
+            let (positions_m, slack_m) = from.unwrap_or((&sensed.own.positions_m, 0.0));
+            self.near.update(positions_m, range_m + slack_m);
         }
         let at = Observation {
             time_s,
@@ -71,9 +79,15 @@ impl Controller {
             near: self.near.pairs(),
             obstacles: &self.obstacles,
         };
-        self.law.command(&at, command)?;
-        self.link.actuate(time_s, command);
+        self.law.command(&at, &mut self.commanded)?;
+        self.actuate(time_s, command);
         Ok(())
+    }
+
+    /// Writes what becomes at a time \[s\] of the law's last command.
+    pub(super) fn actuate(&mut self, time_s: f64, command: &mut Rows) {
+        command.copy_from(&self.commanded);
+        self.link.actuate(time_s, command);
     }
 
     /// What the supervisor has changed within a leg, and what the law promises anew from this true state on.

@@ -1,12 +1,12 @@
 //! What moves the vehicles between two instants at which the law is asked.
 
 #[cfg(feature = "ideal")]
-use crate::continuous::{Continuous, IdealError};
+use crate::continuous::{Continuous, IdealError, Quadrotors};
 #[cfg(feature = "ideal")]
 use crate::feedback::Feedback;
 #[cfg(feature = "ideal")]
 use crate::law::LawError;
-use crate::plant::{HullContact, Path, Plant, PlantError, rapier};
+use crate::plant::{HullContact, Path, Plant, PlantError, Unicycles, rapier};
 use crate::record::Channel;
 use crate::scenario::{PlantSpec, Scenario};
 use crate::swarm::{Pair, Rows, Swarm};
@@ -46,10 +46,16 @@ impl Motion {
     /// What the scenario asks for, at its start.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
+        if let Some(unicycle) = scenario.airframe.unicycle() {
+            return Unicycles::new(*unicycle, &scenario.start).into();
+        }
         match scenario.plant {
             PlantSpec::Rapier(precision) => Self::Sampled(rapier::plant(scenario, precision)),
             #[cfg(feature = "ideal")]
-            PlantSpec::Ideal => Self::Continuous(Box::new(Continuous::new(scenario))),
+            PlantSpec::Ideal => match scenario.fleet() {
+                Some(fleet) => Self::Sampled(Box::new(Quadrotors::new(fleet))),
+                None => Self::Continuous(Box::new(Continuous::new(scenario))),
+            },
         }
     }
 
@@ -66,9 +72,10 @@ impl Motion {
     ) -> Result<(), Ending> {
         path.begin();
         match self {
-            Self::Sampled(plant) => plant
-                .advance(dt_s, end, path)
-                .map_err(|PlantError::NotFinite { vehicle }| Breakdown::StateNotFinite { step, vehicle }.into()),
+            Self::Sampled(plant) => plant.advance(dt_s, end, path).map_err(|error| match error {
+                PlantError::NotFinite { vehicle } => Breakdown::StateNotFinite { step, vehicle }.into(),
+                PlantError::Stalled => Breakdown::Stalled { step }.into(),
+            }),
             #[cfg(feature = "ideal")]
             Self::Continuous(solution) => {
                 let mut still = held.map(Held);

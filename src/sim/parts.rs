@@ -3,7 +3,7 @@
 use super::ending::SimError;
 use super::motion::Motion;
 use crate::law::Law;
-use crate::link::{Direct, Link};
+use crate::link::{self, Link};
 use crate::scenario::Scenario;
 use crate::target::{Schedule, Supervisor};
 
@@ -31,6 +31,7 @@ impl Parts {
     /// What the scenario asks for, under another law.
     #[must_use]
     pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
+        let link = link::of(scenario, law.sensing_range_m().is_some());
         let supervisor =
             Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(law.controls().freedom());
         let supervisor = match law.settling_rate_per_s() {
@@ -40,6 +41,6 @@ impl Parts {
             }
             None => supervisor,
         };
-        Self { law, motion: Motion::of(scenario), link: Box::new(Direct), supervisor: Box::new(supervisor) }
+        Self { law, motion: Motion::of(scenario), link, supervisor: Box::new(supervisor) }
     }
 }

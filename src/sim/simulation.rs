@@ -92,7 +92,7 @@ impl Simulation {
         let certificate = scenario
             .certificate(law.as_ref())
             .void_where(!supervisor.keeps_to(&scenario.legs), Void::TargetChanges)
-            .void_where(!link.is_exact(), Void::InexactLink);
+            .void_where(!link.is_exact() && scenario.is_exact(), Void::InexactLink);
         let mut state = scenario.start.clone();
         motion.observe(&mut state);
         let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());

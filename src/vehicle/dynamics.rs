@@ -22,10 +22,12 @@ pub struct State {
     pub rates_rad_s: Vector3<f64>,
     /// Speed of each rotor \[rpm\].
     pub rotors_rpm: Vector4<f64>,
+    /// Share of its thrust that each still gives: 1 unless it has failed.
+    pub shares: Vector4<f64>,
 }
 
 /// What acts on a quadrotor beside gravity.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
     /// Force in the world \[N\].
     pub force_n: Vector3<f64>,
@@ -61,6 +63,13 @@ pub struct Drift {
 pub struct Dynamics {
     model: Model,
     inertia_kg_m2: Vector3<f64>,
+    /// Where each rotor is from the centre of mass \[m\].
+    arms_m: [Vector3<f64>; 4],
+    /// Torque about z over thrust of each \[m\].
+    reactions_m: [f64; 4],
+    /// Drag of a rotor over its speed \[N s/m/rpm\].
+    drag: Vector3<f64>,
+    parasitic_n_s2_m2: Vector3<f64>,
     curve: RotorCurve,
     mixer: Mixer,
     attitude: Attitude,
@@ -70,21 +79,25 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Of a quadrotor, above these planes where it feels any; none where its rotors cannot set thrust and torques each by
-    /// itself ([`Model::check`]).
+    /// Of a quadrotor, above these planes where it feels any. Rotors of a model that [`Model::check`] refuses are not mixed.
     #[must_use]
-    pub fn new(quadrotor: &Quadrotor, grounds: &[Ground]) -> Option<Self> {
+    pub fn new(quadrotor: &Quadrotor, grounds: &[Ground]) -> Self {
         let (model, curve) = (quadrotor.model.clone(), RotorCurve::of(&quadrotor.model));
-        Some(Self {
-            mixer: Mixer::new(&model)?,
+        let hover_rpm = curve.speed_rpm(0.25 * model.weight_n());
+        Self {
+            mixer: Mixer::new(&model).unwrap_or_default(),
             attitude: Attitude::of(&model),
             inertia_kg_m2: model.inertia_kg_m2.into(),
-            hover_rpm: curve.speed_rpm(0.25 * model.weight_n()),
+            arms_m: model.rotor_positions_m.map(|[x, y]| Vector3::new(x, y, 0.0)),
+            reactions_m: model.rotor_turns.map(|turn| turn.reaction() * model.torque_per_thrust_m),
+            drag: Vector3::from(model.rotor_drag_n_s_m) * (0.25 / hover_rpm),
+            parasitic_n_s2_m2: model.parasitic_drag_n_s2_m2.into(),
+            hover_rpm,
             curve,
             grounds: if quadrotor.ground_effect { grounds.to_vec() } else { Vec::new() },
             downwash: quadrotor.downwash,
             model,
-        })
+        }
     }
 
     /// Its numbers.
@@ -114,13 +127,15 @@ impl Dynamics {
             attitude: UnitQuaternion::identity(),
             rates_rad_s: Vector3::zeros(),
             rotors_rpm: Vector4::repeat(self.hover_rpm),
+            shares: Vector4::repeat(1.0),
         }
     }
 
     /// Thrust of each rotor \[N\], with what the ground adds.
     #[must_use]
     pub fn thrusts_n(&self, state: &State) -> Vector4<f64> {
-        let mut thrusts_n = state.rotors_rpm.map(|speed_rpm| self.curve.thrust_n(speed_rpm));
+        let thrust_n = |speed_rpm: f64, share: f64| share * self.curve.thrust_n(speed_rpm);
+        let mut thrusts_n = state.rotors_rpm.zip_map(&state.shares, thrust_n);
         if !self.grounds.is_empty() {
             for (rotor, thrust_n) in thrusts_n.iter_mut().enumerate() {
                 *thrust_n *= self.ground_factor(state, rotor);
@@ -132,7 +147,7 @@ impl Dynamics {
     /// Factor 1 + k (r/4h)^2 of the thrust of a rotor h above a ground, for h from the rotor's radius on; 1 where the rotor is
     /// below it, or blows away from it.
     fn ground_factor(&self, state: &State, rotor: usize) -> f64 {
-        let place_m = state.position_m + state.attitude * self.arm_m(rotor);
+        let place_m = state.position_m + state.attitude * self.arms_m[rotor];
         let up = state.attitude * Vector3::z();
         let radius_m = self.model.rotor_radius_m;
         let grounds = self.grounds.iter().filter(|ground| up.dot(&ground.normal) > 0.0);
@@ -143,55 +158,39 @@ impl Dynamics {
             .fold(1.0, f64::max)
     }
 
-    fn arm_m(&self, rotor: usize) -> Vector3<f64> {
-        let [x, y] = self.model.rotor_positions_m[rotor];
-        Vector3::new(x, y, 0.0)
-    }
-
-    /// What acts on it beside gravity, where the air moves at these velocities past its rotors \[m/s\].
+    /// What acts on it beside gravity, in a wind \[m/s\] and in what others blow down on its rotors \[m/s\].
     #[must_use]
-    pub fn wrench(&self, state: &State, air_m_s: &[Vector3<f64>; 4]) -> Wrench {
-        let into_body = state.attitude.to_rotation_matrix().inverse();
-        let velocity_m_s = into_body * state.velocity_m_s;
+    pub fn wrench(&self, state: &State, wind_m_s: Vector3<f64>, down_m_s: [f64; 4]) -> Wrench {
+        let body = state.attitude.to_rotation_matrix().into_inner();
+        let (up, past_m_s) = (body.row(2).transpose(), body.tr_mul(&(state.velocity_m_s - wind_m_s)));
         let thrusts_n = self.thrusts_n(state);
-        let drag_n_s_m = Vector3::from(self.model.rotor_drag_n_s_m) * (0.25 / self.hover_rpm);
         let (mut force_n, mut torque_n_m) = (Vector3::zeros(), Vector3::zeros());
-        let mut mean_air_m_s = Vector3::zeros();
-        for (rotor, air_m_s) in air_m_s.iter().enumerate() {
-            let (arm_m, air_m_s) = (self.arm_m(rotor), into_body * air_m_s);
-            let past_m_s = velocity_m_s + state.rates_rad_s.cross(&arm_m) - air_m_s;
-            let mut rotor_n = -state.rotors_rpm[rotor] * drag_n_s_m.component_mul(&past_m_s);
+        for (rotor, arm_m) in self.arms_m.iter().enumerate() {
+            let rotor_m_s = past_m_s + state.rates_rad_s.cross(arm_m) + up * down_m_s[rotor];
+            let mut rotor_n = self.drag.component_mul(&rotor_m_s) * -state.rotors_rpm[rotor];
             rotor_n.z += thrusts_n[rotor];
             force_n += rotor_n;
             torque_n_m += arm_m.cross(&rotor_n);
-            torque_n_m.z +=
-                self.model.rotor_turns[rotor].reaction() * self.model.torque_per_thrust_m * thrusts_n[rotor];
-            mean_air_m_s += 0.25 * air_m_s;
+            torque_n_m.z += self.reactions_m[rotor] * thrusts_n[rotor];
         }
-        let past_m_s = velocity_m_s - mean_air_m_s;
-        force_n -= past_m_s.norm() * Vector3::from(self.model.parasitic_drag_n_s2_m2).component_mul(&past_m_s);
-        Wrench { force_n: state.attitude * force_n, torque_n_m }
+        if self.parasitic_n_s2_m2 != Vector3::zeros() {
+            let past_m_s = past_m_s + up * (0.25 * down_m_s.iter().sum::<f64>());
+            force_n -= past_m_s.norm() * self.parasitic_n_s2_m2.component_mul(&past_m_s);
+        }
+        Wrench { force_n: body * force_n, torque_n_m }
     }
 
-    /// Velocity of the air at each rotor of a vehicle, from 0 \[m/s\]: the wind there, and what the rotors of others blow down.
+    /// How fast the rotors of others blow down on each rotor of a vehicle, from 0 \[m/s\].
     #[must_use]
-    pub fn air_m_s(
-        &self,
-        vehicle: usize,
-        state: &State,
-        wind_m_s: Vector3<f64>,
-        jets: &[Downwash],
-    ) -> [Vector3<f64>; 4] {
-        let mut air_m_s = [wind_m_s; 4];
-        if !jets.is_empty() {
-            for (rotor, air_m_s) in air_m_s.iter_mut().enumerate() {
-                let place_m = state.position_m + state.attitude * self.arm_m(rotor);
-                let others = jets.iter().enumerate().filter(|(jet, _)| jet / 4 != vehicle);
-                let squared_m2_s2: f64 = others.map(|(_, jet)| jet.squared_m2_s2(place_m)).sum();
-                air_m_s.z -= squared_m2_s2.sqrt();
-            }
+    pub fn down_m_s(&self, vehicle: usize, state: &State, jets: &[Downwash]) -> [f64; 4] {
+        if jets.is_empty() {
+            return [0.0; 4];
         }
-        air_m_s
+        self.arms_m.map(|arm_m| {
+            let place_m = state.position_m + state.attitude * arm_m;
+            let others = jets.iter().enumerate().filter(|(jet, _)| jet / 4 != vehicle);
+            others.map(|(_, jet)| jet.squared_m2_s2(place_m)).sum::<f64>().sqrt()
+        })
     }
 
     /// Writes the jets of all rotors of these vehicles, four each, where they blow on each other.
@@ -201,7 +200,7 @@ impl Dynamics {
             for state in states {
                 let thrusts_n = self.thrusts_n(state);
                 jets.extend((0..4).map(|rotor| {
-                    let place_m = state.position_m + state.attitude * self.arm_m(rotor);
+                    let place_m = state.position_m + state.attitude * self.arms_m[rotor];
                     Downwash::new(place_m, self.model.rotor_radius_m, thrusts_n[rotor])
                 }));
             }

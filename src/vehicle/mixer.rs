@@ -7,8 +7,8 @@ use super::model::Model;
 /// Determinant, with lengths in arms, from which four rotors set thrust and torques each by itself.
 const LEAST_DETERMINANT: f64 = 1e-3;
 
-/// The shares of each rotor in a thrust and in the torques about the body's axes.
-#[derive(Clone, Debug, PartialEq)]
+/// The shares of each rotor in a thrust and in the torques about the body's axes; by default none.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mixer {
     /// Thrust of each rotor for a unit of all thrust, with no torque.
     lift: Vector4<f64>,
@@ -41,6 +41,10 @@ impl Mixer {
     #[must_use]
     pub fn thrusts_n(&self, lift_n: f64, torque_n_m: Vector3<f64>) -> Vector4<f64> {
         let [roll, pitch, yaw] = &self.turns;
+        let all = roll * torque_n_m.x + pitch * torque_n_m.y + yaw * torque_n_m.z + self.lift * lift_n;
+        if all.iter().all(|thrust_n| (0.0..=self.most_n).contains(thrust_n)) {
+            return all;
+        }
         let level = roll * torque_n_m.x + pitch * torque_n_m.y;
         let level = level * self.largest_share(&Vector4::zeros(), &level);
         let yaw = yaw * torque_n_m.z;

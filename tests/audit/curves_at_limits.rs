@@ -239,6 +239,15 @@ fn any_two_curves_are_judged_as_places_on_them_say() {
 }
 
 #[test]
+fn one_that_comes_near_in_the_last_place_of_a_time_is_near_from_then_on_and_not_until_before() {
+    let still = |duration_s: f64| (duration_s, vec![Vector3::zeros()]);
+    let (duration_s, speed) = (1.118_113_481_321_576, -8.943_636_014_638_072e29);
+    let falls = (duration_s, vec![Vector3::z() * 1e30, Vector3::z() * speed]);
+    let still = [still(0.639_789_898_891_851_6), still(3.522_182_792_088_384)];
+    assert_eq!(agree(&still, &[falls], Asked { delta_m: 1.0, above_m: None }), Ok(()));
+}
+
+#[test]
 fn two_whose_distance_touches_the_limit_are_judged_as_places_on_them_say() {
     // Bravo flies like alpha, aside by the limit and a power of the time from when they touch.
     let touch = (part(), 0.05..20.0_f64, 0.0..1.0_f64, 1..4_usize, -2.0..2.0_f64, asked());

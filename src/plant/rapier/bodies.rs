@@ -1,16 +1,17 @@
 // The plant itself, for whichever engine the including module calls `engine`.
 
 use engine::prelude::{
-    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, LockedAxes, PhysicsWorld, Real,
-    RigidBodyBuilder, RigidBodyHandle, SharedShape, Vector,
+    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, LockedAxes, MassProperties,
+    PhysicsWorld, Real, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape, Vector,
 };
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::plant::{Air, HullContact, Path, Plant, PlantError};
+use crate::plant::{Air, HullContact, Path, Plant, PlantError, Quadrotors};
 use crate::record::Channel;
 use crate::scenario::{CONTACT_PREDICTION_M, Scenario, Space};
 use crate::space::{Obstacle, Shape};
 use crate::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
+use crate::vehicle::{Drift, Fleet};
 
 /// Hulls meet hulls.
 const HULL: Group = Group::GROUP_1;
@@ -89,22 +90,9 @@ impl Bodies {
     }
 }
 
-/// With everything that the engine carries from step to step: bodies, contacts, islands, bounding volumes. What it leaves
-/// out is working memory.
 impl Clone for Bodies {
     fn clone(&self) -> Self {
-        let world = PhysicsWorld {
-            gravity: self.world.gravity,
-            integration_parameters: self.world.integration_parameters,
-            islands: self.world.islands.clone(),
-            broad_phase: self.world.broad_phase.clone(),
-            narrow_phase: self.world.narrow_phase.clone(),
-            bodies: self.world.bodies.clone(),
-            colliders: self.world.colliders.clone(),
-            impulse_joints: self.world.impulse_joints.clone(),
-            multibody_joints: self.world.multibody_joints.clone(),
-            ..PhysicsWorld::default()
-        };
+        let world = copied(&self.world);
         let (handles, mass_kg) = (self.handles.clone(), self.mass_kg.clone());
         let (held, drift_m_s, began_m) = (self.held.clone(), self.drift_m_s.clone(), self.began_m.clone());
         let air = self.air.clone();
@@ -200,38 +188,66 @@ impl Plant for Bodies {
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        let before = pairs.len();
-        let vehicle = |handle: ColliderHandle| {
-            let collider = self.world.colliders.get(handle)?;
-            let keeps_out = collider.collision_groups().memberships == KEEP_OUT;
-            keeps_out.then_some(usize::try_from(collider.user_data).ok()?)
-        };
-        for contact in self.world.narrow_phase.contact_pairs() {
-            // A manifold also holds contacts predicted for the near future: only an overlap counts.
-            let overlaps = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.dist < 0.0));
-            if overlaps && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
-                pairs.push(Pair::new(i, j));
-            }
-        }
-        pairs[before..].sort_unstable();
+        keep_out_contacts(&self.world, pairs);
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
-        let before = contacts.len();
-        for contact in self.world.narrow_phase.contact_pairs() {
-            // Keep-out balls push nothing.
-            let pushed = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.data.impulse > 0.0));
-            let vehicle = |handle: ColliderHandle| {
-                self.world.colliders.get(handle).and_then(|collider| usize::try_from(collider.user_data).ok())
-            };
-            if pushed && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
-                let apart = (row(&self.began_m, j) - row(&self.began_m, i)).normalize();
-                let closing_m_s = -(row(&self.drift_m_s, j) - row(&self.drift_m_s, i)).dot(&apart);
-                contacts.push(HullContact { pair: Pair::new(i, j), closing_m_s });
-            }
-        }
-        contacts[before..].sort_unstable_by_key(|contact| contact.pair);
+        hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
     }
+}
+
+/// Everything that the engine carries from step to step: bodies, contacts, islands, bounding volumes. What it leaves out is
+/// working memory.
+fn copied(world: &PhysicsWorld) -> PhysicsWorld {
+    PhysicsWorld {
+        gravity: world.gravity,
+        integration_parameters: world.integration_parameters,
+        islands: world.islands.clone(),
+        broad_phase: world.broad_phase.clone(),
+        narrow_phase: world.narrow_phase.clone(),
+        bodies: world.bodies.clone(),
+        colliders: world.colliders.clone(),
+        impulse_joints: world.impulse_joints.clone(),
+        multibody_joints: world.multibody_joints.clone(),
+        ..PhysicsWorld::default()
+    }
+}
+
+/// Appends the pairs whose keep-out balls overlap, in index order.
+fn keep_out_contacts(world: &PhysicsWorld, pairs: &mut Vec<Pair>) {
+    let before = pairs.len();
+    let vehicle = |handle: ColliderHandle| {
+        let collider = world.colliders.get(handle)?;
+        let keeps_out = collider.collision_groups().memberships == KEEP_OUT;
+        keeps_out.then_some(usize::try_from(collider.user_data).ok()?)
+    };
+    for contact in world.narrow_phase.contact_pairs() {
+        // A manifold also holds contacts predicted for the near future: only an overlap counts.
+        let overlaps = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.dist < 0.0));
+        if overlaps && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
+            pairs.push(Pair::new(i, j));
+        }
+    }
+    pairs[before..].sort_unstable();
+}
+
+/// Appends the pairs whose hulls pushed each other in a drift from these places \[m\] at these velocities \[m/s\], in index
+/// order.
+fn hull_contacts(world: &PhysicsWorld, began_m: &Rows, drift_m_s: &Rows, contacts: &mut Vec<HullContact>) {
+    let before = contacts.len();
+    for contact in world.narrow_phase.contact_pairs() {
+        // Keep-out balls push nothing.
+        let pushed = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.data.impulse > 0.0));
+        let vehicle = |handle: ColliderHandle| {
+            world.colliders.get(handle).and_then(|collider| usize::try_from(collider.user_data).ok())
+        };
+        if pushed && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
+            let apart = (row(began_m, j) - row(began_m, i)).normalize();
+            let closing_m_s = -(row(drift_m_s, j) - row(drift_m_s, i)).dot(&apart);
+            contacts.push(HullContact { pair: Pair::new(i, j), closing_m_s });
+        }
+    }
+    contacts[before..].sort_unstable_by_key(|contact| contact.pair);
 }
 
 fn empty_world() -> PhysicsWorld {
@@ -261,22 +277,30 @@ fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vecto
         .can_sleep(false);
     let handle = world.bodies.insert(body);
 
-    let among = |group: Group| InteractionGroups::new(group, group, InteractionTestMode::And);
-    let hull = ColliderBuilder::ball(real(scenario.hull_radius_m[i]))
-        .mass(real(scenario.mass_kg[i]))
-        .restitution(HULL_RESTITUTION)
-        .friction(0.0)
-        .collision_groups(among(HULL))
-        .user_data(i as u128);
-    let keep_out = ColliderBuilder::ball(real(scenario.metric().shortest_m(scenario.delta_m) / 2.0))
-        .density(0.0)
-        .collision_groups(among(KEEP_OUT))
-        .solver_groups(InteractionGroups::none())
-        .user_data(i as u128);
-    world.colliders.insert_with_parent(hull, handle, &mut world.bodies);
-    world.colliders.insert_with_parent(keep_out, handle, &mut world.bodies);
+    let hull = hull(scenario.hull_radius_m[i], i).mass(real(scenario.mass_kg[i]));
+    for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
+        world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
+    }
     world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
     handle
+}
+
+/// The solid ball of a vehicle.
+fn hull(radius_m: f64, vehicle: usize) -> ColliderBuilder {
+    ColliderBuilder::ball(real(radius_m))
+        .restitution(HULL_RESTITUTION)
+        .friction(0.0)
+        .collision_groups(InteractionGroups::new(HULL, HULL, InteractionTestMode::And))
+        .user_data(vehicle as u128)
+}
+
+/// The ball that keeps two vehicles a distance apart, in what it sees.
+fn keep_out(delta_m: f64, vehicle: usize) -> ColliderBuilder {
+    ColliderBuilder::ball(real(delta_m / 2.0))
+        .density(0.0)
+        .collision_groups(InteractionGroups::new(KEEP_OUT, KEEP_OUT, InteractionTestMode::And))
+        .solver_groups(InteractionGroups::none())
+        .user_data(vehicle as u128)
 }
 
 /// A solid that hulls meet and nothing moves. It is the hull of no vehicle.
@@ -310,6 +334,10 @@ fn reals(v: Vector3<f64>) -> Vector {
 }
 
 #[allow(clippy::useless_conversion, reason = "a widening in single precision only")]
+fn double(x: Real) -> f64 {
+    x.into()
+}
+
 fn doubles(v: Vector) -> Vector3<f64> {
-    Vector3::new(v.x.into(), v.y.into(), v.z.into())
+    Vector3::new(double(v.x), double(v.y), double(v.z))
 }

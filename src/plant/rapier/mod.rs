@@ -28,31 +28,60 @@
 //! A point with a drag d in a wind W obeys p'' = (a22 - d) v + u + d W: a22 - d takes the place of a22, and u + d W that of u, with
 //! W at the beginning of the step in w and at its end in v~ and v'. That is the trapezium's rule for d W, and second order.
 //!
+//! # Quadrotors
+//! A quadrotor is a body that turns, with the model's mass, inertia and hull; gravity, rotors and drag are added around the
+//! engine's step as above: half of the kick of the state before, the drift, half of the kick of the state after, whose
+//! velocities are predicted first. For rotation the kick is one of angular momentum, which keeps without torque:
+//!
+//! ```text
+//! l  = R J W + (dt/2) R M              the engine turns by the angular velocity that l has in the middle of the step
+//! W' = J^-1 (R'^T l + (dt/2) M')       about the body's axes, with the torque M' at the end
+//! ```
+//!
+//! The engine's own gyroscopic term, of first order, is switched off. Friction between hulls makes vehicles tumble after a
+//! hit. Rotors follow what is asked of them exactly over the step, and attitude loops run at its beginning.
+//!
 //! # Contacts
 //! The engine looks for contacts before it moves the bodies, so those that it reports after a step are of the state
 //! before that step: evidence that comes one step late, and never the verdict.
 
-use crate::plant::Plant;
+use crate::plant::{Plant, Quadrotors};
 use crate::scenario::{Precision, Scenario};
+use crate::vehicle::Fleet;
 
 /// Both modules hold the same source, compiled against the engine's two precisions.
 mod single {
     use rapier3d as engine;
     include!("bodies.rs");
+    include!("quadrotors.rs");
 }
 
 #[cfg(feature = "double")]
 mod double {
     use rapier3d_f64 as engine;
     include!("bodies.rs");
+    include!("quadrotors.rs");
 }
 
 /// A swarm of rigid bodies at the scenario's start.
 #[must_use]
 pub fn plant(scenario: &Scenario, precision: Precision) -> Box<dyn Plant> {
+    if let Some(fleet) = scenario.fleet() {
+        return quadrotors(scenario, precision, fleet);
+    }
     match precision {
         Precision::Single => Box::new(single::Bodies::new(scenario)),
         #[cfg(feature = "double")]
         Precision::Double => Box::new(double::Bodies::new(scenario)),
+    }
+}
+
+/// Quadrotors in any state, with the delta and the obstacles of a scenario.
+#[must_use]
+pub fn quadrotors(scenario: &Scenario, precision: Precision, fleet: Fleet) -> Box<dyn Quadrotors> {
+    match precision {
+        Precision::Single => Box::new(single::Fliers::new(scenario, fleet)),
+        #[cfg(feature = "double")]
+        Precision::Double => Box::new(double::Fliers::new(scenario, fleet)),
     }
 }

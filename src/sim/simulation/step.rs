@@ -115,6 +115,9 @@ impl Simulation {
         let time = &self.scenario.time;
         let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));
         if time.control_hz.is_some() {
+            if !self.overruled && step.is_some() {
+                self.controller.actuate(self.time_s, &mut self.control);
+            }
             self.motion.apply(&self.control, &mut self.state);
         }
         let Self { judge, controller, state, control, time_s, events, .. } = self;

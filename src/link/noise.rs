@@ -1,0 +1,113 @@
+//! Random numbers that are counted, not drawn in turn.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use std::f64::consts::TAU;
+
+/// Words of a block of the generator: draws of one number begin at a block of their own.
+const BLOCK_WORDS: u128 = 16;
+/// Words of a double.
+const DOUBLE_WORDS: usize = 2;
+
+/// What random numbers are for: streams of different sources never meet.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Source {
+    /// Errors of vehicles' own measurements.
+    Own,
+    /// Errors that they keep.
+    Bias,
+    /// Errors of what they see of each other.
+    Sight,
+    /// What becomes of messages.
+    Radio,
+}
+
+/// Random numbers that depend on a seed, on who draws them and on the number of the draw, and on nothing else: not on how
+/// often or in which order they are asked for.
+#[derive(Clone, Debug)]
+pub(super) struct Noise {
+    random: ChaCha8Rng,
+    source: Source,
+}
+
+impl Noise {
+    pub(super) fn new(seed: u64, source: Source) -> Self {
+        Self { random: ChaCha8Rng::seed_from_u64(seed), source }
+    }
+
+    pub(super) fn reseed(&mut self, seed: u64) {
+        *self = Self::new(seed, self.source);
+    }
+
+    /// The numbers of two vehicles' draw, of which each takes at most `doubles`.
+    pub(super) fn draw(&self, vehicle: usize, other: usize, number: u64, doubles: usize) -> Draw {
+        let mut random = self.random.clone();
+        // Two bits for the source, 31 for each vehicle.
+        random.set_stream((self.source as u64) << 62 | (vehicle as u64) << 31 | other as u64);
+        let blocks = (doubles * DOUBLE_WORDS).div_ceil(BLOCK_WORDS as usize) as u128;
+        random.set_word_pos(u128::from(number) * blocks * BLOCK_WORDS);
+        Draw { random }
+    }
+}
+
+/// Random numbers of one draw.
+pub(super) struct Draw {
+    random: ChaCha8Rng,
+}
+
+impl Draw {
+    /// Uniform in \[0, 1), a multiple of 2^-53.
+    pub(super) fn unit(&mut self) -> f64 {
+        const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
+        (self.random.next_u64() >> 11) as f64 * SCALE
+    }
+
+    /// Two independent normal numbers of mean 0 and variance 1 (Box and Muller), from two doubles.
+    fn normals(&mut self) -> [f64; 2] {
+        let (u, turn) = (self.unit(), self.unit());
+        let length = (-2.0 * libm::log(1.0 - u)).sqrt();
+        let (sin, cos) = libm::sincos(TAU * turn);
+        [length * cos, length * sin]
+    }
+
+    /// Six of them, from six doubles.
+    pub(super) fn six_normals(&mut self) -> [f64; 6] {
+        let [[a, b], [c, d], [e, f]] = [self.normals(), self.normals(), self.normals()];
+        [a, b, c, d, e, f]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_draw_is_the_same_whenever_it_is_asked_for_and_of_its_own_source_vehicle_and_number() {
+        let noise = Noise::new(7, Source::Own);
+        let first = noise.draw(3, 0, 41, 6).six_normals();
+        noise.draw(3, 0, 42, 6).six_normals();
+        assert_eq!(noise.draw(3, 0, 41, 6).six_normals(), first);
+        let others = [
+            noise.draw(3, 0, 42, 6),
+            noise.draw(4, 0, 41, 6),
+            noise.draw(3, 1, 41, 6),
+            Noise::new(8, Source::Own).draw(3, 0, 41, 6),
+            Noise::new(7, Source::Sight).draw(3, 0, 41, 6),
+        ];
+        for mut other in others {
+            assert!(other.six_normals().iter().zip(first).all(|(a, b)| *a != b));
+        }
+    }
+
+    #[test]
+    fn normal_numbers_have_mean_0_variance_1_and_the_fourth_moment_3() {
+        let noise = Noise::new(1, Source::Own);
+        let numbers: Vec<f64> = (0..50_000).flat_map(|number| noise.draw(0, 0, number, 6).six_normals()).collect();
+        let moment = |power: i32| numbers.iter().map(|x| x.powi(power)).sum::<f64>() / numbers.len() as f64;
+        // Standard errors of 300,000 numbers: 0.002, 0.003 and 0.02.
+        assert!(moment(1).abs() < 0.007 && (moment(2) - 1.0).abs() < 0.01 && (moment(4) - 3.0).abs() < 0.07);
+        // Neighbours of a draw do not know of each other.
+        let pairs = numbers.chunks_exact(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / 150_000.0;
+        assert!(pairs.abs() < 0.01, "{pairs}");
+    }
+}

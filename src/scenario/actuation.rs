@@ -1,0 +1,83 @@
+//! `[actuation]`: how commands become accelerations.
+
+#[cfg(feature = "schema")]
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::error::ScenarioError;
+use super::limits::{at_least_zero, positive};
+use super::spec::Scenario;
+
+/// How commands become accelerations: as given and at once unless given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ActuationSpec {
+    /// No vehicle is accelerated by more than this \[m/s^2\]: longer commands are shortened.
+    pub max_accel_m_s2: Option<f64>,
+    /// Time constant with which the acceleration follows the command \[s\]; 0 where it is the command.
+    pub lag_s: f64,
+}
+
+/// How commands become accelerations.
+#[cfg(feature = "files")]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ActuationTable {
+    /// How often the law is asked in Hz, each command being held in between: the same as `time.control_hz`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    pub(super) control_hz: Option<f64>,
+    /// No vehicle is accelerated by more than this in m/s^2: longer commands are shortened, in their direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    max_accel_m_s2: Option<f64>,
+    /// Time constant in s with which the acceleration follows the command, lag a' = u - a, from none at the start.
+    #[serde(skip_serializing_if = "super::sensing::is_off")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0, "minimum" = 0)))]
+    lag_s: f64,
+}
+
+#[cfg(feature = "files")]
+impl ActuationTable {
+    /// The control rate \[Hz\], of which `[time]` has the same key.
+    pub(super) fn control_hz(&self, of_time_hz: Option<f64>) -> Result<Option<f64>, ScenarioError> {
+        match (self.control_hz, of_time_hz) {
+            (Some(own_hz), Some(of_time_hz)) if own_hz != of_time_hz => Err(ScenarioError::new(format!(
+                "actuation.control_hz is {own_hz} and time.control_hz is {of_time_hz}, and both are the control rate"
+            ))
+            .with_help("keep one of them")
+            .at("actuation.control_hz")
+            .at("time.control_hz")),
+            (own_hz, of_time_hz) => Ok(own_hz.or(of_time_hz)),
+        }
+    }
+
+    pub(super) fn spec(&self) -> ActuationSpec {
+        ActuationSpec { max_accel_m_s2: self.max_accel_m_s2, lag_s: self.lag_s }
+    }
+}
+
+#[cfg(feature = "files")]
+impl From<ActuationSpec> for ActuationTable {
+    fn from(spec: ActuationSpec) -> Self {
+        Self { control_hz: None, max_accel_m_s2: spec.max_accel_m_s2, lag_s: spec.lag_s }
+    }
+}
+
+impl Scenario {
+    /// A limit that lets vehicles move, and a lag that the plant can have.
+    pub(super) fn check_actuation(&self) -> Result<(), ScenarioError> {
+        let ActuationSpec { max_accel_m_s2, lag_s } = self.actuation;
+        if let Some(most_m_s2) = max_accel_m_s2 {
+            positive("actuation.max_accel_m_s2", "the largest acceleration", most_m_s2)?;
+        }
+        at_least_zero("actuation.lag_s", "the lag of the acceleration", lag_s)?;
+        if lag_s == 0.0 || self.plant.holds_commands() {
+            return Ok(());
+        }
+        Err(ScenarioError::new("the ideal plant's vehicles are accelerated as they are commanded, without a lag")
+            .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
+            .at("actuation.lag_s")
+            .at("plant.kind"))
+    }
+}
