@@ -102,10 +102,11 @@ fn report(
         ending => ending.reason(),
     };
     let wall_s = flight.performance.wall.as_secs_f64();
+    let in_metres = flight.in_metres.as_ref().unwrap_or(&flight.audit);
     let hulls = if scenario.engine().is_some() {
-        Hulls::solid(&flight.bounces, &flight.audit, &scenario.hull_radius_m, scenario.time.dt_s)
+        Hulls::solid(&flight.bounces, in_metres, &scenario.hull_radius_m, scenario.time.dt_s)
     } else {
-        Hulls::of_points(&flight.audit, &scenario.hull_radius_m)
+        Hulls::of_points(in_metres, &scenario.hull_radius_m)
     };
     let vehicle =
         scenario.airframe.quadrotor().zip(metrics.strain()).map(|(Quadrotor { model, .. }, strain)| VehicleNumbers {
@@ -117,12 +118,14 @@ fn report(
         scenario_name: &scenario.name,
         scenario_sha256: &scenario.sha256_hex(),
         delta_m: scenario.delta_m,
+        half_axes_m: scenario.half_axes_m(),
         judge: scenario.arrival,
         trap_dimension: preflight.trap_dimension(),
         formation_dimension: preflight.formation_dimension,
         refused: &preflight.refusing(),
         certificate: &flight.certificate,
         audit: &flight.audit,
+        in_metres: flight.in_metres.as_ref(),
         clearance: flight.clearance.as_ref(),
         obstacles: &scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect::<Vec<_>>(),
         engine_contact_pairs: scenario.engine().is_some().then_some(flight.engine_contacts.len() as u64),

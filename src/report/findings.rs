@@ -19,6 +19,8 @@ pub struct Findings<'a> {
     pub scenario_sha256: &'a str,
     /// Safety distance delta that was judged by \[m\].
     pub delta_m: f64,
+    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\], of which delta is the width; none for a ball.
+    pub half_axes_m: Option<[f64; 3]>,
     /// What counted as reached.
     pub judge: Arrival,
     /// Dimension of the flat that the start never leaves, where the formation does not fit into it: 0 point, 1 line,
@@ -32,6 +34,8 @@ pub struct Findings<'a> {
     pub certificate: &'a Certificate,
     /// What the judge found.
     pub audit: &'a AuditOutcome,
+    /// What it found in metres where lengths were scaled.
+    pub in_metres: Option<&'a AuditOutcome>,
     /// What it found of the ways past obstacles, where there are any, and the names of these.
     pub clearance: Option<&'a ClearanceOutcome>,
     /// Names of the obstacles, in the order of the scenario.

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
+use super::ellipsoid::Ellipsoid;
 use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
 use super::legs::{self, LegNumbers};
@@ -105,6 +106,9 @@ pub struct Separation<Delta = f64> {
     pub certified_until_s: Option<f64>,
     /// Why the certificate is void, a sentence each; empty where it holds.
     pub certificate_void: Vec<String>,
+    /// Where an ellipsoid must stay empty around each vehicle: distances above, and in the audit, are scaled lengths then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ellipsoid: Option<Ellipsoid>,
 }
 
 impl<Delta> Separation<Delta> {
@@ -258,6 +262,7 @@ impl Report {
                 certified_m: certificate.certified_m.and_then(finite),
                 certified_until_s: certificate.certified_until_s.and_then(finite),
                 certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+                ellipsoid: Ellipsoid::of(findings),
             },
             audit: Audit {
                 status: findings.status(),

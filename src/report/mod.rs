@@ -6,6 +6,7 @@
 //! null.
 
 mod artefact;
+mod ellipsoid;
 mod energy;
 mod findings;
 mod flight;
@@ -23,6 +24,7 @@ mod words;
 
 pub use crate::audit::Status;
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
+pub use ellipsoid::Ellipsoid;
 pub use findings::{Findings, INTERRUPTED, Performance, Run};
 pub use flight::{
     Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,
