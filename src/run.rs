@@ -126,7 +126,7 @@ fn report(
         breaths: &flight.breaths,
         assignments: &flight.assignments,
         energy_rise: flight.energy_rise,
-        energy_falls: energy_falls(preflight, &flight.certificate),
+        energy_falls: scenario.wind.is_still() && energy_falls(preflight, &flight.certificate),
         epsilon: scenario.plant.epsilon(),
         run: &Run {
             duration_s: flight.duration_s,

@@ -1,14 +1,19 @@
 //! The displacement law: consensus on the slots over any connected graph, and a one-sided edge tension between all who are
 //! near.
 
+mod conditions;
+mod promise;
+
+use conditions::{growth, voids};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, LegBound, Void};
+use super::certificate::{Certificate, Void};
 use super::clearance::{ClearanceTension, slot_room_m};
 use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
 use super::contact::in_contact;
 use super::error::{LawError, ParameterError};
+use super::growth::Growth;
 use super::interface::{Controls, Law, VelocityMargin};
 use super::memo::Memo;
 use super::modes::{Linear, Mode};
@@ -20,7 +25,7 @@ use crate::graph::Pinning;
 use crate::observation::Observation;
 use crate::space::{NearPairs, Obstacle};
 use crate::swarm::{Pair, Rows, row, set_row};
-use crate::target::{Guidance, ReferenceMotion, Target};
+use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "displacement"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -89,7 +94,11 @@ impl DisplacementKeys {
 ///
 /// # Certificate
 /// `V_R(l_ij(t)) <= E(0)` for *every* pair, for ever, on *every* connected graph. It assumes exact knowledge of links and near
-/// pairs, a common compass, no delay, no saturation, no disturbance and continuous time.
+/// pairs, a common compass, no delay, no saturation and continuous time.
+///
+/// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of `|w~_i|^2`/(4 zeta) to E, with
+/// `c - a22` for zeta, and at most that of |w~|/sqrt 2 to sqrt E: what is certified then is certified to the end of the flight.
+/// w~ counts as v~ does: what all feel alike is nothing to a swarm without a reference.
 ///
 /// Where slots change by D, at once or along straight lines, `sqrt E` grows by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`:
 /// what holds through all legs is known before the first step.
@@ -112,6 +121,8 @@ pub struct DisplacementLaw {
     is_fed: bool,
     /// Why nothing is certified from any start.
     voids: Vec<Void>,
+    /// What the wind may add to the energy, where it blows.
+    growth: Option<Growth>,
     /// Least eigenvalue of the pinned Laplacian, and a bound on its largest.
     connectivity: f64,
     largest: f64,
@@ -136,7 +147,7 @@ impl DisplacementLaw {
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
     /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
     pub fn new(setting: &Setting<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s } = setting;
+        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s, .. } = setting;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
         for formation in std::iter::once(formation).chain(later.iter().map(|leg| &leg.formation)) {
             ParameterError::check(links, formation, &gains)?;
@@ -164,6 +175,7 @@ impl DisplacementLaw {
             let tension = ClearanceTension::new(keys.alpha, range_m);
             Some(tension.map_err(|source| ParameterError::Tension { pair: Pair::new(0, 1), source })?)
         };
+        let growth = growth(setting, (keys.zeta_per_s + a22_per_s).max(0.0) - a22_per_s);
         Ok(Self {
             clearance,
             largest: links.largest_eigenvalue_bound(&pulls.pinning),
@@ -172,6 +184,7 @@ impl DisplacementLaw {
             delta_m,
             a22_per_s,
             is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
+            growth,
             voids: voids(setting),
             connectivity,
             tension,
@@ -242,23 +255,6 @@ impl DisplacementLaw {
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
 
-    /// What holds from a state of this energy on, and from each time that the slots become those of the next formation.
-    fn bounds(&self, energy: f64, now: &Formation, ahead: &[&Formation]) -> Vec<LegBound> {
-        let bound = |energy: f64| LegBound {
-            energy,
-            certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)),
-            certified_room_m: self.clearance.map(|clearance| clearance.least_room_m(energy)),
-        };
-        let (mut before, mut root) = (now, energy.sqrt());
-        let mut bounds = vec![bound(energy)];
-        for &next in ahead {
-            root += self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt();
-            bounds.push(bound(root * root));
-            before = next;
-        }
-        bounds
-    }
-
     /// R for these slots \[m\].
     fn rest_for(&self, formation: &Formation) -> (Pair, f64) {
         let (pair, distance_m) = nearest_slots(formation, self.delta_m);
@@ -278,26 +274,6 @@ fn tension_between(
 ) -> Result<EdgeTension, ParameterError> {
     let (pair, rest_m) = nearest_slots(formation, delta_m);
     EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })
-}
-
-/// Why nothing is certified from any start: followers are not told how their reference moves, a swarm is carried past obstacles
-/// that stand, or its absolute velocity, which counts among them, is fed.
-fn voids(setting: &Setting<'_>) -> Vec<Void> {
-    let &Setting { guidance, obstacles, a22_per_s, .. } = setting;
-    let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed(&of.motion, a22_per_s);
-    let is_carried = guidance.is_some_and(|of| !of.motion.is_at_rest());
-    let is_driven = guidance.is_none() && a22_per_s > 0.0;
-    let reasons = [
-        (guidance.is_some_and(is_unfed), Void::ReferenceNotFed),
-        (!obstacles.is_empty() && is_carried, Void::CarriedPastObstacles),
-        (!obstacles.is_empty() && is_driven, Void::VelocityUndamped),
-    ];
-    reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
-}
-
-/// Whether a vehicle on the reference stays on it by itself.
-fn needs_no_feed(motion: &ReferenceMotion, a22_per_s: f64) -> bool {
-    motion.is_at_rest() || (motion.is_uniform() && a22_per_s == 0.0)
 }
 
 impl Law for DisplacementLaw {
@@ -354,20 +330,7 @@ impl Law for DisplacementLaw {
     }
 
     fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
-        let energy = match self.try_energy(start) {
-            Ok(energy) => energy,
-            Err(fault) => return Certificate::void(Void::StartRefused(fault)),
-        };
-        let legs = self.bounds(energy, start.target.formation, ahead);
-        let last = legs.last();
-        let (certified_m, certified_room_m) =
-            (last.and_then(|last| last.certified_m), last.and_then(|last| last.certified_room_m));
-        let legs = if ahead.is_empty() { Vec::new() } else { legs };
-        let closes_in = ahead.iter().any(|formation| self.rest_for(formation).1 < self.tension.rest_m());
-        let promised =
-            Certificate { certified_m, certified_room_m, energy_initial: Some(energy), void: Vec::new(), legs }
-                .void_where(closes_in, Void::TargetChanges);
-        self.voids.iter().fold(promised, |promised, &void| promised.void_where(true, void))
+        self.promise_through(start, ahead)
     }
 
     /// In contact on the complete graph without a reference.
@@ -402,6 +365,10 @@ impl Law for DisplacementLaw {
             return &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"];
         }
         &["all share a compass", "each sees who is nearer than slots are"]
+    }
+
+    fn reckons_with_wind(&self) -> bool {
+        true
     }
 
     fn keeps_clear_of_obstacles(&self) -> bool {

@@ -10,11 +10,12 @@ use super::consensus::{
     relative_kinetic_energy,
 };
 use super::error::{LawError, ParameterError};
+use super::growth::{Frame, Grown, Growth};
 use super::interface::{Controls, Law, VelocityMargin};
 use super::kernel::Kernel;
 use super::memo::Memo;
 use super::modes::{Linear, Mode};
-use super::setting::{Gain, Setting};
+use super::setting::{Blown, Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -31,6 +32,9 @@ pub struct EdgeTensionKeys {
     #[serde(default = "one")]
     pub alpha: f64,
 }
+
+/// Rate at which the law damps relative velocities on the complete graph, whatever a22 is \[1/s\].
+const DAMPING_PER_S: f64 = 1.0;
 
 fn one() -> f64 {
     1.0
@@ -54,7 +58,14 @@ impl EdgeTensionKeys {
 
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<EdgeTensionLaw, ParameterError> {
         let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
-        EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })
+        let law =
+            EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })?;
+        let is_unbounded = |blown: &Blown<'_>| blown.wind.turbulence.is_some() && !blown.wind.shared;
+        Ok(EdgeTensionLaw {
+            growth: setting.blown.map(|blown| Growth::new(&blown, links.count(), Frame::Mean, DAMPING_PER_S)),
+            is_unbounded: setting.blown.as_ref().is_some_and(is_unbounded),
+            ..law
+        })
     }
 }
 
@@ -99,6 +110,9 @@ pub struct EdgeTensionLaw {
     tightest: Option<EdgeTension>,
     /// That of the target whose distances are desired.
     revision: u64,
+    /// What the wind may add to the energy, where it blows, and whether that has no bound.
+    growth: Option<Growth>,
+    is_unbounded: bool,
     /// (1/alpha) sum of V over the edges.
     memo: Memo,
 }
@@ -126,6 +140,8 @@ impl EdgeTensionLaw {
             kernel: Kernel::new(graph, parameters.delta_m, inverse_k_per_m),
             tightest: None,
             revision: 0,
+            growth: None,
+            is_unbounded: false,
             memo: Memo::new(graph.count()),
         };
         law.set_rest_lengths().map_err(|(pair, source)| ParameterError::Tension { pair, source })?;
@@ -260,7 +276,8 @@ impl Law for EdgeTensionLaw {
 
     fn promise(&self) -> &'static str {
         "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on the control, no \
-         disturbance and continuous time: the law's energy never grows, so no pair's tension exceeds N E(0)."
+         disturbance but the wind of the scenario and continuous time: the law's energy grows by no more than that wind can add, so no \
+         pair's tension exceeds N times all of it."
     }
 
     fn barrier_m(&self) -> Option<f64> {
@@ -322,7 +339,10 @@ impl Law for EdgeTensionLaw {
     /// the same function, so the pair that may come closest is the one with the smallest K, and one root
     /// ([`EdgeTension::push_side_root`]) answers for all pairs.
     ///
-    /// The promise is that of the proof: exact state, no delay, no saturation, no disturbance, continuous time.
+    /// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of
+    /// `|w_i - mean w|^2`/4 to E: what all feel alike changes nothing.
+    ///
+    /// The promise is that of the proof: exact state, no delay, no saturation, no other disturbance, continuous time.
     /// Without pairs there is nothing to promise, and nothing void either.
     fn certificate(&self, start: &Observation<'_>) -> Certificate {
         let energy = self.try_energy(start.own);
@@ -333,9 +353,31 @@ impl Law for EdgeTensionLaw {
         if let Err(fault) = energy {
             void.push(Void::StartRefused(fault));
         }
+        if self.is_unbounded {
+            void.push(Void::WindUnbounded);
+        }
         let energy_initial = energy.ok();
-        let certified_m = if void.is_empty() { self.linked_separation_m(start) } else { None };
-        Certificate { certified_m, certified_room_m: None, energy_initial, void, legs: Vec::new() }
+        let promised = energy_initial.zip(self.tightest).filter(|_| void.is_empty());
+        let count = start.own.count() as f64;
+        let grown = promised.map(|(energy, tightest)| match &self.growth {
+            None => Grown { energy, until_s: None },
+            Some(growth) => {
+                let borne = tightest.value(tightest.delta_m() + growth.resolution_m()) / count;
+                growth.of(energy, start.time_s, borne)
+            }
+        });
+        Certificate {
+            certified_m: promised.zip(grown).map(|((_, tightest), most)| tightest.push_side_root(count * most.energy)),
+            certified_until_s: grown.and_then(|grown| grown.until_s),
+            certified_room_m: None,
+            energy_initial,
+            void,
+            legs: Vec::new(),
+        }
+    }
+
+    fn reckons_with_wind(&self) -> bool {
+        true
     }
 }
 

@@ -54,7 +54,8 @@ pub trait Law: DynClone + Send {
     /// What the certified distance rests on, a sentence.
     fn promise(&self) -> &'static str {
         "The certified distance holds for exact states of all whom a vehicle hears and sees, no delay, no limit on the control, no \
-         disturbance and continuous time: the law's energy never grows, and no pair can hold more than all of it."
+         disturbance but the wind of the scenario and continuous time: the law's energy grows by no more than that wind can add, and \
+         no pair can hold more than all of it."
     }
 
     /// Distance below which no pair joined by a link comes for as long as the energy does not exceed that of this start
@@ -93,6 +94,11 @@ pub trait Law: DynClone + Send {
     /// velocity coefficient a22. `None` where none is known, or where it depends on a distance that is not given.
     fn fastest_rate_per_s(&self, _nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
         None
+    }
+
+    /// Whether what the law certifies counts a wind in. What any other certifies is void where one blows.
+    fn reckons_with_wind(&self) -> bool {
+        false
     }
 
     /// Whether the law keeps vehicles clear of the obstacles that it is told of. What any other certifies is void where there

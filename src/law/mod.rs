@@ -15,6 +15,7 @@ mod displacement;
 mod edge_tension;
 mod error;
 mod flocking;
+mod growth;
 mod half_spaces;
 mod interface;
 mod kernel;
@@ -40,7 +41,7 @@ pub use laplacian::{LaplacianKeys, LaplacianLaw};
 pub use modes::{Heard, HeardLinks, Linear, Mode};
 pub use orca::{OrcaKeys, OrcaLaw};
 pub use potential::{PotentialKeys, PotentialLaw};
-pub use setting::{Gain, Setting};
+pub use setting::{Blown, Gain, Setting};
 pub use spec::LawSpec;
 pub use tension::{EdgeTension, TensionError};
 

@@ -52,6 +52,9 @@ pub struct Preflight {
     pub energy_initial: Option<f64>,
     /// Separation below which no pair ever comes \[m\].
     pub certified_m: Option<f64>,
+    /// Up to when \[s\]; null where it holds for ever, or nothing is certified. Where a wind blows on it is the end of the flight, or
+    /// when what the wind may have added leaves too little to be told from delta.
+    pub certified_until_s: Option<f64>,
     /// What every vehicle keeps beyond the clearance of every obstacle \[m\], where there are obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified_room_m: Option<f64>,
@@ -143,7 +146,7 @@ impl Preflight {
         let certificate = scenario.certificate(law.as_ref());
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
-        let drift = scenario.drift(law.common_mode_rate_per_s(scenario.a22_per_s));
+        let drift = scenario.drift(law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()));
         let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
             scenario: scenario.name.clone(),
@@ -151,10 +154,13 @@ impl Preflight {
             dimensions: scenario.space.dimensions(),
             delta_m: scenario.delta_m,
             algebraic_connectivity: connectivity,
-            velocity_margin_per_s: law.velocity_margin(connectivity, scenario.a22_per_s).map(|margin| margin.per_s),
-            common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.a22_per_s),
+            velocity_margin_per_s: law
+                .velocity_margin(connectivity, scenario.velocity_coefficient_per_s())
+                .map(|margin| margin.per_s),
+            common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()),
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
+            certified_until_s: certificate.certified_until_s,
             certified_room_m: certificate.certified_room_m,
             start_room_m: least_room(&scenario.obstacles, &scenario.start.positions_m).map(|(room_m, ..)| room_m),
             legs: certificate
@@ -173,10 +179,12 @@ impl Preflight {
             drift_m: drift.distance_m,
             spacing_m: drift.spacing_m,
             dt_s: scenario.time.dt_s,
-            dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s).map(|rate_per_s| {
-                let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
-                scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
-            }),
+            dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.velocity_coefficient_per_s()).map(
+                |rate_per_s| {
+                    let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
+                    scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
+                },
+            ),
             dt_links_s: links_step_s(law.as_ref(), scenario),
             margins: margins::margins(law.as_ref(), scenario),
             samples: scenario.time.samples(),
@@ -193,7 +201,11 @@ impl Preflight {
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
         let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
-        if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {
+        if scenario.wind.is_still()
+            && certificate.void == [Void::GraphNotComplete]
+            && found.velocity_margin_per_s.is_some()
+            && undamped.is_none()
+        {
             found.certified_edges_m = law.linked_separation_m(&start);
         }
         let trap = if found.trap_dimension() == Some(2) { Code::StartInPlane } else { Code::StartOnLine };
@@ -226,7 +238,7 @@ impl Preflight {
     }
 
     fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<String> {
-        let margin = law.velocity_margin(self.algebraic_connectivity, scenario.a22_per_s)?;
+        let margin = law.velocity_margin(self.algebraic_connectivity, scenario.velocity_coefficient_per_s())?;
         (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
             let rate = numbers::rate(margin.per_s);
             format!(
@@ -337,7 +349,7 @@ impl Preflight {
     }
 
     fn why_common_mode_grows(&self, scenario: &Scenario) -> &'static str {
-        if self.common_mode_rate_per_s < scenario.a22_per_s {
+        if self.common_mode_rate_per_s < scenario.velocity_coefficient_per_s() {
             "the law brakes it too little"
         } else {
             "the law cannot move the centre of mass"
@@ -369,7 +381,7 @@ impl Preflight {
 /// shorter still.
 /// Longest step that the links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
 fn links_step_s(law: &dyn Law, scenario: &Scenario) -> Option<f64> {
-    let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.a22_per_s)?;
+    let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.velocity_coefficient_per_s())?;
     (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| scenario.time.max_rate_dt / rate_per_s)
 }
 

@@ -3,7 +3,7 @@
 use super::margins;
 use super::numbers::{rate, significant};
 use super::{LegPromise, Preflight};
-use crate::text::{at_least, counted, table};
+use crate::text::{at_least, counted, seconds, table};
 
 impl Preflight {
     /// The check in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings`,
@@ -75,7 +75,8 @@ impl Preflight {
                     (true, false) => ", renewed where slots are spread (breathing.mode)",
                     _ => "",
                 };
-                format!("{} m, from {energy}{breath}", at_least(certified_m, 6))
+                let until = self.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+                format!("{} m{}, from {energy}{breath}", at_least(certified_m, 6), until.unwrap_or_default())
             }
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }

@@ -96,8 +96,18 @@ pub struct Separation<Delta = f64> {
     pub min_pair: Option<[usize; 2]>,
     /// Distance that the law's certificate promised before the first step, and anew wherever slots were spread \[m\].
     pub certified_m: Option<f64>,
+    /// Up to when it is promised \[s\]; null where it holds for ever, or nothing is promised.
+    #[serde(default)]
+    pub certified_until_s: Option<f64>,
     /// Why the certificate is void, a sentence each; empty where it holds.
     pub certificate_void: Vec<String>,
+}
+
+impl<Delta> Separation<Delta> {
+    /// Whether what was promised was promised of the time at which two came closest.
+    pub(super) fn is_promised(&self) -> bool {
+        self.certified_until_s.zip(self.min_at_s).is_none_or(|(until_s, min_at_s)| min_at_s <= until_s)
+    }
 }
 
 /// What the judgement rests on.
@@ -242,6 +252,7 @@ impl Report {
                 min_at_s: closest.and_then(|closest| finite(closest.time_s)),
                 min_pair: closest.map(|closest| closest.pair.numbers()),
                 certified_m: certificate.certified_m.and_then(finite),
+                certified_until_s: certificate.certified_until_s.and_then(finite),
                 certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             },
             audit: Audit {

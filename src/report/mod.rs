@@ -15,6 +15,7 @@ mod legs;
 mod obstacles;
 pub mod page;
 pub mod recorded;
+mod vehicles;
 mod verdict;
 mod verification;
 mod words;

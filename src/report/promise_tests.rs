@@ -48,6 +48,7 @@ fn a_certificate_is_broken_by_a_share_of_its_clearance() {
     let report = |certified_m: f64, closest_m: f64| {
         let certificate = Certificate {
             certified_m: Some(certified_m),
+            certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(3.656),
             void: vec![],

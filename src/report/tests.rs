@@ -59,6 +59,7 @@ impl Case {
     pub(super) fn good() -> Self {
         let certificate = Certificate {
             certified_m: Some(2.055_307),
+            certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(3.656),
             void: vec![],
@@ -160,6 +161,7 @@ separation
   min_at_s
   min_pair
   certified_m
+  certified_until_s
   certificate_void
 audit
   status
@@ -284,6 +286,7 @@ fn rounding_breaks_no_certificate() {
     // A swarm that starts in its own formation certifies its own distances, and flies in single precision.
     let certificate = Certificate {
         certified_m: Some(3.0),
+        certified_until_s: None,
         certified_room_m: None,
         energy_initial: Some(0.0),
         void: vec![],

@@ -47,7 +47,8 @@ impl Report {
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
                 let broken = match (self.separation.min_m, self.separation.certified_m) {
                     (Some(min_m), Some(certified_m))
-                        if breaks_certificate(min_m, certified_m, self.separation.delta_m) =>
+                        if self.separation.is_promised()
+                            && breaks_certificate(min_m, certified_m, self.separation.delta_m) =>
                     {
                         format!(", which breaks the certificate of {} m", at_least(certified_m, 6))
                     }
@@ -150,7 +151,10 @@ impl Report {
         let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         let certified = match separation.certified_m {
-            Some(certified_m) => format!("certified {} m", at_least(certified_m, 6)),
+            Some(certified_m) => {
+                let until = separation.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+                format!("certified {} m{}", at_least(certified_m, 6), until.unwrap_or_default())
+            }
             None => "not certified".to_owned(),
         };
         format!(

@@ -68,6 +68,9 @@ mod validate;
 #[cfg(feature = "files")]
 mod values;
 mod vehicle;
+mod weather;
+#[cfg(feature = "files")]
+mod wind;
 
 pub use actuation::ActuationSpec;
 pub use error::{Field, Place, ScenarioError};

@@ -17,6 +17,7 @@ use super::reference::ReferenceTable;
 use super::spec::{PlantSpec, Scenario, Space};
 use super::values::{Edge, PerVehicle, Point};
 use super::vehicle::VehicleTable;
+use super::wind::WindTable;
 use crate::swarm::Rows;
 use crate::target::{Begins, Leg};
 
@@ -70,7 +71,7 @@ impl Scenario {
 
 impl From<&Scenario> for Document {
     fn from(scenario: &Scenario) -> Self {
-        let law = scenario.law.clone().complete(scenario.a22_per_s);
+        let law = scenario.law.clone().complete(scenario.velocity_coefficient_per_s());
         let (kind, precision) = match scenario.plant {
             PlantSpec::Rapier(precision) => (PlantKind::Rapier, Some(precision)),
             PlantSpec::Ideal => (PlantKind::Ideal, None),
@@ -85,6 +86,7 @@ impl From<&Scenario> for Document {
                 a22_per_s: scenario.a22_per_s,
             },
             vehicle: VehicleTable::from(scenario),
+            wind: WindTable::of(&scenario.wind),
             start: StartTable {
                 positions_m: Some(scenario.points(&scenario.start.positions_m)),
                 velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),

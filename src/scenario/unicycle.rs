@@ -44,6 +44,13 @@ impl Scenario {
                 .at("swarm.a22_per_s")
                 .at("vehicle.model"));
         }
+        if self.drag_per_s != 0.0 || !self.wind.is_still() {
+            let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
+            return Err(ScenarioError::new("a unicycle does not feel the air")
+                .with_help("leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model")
+                .at(key)
+                .at("vehicle.model"));
+        }
         for i in 0..self.count() {
             let speed_m_s = Heading::of(row(&self.start.velocities_m_s, i)).speed_m_s;
             let (least, most) = (min_speed_m_s * (1.0 - ROUNDING), max_speed_m_s * (1.0 + ROUNDING));

@@ -52,6 +52,7 @@ impl Scenario {
         self.check_obstacles()?;
         check_connected(&self.graph)?;
         self.check_time()?;
+        self.check_wind()?;
         self.check_arrival()?;
         self.check_breathing()?;
         self.check_noise()?;

@@ -3,7 +3,7 @@
 #[cfg(feature = "files")]
 use std::fmt;
 #[cfg(feature = "files")]
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -88,6 +88,17 @@ pub(super) struct VehicleTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
     max_accel_m_s2: Option<f64>,
+    /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
+    /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
+    #[serde(skip_serializing_if = "is_none")]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
+    pub(super) drag_per_s: f64,
+}
+
+#[cfg(feature = "files")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_none(drag_per_s: &f64) -> bool {
+    *drag_per_s == 0.0
 }
 
 /// A model by name, by file, or with all of its keys.
@@ -244,9 +255,10 @@ impl VehicleTable {
 #[cfg(feature = "files")]
 impl From<&Scenario> for VehicleTable {
     fn from(scenario: &Scenario) -> Self {
+        let drag_per_s = scenario.drag_per_s;
         let quadrotor = match &scenario.airframe {
-            Airframe::Point => return Self::default(),
-            Airframe::Unicycle(unicycle) => return Self::from(unicycle),
+            Airframe::Point => return Self { drag_per_s, ..Self::default() },
+            Airframe::Unicycle(unicycle) => return Self { drag_per_s, ..Self::from(unicycle) },
             Airframe::Quadrotor(quadrotor) => quadrotor,
         };
         let model = &quadrotor.model;
@@ -263,6 +275,7 @@ impl From<&Scenario> for VehicleTable {
             attitude_damping: Some(model.attitude_damping),
             ground_effect: Some(quadrotor.ground_effect),
             downwash: Some(quadrotor.downwash),
+            drag_per_s,
             ..Self::default()
         }
     }
@@ -284,7 +297,7 @@ impl From<&Unicycle> for VehicleTable {
 
 /// Reads the file of a model.
 #[cfg(feature = "files")]
-fn read(path: &PathBuf) -> Result<Model, ScenarioError> {
+fn read(path: &Path) -> Result<Model, ScenarioError> {
     let shown = path.display().to_string();
     let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
         ScenarioError::new(format!("{shown} is not UTF-8")).with_help("save the file as UTF-8 text").at(MODEL)
@@ -303,7 +316,9 @@ impl Scenario {
             _ => None,
         };
         let grounds: Vec<_> = self.obstacles.iter().filter_map(ground).collect();
-        Some(Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane))
+        let fleet = Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane);
+        let fleet = fleet.failing(self.rotor_failures());
+        Some(if self.wind.is_still() { fleet } else { fleet.blown(self.air()) })
     }
 
     /// Makes every vehicle one of these, with the mass, the hull and the default rates of its kind. Points of a quadrotor's mass

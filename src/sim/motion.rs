@@ -115,12 +115,12 @@ impl Motion {
         matches!(self, Self::Sampled(_))
     }
 
-    /// All random numbers begin anew; continuous time has none.
+    /// All random numbers begin anew.
     pub(super) fn reseed(&mut self, seed: u64) {
         match self {
             Self::Sampled(plant) => plant.reseed(seed),
             #[cfg(feature = "ideal")]
-            Self::Continuous(_) => {}
+            Self::Continuous(solution) => solution.reseed(seed),
         }
     }
 
@@ -129,7 +129,7 @@ impl Motion {
         match self {
             Self::Sampled(plant) => plant.channels(),
             #[cfg(feature = "ideal")]
-            Self::Continuous(_) => Vec::new(),
+            Self::Continuous(solution) => solution.channels(),
         }
     }
 
@@ -138,7 +138,7 @@ impl Motion {
         match self {
             Self::Sampled(plant) => plant.write_channels(channels),
             #[cfg(feature = "ideal")]
-            Self::Continuous(_) => {}
+            Self::Continuous(solution) => solution.write_channels(channels),
         }
     }
 

@@ -24,7 +24,7 @@ pub use downwash::{AIR_DENSITY_KG_M3, Downwash};
 pub use dynamics::{Drift, Dynamics, Ground, State, Wrench};
 #[cfg(feature = "files")]
 pub use file::{MODELS, Misread, read};
-pub use fleet::{Fleet, HEIGHT_RAD_S};
+pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
 pub use mixer::Mixer;
 pub use model::{Model, ModelError, Quadrotor, Turn};
 pub use rotor::{RotorCurve, RotorLag};

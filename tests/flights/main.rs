@@ -21,3 +21,4 @@ mod scenario_files;
 mod shapes;
 mod simulation;
 mod unicycles;
+mod wind;

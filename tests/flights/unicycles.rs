@@ -44,7 +44,7 @@ fn flown(
 ) -> (Swarm, f64) {
     let (mut plant, mut state, mut path) = (Unicycles::new(unicycle, start), start.clone(), Path::default());
     let (dt_s, mut bend_m) = (duration_s / f64::from(steps), 0.0_f64);
-    let mut apply = |plant: &mut Unicycles, state: &mut Swarm, time_s: f64| {
+    let apply = |plant: &mut Unicycles, state: &mut Swarm, time_s: f64| {
         let u = command(time_s, row(&state.velocities_m_s, 0));
         plant.apply(&Rows::from_row_slice(u.as_slice()), state);
     };
@@ -162,6 +162,8 @@ fn what_a_unicycle_cannot_fly_is_refused_with_its_place_and_remedy() {
         ("vehicle.attitude_hz=100", "a unicycle has neither attitude nor rotors"),
         ("plant.kind=ideal", "no unicycles"),
         ("swarm.dimensions=3", "move in the plane"),
+        ("vehicle.drag_per_s=0.3", "does not feel the air"),
+        ("wind.mean_m_s=[1, 0]", "does not feel the air"),
         ("vehicle.model=point", "unknown"),
     ] {
         let source = Source::Text { name: "test".to_owned(), text: FLIGHT.to_owned() };

@@ -36,6 +36,63 @@ fn graphs() -> [Graph; 4] {
     [Graph::complete(7), Graph::star(7), Graph::ring(7), Graph::path(7)]
 }
 
+/// The state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method, with the integral of
+/// sum |w_i|^2 added to `fed`.
+fn pushed(
+    swarm: &Swarm,
+    dt_s: f64,
+    fed: &mut f64,
+    u: &mut dyn FnMut(&Swarm) -> Rows,
+    w: &dyn Fn(&Swarm) -> Rows,
+) -> Swarm {
+    let mut rates = Vec::new();
+    for (share, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+        let mut at = swarm.clone();
+        if let Some((v, a)) = rates.last() {
+            at.positions_m += v * (share * dt_s);
+            at.velocities_m_s += a * (share * dt_s);
+        }
+        let push = w(&at);
+        *fed += weight / 6.0 * dt_s * push.norm_squared();
+        let a: Rows = &at.velocities_m_s * A22_PER_S + u(&at) + push;
+        rates.push((at.velocities_m_s, a));
+    }
+    let mean = |of: &dyn Fn(&(Rows, Rows)) -> Rows| {
+        (of(&rates[0]) + of(&rates[1]) * 2.0 + of(&rates[2]) * 2.0 + of(&rates[3])) * (dt_s / 6.0)
+    };
+    Swarm {
+        positions_m: &swarm.positions_m + mean(&|(v, _)| v.clone()),
+        velocities_m_s: &swarm.velocities_m_s + mean(&|(_, a)| a.clone()),
+    }
+}
+
+/// On the complete graph dE/dt = -zeta |v~|^2 + v~.w exactly: the push 2 zeta v~ adds all that the bound allows, one half or
+/// twice as strong less, and one against v~ takes energy away.
+#[test]
+fn the_bound_under_a_push_is_reached_by_the_worst_one() -> Result<(), LawError> {
+    let (links, formation) = (Graph::complete(7), Formation::grid(7, 2.0));
+    for (gain, least, most) in [(2.0, 1.0 - 1e-9, 1.0 + 1e-9), (1.0, -9.0, 0.9), (4.0, -9.0, 0.9), (-2.0, -9.0, -0.9)] {
+        let mut law = law(&links, &formation);
+        let mut swarm = Swarm { positions_m: Formation::grid(7, 1.9).slots_m, velocities_m_s: Rows::zeros(7) };
+        swarm.velocities_m_s[(2, 0)] = 0.6;
+        swarm.velocities_m_s[(5, 1)] = -0.4;
+        let before = law.try_energy(&Observation::exact(&swarm, &links, &formation))?;
+        let mut fed = 0.0;
+        for _ in 0..300 {
+            let mut u = |at: &Swarm| command(&mut law, &Observation::exact(at, &links, &formation)).expect("clear");
+            let w = |at: &Swarm| {
+                let mean = at.mean_velocity_m_s();
+                Rows::from_fn(7, |i, axis| gain * ZETA_PER_S * (at.velocities_m_s[(i, axis)] - mean[axis]))
+            };
+            swarm = pushed(&swarm, 2.5e-4, &mut fed, &mut u, &w);
+        }
+        let gained = law.try_energy(&Observation::exact(&swarm, &links, &formation))? - before;
+        let ratio = gained / (fed / (4.0 * ZETA_PER_S));
+        assert!((least..=most).contains(&ratio), "w = {gain} zeta v~: {ratio}");
+    }
+    Ok(())
+}
+
 proptest! {
     #[test]
     fn the_command_is_the_fall_of_the_potential_and_damps_velocities_over_links(swarm in swarms()) {

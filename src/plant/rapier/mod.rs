@@ -23,6 +23,10 @@
 //! motion under a constant acceleration exactly, where a22 = 0. Forces u m go through the engine, so that what
 //! its contacts do to a velocity stays in w.
 //!
+//! # Wind
+//! A point with a drag d in a wind W obeys p'' = (a22 - d) v + u + d W: a22 - d takes the place of a22, and u + d W that of u, with
+//! W at the beginning of the step in w and at its end in v~ and v'. That is the trapezium's rule for d W, and second order.
+//!
 //! # Quadrotors
 //! A quadrotor is a body that turns, with the model's mass, inertia and hull; gravity, rotors and drag are added around the
 //! engine's step as above: half of the kick of the state before, the drift, half of the kick of the state after, whose

@@ -78,6 +78,7 @@ impl Fliers {
             }
             self.fleet.dynamics.predict(state, drift);
         }
+        self.fleet.blow(dt_s);
         // Also what begins the next step: it differs from what the velocities make of it by the square of the step.
         self.fleet.feel();
         self.fleet.complete(&self.drifts, dt_s);
@@ -152,11 +153,15 @@ impl Plant for Fliers {
     }
 
     fn channels(&self) -> Vec<Channel> {
-        Fleet::channels()
+        self.fleet.channels()
     }
 
     fn write_channels(&self, channels: &mut [Channel]) {
         self.fleet.write_channels(channels);
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        self.fleet.reseed(seed);
     }
 }
 
