@@ -23,7 +23,7 @@ use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
 use crate::observation::Observation;
-use crate::space::{NearPairs, Obstacle};
+use crate::space::{Metric, NearPairs, Obstacle};
 use crate::swarm::{Pair, Rows, row, set_row};
 use crate::target::Target;
 
@@ -103,6 +103,11 @@ impl DisplacementKeys {
 /// Where slots change by D, at once or along straight lines, `sqrt E` grows by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`:
 /// what holds through all legs is known before the first step.
 ///
+/// # Ellipsoids
+/// Where what must stay empty around a vehicle is an ellipsoid, `l_ij` is the scaled length of its [`Metric`], in which R and delta
+/// are lengths too, and a near pair is pushed by `-V_R'(l) S^2 (p_i - p_j)/l`. Nothing else changes, and what is certified is
+/// certified of scaled lengths.
+///
 /// # Obstacles
 /// The same one-sided tension acts between vehicles and obstacles at rest, on the distance from the surface less the
 /// clearance, over a range of R - delta, or of the least room that a slot has where slots are places. E holds all of these
@@ -116,6 +121,8 @@ pub struct DisplacementLaw {
     pulls: PinnedConsensus,
     keys: DisplacementKeys,
     delta_m: f64,
+    /// What vehicles are kept apart in.
+    metric: Metric,
     a22_per_s: f64,
     /// Whether `r'' - a22 r'` is fed forward to those who follow.
     is_fed: bool,
@@ -147,7 +154,7 @@ impl DisplacementLaw {
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
     /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
     pub fn new(setting: &Setting<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s, .. } = setting;
+        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s, metric, .. } = setting;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
         for formation in std::iter::once(formation).chain(later.iter().map(|leg| &leg.formation)) {
             ParameterError::check(links, formation, &gains)?;
@@ -160,9 +167,9 @@ impl DisplacementLaw {
         if connectivity <= 0.0 {
             return Err(ParameterError::NobodyKnowsTheReference);
         }
-        let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, delta_m)?, f64::INFINITY);
+        let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, (delta_m, metric))?, f64::INFINITY);
         for leg in later {
-            let of_leg = tension_between(&leg.formation, &keys, delta_m)?;
+            let of_leg = tension_between(&leg.formation, &keys, (delta_m, metric))?;
             if of_leg.rest_m() < tension.rest_m() {
                 tension = of_leg;
             }
@@ -182,6 +189,7 @@ impl DisplacementLaw {
             pulls,
             keys,
             delta_m,
+            metric,
             a22_per_s,
             is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
             growth,
@@ -212,7 +220,8 @@ impl DisplacementLaw {
 
     /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and `V_R`.
     fn push(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError> {
-        let separation_m = apart_m.norm();
+        let scaled_m = self.metric.scaled(apart_m);
+        let separation_m = scaled_m.norm();
         if separation_m >= self.tension.rest_m() {
             return Ok((Vector3::zeros(), 0.0));
         }
@@ -220,7 +229,7 @@ impl DisplacementLaw {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m, delta_m: self.delta_m });
         }
         let slope_m_s2 = self.tension.derivative(separation_m);
-        Ok((apart_m * (-slope_m_s2 / separation_m), self.tension.value(separation_m)))
+        Ok((self.metric.scaled(scaled_m) * (-slope_m_s2 / separation_m), self.tension.value(separation_m)))
     }
 
     /// Sum of the tensions of a state that the law was not asked about \[m^2/s^2\].
@@ -230,7 +239,7 @@ impl DisplacementLaw {
             None => 0.0,
         };
         let mut near = NearPairs::default();
-        near.update(positions_m, self.tension.rest_m());
+        near.update(positions_m, self.metric.longest_m(self.tension.rest_m()));
         let of_pair = |&(i, j): &(usize, usize)| Ok(self.push(i, j, row(positions_m, i) - row(positions_m, j))?.1);
         Ok(of_obstacles + near.pairs().iter().map(of_pair).sum::<Result<f64, LawError>>()?)
     }
@@ -257,22 +266,23 @@ impl DisplacementLaw {
 
     /// R for these slots \[m\].
     fn rest_for(&self, formation: &Formation) -> (Pair, f64) {
-        let (pair, distance_m) = nearest_slots(formation, self.delta_m);
+        let (pair, distance_m) = nearest_slots(formation, self.delta_m, self.metric);
         (pair, distance_m.min(self.rest_at_most_m))
     }
 }
 
 /// The two slots that are nearest to each other, and how near \[m\]; a vehicle alone keeps any distance.
-fn nearest_slots(formation: &Formation, delta_m: f64) -> (Pair, f64) {
-    formation.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
+fn nearest_slots(formation: &Formation, delta_m: f64, metric: Metric) -> (Pair, f64) {
+    let slots = Formation::points(metric.scaled_rows(&formation.slots_m));
+    slots.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
 }
 
 fn tension_between(
     formation: &Formation,
     keys: &DisplacementKeys,
-    delta_m: f64,
+    (delta_m, metric): (f64, Metric),
 ) -> Result<EdgeTension, ParameterError> {
-    let (pair, rest_m) = nearest_slots(formation, delta_m);
+    let (pair, rest_m) = nearest_slots(formation, delta_m, metric);
     EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })
 }
 
@@ -357,7 +367,7 @@ impl Law for DisplacementLaw {
     }
 
     fn sensing_range_m(&self) -> Option<f64> {
-        Some(self.tension.rest_m())
+        Some(self.metric.longest_m(self.tension.rest_m()))
     }
 
     fn needs(&self) -> &'static [&'static str] {
@@ -365,6 +375,10 @@ impl Law for DisplacementLaw {
             return &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"];
         }
         &["all share a compass", "each sees who is nearer than slots are"]
+    }
+
+    fn keeps_ellipsoids(&self) -> bool {
+        true
     }
 
     fn reckons_with_wind(&self) -> bool {
@@ -385,7 +399,9 @@ impl Law for DisplacementLaw {
     fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
         const DAMPED: f64 = 0.3 / 0.5;
         let contact = match nearest_m? {
-            nearest_m if nearest_m < self.tension.rest_m() => 2.0 * self.tension.second_derivative(nearest_m),
+            nearest_m if nearest_m < self.tension.rest_m() => {
+                2.0 * self.tension.second_derivative(nearest_m) / self.metric.shortest_m(1.0).powi(2)
+            }
             _ => 0.0,
         };
         let links = self.scale() * self.largest;

@@ -96,6 +96,12 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Whether the law keeps vehicles apart in the lengths of its [`Setting`](super::Setting), of which distances between them are then
+    /// told, and not in metres alone.
+    fn keeps_ellipsoids(&self) -> bool {
+        false
+    }
+
     /// Whether what the law certifies counts a wind in. What any other certifies is void where one blows.
     fn reckons_with_wind(&self) -> bool {
         false

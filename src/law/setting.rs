@@ -2,7 +2,7 @@
 
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
-use crate::space::Obstacle;
+use crate::space::{Metric, Obstacle};
 use crate::target::{Guidance, Leg};
 use crate::wind::WindSpec;
 
@@ -23,6 +23,8 @@ pub struct Setting<'a> {
     pub delta_m: f64,
     /// Velocity coefficient a22 of the vehicles \[1/s\], drag of the air included.
     pub a22_per_s: f64,
+    /// The lengths that delta is one of, and that vehicles are kept apart in.
+    pub metric: Metric,
     /// What pushes them beside their commands, where anything does.
     pub blown: Option<Blown<'a>>,
 }
@@ -44,7 +46,17 @@ impl<'a> Setting<'a> {
     /// One formation, wherever it comes to be.
     #[must_use]
     pub fn new(links: &'a Graph, formation: &'a Formation, delta_m: f64, a22_per_s: f64) -> Self {
-        Self { links, formation, later: &[], guidance: None, obstacles: &[], delta_m, a22_per_s, blown: None }
+        Self {
+            links,
+            formation,
+            later: &[],
+            guidance: None,
+            obstacles: &[],
+            delta_m,
+            a22_per_s,
+            metric: Metric::default(),
+            blown: None,
+        }
     }
 
     /// Who knows the reference.

@@ -18,6 +18,7 @@ use crate::scenario::{LARGEST, MAX_HALVINGS, Scenario, TimeSpec};
 use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
+use crate::vehicle::Quadrotor;
 
 pub use margins::{Bound, Near, PredictedMargin};
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
@@ -40,6 +41,10 @@ pub struct Preflight {
     pub dimensions: usize,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
+    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\]; distances between vehicles are scaled lengths then, of
+    /// which delta is the width of the ellipsoid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_axes_m: Option<[f64; 3]>,
     /// Second smallest eigenvalue lambda2 of the graph's Laplacian.
     pub algebraic_connectivity: f64,
     /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: for g >= 0 relative
@@ -107,6 +112,9 @@ pub struct Preflight {
     pub rigidity: Rigidity,
     /// What stands in the way, the worst first.
     pub warnings: Vec<Warning>,
+    /// What bodies that turn bring in the place of what describes points.
+    #[serde(skip)]
+    vehicle: Option<Quadrotor>,
     #[serde(skip)]
     controls: Controls,
     #[serde(skip)]
@@ -147,12 +155,14 @@ impl Preflight {
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
         let drift = scenario.drift(law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()));
-        let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
+        let scaled = |rows: &Rows| closest_pair(&scenario.metric().scaled_rows(rows));
+        let margin = |rows: &Rows| scaled(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
             scenario: scenario.name.clone(),
             vehicles: scenario.count(),
             dimensions: scenario.space.dimensions(),
             delta_m: scenario.delta_m,
+            half_axes_m: scenario.half_axes_m(),
             algebraic_connectivity: connectivity,
             velocity_margin_per_s: law
                 .velocity_margin(connectivity, scenario.velocity_coefficient_per_s())
@@ -195,6 +205,7 @@ impl Preflight {
             formation_margin_m: scenario.legs.iter().filter_map(|leg| margin(&leg.formation.slots_m)).reduce(f64::min),
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
+            vehicle: scenario.airframe.quadrotor().cloned(),
             controls: law.controls(),
             links_all: scenario.graph.is_complete(),
             barrier_m: law.barrier_m(),

@@ -43,6 +43,8 @@ pub(super) const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: No
 /// What a test changes about an otherwise good run.
 pub(super) struct Case {
     pub(super) audit: AuditOutcome,
+    /// Half axes of ellipsoids, and what the judge saw in metres.
+    pub(super) in_metres: Option<([f64; 3], AuditOutcome)>,
     pub(super) summary: Summary,
     pub(super) trap_dimension: Option<usize>,
     pub(super) ended_early: Option<&'static str>,
@@ -67,6 +69,7 @@ impl Case {
         };
         Self {
             audit: passing(2.4607),
+            in_metres: None,
             summary: REACHED,
             trap_dimension: None,
             ended_early: None,
@@ -85,14 +88,17 @@ impl Case {
             scenario_name: "pentagon",
             scenario_sha256: "00ff",
             delta_m: DELTA_M,
+            half_axes_m: self.in_metres.as_ref().map(|(axes, _)| *axes),
             judge: JUDGE,
             trap_dimension: self.trap_dimension,
             formation_dimension: 2,
             refused: self.refused,
             certificate: &self.certificate,
             audit: &self.audit,
+            in_metres: self.in_metres.as_ref().map(|(_, audit)| audit),
             clearance: self.clearance.as_ref(),
             obstacles: &["tower".to_owned()],
+            vehicle: None,
             engine_contact_pairs: Some(0),
             hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
             summary: &self.summary,

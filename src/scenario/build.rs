@@ -27,7 +27,8 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     check_lists(&document, count)?;
     let space = space(&document)?;
     let (a22_per_s, of_velocity_per_s) = (document.a22_per_s(), document.velocity_coefficient_per_s());
-    let (law, delta_m) = (document.law.kind.complete(of_velocity_per_s), document.law.delta_m);
+    let (delta_m, safety) = document.safety.resolve(document.law.delta_m)?;
+    let law = document.law.kind.complete(of_velocity_per_s);
     let reference = document.reference.map(|table| table.guidance(count, document.time.duration_s)).transpose()?;
     let mut start = start(&document.start, count, space, delta_m)?;
     if let (Some(guidance), None) = (&reference, &document.start.velocities_m_s)
@@ -77,6 +78,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         space,
         law,
         delta_m,
+        safety,
     };
     legs(&mut scenario, &document.formation, &document.leg)?;
     Ok(scenario)

@@ -14,6 +14,7 @@ use super::network::NetworkSpec;
 use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
+use super::safety::SafetyTable;
 use super::sensing::SensingSpec;
 #[cfg(feature = "shapes")]
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
@@ -45,6 +46,9 @@ pub(super) struct Document {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "WindTable"))]
     pub(super) wind: Option<WindTable>,
+    /// What must stay empty around each: a ball unless given.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) safety: SafetyTable,
     /// Where they start.
     pub(super) start: StartTable,
     /// The slots that they shall reach.
@@ -322,8 +326,10 @@ pub(super) const DEFAULT_LAW: &str = "edge-tension";
 pub(super) struct LawTable {
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) kind: LawSpec,
-    /// Safety distance delta in m: every flight is judged by it, whatever the law.
-    pub(super) delta_m: f64,
+    /// Safety distance delta in m: every flight is judged by it, whatever the law. Needed unless `[safety]` has an ellipsoid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "f64"))]
+    pub(super) delta_m: Option<f64>,
 }
 
 /// Which vehicles sense each other.

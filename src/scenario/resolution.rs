@@ -231,7 +231,7 @@ impl Scenario {
             }
         }
         let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
-        match first_within(&self.start.positions_m, rounded_m) {
+        match first_within(&self.metric().scaled_rows(&self.start.positions_m), rounded_m) {
             Some((pair, separation_m)) => refuse(format!(
                 "vehicles {pair} start {separation_m} m apart, which single precision cannot tell from delta = {} m",
                 self.delta_m

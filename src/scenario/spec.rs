@@ -15,7 +15,7 @@ use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::law::{Blown, EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
 use crate::observation::Observation;
-use crate::space::Obstacle;
+use crate::space::{Metric, Obstacle};
 use crate::swarm::{Rows, Swarm};
 use crate::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
 use crate::vehicle::Airframe;
@@ -59,8 +59,10 @@ pub struct Scenario {
     pub graph: Graph,
     /// The control law and its parameters.
     pub law: LawSpec,
-    /// Safety distance delta \[m\] that the audit judges by, whatever the law.
+    /// Safety distance delta \[m\] that the audit judges by, whatever the law: the width of what must stay empty around a vehicle.
     pub delta_m: f64,
+    /// The shape of that.
+    pub safety: Safety,
     /// The body that carries out the commands.
     pub plant: PlantSpec,
     /// Duration and rates.
@@ -79,6 +81,18 @@ pub struct Scenario {
     pub failures: Vec<Failure>,
     /// Seed of every random number that is drawn in flight.
     pub noise_seed: u64,
+}
+
+/// What must stay empty around a vehicle, delta wide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Safety {
+    /// A ball.
+    Ball,
+    /// An upright ellipsoid.
+    Ellipsoid {
+        /// Half of its height \[m\].
+        half_height_m: f64,
+    },
 }
 
 /// The space that a swarm lives in.
@@ -143,6 +157,7 @@ impl Scenario {
             graph: Graph::complete(count),
             law: LawSpec::EdgeTension(EdgeTensionKeys::default()),
             delta_m,
+            safety: Safety::Ball,
             plant: PlantSpec::Rapier(Precision::Single),
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
@@ -196,7 +211,14 @@ impl Scenario {
             until_s: self.time.duration_s,
             resolution_m: self.told_apart_m(),
         });
-        self.law.build(&Setting { later, guidance, obstacles: &self.obstacles, blown, ..setting })
+        self.law.build(&Setting {
+            later,
+            guidance,
+            obstacles: &self.obstacles,
+            blown,
+            metric: self.metric(),
+            ..setting
+        })
     }
 
     /// What a vehicle's own velocity accelerates it by, a22 less the drag of the air \[1/s\]: with the wind W,
@@ -204,6 +226,24 @@ impl Scenario {
     #[must_use]
     pub fn velocity_coefficient_per_s(&self) -> f64 {
         self.a22_per_s - self.drag_per_s
+    }
+
+    /// The lengths that distances between vehicles are judged in, of which delta is one: metres for balls.
+    #[must_use]
+    pub fn metric(&self) -> Metric {
+        match self.safety {
+            Safety::Ball => Metric::default(),
+            Safety::Ellipsoid { half_height_m } => Metric::of_ratio(half_height_m / (0.5 * self.delta_m)),
+        }
+    }
+
+    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\]; none for a ball.
+    #[must_use]
+    pub fn half_axes_m(&self) -> Option<[f64; 3]> {
+        match self.safety {
+            Safety::Ball => None,
+            Safety::Ellipsoid { half_height_m } => Some([0.5 * self.delta_m, 0.5 * self.delta_m, half_height_m]),
+        }
     }
 
     /// The wind at time 0, as it blows in flight.

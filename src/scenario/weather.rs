@@ -37,8 +37,8 @@ impl Scenario {
             .with_help(
                 "set vehicle.drag_per_s to what a vehicle loses of its velocity through still air, for example 0.3",
             )
-            .at("vehicle.drag_per_s")
-            .at("wind"));
+            .at("wind")
+            .at("vehicle.drag_per_s"));
         }
         self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
         self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))?;

@@ -278,7 +278,7 @@ fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vecto
     let handle = world.bodies.insert(body);
 
     let hull = hull(scenario.hull_radius_m[i], i).mass(real(scenario.mass_kg[i]));
-    for collider in [hull, keep_out(scenario.delta_m, i)] {
+    for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
         world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
     }
     world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);

@@ -1,7 +1,8 @@
 //! Rigid bodies in Rapier, in single and double precision: the only room that names the engine.
 //!
 //! Each vehicle is a dynamic body with rotations locked, no gravity and two ball colliders: the **hull** (the vehicle's
-//! real radius; hulls collide and bounce) and the **keep-out** ball of radius delta/2 (reports contacts, never pushes).
+//! real radius; hulls collide and bounce) and the **keep-out** ball of radius delta/2 (reports contacts, never pushes); in an
+//! ellipsoid it is the largest ball within.
 //! In the plane z = 0 translation along z is locked as well.
 //!
 //! # Motion within a step

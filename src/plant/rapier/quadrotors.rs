@@ -35,7 +35,7 @@ impl Fliers {
             let handle = world.bodies.insert(body);
             world.bodies[handle].set_rotation(rotation(&state.attitude), true);
             let hull = hull(model.hull_radius_m, i).density(0.0).friction(HULL_FRICTION);
-            for collider in [hull, keep_out(scenario.delta_m, i)] {
+            for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
                 world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
             }
             world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);

@@ -113,6 +113,8 @@ pub struct Scene {
     pub balls: Vec<Ball>,
     /// Keep-out shells, in the order in which they must be drawn: see [`Scene::compose`].
     pub shells: Vec<Ball>,
+    /// Height of shells over their width.
+    pub shell_ratio: f32,
     /// Ground, trails, start marks, goal slots, edges, pairs: a later one is drawn over those before it.
     pub lines: Vec<Line>,
     /// Words and legends.
@@ -123,7 +125,7 @@ impl Scene {
     /// Nothing, seen by this camera.
     pub(super) fn empty(camera: Camera, depth_m: [f64; 2], background: Colour) -> Self {
         let (balls, shells, lines, annotations) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { camera, depth_m, background, balls, shells, lines, annotations }
+        Self { camera, depth_m, background, balls, shells, shell_ratio: 1.0, lines, annotations }
     }
 
     /// A picture of nothing.

@@ -157,6 +157,7 @@ impl RecordedReport {
                 certified_m: None,
                 certified_until_s: None,
                 certificate_void: Vec::new(),
+                ellipsoid: None,
             },
             audit: RecordedAudit {
                 flight: Audit {
