@@ -47,7 +47,10 @@ impl Preflight {
         rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
         let rest = [
             ("needs", self.needs_line()),
-            ("margins", margins::line(&self.margins).unwrap_or_else(|| "not known for this law and graph".to_owned())),
+            (
+                "margins",
+                margins::line(&self.margins).unwrap_or_else(|| "not known for this law, graph and vehicle".to_owned()),
+            ),
             ("step", self.step_line()),
             ("recording", self.recording_line()),
             ("start", self.start_line()),

@@ -17,6 +17,7 @@ mod random_scenarios;
 mod reach;
 mod reference_flights;
 mod rivals;
+mod safety;
 mod scenario_files;
 mod shapes;
 mod simulation;

@@ -201,3 +201,50 @@ fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
     assert!(rate(rest_m.next_down()) > rate(rest_m) && rate(1.01 * DELTA_M) > rate(rest_m.next_down()));
     assert_eq!(law.fastest_rate_per_s(None, A22_PER_S), None);
 }
+
+/// Two vehicles that meet between ellipsoids, without links: `r'' = 2 F`, whose energy is `|r'|^2/4 + V(l)`. Gives how far that
+/// rises above its start, as a share of it, where the force is made by `push`.
+fn highest_rise(law: &DisplacementLaw, angle: f64, push: &dyn Fn(Vector3<f64>) -> Vector3<f64>) -> f64 {
+    const STEP_S: f64 = 2e-4;
+    let potential = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").1;
+    let (mut r, mut v) = (Vector3::new(1.2, 0.0, 4.0 * angle.sin()), Vector3::new(-1.0, 0.0, -3.0 * angle.cos()));
+    let energy = |r, v: Vector3<f64>| 0.25 * v.norm_squared() + potential(r);
+    let (start, mut most) = (energy(r, v), 0.0_f64);
+    for _ in 0..15_000 {
+        let half = v + STEP_S * push(r);
+        r += STEP_S * half;
+        v = half + STEP_S * push(r);
+        most = most.max(energy(r, v) / start - 1.0);
+    }
+    most
+}
+
+#[test]
+fn the_push_between_ellipsoids_is_a_gradient_and_with_one_factor_too_few_it_feeds_energy_in() {
+    let (links, formation) =
+        (Graph::complete(2), Formation::points(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0])));
+    let metric = Metric::of_ratio(3.0);
+    let setting = Setting { metric, ..Setting::new(&links, &formation, DELTA_M, 0.0) };
+    let law = DisplacementLaw::new(&setting, keys()).expect("a law");
+    let right = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").0;
+    // S once: -V' S dp/l.
+    let wrong = |r: Vector3<f64>| {
+        let push = right(r);
+        Vector3::new(push.x, push.y, push.z * metric.ratio())
+    };
+    let rises = |push: &dyn Fn(Vector3<f64>) -> Vector3<f64>| {
+        (0..10).map(|k| highest_rise(&law, 0.15 * f64::from(k), push)).fold(0.0, f64::max)
+    };
+    assert!(rises(&right) < 1e-5, "{}", rises(&right));
+    assert!(rises(&wrong) > 0.1, "{}", rises(&wrong));
+    for k in 0..40 {
+        let r = Vector3::new(0.4 + 0.05 * f64::from(k), 0.3, 3.2 - 0.04 * f64::from(k));
+        let slope = |axis: usize| {
+            let mut by = Vector3::zeros();
+            by[axis] = 1e-6;
+            let value = |r| law.push(0, 1, r).expect("clear of delta").1;
+            (value(r + by) - value(r - by)) / 2e-6
+        };
+        assert!((right(r) + Vector3::new(slope(0), slope(1), slope(2))).norm() < 1e-6);
+    }
+}
