@@ -31,8 +31,8 @@ pub fn of_run(history: &RunHistory, criteria: &Criteria<'_>) -> Vec<Figure> {
         figures.push(paths_in_space(history, "Paths in space"));
     }
     if history.vehicles() > 1 {
-        let scaled = if history.metric().is_metres() { \"\" } else { \", scaled to ellipsoids\" };
-        let title = format!(\"Distances between vehicles{scaled}\");
+        let scaled = if history.metric().is_metres() { "" } else { ", scaled to ellipsoids" };
+        let title = format!("Distances between vehicles{scaled}");
         figures.push(distances(history, criteria.delta_m, criteria.certified_m, &title));
     }
     figures.push(control(history, "Control effort"));
