@@ -9,9 +9,10 @@ use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash, record_beside};
-use crate::report::{Findings, Hulls, Performance, Report, Run, Verification};
+use crate::report::{Findings, Hulls, Performance, Report, Run, VehicleNumbers, Verification};
 use crate::scenario::Scenario;
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
+use crate::vehicle::Quadrotor;
 
 /// Flies a scenario to its end, hands what is recorded to `sink`, and reports.
 ///
@@ -107,6 +108,12 @@ fn report(
     } else {
         Hulls::of_points(in_metres, &scenario.hull_radius_m)
     };
+    let vehicle =
+        scenario.airframe.quadrotor().zip(metrics.strain()).map(|(Quadrotor { model, .. }, strain)| VehicleNumbers {
+            model: model.name.clone(),
+            max_tilt_deg: strain.max_tilt_rad.to_degrees(),
+            thrust_share: strain.max_thrust_n / model.max_thrust_n,
+        });
     Report::new(&Findings {
         scenario_name: &scenario.name,
         scenario_sha256: &scenario.sha256_hex(),
@@ -123,6 +130,7 @@ fn report(
         obstacles: &scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect::<Vec<_>>(),
         engine_contact_pairs: scenario.engine().is_some().then_some(flight.engine_contacts.len() as u64),
         hulls: &hulls,
+        vehicle: vehicle.as_ref(),
         summary: &metrics.finish(),
         legs: scenario.legs.len(),
         ended_legs: metrics.ended_legs(),

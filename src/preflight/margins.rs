@@ -43,11 +43,15 @@ const KNOWN_LATE: &str = "sensing.latency_s";
 const HEARD_LATE: &str = "network.latency_s";
 const COMMANDED: &str = "actuation.control_hz";
 
-/// What linear theory predicts for the first formation; nothing where the law's modes are not known.
+/// What linear theory predicts for the first formation; nothing where the law's modes are not known, nor for vehicles that are
+/// more than points, whose own lag the theory does not know.
 pub(super) fn margins(law: &dyn Law, scenario: &Scenario) -> Vec<PredictedMargin> {
+    if !scenario.airframe.is_point() {
+        return Vec::new();
+    }
     let Some(linear) = law.linear(scenario.formation()) else { return Vec::new() };
     let Linear { in_contact, heard, .. } = &linear;
-    let a22_per_s = scenario.a22_per_s;
+    let a22_per_s = scenario.velocity_coefficient_per_s();
     let at_most = |key, state, value: f64| PredictedMargin { key, state, bound: Bound::AtMost, value: finite(value) };
     let at_least = |state, period_s: f64| PredictedMargin {
         key: COMMANDED,

@@ -18,6 +18,7 @@ use crate::scenario::{LARGEST, MAX_HALVINGS, Scenario, TimeSpec};
 use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
+use crate::vehicle::Quadrotor;
 
 pub use margins::{Bound, Near, PredictedMargin};
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
@@ -111,6 +112,9 @@ pub struct Preflight {
     pub rigidity: Rigidity,
     /// What stands in the way, the worst first.
     pub warnings: Vec<Warning>,
+    /// What bodies that turn bring in the place of what describes points.
+    #[serde(skip)]
+    vehicle: Option<Quadrotor>,
     #[serde(skip)]
     controls: Controls,
     #[serde(skip)]
@@ -201,6 +205,7 @@ impl Preflight {
             formation_margin_m: scenario.legs.iter().filter_map(|leg| margin(&leg.formation.slots_m)).reduce(f64::min),
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
+            vehicle: scenario.airframe.quadrotor().cloned(),
             controls: law.controls(),
             links_all: scenario.graph.is_complete(),
             barrier_m: law.barrier_m(),

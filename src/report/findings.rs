@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::hulls::Hulls;
+use super::strain::VehicleNumbers;
 use crate::audit::{AuditOutcome, ClearanceOutcome, Status};
 use crate::law::Certificate;
 use crate::metrics::{LegSummary, Summary};
@@ -43,6 +44,8 @@ pub struct Findings<'a> {
     pub engine_contact_pairs: Option<u64>,
     /// What solid hulls did, or would have done.
     pub hulls: &'a Hulls,
+    /// What was asked of bodies that turn.
+    pub vehicle: Option<&'a VehicleNumbers>,
     /// Numbers of the samples.
     pub summary: &'a Summary,
     /// Number of legs that were asked for.

@@ -10,6 +10,7 @@ use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
 use super::legs::{self, LegNumbers};
 use super::obstacles::Obstacles;
+use super::strain::VehicleNumbers;
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use crate::audit::{self, Status};
@@ -34,6 +35,9 @@ pub struct Report {
     pub separation: Separation,
     /// What the judgement rests on.
     pub audit: Audit,
+    /// What was asked of bodies that turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vehicle: Option<VehicleNumbers>,
     /// How vehicles kept clear of obstacles, where there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacles: Option<Obstacles>,
@@ -272,6 +276,7 @@ impl Report {
                 },
                 rapier: Rapier { contact_pairs: findings.engine_contact_pairs },
             },
+            vehicle: findings.vehicle.cloned(),
             obstacles: Obstacles::of(findings),
             hulls: findings.hulls.clone(),
             formation: FormationNumbers {

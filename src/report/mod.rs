@@ -16,6 +16,7 @@ mod legs;
 mod obstacles;
 pub mod page;
 pub mod recorded;
+mod strain;
 mod vehicles;
 mod verdict;
 mod verification;
@@ -33,6 +34,7 @@ pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
+pub use strain::VehicleNumbers;
 pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 

@@ -98,6 +98,7 @@ impl Case {
             in_metres: self.in_metres.as_ref().map(|(_, audit)| audit),
             clearance: self.clearance.as_ref(),
             obstacles: &["tower".to_owned()],
+            vehicle: None,
             engine_contact_pairs: Some(0),
             hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
             summary: &self.summary,

@@ -4,6 +4,7 @@
 mod browser;
 
 mod figures;
+mod margins;
 mod opened;
 mod page;
 mod scale;
