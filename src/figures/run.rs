@@ -31,11 +31,9 @@ pub fn of_run(history: &RunHistory, criteria: &Criteria<'_>) -> Vec<Figure> {
         figures.push(paths_in_space(history, "Paths in space"));
     }
     if history.vehicles() > 1 {
-        let title = match history.metric().is_metres() {
-            true => "Distances between vehicles",
-            false => "Distances between vehicles, scaled to ellipsoids",
-        };
-        figures.push(distances(history, criteria.delta_m, criteria.certified_m, title));
+        let scaled = if history.metric().is_metres() { "" } else { ", scaled to ellipsoids" };
+        let title = format!("Distances between vehicles{scaled}");
+        figures.push(distances(history, criteria.delta_m, criteria.certified_m, &title));
     }
     figures.push(control(history, "Control effort"));
     if history.energy_initial().is_some() {

@@ -277,6 +277,15 @@ mod tests {
     }
 
     #[test]
+    fn a_shell_is_as_high_as_the_ellipsoid_that_must_stay_empty() {
+        let scenario = Scenario { safety: crate::scenario::Safety::Ellipsoid { half_height_m: 3.0 }, ..pentagon() };
+        let bytes = message(&mut FoxgloveScene::of(&scenario), 0.0, &scenario.start).expect("a message");
+        let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
+        let size = |k: usize| update.entities[0].spheres[k].size.map(|size| (size.x, size.y, size.z));
+        assert_eq!((size(0), size(5)), (Some((0.5, 0.5, 0.5)), Some((2.0, 2.0, 6.0))));
+    }
+
+    #[test]
     fn two_without_an_edge_between_them_are_red_too_while_the_judge_finds_them_too_close() {
         let mut scenario = pentagon();
         scenario.graph = crate::graph::Graph::ring(5);
