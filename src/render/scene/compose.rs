@@ -23,16 +23,18 @@ impl Scene {
         let builder = SceneBuilder::new(timeline, extent, frame, view, camera);
         let mut scene = Self::empty(camera, extent.depth_m(&camera), view.theme.background());
         builder.vehicles(&mut scene);
+        builder.rotors(&mut scene.discs);
         builder.round_obstacles(&mut scene);
         let layers = view.layers;
         // In the order in which they cover each other, and in which they take room from each other.
-        let lines: [Part<'_, Vec<Line>>; 6] = [
+        let lines: [Part<'_, Vec<Line>>; 7] = [
             (layers.ground, SceneBuilder::ground),
             (true, SceneBuilder::flat_obstacles),
             (layers.trails, SceneBuilder::trails),
             (layers.marks, SceneBuilder::starts_and_goals),
             (layers.edges, SceneBuilder::edges),
             (layers.closest, SceneBuilder::pairs),
+            (true, SceneBuilder::arms),
         ];
         let words: [Part<'_, LabelLayout>; 6] = [
             (layers.caption, SceneBuilder::caption),
