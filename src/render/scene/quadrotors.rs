@@ -7,8 +7,8 @@ use super::colour::Colour;
 use super::draw_list::{Ball, Disc, Line, single};
 use crate::render::timeline::QuadrotorShape;
 
-/// Least radius of a hull that is drawn with arms in a picture 720 pixels high \[pixels\]: a smaller one is a ball.
-const LEAST_PX: f64 = 5.0;
+/// Least radius of a hull that is drawn with arms in a picture 720 pixels high, and in any \[pixels\]: a smaller one is a ball.
+const LEAST_PX: [f64; 2] = [5.0, 4.0];
 /// In units of the arm: radius of the body and of the mark ahead, how far ahead that is, height of the rotors above the
 /// body's middle, width of an arm.
 const BODY: f64 = 0.3;
@@ -71,7 +71,8 @@ impl SceneBuilder<'_> {
         let place = self.vehicle(k)?;
         let radius_m = self.timeline.radius_m[k];
         let radius_px = radius_m * self.camera.project(place)?.px_per_m;
-        if radius_px < LEAST_PX * f64::from(self.view.unit_px()) {
+        let [at_720, least] = LEAST_PX;
+        if radius_px < least.max(at_720 * f64::from(self.view.unit_px())) {
             return None;
         }
         let shape = self.timeline.shape.unwrap_or_else(|| QuadrotorShape::within(radius_m));
