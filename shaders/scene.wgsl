@@ -5,7 +5,8 @@ struct Camera {
     up: vec4<f32>,
     back: vec4<f32>,
     eye: vec4<f32>,
-    // Half of width and height (tangents in perspective, metres in parallel projection), 1 in perspective, unused.
+    // Half of width and height (tangents in perspective, metres in parallel projection), 1 in perspective, height of shells over
+    // their width.
     lens: vec4<f32>,
     // Nearest and farthest depth in metres, width and height in pixels.
     range: vec4<f32>,
@@ -75,14 +76,25 @@ fn is_aside(centre: vec3<f32>, radius: f32) -> bool {
 
 @vertex
 fn ball_corner(@builtin(vertex_index) index: u32, ball: Ball) -> BallCorner {
+    return BallCorner(corner_around(index, ball, ball.radius), seen(ball.centre), ball.radius, light_of(ball.colour));
+}
+
+// An upright ellipsoid on the flat piece of the ball around it.
+@vertex
+fn shell_corner(@builtin(vertex_index) index: u32, ball: Ball) -> BallCorner {
+    let around = ball.radius * max(1.0, camera.lens.w);
+    return BallCorner(corner_around(index, ball, around), seen(ball.centre), ball.radius, light_of(ball.colour));
+}
+
+fn corner_around(index: u32, ball: Ball, radius: f32) -> vec4<f32> {
     let side = vec2(f32(index & 1u), f32(index >> 1u)) * 2.0 - 1.0;
     let centre = seen(ball.centre);
     let distance = length(centre);
     var position: vec4<f32>;
-    if is_perspective() && (centre.z >= ball.radius || is_aside(centre, 1.001 * ball.radius + 1e-5 * distance)) {
+    if is_perspective() && (centre.z >= radius || is_aside(centre, 1.001 * radius + 1e-5 * distance)) {
         // All of it is behind the camera or beside what it sees: outside the picture.
         position = vec4(2.0, 2.0, 2.0, 1.0);
-    } else if is_perspective() && (distance < 1.001 * ball.radius || -centre.z < ball.radius) {
+    } else if is_perspective() && (distance < 1.001 * radius || -centre.z < radius) {
         // The camera is within the ball or beside it.
         position = vec4(side, 0.5, 1.0);
     } else if is_perspective() {
@@ -91,16 +103,16 @@ fn ball_corner(@builtin(vertex_index) index: u32, ball: Ball) -> BallCorner {
         let axis = centre / distance;
         let across = normalize(cross(vec3(0.0, 1.0, 0.0), axis));
         let along = cross(axis, across);
-        let sine = ball.radius / distance;
-        let reach = ball.radius / sqrt(1.0 - sine * sine) + pixel;
+        let sine = radius / distance;
+        let reach = radius / sqrt(1.0 - sine * sine) + pixel;
         position = clipped(centre + (across * side.x + along * side.y) * reach);
     } else {
         let pixel = 2.0 * camera.lens.y / camera.range.w;
-        position = clipped(centre + vec3(side * (ball.radius + pixel), 0.0));
+        position = clipped(centre + vec3(side * (radius + pixel), 0.0));
     }
     // The depth is that of the sphere and found for each pixel.
     position.z = 0.5 * position.w;
-    return BallCorner(position, centre, ball.radius, light_of(ball.colour));
+    return position;
 }
 
 struct Ray {
@@ -116,11 +128,18 @@ fn ray_at(pixel: vec2<f32>) -> Ray {
     return Ray(vec3(flat, 0.0), vec3(0.0, 0.0, -1.0));
 }
 
+// What is seen of a vector in lengths in which upright ellipsoids of this height over width are balls.
+fn levelled(v: vec3<f32>, ratio: f32) -> vec3<f32> {
+    let up = vec3(camera.right.z, camera.up.z, camera.back.z);
+    return v + up * (dot(v, up) * (1.0 / ratio - 1.0));
+}
+
 // Squared half of the chord that a ball cuts from a ray. The vector from the centre to the ray is formed first:
 // subtracting squares of distances would lose small balls far away.
-fn chord(ray: Ray, centre: vec3<f32>, radius: f32) -> f32 {
-    let to_origin = ray.origin - centre;
-    let foot = to_origin - ray.direction * (dot(to_origin, ray.direction) / dot(ray.direction, ray.direction));
+fn chord(ray: Ray, centre: vec3<f32>, radius: f32, ratio: f32) -> f32 {
+    let to_origin = levelled(ray.origin - centre, ratio);
+    let direction = levelled(ray.direction, ratio);
+    let foot = to_origin - direction * (dot(to_origin, direction) / dot(direction, direction));
     return radius * radius - dot(foot, foot);
 }
 
@@ -133,20 +152,21 @@ struct Hit {
     inside: bool,
 }
 
-fn hit(corner: BallCorner) -> Hit {
+fn hit(corner: BallCorner, ratio: f32) -> Hit {
     // Where the four samples of a pixel are.
     var offsets = array(vec2(0.375, 0.125), vec2(0.875, 0.375), vec2(0.125, 0.625), vec2(0.625, 0.875));
     let pixel = floor(corner.position.xy);
     var samples = 0u;
     for (var k = 0u; k < 4u; k++) {
-        if chord(ray_at(pixel + offsets[k]), corner.centre, corner.radius) >= 0.0 {
+        if chord(ray_at(pixel + offsets[k]), corner.centre, corner.radius, ratio) >= 0.0 {
             samples |= 1u << k;
         }
     }
     let ray = ray_at(pixel + 0.5);
-    let squared = dot(ray.direction, ray.direction);
-    let middle = -dot(ray.origin - corner.centre, ray.direction) / squared;
-    let half = sqrt(max(chord(ray, corner.centre, corner.radius), 0.0) / squared);
+    let direction = levelled(ray.direction, ratio);
+    let squared = dot(direction, direction);
+    let middle = -dot(levelled(ray.origin - corner.centre, ratio), direction) / squared;
+    let half = sqrt(max(chord(ray, corner.centre, corner.radius, ratio), 0.0) / squared);
     var along = middle - half;
     let inside = along < 0.0;
     if inside {
@@ -157,13 +177,13 @@ fn hit(corner: BallCorner) -> Hit {
     }
     let at = ray.origin + ray.direction * along;
     let clip = clipped(at);
-    let normal = normalize(at - corner.centre);
+    let normal = normalize(levelled(levelled(at - corner.centre, ratio), ratio));
     return Hit(at, normal, -normalize(ray.direction), clamp(clip.z / clip.w, 0.0, 1.0), samples, inside);
 }
 
 @fragment
 fn solid(corner: BallCorner) -> Shade {
-    let hit = hit(corner);
+    let hit = hit(corner, 1.0);
     if hit.samples == 0u {
         discard;
     }
@@ -174,7 +194,7 @@ fn solid(corner: BallCorner) -> Shade {
 
 @fragment
 fn shell(corner: BallCorner) -> Shade {
-    let hit = hit(corner);
+    let hit = hit(corner, camera.lens.w);
     if hit.samples == 0u {
         discard;
     }

@@ -15,20 +15,21 @@
 //! refused and tried again shorter. Where no step is short enough, the solution itself ends there, and the law's reason
 //! is the error.
 
+mod flow;
 mod quadrotors;
 
 pub use quadrotors::Quadrotors;
 
-use std::cell::RefCell;
-
 use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinary};
-use differential_equations::ode::{ODE, OrdinaryNumericalMethod as _};
+use differential_equations::ode::OrdinaryNumericalMethod as _;
+use flow::{Flow, FreeMotion, packed};
 use nalgebra::Vector3;
 
 use crate::feedback::Feedback;
 use crate::law::{Law, LawError};
 use crate::observation::Observation;
-use crate::plant::Path;
+use crate::plant::{Air, Path};
+use crate::record::Channel;
 use crate::scenario::Scenario;
 use crate::space::NearPairs;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
@@ -52,8 +53,6 @@ impl Feedback for Exact<'_> {
 
 /// First step that is tried \[s\]: the error control lengthens it tenfold a step, or shortens it.
 const FIRST_STEP_S: f64 = 1e-3;
-/// Longest step \[s\]: where nothing accelerates, the error control alone would let a pair pass each other unseen.
-const LONGEST_STEP_S: f64 = 0.125;
 /// A step, or what is left to the time asked for, that is shorter than this part of that time is rounding.
 const RESOLUTION: f64 = 1e-14;
 /// Time to which a closest approach is found \[s\]. The distance is flat there: it is off by (1e-7 s)^2/2 times its second
@@ -138,7 +137,13 @@ pub fn solve(
         return Err(IdealError::Times { entry });
     }
     let mut feedback = Exact { law, scenario, near: NearPairs::default() };
-    let flow = Flow::new(&mut feedback, &scenario.start, scenario.a22_per_s, 0.0);
+    let mut air = Air::of(scenario);
+    let end_s = times_s.last().copied().unwrap_or_default();
+    if let Some(air) = &mut air {
+        air.advance(end_s);
+    }
+    let motion = FreeMotion { a22_per_s: scenario.velocity_coefficient_per_s(), air: air.as_ref(), end_s };
+    let flow = Flow::new(&mut feedback, &scenario.start, motion, 0.0);
     let mut solver = Solver::begin(&flow, 0.0, &packed(&scenario.start), tolerances, FIRST_STEP_S)?;
     let mut closest = None;
     for (pair, approach) in pairs(solver.method.y()) {
@@ -156,7 +161,10 @@ pub fn solve(
 #[derive(Clone, Debug)]
 pub struct Continuous {
     swarm: Swarm,
+    /// Drag of the air included.
     a22_per_s: f64,
+    /// What blows, where anything does.
+    air: Option<Air>,
     /// Solver step that the error control came to last.
     step_s: f64,
 }
@@ -165,7 +173,8 @@ impl Continuous {
     /// At the scenario's start.
     #[must_use]
     pub fn new(scenario: &Scenario) -> Self {
-        Self { swarm: scenario.start.clone(), a22_per_s: scenario.a22_per_s, step_s: FIRST_STEP_S }
+        let (a22_per_s, air) = (scenario.velocity_coefficient_per_s(), Air::of(scenario));
+        Self { swarm: scenario.start.clone(), a22_per_s, air, step_s: FIRST_STEP_S }
     }
 
     /// Number of vehicles N.
@@ -190,7 +199,11 @@ impl Continuous {
         end: &mut Swarm,
         path: &mut Path,
     ) -> Result<(), IdealError> {
-        let flow = Flow::new(feedback, &self.swarm, self.a22_per_s, from_s);
+        if let Some(air) = &mut self.air {
+            air.advance(dt_s);
+        }
+        let motion = FreeMotion { a22_per_s: self.a22_per_s, air: self.air.as_ref(), end_s: dt_s };
+        let flow = Flow::new(feedback, &self.swarm, motion, from_s);
         let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), self.step_s.min(dt_s))?;
         let mut turned_m_s = vec![0.0; self.swarm.count()];
         solver.advance(dt_s, &mut |solver| {
@@ -210,9 +223,30 @@ impl Continuous {
         swarm.clone_from(&self.swarm);
     }
 
-    /// Goes back to a state that was observed.
+    /// Goes back to a state that was observed before the last step.
     pub fn restore(&mut self, swarm: &Swarm) {
         self.swarm.clone_from(swarm);
+        if let Some(air) = &mut self.air {
+            air.undo();
+        }
+    }
+
+    /// What is recorded beside states, without values yet.
+    #[must_use]
+    pub fn channels(&self) -> Vec<Channel> {
+        self.air.iter().map(|_| Air::channel()).collect()
+    }
+
+    /// Writes the present values into [`Continuous::channels`].
+    pub fn write_channels(&self, channels: &mut [Channel]) {
+        self.air.iter().zip(channels).for_each(|(air, channel)| air.write_channel(channel));
+    }
+
+    /// Begins its random numbers anew.
+    pub fn reseed(&mut self, seed: u64) {
+        if let Some(air) = &mut self.air {
+            air.reseed(seed);
+        }
     }
 }
 
@@ -261,7 +295,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         let mut undefined = None;
         while until_s - self.method.t() > RESOLUTION * until_s {
             let (time_s, free_step_s) = (self.method.t(), self.method.h());
-            let step_s = free_step_s.min(until_s - time_s);
+            let step_s = free_step_s.min(until_s - time_s).min(self.flow.smooth_s(time_s));
             if step_s <= RESOLUTION * until_s {
                 return Err(
                     undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })
@@ -344,76 +378,8 @@ impl<'a, 'law> Solver<'a, 'law> {
     }
 
     fn swarm(&self) -> Swarm {
-        let mut swarm = self.flow.scratch.borrow().swarm.clone();
-        unpack(self.method.y(), &mut swarm);
-        swarm
+        self.flow.swarm_of(self.method.y())
     }
-}
-
-/// The right-hand side. The solver asks it through a shared reference, so what changes is in a cell.
-struct Flow<'law> {
-    a22_per_s: f64,
-    /// Time of the flight at the solver's time 0 \[s\].
-    from_s: f64,
-    scratch: RefCell<Scratch<'law>>,
-}
-
-struct Scratch<'law> {
-    feedback: &'law mut dyn Feedback,
-    swarm: Swarm,
-    control: Rows,
-    /// Why the law had no answer, the last time that it had none.
-    failure: Option<LawError>,
-}
-
-impl<'law> Flow<'law> {
-    fn new(feedback: &'law mut dyn Feedback, swarm: &Swarm, a22_per_s: f64, from_s: f64) -> Self {
-        let control = Rows::zeros(swarm.count());
-        let scratch = Scratch { feedback, swarm: swarm.clone(), control, failure: None };
-        Self { a22_per_s, from_s, scratch: RefCell::new(scratch) }
-    }
-
-    fn take_failure(&self) -> Option<LawError> {
-        self.scratch.borrow_mut().failure.take()
-    }
-
-    fn longest_step_s(&self) -> f64 {
-        self.scratch.borrow().feedback.longest_step_s().min(LONGEST_STEP_S)
-    }
-
-    fn accept(&self, time_s: f64, state: &[f64]) {
-        let Scratch { feedback, swarm, .. } = &mut *self.scratch.borrow_mut();
-        unpack(state, swarm);
-        feedback.accept(self.from_s + time_s, swarm);
-    }
-}
-
-impl ODE<f64, Vec<f64>> for Flow<'_> {
-    fn diff(&self, time_s: f64, state: &Vec<f64>, rates: &mut Vec<f64>) {
-        let Scratch { feedback, swarm, control, failure } = &mut *self.scratch.borrow_mut();
-        unpack(state, swarm);
-        if let Err(undefined) = feedback.command(self.from_s + time_s, swarm, control) {
-            *failure = Some(undefined);
-            // An error estimate that is not a number refuses the step.
-            rates.fill(f64::NAN);
-            return;
-        }
-        let (velocities, half) = (swarm.velocities_m_s.as_slice(), state.len() / 2);
-        rates[..half].copy_from_slice(velocities);
-        for ((rate, v), u) in rates[half..].iter_mut().zip(velocities).zip(control.as_slice()) {
-            *rate = self.a22_per_s * v + u;
-        }
-    }
-}
-
-fn packed(swarm: &Swarm) -> Vec<f64> {
-    swarm.positions_m.iter().chain(swarm.velocities_m_s.iter()).copied().collect()
-}
-
-fn unpack(state: &[f64], swarm: &mut Swarm) {
-    let (positions, velocities) = state.split_at(state.len() / 2);
-    swarm.positions_m.as_mut_slice().copy_from_slice(positions);
-    swarm.velocities_m_s.as_mut_slice().copy_from_slice(velocities);
 }
 
 /// How a pair moves.

@@ -78,3 +78,4 @@ pub mod track;
 #[cfg(feature = "reports")]
 pub mod validate;
 pub mod vehicle;
+pub mod wind;

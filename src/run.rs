@@ -9,9 +9,10 @@ use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash, record_beside};
-use crate::report::{Findings, Hulls, Performance, Report, Run, Verification};
-use crate::scenario::{PlantSpec, Scenario};
+use crate::report::{Findings, Hulls, Performance, Report, Run, VehicleNumbers, Verification};
+use crate::scenario::Scenario;
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
+use crate::vehicle::Quadrotor;
 
 /// Flies a scenario to its end, hands what is recorded to `sink`, and reports.
 ///
@@ -101,34 +102,42 @@ fn report(
         ending => ending.reason(),
     };
     let wall_s = flight.performance.wall.as_secs_f64();
-    let hulls = match scenario.plant {
-        PlantSpec::Rapier(_) => {
-            Hulls::solid(&flight.bounces, &flight.audit, &scenario.hull_radius_m, scenario.time.dt_s)
-        }
-        PlantSpec::Ideal => Hulls::of_points(&flight.audit, &scenario.hull_radius_m),
+    let in_metres = flight.in_metres.as_ref().unwrap_or(&flight.audit);
+    let hulls = if scenario.engine().is_some() {
+        Hulls::solid(&flight.bounces, in_metres, &scenario.hull_radius_m, scenario.time.dt_s)
+    } else {
+        Hulls::of_points(in_metres, &scenario.hull_radius_m)
     };
+    let vehicle =
+        scenario.airframe.quadrotor().zip(metrics.strain()).map(|(Quadrotor { model, .. }, strain)| VehicleNumbers {
+            model: model.name.clone(),
+            max_tilt_deg: strain.max_tilt_rad.to_degrees(),
+            thrust_share: strain.max_thrust_n / model.max_thrust_n,
+        });
     Report::new(&Findings {
         scenario_name: &scenario.name,
         scenario_sha256: &scenario.sha256_hex(),
         delta_m: scenario.delta_m,
+        half_axes_m: scenario.half_axes_m(),
         judge: scenario.arrival,
         trap_dimension: preflight.trap_dimension(),
         formation_dimension: preflight.formation_dimension,
         refused: &preflight.refusing(),
         certificate: &flight.certificate,
         audit: &flight.audit,
+        in_metres: flight.in_metres.as_ref(),
         clearance: flight.clearance.as_ref(),
         obstacles: &scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect::<Vec<_>>(),
-        engine_contact_pairs: matches!(scenario.plant, PlantSpec::Rapier(_))
-            .then_some(flight.engine_contacts.len() as u64),
+        engine_contact_pairs: scenario.engine().is_some().then_some(flight.engine_contacts.len() as u64),
         hulls: &hulls,
+        vehicle: vehicle.as_ref(),
         summary: &metrics.finish(),
         legs: scenario.legs.len(),
         ended_legs: metrics.ended_legs(),
         breaths: &flight.breaths,
         assignments: &flight.assignments,
         energy_rise: flight.energy_rise,
-        energy_falls: energy_falls(preflight, &flight.certificate),
+        energy_falls: scenario.wind.is_still() && energy_falls(preflight, &flight.certificate),
         epsilon: scenario.plant.epsilon(),
         run: &Run {
             duration_s: flight.duration_s,

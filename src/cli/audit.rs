@@ -178,6 +178,7 @@ impl AuditArguments {
             max_accel_m_s2,
             radius_m,
             ellipsoid_m: self.ellipsoid,
+            is_told_scaled: false,
             from_s: self.from,
             to_s: self.to,
             above_m: self.above,
@@ -272,19 +273,23 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     let is_silent = arguments.delta.is_none() && arguments.radius.is_empty() && arguments.ellipsoid.is_none();
     let own_delta_m =
         own.as_ref().map(|own| own.delta_m).or_else(|| read::own_limit_m(&arguments.reading.recording, &options));
-    let own_delta_m = own_delta_m.filter(|_| is_silent);
+    let own_ellipsoid_m = own.as_ref().and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
+    let own_delta_m = own_delta_m.filter(|_| is_silent && own_ellipsoid_m.is_none());
     settings.delta_m = settings.delta_m.or(own_delta_m);
+    settings.ellipsoid_m = settings.ellipsoid_m.or(own_ellipsoid_m);
+    settings.is_told_scaled = own_ellipsoid_m.is_some();
     let own_obstacles = own
         .as_ref()
         .map(|own| &own.obstacles)
-        .filter(|own| arguments.obstacles.is_none() && arguments.ellipsoid.is_none() && !own.obstacles.is_empty());
+        .filter(|own| arguments.obstacles.is_none() && settings.ellipsoid_m.is_none() && !own.obstacles.is_empty());
     settings.obstacles.extend(own_obstacles.iter().flat_map(|own| own.obstacles.iter().cloned()));
     let mut auditor = TrackAuditor::new(settings.clone())?;
     if arguments.html.is_some() {
         auditor = auditor.with_smallest();
     }
-    own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
-    own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
+    let telling = own.as_ref().filter(|own| own.is_told_in(settings.ellipsoid_m));
+    telling.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
+    telling.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
     let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);
@@ -295,6 +300,9 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
+    notes.extend(own_ellipsoid_m.map(|axes| {
+        format!("the ellipsoid is the recording's own, with half axes of {:?}, {:?} and {:?} m", axes.x, axes.y, axes.z)
+    }));
     if own_obstacles.is_none() && own.as_ref().is_some_and(|own| !own.obstacles.obstacles.is_empty()) {
         let why = if arguments.obstacles.is_some() {
             "--obstacles names others"

@@ -161,7 +161,8 @@ pub(super) fn margin(arguments: &MarginArguments) -> Result<Exit, Failure> {
     }
     let sides = arguments.sides(&plan, &margin);
     let repeated: Vec<_> = sides.iter().map(|(what, command)| format!("{what}\n  {command}")).collect();
-    console.say(&format!("{}\n\n{}\n{}", margin.headline(), margin.text(), repeated.join("\n")));
+    let said = [vec![margin.headline()], margin.predictions()].concat().join("\n");
+    console.say(&format!("{said}\n\n{}\n{}", margin.text(), repeated.join("\n")));
     leave(arguments, &margin, &sides, console)?;
     let known = !margin.interrupted && (margin.turn.is_some() || margin.holds_everywhere());
     Ok(if known { Exit::Good } else { Exit::Bad })

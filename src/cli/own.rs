@@ -9,13 +9,19 @@ use super::own_obstacles::OwnObstacles;
 use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, OwnedSample};
-use crate::scenario::{self, PlantSpec, Scenario};
+use crate::scenario::{self, Scenario};
 use crate::swarm::{ClosestApproach, Pair, row};
+
+/// Scaled distance at which two equal ellipsoids touch.
+const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 
 /// A recording of ours.
 pub(super) struct OwnRecording {
-    /// Its safety distance \[m\].
+    /// Its safety distance \[m\]; the scaled distance at which two of its ellipsoids touch where it has these.
     pub(super) delta_m: f64,
+    /// Half axes of what had to stay empty around a vehicle \[m\], where that was no ball. Distances are lengths over them then, in
+    /// what it says of itself too.
+    pub(super) ellipsoid_m: Option<Vector3<f64>>,
     /// What it says of the time between its samples, in order of time; nothing where it holds every step that was flown.
     pub(super) told: Vec<Told>,
     /// The times that it says a pair was too close in.
@@ -39,9 +45,13 @@ impl OwnRecording {
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
         let scenario = Scenario::read(&source, &[]).ok();
-        let is_straight = scenario.as_ref().is_some_and(|scenario| matches!(scenario.plant, PlantSpec::Rapier(_)));
+        let is_straight = scenario.as_ref().is_some_and(|scenario| scenario.engine().is_some());
+        let ellipsoid_m = scenario.as_ref().and_then(Scenario::half_axes_m).map(|axes| Vector3::from(axes) * scale);
+        // What the run told is of lengths in which its delta is the width of an ellipsoid.
+        let told_scale = if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS / header.delta_m } else { scale };
         let mut own = Self {
-            delta_m: header.delta_m * scale,
+            delta_m: header.delta_m * told_scale,
+            ellipsoid_m,
             told: Vec::new(),
             violations: Vec::new(),
             has_every_step: is_straight,
@@ -57,7 +67,8 @@ impl OwnRecording {
                     sample.swarm.positions_m *= scale;
                     let last = before.as_ref().unwrap_or(&sample);
                     own.most_steps = own.most_steps.max(sample.step.saturating_sub(last.step));
-                    let told = sample.separation.and_then(|closest| told(last, &sample, closest, scale));
+                    let told =
+                        sample.separation.and_then(|closest| told(last, &sample, closest, (told_scale, ellipsoid_m)));
                     own.told.extend(told.map(|told| Told { others_m: own.delta_m, ..told }));
                     own.violations.extend(near.pass(&sample));
                     before = Some(sample);
@@ -65,7 +76,7 @@ impl OwnRecording {
                 Entry::Event(Event::StepRefined { .. }) => own.has_every_step = false,
                 Entry::Event(Event::ViolationBegan { pair, time_s }) => near.begin(pair, time_s, before.as_ref()),
                 Entry::Event(Event::ViolationEnded { pair, time_s, min_m }) => {
-                    near.end(pair, time_s, min_m * scale, own.delta_m, before.as_ref());
+                    near.end(pair, time_s, min_m * told_scale, own.delta_m, before.as_ref());
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
                 Entry::Event(event) => own.obstacles.note(&event, scale),
@@ -73,7 +84,7 @@ impl OwnRecording {
         }
         own.violations.append(&mut near.ended);
         if let Some(last) = &before {
-            own.violations.extend(near.lasting(last, own.delta_m, &own.told));
+            own.violations.extend(near.lasting(last, (own.delta_m, ellipsoid_m), &own.told));
         }
         own.has_every_step &= own.most_steps <= 1;
         if own.has_every_step {
@@ -82,6 +93,11 @@ impl OwnRecording {
             own.obstacles.forget_what_was_seen();
         }
         Some(own)
+    }
+
+    /// Whether what it says of the time between samples is of the lengths that are asked about.
+    pub(super) fn is_told_in(&self, ellipsoid_m: Option<Vector3<f64>>) -> bool {
+        self.ellipsoid_m.is_none() || self.ellipsoid_m == ellipsoid_m
     }
 
     /// What a person should know about how it was flown and is judged, by clocks that were all set right alike or not.
@@ -100,9 +116,14 @@ impl OwnRecording {
 }
 
 /// What a sample says of the time since the one before it; nothing where it names a vehicle that is not there.
-fn told(before: &OwnedSample, sample: &OwnedSample, mut closest: ClosestApproach, scale: f64) -> Option<Told> {
+fn told(
+    before: &OwnedSample,
+    sample: &OwnedSample,
+    mut closest: ClosestApproach,
+    (scale, axes_m): (f64, Option<Vector3<f64>>),
+) -> Option<Told> {
     closest.separation_m *= scale;
-    let (from, to) = (apart(before, closest.pair)?, apart(sample, closest.pair)?);
+    let (from, to) = (apart(before, closest.pair, axes_m)?, apart(sample, closest.pair, axes_m)?);
     let (from_s, to_s) = (before.time_s, sample.time_s);
     let passed = if to_s > from_s { ((closest.time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0) } else { 1.0 };
     let drawn_m = from.lerp(&to, passed).norm();
@@ -110,10 +131,11 @@ fn told(before: &OwnedSample, sample: &OwnedSample, mut closest: ClosestApproach
     Some(Told { from_s, to_s, closest, drawn_m, others_m: 0.0, height_m: around(heights) })
 }
 
-/// From the first to the second of a pair \[m\].
-fn apart(sample: &OwnedSample, pair: Pair) -> Option<Vector3<f64>> {
+/// From the first to the second of a pair \[m\], over the axes of their ellipsoids where these are given.
+fn apart(sample: &OwnedSample, pair: Pair, axes_m: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
     let at = &sample.swarm.positions_m;
-    (pair.second() < at.nrows()).then(|| row(at, pair.second()) - row(at, pair.first()))
+    let apart_m = (pair.second() < at.nrows()).then(|| row(at, pair.second()) - row(at, pair.first()))?;
+    Some(axes_m.map_or(apart_m, |axes_m| apart_m.component_div(&axes_m)))
 }
 
 /// How high the higher of a pair is \[m\]; as high as can be where one is not there.
@@ -170,13 +192,18 @@ impl Near {
 
     /// Those that last to the last sample, which the recording does not tell the smallest distance of: nobody came closer
     /// than it says of all, and at the last sample they are as far apart as it says.
-    fn lasting(self, last: &OwnedSample, limit_m: f64, all: &[Told]) -> Vec<ToldViolation> {
+    fn lasting(
+        self,
+        last: &OwnedSample,
+        (limit_m, axes_m): (f64, Option<Vector3<f64>>),
+        all: &[Told],
+    ) -> Vec<ToldViolation> {
         let told = self.since.into_iter().filter_map(|(pair, (from_s, height_m))| {
             let to_s = last.time_s;
             let within = all.iter().filter(|told| told.to_s >= from_s).map(|told| told.closest);
             let least_m = within.clone().map(|of_all| of_all.separation_m).fold(f64::INFINITY, f64::min);
             let own = within.filter(|of_all| of_all.pair == pair && of_all.time_s >= from_s);
-            let min_m = own.map(|own| own.separation_m).fold(apart(last, pair)?.norm(), f64::min);
+            let min_m = own.map(|own| own.separation_m).fold(apart(last, pair, axes_m)?.norm(), f64::min);
             let min_m = min_m.min(limit_m.next_down());
             Some(ToldViolation { pair, from_s, to_s, least_m: least_m.min(min_m), min_m, limit_m, height_m })
         });

@@ -108,7 +108,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
-    let mut history = RunHistory::new();
+    let mut history = RunHistory::new().scaled_by(scenario.metric());
     #[cfg(feature = "viewer")]
     let mut watched = Watched::new(&scenario, !arguments.no_snapshots, &arguments.adapter);
     #[cfg(not(feature = "viewer"))]

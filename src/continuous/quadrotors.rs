@@ -34,10 +34,10 @@ impl Quadrotors {
         Self { fleet }
     }
 
-    /// Solves over a time \[s\] in which what is asked of rotors does not change, and says how far a path bends from its chord
-    /// at most \[m\], as [`super::Continuous::advance`] does.
-    fn solve(&mut self, dt_s: f64) -> Result<f64, PlantError> {
-        let flow = Flow { before: &self.fleet, fleet: RefCell::new(self.fleet.clone()) };
+    /// Solves over a time \[s\] in which the wind is smooth and what is asked of rotors does not change, so many seconds before
+    /// the wind's present; says how far a path bends from its chord at most \[m\], as [`super::Continuous::advance`] does.
+    fn solve(&mut self, dt_s: f64, before_s: f64) -> Result<f64, PlantError> {
+        let flow = Flow { before: &self.fleet, before_s, fleet: RefCell::new(self.fleet.clone()) };
         let Tolerances { relative, absolute } = Tolerances::default();
         let mut method = Method::dop853().rtol(relative).atol(absolute).h_max(dt_s).max_steps(usize::MAX).h0(dt_s);
         method.init(&flow, 0.0, f64::INFINITY, &packed(&self.fleet.states)).map_err(|_| PlantError::Stalled)?;
@@ -75,13 +75,15 @@ impl Plant for Quadrotors {
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError> {
         self.fleet.remember();
+        self.fleet.blow(dt_s);
         let mut passed_s = 0.0;
         loop {
             let due_s = self.fleet.run_attitude();
             let left_s = dt_s - passed_s;
+            let due_s = due_s.min(self.fleet.smooth_s(left_s));
             let is_last = due_s >= left_s - ROUNDING * dt_s;
             let length_s = if is_last { left_s } else { due_s };
-            path.bend(self.solve(length_s)?);
+            path.bend(self.solve(length_s, left_s)?);
             self.fleet.pass(length_s);
             passed_s += length_s;
             if is_last {
@@ -114,17 +116,23 @@ impl Plant for Quadrotors {
     }
 
     fn channels(&self) -> Vec<Channel> {
-        Fleet::channels()
+        self.fleet.channels()
     }
 
     fn write_channels(&self, channels: &mut [Channel]) {
         self.fleet.write_channels(channels);
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        self.fleet.reseed(seed);
     }
 }
 
 /// The right-hand side, from the fleet at time 0.
 struct Flow<'a> {
     before: &'a Fleet,
+    /// How many seconds before the wind's present that is.
+    before_s: f64,
     /// At the time that is asked about. The solver asks through a shared reference.
     fleet: RefCell<Fleet>,
 }
@@ -143,9 +151,11 @@ impl Flow<'_> {
                     numbers[6], numbers[7], numbers[8], numbers[9],
                 )),
                 rates_rad_s: three(10),
+                shares: self.before.states[i].shares,
                 rotors_rpm: lag.after(self.before.states[i].rotors_rpm, self.before.asked_rpm(i)),
             };
         }
+        fleet.blow_before(self.before_s - time_s);
         fleet.feel();
     }
 }

@@ -106,7 +106,8 @@ mod tests {
     fn tilt_is_the_angle_from_upright_whatever_the_heading() {
         for (roll, pitch, yaw) in [(0.0, 0.0, 2.0), (0.3, 0.0, -1.0), (0.2, -0.4, 0.7), (3.0, 0.1, 0.0)] {
             let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
-            let expected = (q * Vector3::z()).angle(&Vector3::z()).to_degrees();
+            let up: Vector3<f64> = q * Vector3::z();
+            let expected = up.angle(&Vector3::z()).to_degrees();
             let found = tilt_deg(&[q.w, q.i, q.j, q.k]);
             assert!((found - expected).abs() < 1e-6, "{found} instead of {expected}");
         }

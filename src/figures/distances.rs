@@ -44,8 +44,9 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
         chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", at_least(certified_m, 3)));
     }
     let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
+    let of = if history.metric().is_metres() { "" } else { ", scaled to the ellipsoids that must stay empty," };
     let mut description = format!(
-        "Distances between {} vehicles over time{scale}; the safety distance is {delta_m} m.",
+        "Distances between {} vehicles{of} over time{scale}; the safety distance is {delta_m} m.",
         history.vehicles()
     );
     if let Some(closest) = closest {
@@ -84,8 +85,8 @@ fn of_many_pairs(history: &RunHistory, chart: &mut Chart) -> String {
     let (ranked_pairs, all) = ranked_pairs(history.vehicles());
     let instants = history.spread(RANKED_INSTANTS);
     let mut scratch = Vec::new();
-    let ranks: Vec<_> =
-        instants.iter().map(|span| quantiles_m(&span.positions_m, &ranked_pairs, &mut scratch)).collect();
+    let scaled = |span: &Span| history.metric().scaled_rows(&span.positions_m);
+    let ranks: Vec<_> = instants.iter().map(|span| quantiles_m(&scaled(span), &ranked_pairs, &mut scratch)).collect();
     let times_s = || instants.iter().map(|span| span.time_s);
     let band = |low: usize, high: usize, opacity: f64, label: &str| Band {
         points: times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[low], ranks[high])).collect(),
@@ -100,12 +101,12 @@ fn of_many_pairs(history: &RunHistory, chart: &mut Chart) -> String {
     // Between samples too, where the recording knows.
     let swept: Vec<_> = history.spans().filter_map(|span| Some((span.time_s, span.closest?))).collect();
     let closest: Vec<_> = if swept.is_empty() && ranked_pairs.len() == all {
-        instants.iter().filter_map(|span| Some((span.time_s, nearest(&span.positions_m, span.time_s)?))).collect()
+        instants.iter().filter_map(|span| Some((span.time_s, nearest(&scaled(span), span.time_s)?))).collect()
     } else {
         swept
     };
     for (k, pair) in closest_pairs(&closest, history.vehicles()).into_iter().enumerate() {
-        let apart_m = |span: &Span| separation(&span.positions_m, pair.first(), pair.second());
+        let apart_m = |span: &Span| separation(&scaled(span), pair.first(), pair.second());
         let apart = history.spans().map(|span| (span.time_s, apart_m(span))).collect();
         chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair.to_string());
     }

@@ -4,6 +4,7 @@ use super::axis::{Axis, extent};
 use super::beside::{self, numbers_of};
 use crate::record::mcap::Entry;
 use crate::record::{Event, RecordError, Sample, Sink};
+use crate::space::Metric;
 use crate::swarm::{ClosestApproach, Pair, Rows, row, separation};
 
 /// Most spans of time that are kept: some four for each pixel of a figure's width.
@@ -33,6 +34,8 @@ pub(super) const FEW_VEHICLES: usize = 12;
 /// It is a [`Sink`]: it can watch a run as it is flown, or [`RunHistory::read`] a recording.
 #[derive(Clone, Debug, Default)]
 pub struct RunHistory {
+    /// What distances between vehicles are counted in.
+    metric: Metric,
     vehicles: usize,
     most_spans: usize,
     samples_per_span: u64,
@@ -77,6 +80,17 @@ impl RunHistory {
         Self::default()
     }
 
+    /// With distances between vehicles in these lengths; before the first sample.
+    #[must_use]
+    pub fn scaled_by(self, metric: Metric) -> Self {
+        Self { metric, ..self }
+    }
+
+    /// What distances between vehicles are counted in.
+    pub(super) fn metric(&self) -> Metric {
+        self.metric
+    }
+
     /// The history of a recording, read one sample at a time.
     ///
     /// # Errors
@@ -105,7 +119,7 @@ impl RunHistory {
         if count != self.vehicles {
             return;
         }
-        let instant = Span::at(sample);
+        let instant = Span::at(sample, self.metric);
         self.closest = closer(self.closest, instant.closest);
         self.energy_initial = self.energy_initial.or(instant.energy);
         if self.samples.is_multiple_of(self.samples_per_span) && self.spans.len() == self.most_spans {
@@ -181,8 +195,9 @@ impl RunHistory {
     /// The first times that hulls hit \[s\], with the distance of the two centres \[m\]: by straight lines between spans,
     /// or the closest approach where that is theirs.
     pub(super) fn hits(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let apart =
-            |span: &Span, pair: Pair| row(&span.positions_m, pair.second()) - row(&span.positions_m, pair.first());
+        let apart = |span: &Span, pair: Pair| {
+            self.metric.scaled(row(&span.positions_m, pair.second()) - row(&span.positions_m, pair.first()))
+        };
         self.hits.iter().filter(|(_, pair)| pair.second() < self.vehicles).filter_map(move |&(time_s, pair)| {
             let before = self.spans().take_while(|span| span.time_s <= time_s).last()?;
             let after = self.spans().find(|span| span.time_s > time_s).unwrap_or(before);
@@ -250,7 +265,7 @@ impl Sink for RunHistory {
 }
 
 impl Span {
-    fn at(sample: &Sample<'_>) -> Self {
+    fn at(sample: &Sample<'_>, metric: Metric) -> Self {
         let positions_m = &sample.swarm.positions_m;
         let count = positions_m.nrows();
         let effort = |i: usize| if i < sample.control.nrows() { row(sample.control, i).norm() } else { f64::NAN };
@@ -264,7 +279,8 @@ impl Span {
             energy: sample.energy,
             closest: sample.separation,
             pair_min_m: if few {
-                pairs(count).map(|(i, j)| separation(positions_m, i, j)).collect()
+                let scaled = metric.scaled_rows(positions_m);
+                pairs(count).map(|(i, j)| separation(&scaled, i, j)).collect()
             } else {
                 Vec::new()
             },

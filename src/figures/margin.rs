@@ -17,9 +17,16 @@ pub struct Share {
 }
 
 /// Shares of flights that show something (`does`) over the values of a key, with their 95 % intervals and the bracket in which
-/// the verdict turns. The axis is logarithmic where asked.
+/// the verdict turns, and values that are `predicted`, each with what it is. The axis is logarithmic where asked.
 #[must_use]
-pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>, logarithmic: bool) -> Figure {
+pub fn margin(
+    shares: &[Share],
+    key: &str,
+    does: &str,
+    bracket: Option<[f64; 2]>,
+    predicted: &[(f64, String)],
+    logarithmic: bool,
+) -> Figure {
     let values = shares.iter().map(|share| share.value);
     let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
     let mut chart = Chart::new(x, Axis::spanning(&format!("share that {does}"), 0.0, 1.0, 5.0));
@@ -43,6 +50,10 @@ pub fn margin(shares: &[Share], key: &str, does: &str, bracket: Option<[f64; 2]>
             stroke: Stroke::dashed(SOFT_INK, 1.0),
             label: (k == 0).then(|| "the verdict turns in between".to_owned()),
         });
+    }
+    for (k, (value, what)) in predicted.iter().enumerate() {
+        let points = vec![(*value, 0.0), (*value, 1.0)];
+        chart.line(points, Stroke::dashed(PALETTE[1 + k % 2], 1.5), format!("predicted {what}"));
     }
     let description = match bracket {
         Some([low, high]) => format!("The share that {does} over {key}; the verdict turns between {low} and {high}."),

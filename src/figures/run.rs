@@ -34,7 +34,11 @@ pub fn of_run(history: &RunHistory, criteria: &Criteria<'_>) -> Vec<Figure> {
         figures.push(paths_in_space(history, "Paths in space"));
     }
     if history.vehicles() > 1 {
-        figures.push(distances(history, criteria.delta_m, criteria.certified_m, "Distances between vehicles"));
+        let title = match history.metric().is_metres() {
+            true => "Distances between vehicles",
+            false => "Distances between vehicles, scaled to ellipsoids",
+        };
+        figures.push(distances(history, criteria.delta_m, criteria.certified_m, title));
     }
     figures.push(control(history, "Control effort"));
     figures.extend(channels(history, criteria.most_thrust_n));

@@ -14,6 +14,8 @@ const BLOCK: usize = 6;
 /// Relative change of the least eigenvalue from one iteration to the next at which it is known: what is left falls in
 /// proportion.
 const SETTLED: f64 = 1e-12;
+/// Relative difference of eigenvalues that are the same one.
+const SAME: f64 = 1e-9;
 const MOST_ITERATIONS: usize = 300;
 /// Residual of a linear system, relative to its right side.
 const SOLVED: f64 = 1e-6;
@@ -105,6 +107,45 @@ impl Graph {
         }
         (0..self.count()).filter(|&i| pinning.pins(i)).for_each(|i| matrix[(i, i)] += 1.0);
         matrix
+    }
+
+    /// The eigenvalues of M that count: all different ones but the 0 of common motion where nobody is pinned, in ascending
+    /// order. For more than 400 vehicles on a graph that is not complete, the least of them and a bound on the largest, between
+    /// which the others are. None of a graph that is not connected.
+    #[must_use]
+    pub fn pinned_spectrum(&self, pinning: &Pinning) -> Vec<f64> {
+        let least = self.pinned_connectivity(pinning);
+        if least <= 0.0 {
+            return Vec::new();
+        }
+        let is_dense = self.count() <= DENSE_UP_TO;
+        let mut eigenvalues = match pinning {
+            Pinning::Nobody if self.is_complete() => vec![least],
+            Pinning::All if self.is_complete() => vec![least, self.count() as f64 + 1.0],
+            _ if is_dense => self.pinned_laplacian(pinning).symmetric_eigenvalues().data.as_vec().clone(),
+            _ => vec![least, self.largest_eigenvalue_bound(pinning)],
+        };
+        eigenvalues.sort_unstable_by(f64::total_cmp);
+        eigenvalues.retain(|&eigenvalue| eigenvalue >= least * (1.0 - SAME));
+        eigenvalues.dedup_by(|next, before| *next <= *before * (1.0 + SAME));
+        eigenvalues
+    }
+
+    /// The largest eigenvalue of the Laplacian, connected or not; a bound on it for more than 400 vehicles.
+    #[must_use]
+    pub fn largest_eigenvalue(&self) -> f64 {
+        if self.is_complete() || self.count() > DENSE_UP_TO {
+            return self.largest_eigenvalue_bound(&Pinning::Nobody);
+        }
+        self.laplacian().symmetric_eigenvalues().iter().copied().fold(0.0, f64::max)
+    }
+
+    /// The diagonal of M: for each vehicle whom it hears, and one more where it is pinned; without a leader's.
+    #[must_use]
+    pub fn pinned_diagonal(&self, pinning: &Pinning) -> Vec<f64> {
+        let of = |(i, &degree): (usize, &usize)| degree as f64 + if pinning.pins(i) { 1.0 } else { 0.0 };
+        let degrees = self.degrees();
+        degrees.iter().enumerate().filter(|&(i, _)| pinning.leader() != Some(i)).map(of).collect()
     }
 
     /// A bound on the largest eigenvalue of M: for nobody pinned N where the graph is complete, otherwise the largest sum of

@@ -9,6 +9,8 @@ use super::error::LawError;
 pub struct Certificate {
     /// No pair ever comes closer than this \[m\], under the assumptions of the law's proof.
     pub certified_m: Option<f64>,
+    /// What is certified holds up to then \[s\], where it does not hold for ever: a wind blows on.
+    pub certified_until_s: Option<f64>,
     /// No vehicle ever comes nearer to an obstacle than its clearance and this \[m\], where the law keeps clear of obstacles
     /// and there are some.
     pub certified_room_m: Option<f64>,
@@ -64,6 +66,12 @@ pub enum Void {
     CommandsFromOutside,
     /// Each command is held for a period of its own.
     CommandsHeld,
+    /// A wind blows, and the law's proof is of vehicles that nothing pushes.
+    Windblown,
+    /// The wind is turbulent, and turbulence has no bound.
+    WindUnbounded,
+    /// The wind pushes the leader off the reference that its followers are told.
+    LeaderBlown,
     /// Vehicles are bodies that tilt and whose rotors lag: no command is carried out at once.
     NotAPoint,
     /// The vehicles are not told how the reference that they follow moves.
@@ -82,7 +90,14 @@ impl Certificate {
     /// A certificate that promises nothing, for one reason.
     #[must_use]
     pub fn void(reason: Void) -> Self {
-        Self { certified_m: None, certified_room_m: None, energy_initial: None, void: vec![reason], legs: Vec::new() }
+        Self {
+            certified_m: None,
+            certified_until_s: None,
+            certified_room_m: None,
+            energy_initial: None,
+            void: vec![reason],
+            legs: Vec::new(),
+        }
     }
 
     /// What holds of a flight for which this was promised first and another promise was made on a leg, from 0, after its
@@ -95,8 +110,11 @@ impl Certificate {
         let least = |before_m: Option<f64>, now_m: Option<f64>| before_m.zip(now_m).map(|(a, b)| a.min(b));
         self.certified_m = least(self.certified_m, later.certified_m);
         self.certified_room_m = least(self.certified_room_m, later.certified_room_m);
+        let ends = [self.certified_until_s, later.certified_until_s];
+        self.certified_until_s = ends.into_iter().flatten().reduce(f64::min);
         self.void.clone_from(&later.void);
         if self.certified_m.is_none() {
+            self.certified_until_s = None;
             self.legs.clear();
         }
         for (bound, now) in self.legs.iter_mut().skip(leg).zip(later.legs.iter().skip(1)) {
@@ -110,7 +128,7 @@ impl Certificate {
     #[must_use]
     pub fn void_where(mut self, breaks: bool, reason: Void) -> Self {
         if breaks && !self.void.contains(&reason) {
-            (self.certified_m, self.certified_room_m) = (None, None);
+            (self.certified_m, self.certified_until_s, self.certified_room_m) = (None, None, None);
             self.legs.clear();
             self.void.push(reason);
         }
@@ -138,6 +156,9 @@ impl Void {
             Self::VehicleFails => "vehicle-fails",
             Self::CommandsFromOutside => "commands-from-outside",
             Self::CommandsHeld => "commands-held",
+            Self::Windblown => "windblown",
+            Self::WindUnbounded => "wind-unbounded",
+            Self::LeaderBlown => "leader-blown",
             Self::NotAPoint => "not-a-point",
             Self::ReferenceNotFed => "reference-not-fed",
             Self::ObstaclesUnknown => "obstacles-unknown",
@@ -177,6 +198,13 @@ impl fmt::Display for Void {
             Self::CommandsHeld => {
                 f.write_str("The vehicles hold each command while the swarm moves on (time.control_hz).")
             }
+            Self::Windblown => f.write_str("The law's proof is of vehicles that nothing else pushes: the wind does."),
+            Self::WindUnbounded => {
+                f.write_str("The wind is turbulent (wind.dryden): what it adds to the energy has no bound.")
+            }
+            Self::LeaderBlown => {
+                f.write_str("The wind pushes the leader off the reference: its followers are told another motion.")
+            }
             Self::NotAPoint => f.write_str(
                 "The vehicles are no points: they tilt and their rotors lag before a command is carried out (vehicle.model).",
             ),
@@ -206,6 +234,7 @@ mod tests {
     fn a_renewed_promise_is_never_more_than_the_one_before() {
         let promised = |certified_m: Option<f64>| Certificate {
             certified_m,
+            certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(1.0),
             void: if certified_m.is_some() { Vec::new() } else { vec![Void::NoBarrier] },
@@ -243,6 +272,9 @@ mod tests {
             Void::VehicleFails,
             Void::CommandsFromOutside,
             Void::CommandsHeld,
+            Void::Windblown,
+            Void::WindUnbounded,
+            Void::LeaderBlown,
             Void::NotAPoint,
             Void::ReferenceNotFed,
             Void::ObstaclesUnknown,
@@ -268,6 +300,9 @@ mod tests {
             "vehicle-fails",
             "commands-from-outside",
             "commands-held",
+            "windblown",
+            "wind-unbounded",
+            "leader-blown",
             "not-a-point",
             "reference-not-fed",
             "obstacles-unknown",
@@ -282,7 +317,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[20].to_string(),
+            reasons[23].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

@@ -1,24 +1,31 @@
 //! The displacement law: consensus on the slots over any connected graph, and a one-sided edge tension between all who are
 //! near.
 
+mod conditions;
+mod promise;
+
+use conditions::{growth, voids};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, LegBound, Void};
+use super::certificate::{Certificate, Void};
 use super::clearance::{ClearanceTension, slot_room_m};
 use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
+use super::contact::in_contact;
 use super::error::{LawError, ParameterError};
+use super::growth::Growth;
 use super::interface::{Controls, Law, VelocityMargin};
 use super::memo::Memo;
+use super::modes::{Linear, Mode};
 use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
 use super::setting::{Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
 use crate::observation::Observation;
-use crate::space::{NearPairs, Obstacle};
+use crate::space::{Metric, NearPairs, Obstacle};
 use crate::swarm::{Pair, Rows, row, set_row};
-use crate::target::{Guidance, ReferenceMotion, Target};
+use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "displacement"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,10 +94,19 @@ impl DisplacementKeys {
 ///
 /// # Certificate
 /// `V_R(l_ij(t)) <= E(0)` for *every* pair, for ever, on *every* connected graph. It assumes exact knowledge of links and near
-/// pairs, a common compass, no delay, no saturation, no disturbance and continuous time.
+/// pairs, a common compass, no delay, no saturation and continuous time.
+///
+/// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of `|w~_i|^2`/(4 zeta) to E, with
+/// `c - a22` for zeta, and at most that of |w~|/sqrt 2 to sqrt E: what is certified then is certified to the end of the flight.
+/// w~ counts as v~ does: what all feel alike is nothing to a swarm without a reference.
 ///
 /// Where slots change by D, at once or along straight lines, `sqrt E` grows by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`:
 /// what holds through all legs is known before the first step.
+///
+/// # Ellipsoids
+/// Where what must stay empty around a vehicle is an ellipsoid, `l_ij` is the scaled length of its [`Metric`], in which R and delta
+/// are lengths too, and a near pair is pushed by `-V_R'(l) S^2 (p_i - p_j)/l`. Nothing else changes, and what is certified is
+/// certified of scaled lengths.
 ///
 /// # Obstacles
 /// The same one-sided tension acts between vehicles and obstacles at rest, on the distance from the surface less the
@@ -105,11 +121,15 @@ pub struct DisplacementLaw {
     pulls: PinnedConsensus,
     keys: DisplacementKeys,
     delta_m: f64,
+    /// What vehicles are kept apart in.
+    metric: Metric,
     a22_per_s: f64,
     /// Whether `r'' - a22 r'` is fed forward to those who follow.
     is_fed: bool,
     /// Why nothing is certified from any start.
     voids: Vec<Void>,
+    /// What the wind may add to the energy, where it blows.
+    growth: Option<Growth>,
     /// Least eigenvalue of the pinned Laplacian, and a bound on its largest.
     connectivity: f64,
     largest: f64,
@@ -134,7 +154,7 @@ impl DisplacementLaw {
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
     /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
     pub fn new(setting: &Setting<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s } = setting;
+        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s, metric, .. } = setting;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
         for formation in std::iter::once(formation).chain(later.iter().map(|leg| &leg.formation)) {
             ParameterError::check(links, formation, &gains)?;
@@ -147,9 +167,9 @@ impl DisplacementLaw {
         if connectivity <= 0.0 {
             return Err(ParameterError::NobodyKnowsTheReference);
         }
-        let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, delta_m)?, f64::INFINITY);
+        let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, (delta_m, metric))?, f64::INFINITY);
         for leg in later {
-            let of_leg = tension_between(&leg.formation, &keys, delta_m)?;
+            let of_leg = tension_between(&leg.formation, &keys, (delta_m, metric))?;
             if of_leg.rest_m() < tension.rest_m() {
                 tension = of_leg;
             }
@@ -162,14 +182,17 @@ impl DisplacementLaw {
             let tension = ClearanceTension::new(keys.alpha, range_m);
             Some(tension.map_err(|source| ParameterError::Tension { pair: Pair::new(0, 1), source })?)
         };
+        let growth = growth(setting, (keys.zeta_per_s + a22_per_s).max(0.0) - a22_per_s);
         Ok(Self {
             clearance,
             largest: links.largest_eigenvalue_bound(&pulls.pinning),
             pulls,
             keys,
             delta_m,
+            metric,
             a22_per_s,
             is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
+            growth,
             voids: voids(setting),
             connectivity,
             tension,
@@ -197,7 +220,8 @@ impl DisplacementLaw {
 
     /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and `V_R`.
     fn push(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError> {
-        let separation_m = apart_m.norm();
+        let scaled_m = self.metric.scaled(apart_m);
+        let separation_m = scaled_m.norm();
         if separation_m >= self.tension.rest_m() {
             return Ok((Vector3::zeros(), 0.0));
         }
@@ -205,7 +229,7 @@ impl DisplacementLaw {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m, delta_m: self.delta_m });
         }
         let slope_m_s2 = self.tension.derivative(separation_m);
-        Ok((apart_m * (-slope_m_s2 / separation_m), self.tension.value(separation_m)))
+        Ok((self.metric.scaled(scaled_m) * (-slope_m_s2 / separation_m), self.tension.value(separation_m)))
     }
 
     /// Sum of the tensions of a state that the law was not asked about \[m^2/s^2\].
@@ -215,7 +239,7 @@ impl DisplacementLaw {
             None => 0.0,
         };
         let mut near = NearPairs::default();
-        near.update(positions_m, self.tension.rest_m());
+        near.update(positions_m, self.metric.longest_m(self.tension.rest_m()));
         let of_pair = |&(i, j): &(usize, usize)| Ok(self.push(i, j, row(positions_m, i) - row(positions_m, j))?.1);
         Ok(of_obstacles + near.pairs().iter().map(of_pair).sum::<Result<f64, LawError>>()?)
     }
@@ -240,62 +264,26 @@ impl DisplacementLaw {
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
 
-    /// What holds from a state of this energy on, and from each time that the slots become those of the next formation.
-    fn bounds(&self, energy: f64, now: &Formation, ahead: &[&Formation]) -> Vec<LegBound> {
-        let bound = |energy: f64| LegBound {
-            energy,
-            certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)),
-            certified_room_m: self.clearance.map(|clearance| clearance.least_room_m(energy)),
-        };
-        let (mut before, mut root) = (now, energy.sqrt());
-        let mut bounds = vec![bound(energy)];
-        for &next in ahead {
-            root += self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt();
-            bounds.push(bound(root * root));
-            before = next;
-        }
-        bounds
-    }
-
     /// R for these slots \[m\].
     fn rest_for(&self, formation: &Formation) -> (Pair, f64) {
-        let (pair, distance_m) = nearest_slots(formation, self.delta_m);
+        let (pair, distance_m) = nearest_slots(formation, self.delta_m, self.metric);
         (pair, distance_m.min(self.rest_at_most_m))
     }
 }
 
 /// The two slots that are nearest to each other, and how near \[m\]; a vehicle alone keeps any distance.
-fn nearest_slots(formation: &Formation, delta_m: f64) -> (Pair, f64) {
-    formation.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
+fn nearest_slots(formation: &Formation, delta_m: f64, metric: Metric) -> (Pair, f64) {
+    let slots = Formation::points(metric.scaled_rows(&formation.slots_m));
+    slots.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
 }
 
 fn tension_between(
     formation: &Formation,
     keys: &DisplacementKeys,
-    delta_m: f64,
+    (delta_m, metric): (f64, Metric),
 ) -> Result<EdgeTension, ParameterError> {
-    let (pair, rest_m) = nearest_slots(formation, delta_m);
+    let (pair, rest_m) = nearest_slots(formation, delta_m, metric);
     EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })
-}
-
-/// Why nothing is certified from any start: followers are not told how their reference moves, a swarm is carried past obstacles
-/// that stand, or its absolute velocity, which counts among them, is fed.
-fn voids(setting: &Setting<'_>) -> Vec<Void> {
-    let &Setting { guidance, obstacles, a22_per_s, .. } = setting;
-    let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed(&of.motion, a22_per_s);
-    let is_carried = guidance.is_some_and(|of| !of.motion.is_at_rest());
-    let is_driven = guidance.is_none() && a22_per_s > 0.0;
-    let reasons = [
-        (guidance.is_some_and(is_unfed), Void::ReferenceNotFed),
-        (!obstacles.is_empty() && is_carried, Void::CarriedPastObstacles),
-        (!obstacles.is_empty() && is_driven, Void::VelocityUndamped),
-    ];
-    reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
-}
-
-/// Whether a vehicle on the reference stays on it by itself.
-fn needs_no_feed(motion: &ReferenceMotion, a22_per_s: f64) -> bool {
-    motion.is_at_rest() || (motion.is_uniform() && a22_per_s == 0.0)
 }
 
 impl Law for DisplacementLaw {
@@ -352,20 +340,18 @@ impl Law for DisplacementLaw {
     }
 
     fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
-        let energy = match self.try_energy(start) {
-            Ok(energy) => energy,
-            Err(fault) => return Certificate::void(Void::StartRefused(fault)),
-        };
-        let legs = self.bounds(energy, start.target.formation, ahead);
-        let last = legs.last();
-        let (certified_m, certified_room_m) =
-            (last.and_then(|last| last.certified_m), last.and_then(|last| last.certified_room_m));
-        let legs = if ahead.is_empty() { Vec::new() } else { legs };
-        let closes_in = ahead.iter().any(|formation| self.rest_for(formation).1 < self.tension.rest_m());
-        let promised =
-            Certificate { certified_m, certified_room_m, energy_initial: Some(energy), void: Vec::new(), legs }
-                .void_where(closes_in, Void::TargetChanges);
-        self.voids.iter().fold(promised, |promised, &void| promised.void_where(true, void))
+        self.promise_through(start, ahead)
+    }
+
+    /// In contact on the complete graph without a reference.
+    fn linear(&self, formation: &Formation) -> Option<Linear> {
+        let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
+        let lead = Mode { stiffness_per_s2: k, damping_per_s: c };
+        let mut linear = self.pulls.linear(lead.times(self.scale()), lead);
+        if self.pulls.graph.is_complete() && !self.is_guided() && self.has_pairs {
+            linear.in_contact = in_contact(lead, &self.tension, formation);
+        }
+        Some(linear)
     }
 
     fn controls(&self) -> Controls {
@@ -381,7 +367,7 @@ impl Law for DisplacementLaw {
     }
 
     fn sensing_range_m(&self) -> Option<f64> {
-        Some(self.tension.rest_m())
+        Some(self.metric.longest_m(self.tension.rest_m()))
     }
 
     fn needs(&self) -> &'static [&'static str] {
@@ -389,6 +375,14 @@ impl Law for DisplacementLaw {
             return &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"];
         }
         &["all share a compass", "each sees who is nearer than slots are"]
+    }
+
+    fn keeps_ellipsoids(&self) -> bool {
+        true
+    }
+
+    fn reckons_with_wind(&self) -> bool {
+        true
     }
 
     fn keeps_clear_of_obstacles(&self) -> bool {
@@ -405,7 +399,9 @@ impl Law for DisplacementLaw {
     fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
         const DAMPED: f64 = 0.3 / 0.5;
         let contact = match nearest_m? {
-            nearest_m if nearest_m < self.tension.rest_m() => 2.0 * self.tension.second_derivative(nearest_m),
+            nearest_m if nearest_m < self.tension.rest_m() => {
+                2.0 * self.tension.second_derivative(nearest_m) / self.metric.shortest_m(1.0).powi(2)
+            }
             _ => 0.0,
         };
         let links = self.scale() * self.largest;

@@ -1,6 +1,7 @@
 //! The edge-tension law (8): vehicles joined by an edge are pulled to their desired distance and never let closer than
 //! delta.
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
@@ -9,15 +10,17 @@ use super::consensus::{
     relative_kinetic_energy,
 };
 use super::error::{LawError, ParameterError};
+use super::growth::{Frame, Grown, Growth};
 use super::interface::{Controls, Law, VelocityMargin};
 use super::kernel::Kernel;
 use super::memo::Memo;
-use super::setting::{Gain, Setting};
+use super::modes::{Linear, Mode};
+use super::setting::{Blown, Gain, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::Observation;
-use crate::swarm::{Pair, Rows, Swarm, separation};
+use crate::swarm::{Pair, Rows, Swarm, row, separation};
 use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "edge-tension"`.
@@ -29,6 +32,9 @@ pub struct EdgeTensionKeys {
     #[serde(default = "one")]
     pub alpha: f64,
 }
+
+/// Rate at which the law damps relative velocities on the complete graph, whatever a22 is \[1/s\].
+const DAMPING_PER_S: f64 = 1.0;
 
 fn one() -> f64 {
     1.0
@@ -52,7 +58,14 @@ impl EdgeTensionKeys {
 
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<EdgeTensionLaw, ParameterError> {
         let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
-        EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })
+        let law =
+            EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })?;
+        let is_unbounded = |blown: &Blown<'_>| blown.wind.turbulence.is_some() && !blown.wind.shared;
+        Ok(EdgeTensionLaw {
+            growth: setting.blown.map(|blown| Growth::new(&blown, links.count(), Frame::Mean, DAMPING_PER_S)),
+            is_unbounded: setting.blown.as_ref().is_some_and(is_unbounded),
+            ..law
+        })
     }
 }
 
@@ -97,6 +110,9 @@ pub struct EdgeTensionLaw {
     tightest: Option<EdgeTension>,
     /// That of the target whose distances are desired.
     revision: u64,
+    /// What the wind may add to the energy, where it blows, and whether that has no bound.
+    growth: Option<Growth>,
+    is_unbounded: bool,
     /// (1/alpha) sum of V over the edges.
     memo: Memo,
 }
@@ -124,6 +140,8 @@ impl EdgeTensionLaw {
             kernel: Kernel::new(graph, parameters.delta_m, inverse_k_per_m),
             tightest: None,
             revision: 0,
+            growth: None,
+            is_unbounded: false,
             memo: Memo::new(graph.count()),
         };
         law.set_rest_lengths().map_err(|(pair, source)| ParameterError::Tension { pair, source })?;
@@ -258,7 +276,8 @@ impl Law for EdgeTensionLaw {
 
     fn promise(&self) -> &'static str {
         "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on the control, no \
-         disturbance and continuous time: the law's energy never grows, so no pair's tension exceeds N E(0)."
+         disturbance but the wind of the scenario and continuous time: the law's energy grows by no more than that wind can add, so no \
+         pair's tension exceeds N times all of it."
     }
 
     fn barrier_m(&self) -> Option<f64> {
@@ -280,6 +299,32 @@ impl Law for EdgeTensionLaw {
         Some(self.tightest?.second_derivative(nearest_m?).sqrt().max(1.0))
     }
 
+    /// On the complete graph relative velocities are all damped by 1 + a22, and the stiffnesses are the eigenvalues of 1/N times
+    /// the sum over edges of V'' in their directions: V' is 0 at the desired distance. 0 for rotations.
+    fn linear(&self, formation: &Formation) -> Option<Linear> {
+        /// Most vehicles for whom they are computed, in O(N^3).
+        const MOST: usize = 130;
+        let (count, EdgeTensionParameters { alpha, delta_m, a22_per_s }) = (self.graph.count(), self.parameters);
+        if !self.graph.is_complete() || !(2..=MOST).contains(&count) {
+            return None;
+        }
+        let mut stiffness = DMatrix::zeros(3 * count, 3 * count);
+        for (i, j) in self.graph.edges() {
+            let distance_m = formation.desired_distance(i, j);
+            let along = (row(&formation.slots_m, j) - row(&formation.slots_m, i)) / distance_m;
+            let curvature = EdgeTension::new(alpha, delta_m, distance_m).ok()?.second_derivative(distance_m);
+            let block = along * along.transpose() * (curvature / count as f64);
+            for (a, b, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
+                let mut part = stiffness.fixed_view_mut::<3, 3>(3 * a, 3 * b);
+                part += block * sign;
+            }
+        }
+        // Rounding of eigenvalues that are 0.
+        let stiffnesses = stiffness.symmetric_eigenvalues().map(|eigenvalue| eigenvalue.max(0.0));
+        let mode = |&stiffness_per_s2: &f64| Mode { stiffness_per_s2, damping_per_s: 1.0 + a22_per_s };
+        Some(Linear { free: stiffnesses.iter().map(mode).collect(), in_contact: None, heard: None })
+    }
+
     fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
         let gain_per_s = 1.0 + self.parameters.a22_per_s;
         Some(consensus_margin(self.graph.count(), gain_per_s, connectivity, a22_per_s))
@@ -294,7 +339,10 @@ impl Law for EdgeTensionLaw {
     /// the same function, so the pair that may come closest is the one with the smallest K, and one root
     /// ([`EdgeTension::push_side_root`]) answers for all pairs.
     ///
-    /// The promise is that of the proof: exact state, no delay, no saturation, no disturbance, continuous time.
+    /// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of
+    /// `|w_i - mean w|^2`/4 to E: what all feel alike changes nothing.
+    ///
+    /// The promise is that of the proof: exact state, no delay, no saturation, no other disturbance, continuous time.
     /// Without pairs there is nothing to promise, and nothing void either.
     fn certificate(&self, start: &Observation<'_>) -> Certificate {
         let energy = self.try_energy(start.own);
@@ -305,9 +353,31 @@ impl Law for EdgeTensionLaw {
         if let Err(fault) = energy {
             void.push(Void::StartRefused(fault));
         }
+        if self.is_unbounded {
+            void.push(Void::WindUnbounded);
+        }
         let energy_initial = energy.ok();
-        let certified_m = if void.is_empty() { self.linked_separation_m(start) } else { None };
-        Certificate { certified_m, certified_room_m: None, energy_initial, void, legs: Vec::new() }
+        let promised = energy_initial.zip(self.tightest).filter(|_| void.is_empty());
+        let count = start.own.count() as f64;
+        let grown = promised.map(|(energy, tightest)| match &self.growth {
+            None => Grown { energy, until_s: None },
+            Some(growth) => {
+                let borne = tightest.value(tightest.delta_m() + growth.resolution_m()) / count;
+                growth.of(energy, start.time_s, borne)
+            }
+        });
+        Certificate {
+            certified_m: promised.zip(grown).map(|((_, tightest), most)| tightest.push_side_root(count * most.energy)),
+            certified_until_s: grown.and_then(|grown| grown.until_s),
+            certified_room_m: None,
+            energy_initial,
+            void,
+            legs: Vec::new(),
+        }
+    }
+
+    fn reckons_with_wind(&self) -> bool {
+        true
     }
 }
 

@@ -4,6 +4,7 @@ use dyn_clone::DynClone;
 
 use super::certificate::{Certificate, Void};
 use super::error::LawError;
+use super::modes::Linear;
 use crate::formation::{Formation, Freedom};
 use crate::observation::Observation;
 use crate::swarm::Rows;
@@ -53,7 +54,8 @@ pub trait Law: DynClone + Send {
     /// What the certified distance rests on, a sentence.
     fn promise(&self) -> &'static str {
         "The certified distance holds for exact states of all whom a vehicle hears and sees, no delay, no limit on the control, no \
-         disturbance and continuous time: the law's energy never grows, and no pair can hold more than all of it."
+         disturbance but the wind of the scenario and continuous time: the law's energy grows by no more than that wind can add, and \
+         no pair can hold more than all of it."
     }
 
     /// Distance below which no pair joined by a link comes for as long as the energy does not exceed that of this start
@@ -94,6 +96,17 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Whether the law keeps vehicles apart in the lengths of its [`Setting`](super::Setting), of which distances between them are then
+    /// told, and not in metres alone.
+    fn keeps_ellipsoids(&self) -> bool {
+        false
+    }
+
+    /// Whether what the law certifies counts a wind in. What any other certifies is void where one blows.
+    fn reckons_with_wind(&self) -> bool {
+        false
+    }
+
     /// Whether the law keeps vehicles clear of the obstacles that it is told of. What any other certifies is void where there
     /// are some: it is certified of vehicles that hit nothing.
     fn keeps_clear_of_obstacles(&self) -> bool {
@@ -114,6 +127,11 @@ pub trait Law: DynClone + Send {
 
     /// How fast relative velocities are damped at least, on a graph of this algebraic connectivity.
     fn velocity_margin(&self, _connectivity: f64, _a22_per_s: f64) -> Option<VelocityMargin> {
+        None
+    }
+
+    /// Linear motion about the slots of a formation, where it is known.
+    fn linear(&self, _formation: &Formation) -> Option<Linear> {
         None
     }
 

@@ -9,9 +9,11 @@ use super::consensus::{
 };
 use super::error::{LawError, ParameterError};
 use super::interface::{Law, VelocityMargin};
+use super::modes::{Linear, Mode};
+use super::pinned::PinnedConsensus;
 use super::setting::{Gain, Setting};
 use crate::formation::Formation;
-use crate::graph::Graph;
+use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
 use crate::swarm::{Rows, row};
 
@@ -146,6 +148,12 @@ impl Law for LaplacianLaw {
     /// graph's Laplacian have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
     fn fastest_rate_per_s(&self, _nearest_m: Option<f64>, a22_per_s: f64) -> Option<f64> {
         Some(self.f1_per_s2.sqrt().max((self.f2_per_s - a22_per_s).abs()).max(a22_per_s.abs()))
+    }
+
+    fn linear(&self, _formation: &Formation) -> Option<Linear> {
+        let count = self.graph.count().max(1) as f64;
+        let gain = Mode { stiffness_per_s2: self.f1_per_s2, damping_per_s: self.f2_per_s }.times(1.0 / count);
+        Some(PinnedConsensus::new(&self.graph, Pinning::Nobody).linear(gain, gain))
     }
 
     fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {

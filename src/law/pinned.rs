@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::consensus::{add_heard, add_laplacian_product, relative_kinetic_energy, sum_of_squares_about_mean};
 use super::error::LawError;
+use super::modes::{Heard, HeardLinks, Linear, Mode};
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
@@ -37,6 +38,36 @@ impl PinnedConsensus {
             return 1.0;
         }
         self.graph.pinned_connectivity(&self.pinning)
+    }
+
+    /// Linear motion about the slots with these gains times the pinned Laplacian M: a leader is drawn to the reference by the
+    /// gains `lead` alone.
+    pub(super) fn linear(&self, gain: Mode, lead: Mode) -> Linear {
+        let leads = self.pinning.leader().map(|_| lead);
+        let eigenvalues = self.graph.pinned_spectrum(&self.pinning);
+        let free = eigenvalues.iter().map(|&eigenvalue| gain.times(eigenvalue)).chain(leads).collect();
+        let links = self.heard_links(&eigenvalues);
+        Linear { free, in_contact: None, heard: links.map(|links| Heard { gain, links }) }
+    }
+
+    /// The loop over links, where own and others' parts have the same modes, and on a star.
+    fn heard_links(&self, eigenvalues: &[f64]) -> Option<HeardLinks> {
+        let own = self.graph.pinned_diagonal(&self.pinning);
+        let (&first, &last) = (own.first()?, own.last()?);
+        if own.iter().all(|&other| other == first) {
+            // M = D - A, and common motion has the eigenvalue 0 where nobody knows a reference.
+            let common = (self.pinning == Pinning::Nobody).then_some(first);
+            return Some(HeardLinks::Alike {
+                own: first,
+                others: eigenvalues.iter().map(|eigenvalue| first - eigenvalue).chain(common).collect(),
+            });
+        }
+        let (least, most) = (own.iter().copied().fold(first, f64::min), own.iter().copied().fold(last, f64::max));
+        let leaves = self.graph.edge_count();
+        let is_star = leaves + 1 == self.graph.count()
+            && matches!(self.pinning, Pinning::Nobody | Pinning::All)
+            && most - least == (leaves - 1) as f64;
+        is_star.then(|| HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
     }
 
     /// Adds to row i `scale` times the sum over neighbours j of `k (e_i - e_j) + c (v_i - v_j)`, and

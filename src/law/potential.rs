@@ -240,7 +240,14 @@ impl Law for PotentialLaw {
             let steep = (2.0 * energy / self.keys.eta_m4_per_s2).sqrt();
             self.delta_m + 1.0 / (steep + 1.0 / (self.range_m - self.delta_m))
         });
-        Certificate { certified_m, certified_room_m: None, energy_initial: energy, void, legs: Vec::new() }
+        Certificate {
+            certified_m,
+            certified_until_s: None,
+            certified_room_m: None,
+            energy_initial: energy,
+            void,
+            legs: Vec::new(),
+        }
     }
 
     fn needs(&self) -> &'static [&'static str] {

@@ -2,8 +2,9 @@
 
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
-use crate::space::Obstacle;
+use crate::space::{Metric, Obstacle};
 use crate::target::{Guidance, Leg};
+use crate::wind::WindSpec;
 
 /// What a law is built from beside its own keys.
 #[derive(Clone, Copy, Debug)]
@@ -20,15 +21,42 @@ pub struct Setting<'a> {
     pub obstacles: &'a [Obstacle],
     /// Safety distance delta \[m\].
     pub delta_m: f64,
-    /// Velocity coefficient a22 of the vehicles \[1/s\].
+    /// Velocity coefficient a22 of the vehicles \[1/s\], drag of the air included.
     pub a22_per_s: f64,
+    /// The lengths that delta is one of, and that vehicles are kept apart in.
+    pub metric: Metric,
+    /// What pushes them beside their commands, where anything does.
+    pub blown: Option<Blown<'a>>,
+}
+
+/// A wind, and how it is felt.
+#[derive(Clone, Copy, Debug)]
+pub struct Blown<'a> {
+    /// What blows.
+    pub wind: &'a WindSpec,
+    /// Acceleration of a vehicle over the velocity of the air past it \[1/s\].
+    pub drag_per_s: f64,
+    /// End of the flight \[s\].
+    pub until_s: f64,
+    /// A distance that exceeds delta by no more than this is not told from it \[m\].
+    pub resolution_m: f64,
 }
 
 impl<'a> Setting<'a> {
     /// One formation, wherever it comes to be.
     #[must_use]
     pub fn new(links: &'a Graph, formation: &'a Formation, delta_m: f64, a22_per_s: f64) -> Self {
-        Self { links, formation, later: &[], guidance: None, obstacles: &[], delta_m, a22_per_s }
+        Self {
+            links,
+            formation,
+            later: &[],
+            guidance: None,
+            obstacles: &[],
+            delta_m,
+            a22_per_s,
+            metric: Metric::default(),
+            blown: None,
+        }
     }
 
     /// Who knows the reference.

@@ -26,7 +26,7 @@ impl Failing {
             let keeps = match failure.kind {
                 FailureKind::Dead {} => None,
                 FailureKind::Frozen {} => Some(None),
-                FailureKind::Silent {} => return None,
+                FailureKind::Silent {} | FailureKind::Rotor { .. } => return None,
             };
             Some(Failed { vehicle: failure.index(), at_s: failure.at_s, keeps })
         });

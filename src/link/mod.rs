@@ -22,6 +22,3 @@ mod world;
 pub use history::History;
 pub use interface::{Direct, Link, Sensed, Traffic};
 pub use world::of;
-
-#[cfg(test)]
-mod tests;

@@ -1,7 +1,7 @@
 //! The margin as a page.
 
 use super::result::Margin;
-use super::words::{held, value};
+use super::words::{held, prediction, value};
 use crate::figures::{Share, margin as figure};
 use crate::report::page::{self, Badge, Page, Render as _, Tone, noted, section};
 use crate::text::metres;
@@ -37,6 +37,7 @@ impl Margin {
             &self.key,
             self.question.words()[0],
             self.turn.map(|turn| turn.bracket),
+            &self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin)))).collect::<Vec<_>>(),
             self.logarithmic,
         );
         let rows = self.probes.iter().map(|probe| {
@@ -48,7 +49,7 @@ impl Margin {
         let columns = [self.key.as_str(), self.question.words()[0], "Smallest separation [m]"];
         let mut sections = vec![section("Where the verdict turns", &[page::figures(&[chart])])];
         sections.push(section("Every value tried", &[page::numbers(caption, &columns, rows)]));
-        let notes = self.notes();
+        let notes = [self.predictions(), self.notes()].concat();
         if !notes.is_empty() {
             sections.push(section("What to know", &[page::list(&notes)]));
         }

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use super::result::{Flown, Margin, Probe, Question};
 use super::search::{Found, Halving, search};
 use crate::compare::{Watch, fly, in_parallel};
+use crate::preflight::{PredictedMargin, Preflight};
 use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
 use crate::sim::SimError;
 
@@ -51,6 +52,7 @@ pub struct Plan {
     asked: Asked,
     /// Overrides for what is drawn in each run.
     jitter: Option<String>,
+    predicted: Vec<PredictedMargin>,
 }
 
 /// Why there is no such search.
@@ -118,7 +120,11 @@ impl Plan {
         let template = Template::read(&source, overrides).map_err(as_it_is)?;
         let is_drawn = asked.runs > 1 && !template.start_is_random();
         let jitter = is_drawn.then(|| format!("start.jitter_m={:?}", JITTER * template.own().delta_m));
-        let plan = Self { source, overrides: overrides.to_vec(), template, key: key.to_owned(), range, asked, jitter };
+        // A law that does not exist is told of where it is to be flown.
+        let predicted = Preflight::of(template.own()).map(|preflight| preflight.margins).unwrap_or_default();
+        let predicted = predicted.into_iter().filter(|margin| is_same(margin.key, key)).collect();
+        let (overrides, key) = (overrides.to_vec(), key.to_owned());
+        let plan = Self { source, overrides, template, key, range, asked, jitter, predicted };
         for value in [range.from, range.to] {
             plan.scenario(value, 0)?;
         }
@@ -147,6 +153,12 @@ impl Plan {
     #[must_use]
     pub fn asked(&self) -> Asked {
         self.asked
+    }
+
+    /// What linear theory predicts for the key.
+    #[must_use]
+    pub fn predicted(&self) -> &[PredictedMargin] {
+        &self.predicted
     }
 
     /// Whether a start without randomness is moved.
@@ -232,4 +244,10 @@ impl Plan {
         let row = row.map_err(|error| MarginError::Flight { set: format!("{} = {value}", self.key), error })?;
         Ok(row.map(|row| Flown::new(&row)))
     }
+}
+
+/// Whether two keys are one: how often commands are given has two names.
+fn is_same(key: &str, other: &str) -> bool {
+    let name = |key: &str| if key == "time.control_hz" { "actuation.control_hz".to_owned() } else { key.to_owned() };
+    name(key) == name(other)
 }

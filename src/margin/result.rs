@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::plan::Plan;
 use super::search::Found;
 use crate::compare::{FlightRow, Outcome};
+use crate::preflight::PredictedMargin;
 use crate::report::{ScenarioIdentity, Tool};
 use crate::statistics::{CONFIDENCE, Proportion};
 
@@ -95,6 +96,8 @@ pub struct Margin {
     pub confidence: f64,
     /// Where the verdict turns; none where it was the same at every value.
     pub turn: Option<Turn>,
+    /// What linear theory predicts for this key near the first formation, as `check` says it; none where there is no theory.
+    pub predicted: Vec<PredictedMargin>,
     /// Whether the search was broken off before the bracket was as narrow as asked.
     pub interrupted: bool,
     /// Every value that was tried, in increasing order.
@@ -180,6 +183,7 @@ impl Margin {
             jittered: plan.jitters(),
             confidence: CONFIDENCE,
             turn,
+            predicted: plan.predicted().to_vec(),
             interrupted,
             probes,
         }

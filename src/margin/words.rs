@@ -2,7 +2,8 @@
 
 use super::plan::JITTER;
 use super::result::{Margin, Probe};
-use crate::text::{aligned, at_least, at_most, counted, metres};
+use crate::preflight::{Bound, Near, PredictedMargin};
+use crate::text::{aligned, at_least, at_most, counted, metres, significant};
 
 /// Digits of a share.
 const SHARE_DIGITS: u8 = 2;
@@ -20,6 +21,13 @@ pub(super) fn held(probe: &Probe) -> [String; 2] {
     }
     let interval = format!("({} to {})", at_most(of.low, SHARE_DIGITS), at_least(of.high, SHARE_DIGITS));
     [format!("{} of {}", of.count, of.of), interval]
+}
+
+/// What is predicted, in words.
+pub(super) fn prediction(margin: &PredictedMargin) -> String {
+    let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
+    let state = if margin.state == Near::Free { "where nobody pushes" } else { "where the nearest are in contact" };
+    margin.value.map_or_else(|| format!("any {state}"), |value| format!("{bound} {} {state}", significant(value, 4)))
 }
 
 impl Margin {
@@ -71,6 +79,12 @@ impl Margin {
             )
         });
         [interrupted, turns, jitter].into_iter().flatten().collect()
+    }
+
+    /// What linear theory predicts, a sentence each.
+    #[must_use]
+    pub fn predictions(&self) -> Vec<String> {
+        self.predicted.iter().map(|margin| format!("predicted by linear theory: {}", prediction(margin))).collect()
     }
 
     /// Every value that was tried, as a table.

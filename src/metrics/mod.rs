@@ -3,6 +3,10 @@
 //! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Peaks are over the
 //! steps between samples too where a sample tells them, see [`crate::record::Peaks`].
 
+mod strain;
+
+pub use strain::Strain;
+
 use std::borrow::Cow;
 
 use nalgebra::Vector3;
@@ -39,6 +43,7 @@ pub struct Metrics<'a> {
     origin_m: Option<Vector3<f64>>,
     extent_m: f64,
     fastest_m_s: f64,
+    strain: Option<Strain>,
 }
 
 /// Energy \[m^2/s^2\] over the samples that have one.
@@ -119,6 +124,7 @@ impl<'a> Metrics<'a> {
             origin_m: None,
             extent_m: 0.0,
             fastest_m_s: 0.0,
+            strain: None,
         }
     }
 
@@ -150,6 +156,7 @@ impl<'a> Metrics<'a> {
         self.observe_energy(sample.energy);
         self.observe_peaks(sample.peaks);
         self.observe_extent(sample.swarm);
+        Strain::observe(&mut self.strain, sample);
         let good = self.arrival.is_within(&self.distance) && sample.swarm.first_not_finite().is_none();
         self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
     }
@@ -168,6 +175,12 @@ impl<'a> Metrics<'a> {
     #[must_use]
     pub fn ended_legs(&self) -> &[LegSummary] {
         &self.ended
+    }
+
+    /// How far vehicles tilted and how hard their rotors pushed, where they are quadrotors.
+    #[must_use]
+    pub fn strain(&self) -> Option<Strain> {
+        self.strain
     }
 
     /// A sample without a command has none at the end either.

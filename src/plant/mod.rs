@@ -3,10 +3,14 @@
 //! A [`Plant`] holds the true state of the swarm and knows nothing of laws. [`rapier`] flies rigid bodies in a physics
 //! engine and is the only room that names it.
 
+mod air;
 mod path;
 pub mod rapier;
+mod unicycle;
 
+pub(crate) use air::Air;
 pub use path::Path;
+pub use unicycle::Unicycles;
 
 use dyn_clone::DynClone;
 

@@ -4,6 +4,7 @@
 //! [`Preflight::of`] computes numbers from a scenario alone, without flying it, and says in [`Warning`]s what stands in
 //! the way. Its fields are the keys of `tautline check --json`.
 
+mod margins;
 mod numbers;
 mod rigidity;
 mod warning;
@@ -17,7 +18,9 @@ use crate::scenario::{LARGEST, MAX_HALVINGS, Scenario, TimeSpec};
 use crate::space::{closest_pair, least_room};
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::at_least;
+use crate::vehicle::Quadrotor;
 
+pub use margins::{Bound, Near, PredictedMargin};
 pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 pub use warning::{Code, Warning};
 
@@ -38,6 +41,10 @@ pub struct Preflight {
     pub dimensions: usize,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
+    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\]; distances between vehicles are scaled lengths then, of
+    /// which delta is the width of the ellipsoid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_axes_m: Option<[f64; 3]>,
     /// Second smallest eigenvalue lambda2 of the graph's Laplacian.
     pub algebraic_connectivity: f64,
     /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: for g >= 0 relative
@@ -50,6 +57,9 @@ pub struct Preflight {
     pub energy_initial: Option<f64>,
     /// Separation below which no pair ever comes \[m\].
     pub certified_m: Option<f64>,
+    /// Up to when \[s\]; null where it holds for ever, or nothing is certified. Where a wind blows on it is the end of the flight, or
+    /// when what the wind may have added leaves too little to be told from delta.
+    pub certified_until_s: Option<f64>,
     /// What every vehicle keeps beyond the clearance of every obstacle \[m\], where there are obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified_room_m: Option<f64>,
@@ -83,6 +93,9 @@ pub struct Preflight {
     pub dt_max_s: Option<f64>,
     /// No step is flown in parts longer than this \[s\]: the links alone ask for it, wherever vehicles are.
     pub dt_links_s: Option<f64>,
+    /// How late and how seldom the law may be asked near the formation, as linear theory predicts; none where it does not.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub margins: Vec<PredictedMargin>,
     /// Samples that are recorded.
     pub samples: u64,
     /// What their positions, velocities and commands take in the recording, which holds little else \[bytes\].
@@ -99,6 +112,9 @@ pub struct Preflight {
     pub rigidity: Rigidity,
     /// What stands in the way, the worst first.
     pub warnings: Vec<Warning>,
+    /// What bodies that turn bring in the place of what describes points.
+    #[serde(skip)]
+    vehicle: Option<Quadrotor>,
     #[serde(skip)]
     controls: Controls,
     #[serde(skip)]
@@ -138,18 +154,23 @@ impl Preflight {
         let certificate = scenario.certificate(law.as_ref());
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
-        let drift = scenario.drift(law.common_mode_rate_per_s(scenario.a22_per_s));
-        let margin = |rows: &Rows| closest_pair(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
+        let drift = scenario.drift(law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()));
+        let scaled = |rows: &Rows| closest_pair(&scenario.metric().scaled_rows(rows));
+        let margin = |rows: &Rows| scaled(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
             scenario: scenario.name.clone(),
             vehicles: scenario.count(),
             dimensions: scenario.space.dimensions(),
             delta_m: scenario.delta_m,
+            half_axes_m: scenario.half_axes_m(),
             algebraic_connectivity: connectivity,
-            velocity_margin_per_s: law.velocity_margin(connectivity, scenario.a22_per_s).map(|margin| margin.per_s),
-            common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.a22_per_s),
+            velocity_margin_per_s: law
+                .velocity_margin(connectivity, scenario.velocity_coefficient_per_s())
+                .map(|margin| margin.per_s),
+            common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()),
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
+            certified_until_s: certificate.certified_until_s,
             certified_room_m: certificate.certified_room_m,
             start_room_m: least_room(&scenario.obstacles, &scenario.start.positions_m).map(|(room_m, ..)| room_m),
             legs: certificate
@@ -168,11 +189,14 @@ impl Preflight {
             drift_m: drift.distance_m,
             spacing_m: drift.spacing_m,
             dt_s: scenario.time.dt_s,
-            dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.a22_per_s).map(|rate_per_s| {
-                let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
-                scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
-            }),
+            dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.velocity_coefficient_per_s()).map(
+                |rate_per_s| {
+                    let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
+                    scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
+                },
+            ),
             dt_links_s: links_step_s(law.as_ref(), scenario),
+            margins: margins::margins(law.as_ref(), scenario),
             samples: scenario.time.samples(),
             recording_bytes: scenario.time.samples() * TimeSpec::BYTES_PER_VEHICLE * scenario.count() as u64,
             start_dimension: motion_dimension(&scenario.start),
@@ -181,13 +205,18 @@ impl Preflight {
             formation_margin_m: scenario.legs.iter().filter_map(|leg| margin(&leg.formation.slots_m)).reduce(f64::min),
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
+            vehicle: scenario.airframe.quadrotor().cloned(),
             controls: law.controls(),
             links_all: scenario.graph.is_complete(),
             barrier_m: law.barrier_m(),
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
         let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
-        if certificate.void == [Void::GraphNotComplete] && found.velocity_margin_per_s.is_some() && undamped.is_none() {
+        if scenario.wind.is_still()
+            && certificate.void == [Void::GraphNotComplete]
+            && found.velocity_margin_per_s.is_some()
+            && undamped.is_none()
+        {
             found.certified_edges_m = law.linked_separation_m(&start);
         }
         let trap = if found.trap_dimension() == Some(2) { Code::StartInPlane } else { Code::StartOnLine };
@@ -196,6 +225,7 @@ impl Preflight {
             (trap, found.start_too_flat()),
             (Code::StepTooLong, step_too_long(law.as_ref(), scenario)),
             (Code::DriftUnresolved, found.drift_unresolved(scenario)),
+            (Code::BeyondMargin, margins::beyond(&found.margins, scenario)),
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
             (Code::FlatFormationInSpace, found.flat_formation_in_space()),
@@ -219,7 +249,7 @@ impl Preflight {
     }
 
     fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<String> {
-        let margin = law.velocity_margin(self.algebraic_connectivity, scenario.a22_per_s)?;
+        let margin = law.velocity_margin(self.algebraic_connectivity, scenario.velocity_coefficient_per_s())?;
         (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
             let rate = numbers::rate(margin.per_s);
             format!(
@@ -330,7 +360,7 @@ impl Preflight {
     }
 
     fn why_common_mode_grows(&self, scenario: &Scenario) -> &'static str {
-        if self.common_mode_rate_per_s < scenario.a22_per_s {
+        if self.common_mode_rate_per_s < scenario.velocity_coefficient_per_s() {
             "the law brakes it too little"
         } else {
             "the law cannot move the centre of mass"
@@ -362,7 +392,7 @@ impl Preflight {
 /// shorter still.
 /// Longest step that the links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
 fn links_step_s(law: &dyn Law, scenario: &Scenario) -> Option<f64> {
-    let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.a22_per_s)?;
+    let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.velocity_coefficient_per_s())?;
     (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| scenario.time.max_rate_dt / rate_per_s)
 }
 

@@ -371,3 +371,40 @@ fn a_certificate_that_numbers_do_not_tell_from_delta_is_none() {
     assert!(found.energy_initial.is_some());
     assert!(check(&scenario("pentagon", &faint[..1])).certified_m.is_some());
 }
+
+#[test]
+fn margins_are_predicted_where_the_theory_gives_them_and_scenarios_beyond_them_are_warned_of() {
+    let margin = |found: &Preflight, key: &str, state: Near| {
+        found.margins.iter().find(|margin| margin.key == key && margin.state == state).copied()
+    };
+    let sets = ["law.kind=displacement", "swarm.a22_per_s=0"];
+    let found = check(&scenario("pentagon", &sets));
+    let value = |key: &str, state: Near| margin(&found, key, state).expect(key).value.expect("a bound");
+    assert!((value("sensing.latency_s", Near::Free) - 0.711).abs() < 5e-4);
+    assert!((value("sensing.latency_s", Near::InContact) - 0.0811).abs() < 5e-5);
+    assert!((value("actuation.control_hz", Near::Free) - 0.5).abs() < 1e-9, "2 s between commands");
+    assert!(value("actuation.control_hz", Near::InContact) > 5.0);
+    assert!(value("network.latency_s", Near::Free) > 3.0, "others are a fifth of what is heard each");
+    let text = found.text();
+    assert!(text.contains("sensing.latency_s up to 0.711, up to 0.0811 in contact"), "{text}");
+
+    // An edge tension has modes on the complete graph alone, other laws none.
+    assert!(!check(&scenario("pentagon", &[])).margins.is_empty());
+    for sets in [&["graph.kind=ring"][..], &["law.kind=orca", "swarm.hull_radius_m=0.2"]] {
+        assert_eq!(check(&scenario("pentagon", sets)).margins, []);
+    }
+    // Followers of a hub hear nobody in a loop.
+    let led = check(&scenario("pentagon-leader", &[]));
+    assert_eq!(margin(&led, "network.latency_s", Near::Free).expect("a star").value, None);
+
+    for (set, is_beyond) in [
+        ("sensing.latency_s=0.70", false),
+        ("sensing.latency_s=0.72", true),
+        ("network.latency_s=0.72", false),
+        ("actuation.control_hz=0.6", false),
+        ("actuation.control_hz=0.4", true),
+    ] {
+        let codes = codes(&scenario("pentagon", &[sets[0], sets[1], set]));
+        assert_eq!(codes.contains(&Code::BeyondMargin), is_beyond, "{set}");
+    }
+}

@@ -25,6 +25,8 @@ pub enum Code {
     StepTooLong,
     /// By the end the swarm has drifted so far that numbers do not tell its positions apart.
     DriftUnresolved,
+    /// More delay, or fewer commands, than the formation bears.
+    BeyondMargin,
     /// Nothing is certified about separations.
     NoCertificate,
     /// The formation can be bent without changing the length of an edge to first order.
@@ -37,12 +39,13 @@ pub enum Code {
 
 impl Code {
     /// Every code, the worst first.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::RelativeVelocityUnstable,
         Self::StartOnLine,
         Self::StartInPlane,
         Self::StepTooLong,
         Self::DriftUnresolved,
+        Self::BeyondMargin,
         Self::NoCertificate,
         Self::NotRigid,
         Self::FlatFormationInSpace,
@@ -71,6 +74,7 @@ impl Code {
             Self::StartInPlane => "start-in-plane",
             Self::StepTooLong => "step-too-long",
             Self::DriftUnresolved => "drift-unresolved",
+            Self::BeyondMargin => "beyond-margin",
             Self::NoCertificate => "no-certificate",
             Self::NotRigid => "not-rigid",
             Self::FlatFormationInSpace => "flat-formation-in-space",

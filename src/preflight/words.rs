@@ -1,8 +1,10 @@
 //! A pre-flight check in words: one line, and a table.
 
+use super::margins;
 use super::numbers::{rate, significant};
 use super::{LegPromise, Preflight};
-use crate::text::{at_least, counted, table};
+use crate::text::{at_least, counted, seconds, table};
+use crate::vehicle::Quadrotor;
 
 impl Preflight {
     /// The check in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings`,
@@ -40,10 +42,15 @@ impl Preflight {
     pub fn text(&self) -> String {
         let mut rows =
             vec![("stability".to_owned(), self.stability_line()), ("certificate".to_owned(), self.certificate_line())];
+        rows.extend(self.vehicle.iter().map(|quadrotor| ("vehicle".to_owned(), vehicle_line(quadrotor))));
         rows.extend(self.start_room_m.map(|room_m| ("obstacles".to_owned(), self.obstacles_line(room_m))));
         rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
         let rest = [
             ("needs", self.needs_line()),
+            (
+                "margins",
+                margins::line(&self.margins).unwrap_or_else(|| "not known for this law, graph and vehicle".to_owned()),
+            ),
             ("step", self.step_line()),
             ("recording", self.recording_line()),
             ("start", self.start_line()),
@@ -73,7 +80,8 @@ impl Preflight {
                     (true, false) => ", renewed where slots are spread (breathing.mode)",
                     _ => "",
                 };
-                format!("{} m, from {energy}{breath}", at_least(certified_m, 6))
+                let until = self.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+                format!("{} m{}, from {energy}{breath}", at_least(certified_m, 6), until.unwrap_or_default())
             }
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }
@@ -166,6 +174,20 @@ impl Preflight {
             ", convergence perhaps slow"
         }
     }
+}
+
+/// What a quadrotor brings in the place of what describes points.
+fn vehicle_line(quadrotor: &Quadrotor) -> String {
+    let model = &quadrotor.model;
+    format!(
+        "{}, {} kg, hull {} m, thrust to weight {:.2}, attitude at {} Hz; swarm.mass_kg, hull_radius_m and a22_per_s describe \
+         points and are not used",
+        model.name,
+        model.mass_kg,
+        model.hull_radius_m,
+        model.most_thrust_n() / model.weight_n(),
+        quadrotor.attitude_hz
+    )
 }
 
 fn leg_line(promise: &LegPromise) -> String {

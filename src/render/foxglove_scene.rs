@@ -49,6 +49,8 @@ pub struct FoxgloveScene {
     radius_m: Vec<f64>,
     shape: Option<QuadrotorShape>,
     delta_m: f64,
+    /// Height of shells over their width.
+    shell_ratio: f64,
     next_s: f64,
     schema: Option<Schema>,
     /// Pairs that are closer than delta, by the judge of the flight.
@@ -64,6 +66,7 @@ impl FoxgloveScene {
             radius_m: scenario.hull_radius_m.clone(),
             shape: QuadrotorShape::of(scenario),
             delta_m: scenario.delta_m,
+            shell_ratio: scenario.metric().ratio(),
             next_s: f64::NEG_INFINITY,
             schema: SceneUpdate::get_schema(),
             violated: BTreeSet::new(),
@@ -99,7 +102,9 @@ impl FoxgloveScene {
         });
         let shells = (0..count).filter(is_shown).map(|k| {
             let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
-            sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15))
+            let mut shell = sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15));
+            shell.size.iter_mut().for_each(|size| size.z *= self.shell_ratio);
+            shell
         });
         let mut lines = LinePrimitive {
             r#type: LineType::LineList.into(),

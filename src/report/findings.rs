@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::hulls::Hulls;
+use super::strain::VehicleNumbers;
 use crate::audit::{AuditOutcome, ClearanceOutcome, Status};
 use crate::law::Certificate;
 use crate::metrics::{LegSummary, Summary};
@@ -18,6 +19,8 @@ pub struct Findings<'a> {
     pub scenario_sha256: &'a str,
     /// Safety distance delta that was judged by \[m\].
     pub delta_m: f64,
+    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\], of which delta is the width; none for a ball.
+    pub half_axes_m: Option<[f64; 3]>,
     /// What counted as reached.
     pub judge: Arrival,
     /// Dimension of the flat that the start never leaves, where the formation does not fit into it: 0 point, 1 line,
@@ -31,6 +34,8 @@ pub struct Findings<'a> {
     pub certificate: &'a Certificate,
     /// What the judge found.
     pub audit: &'a AuditOutcome,
+    /// What it found in metres where lengths were scaled.
+    pub in_metres: Option<&'a AuditOutcome>,
     /// What it found of the ways past obstacles, where there are any, and the names of these.
     pub clearance: Option<&'a ClearanceOutcome>,
     /// Names of the obstacles, in the order of the scenario.
@@ -39,6 +44,8 @@ pub struct Findings<'a> {
     pub engine_contact_pairs: Option<u64>,
     /// What solid hulls did, or would have done.
     pub hulls: &'a Hulls,
+    /// What was asked of bodies that turn.
+    pub vehicle: Option<&'a VehicleNumbers>,
     /// Numbers of the samples.
     pub summary: &'a Summary,
     /// Number of legs that were asked for.

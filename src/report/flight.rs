@@ -5,10 +5,12 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
+use super::ellipsoid::Ellipsoid;
 use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
 use super::legs::{self, LegNumbers};
 use super::obstacles::Obstacles;
+use super::strain::VehicleNumbers;
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use crate::audit::{self, Status};
@@ -33,6 +35,9 @@ pub struct Report {
     pub separation: Separation,
     /// What the judgement rests on.
     pub audit: Audit,
+    /// What was asked of bodies that turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vehicle: Option<VehicleNumbers>,
     /// How vehicles kept clear of obstacles, where there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacles: Option<Obstacles>,
@@ -96,8 +101,21 @@ pub struct Separation<Delta = f64> {
     pub min_pair: Option<[usize; 2]>,
     /// Distance that the law's certificate promised before the first step, and anew wherever slots were spread \[m\].
     pub certified_m: Option<f64>,
+    /// Up to when it is promised \[s\]; null where it holds for ever, or nothing is promised.
+    #[serde(default)]
+    pub certified_until_s: Option<f64>,
     /// Why the certificate is void, a sentence each; empty where it holds.
     pub certificate_void: Vec<String>,
+    /// Where an ellipsoid must stay empty around each vehicle: distances above, and in the audit, are scaled lengths then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ellipsoid: Option<Ellipsoid>,
+}
+
+impl<Delta> Separation<Delta> {
+    /// Whether what was promised was promised of the time at which two came closest.
+    pub(super) fn is_promised(&self) -> bool {
+        self.certified_until_s.zip(self.min_at_s).is_none_or(|(until_s, min_at_s)| min_at_s <= until_s)
+    }
 }
 
 /// What the judgement rests on.
@@ -242,7 +260,9 @@ impl Report {
                 min_at_s: closest.and_then(|closest| finite(closest.time_s)),
                 min_pair: closest.map(|closest| closest.pair.numbers()),
                 certified_m: certificate.certified_m.and_then(finite),
+                certified_until_s: certificate.certified_until_s.and_then(finite),
                 certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+                ellipsoid: Ellipsoid::of(findings),
             },
             audit: Audit {
                 status: findings.status(),
@@ -256,6 +276,7 @@ impl Report {
                 },
                 rapier: Rapier { contact_pairs: findings.engine_contact_pairs },
             },
+            vehicle: findings.vehicle.cloned(),
             obstacles: Obstacles::of(findings),
             hulls: findings.hulls.clone(),
             formation: FormationNumbers {

@@ -5,10 +5,11 @@ use maud::{Markup, html};
 use super::findings::Performance;
 use super::flight::{Report, Violation};
 use super::page::{self, Badge, Page, Picture, noted, section};
+use super::vehicles::plant;
 use crate::audit::Status;
 use crate::figures::Figure;
 use crate::formation::Freedom;
-use crate::scenario::{PlantSpec, Precision, Scenario};
+use crate::scenario::Scenario;
 use crate::swarm::Bounce;
 use crate::text::{at_least, seconds, significant};
 
@@ -179,34 +180,17 @@ impl Report {
             _ => "wherever it is, turned and perhaps mirrored",
         };
         let (time, judge) = (&scenario.time, &scenario.arrival);
-        let (plant, command) = match scenario.plant {
-            PlantSpec::Rapier(precision) => (
-                format!(
-                    "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
-                     at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
-                     so close that they touch. The engine computes in {}, law and audit in double precision (64 bits).",
-                    match precision {
-                        Precision::Single => "single precision (32 bits)",
-                        Precision::Double => "double precision (64 bits)",
-                    }
-                ),
-                "held over it",
-            ),
-            PlantSpec::Ideal => (
-                "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
-                 8th order in double precision (64 bits); mass and hull play no part, and there is no engine to see \
-                 contacts. The audit takes them to move on straight lines within a step."
-                    .to_owned(),
-                "recorded; the motion between follows the law in continuous time",
-            ),
-        };
+        let (plant, command) = plant(scenario);
         vec![
             certificate,
             plant,
             format!(
-                "Commands are computed once a step of {} ms and {command}. A step longer than {} over the law's fastest rate, or \
+                "Commands are computed {} and {command}. A step longer than {} over the law's fastest rate, or \
                  that would take more than half of a pair's clearance, is flown in halves, at most {} times halved.",
-                short(time.dt_s * 1e3),
+                time.control_hz.map_or_else(
+                    || format!("once a step of {} ms", short(time.dt_s * 1e3)),
+                    |control_hz| format!("{control_hz} times a second"),
+                ),
                 short(time.max_rate_dt),
                 time.max_halvings
             ),

@@ -6,6 +6,7 @@
 //! null.
 
 mod artefact;
+mod ellipsoid;
 mod energy;
 mod findings;
 mod flight;
@@ -15,12 +16,15 @@ mod legs;
 mod obstacles;
 pub mod page;
 pub mod recorded;
+mod strain;
+mod vehicles;
 mod verdict;
 mod verification;
 mod words;
 
 pub use crate::audit::Status;
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
+pub use ellipsoid::Ellipsoid;
 pub use findings::{Findings, INTERRUPTED, Performance, Run};
 pub use flight::{
     Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,
@@ -30,6 +34,7 @@ pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
+pub use strain::VehicleNumbers;
 pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 

@@ -48,6 +48,7 @@ fn a_certificate_is_broken_by_a_share_of_its_clearance() {
     let report = |certified_m: f64, closest_m: f64| {
         let certificate = Certificate {
             certified_m: Some(certified_m),
+            certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(3.656),
             void: vec![],
@@ -103,4 +104,19 @@ fn who_is_too_near_to_an_obstacle_or_nearer_than_certified_does_not_pass() {
     assert_eq!((violated.audit.status, violated.audit.violations.len()), (Status::Violation, 0));
     assert_eq!(violated.headline(), "VIOLATION: vehicle 1 came to 0.250 m from `tower` at 0.50 s (clearance 0.500 m)");
     assert!(report(0.25, None).headline().contains("0.750 m inside `tower`"));
+}
+
+#[test]
+fn around_ellipsoids_both_lengths_are_told_and_the_scaled_one_is_judged() {
+    let case = Case { in_metres: Some(([1.0, 1.0, 3.0], passing(1.25))), ..Case::good() };
+    let report = case.report();
+    assert!(report.headline().starts_with("CLEAR: never closer than 2.460 m scaled to ellipsoids (delta 2.000 m)"));
+    let ellipsoid = report.separation.ellipsoid.as_ref().expect("an ellipsoid");
+    assert_eq!((report.separation.min_m, ellipsoid.min_distance_m), (Some(2.4607), Some(1.25)));
+    assert!(report.text().contains(
+        "ellipsoids   half axes 1.000, 1.000, 3.000 m; unscaled, centres never closer than 1.250000 m at 0.50 s, vehicles 1-2\n"
+    ));
+    let read: Report = serde_json::from_str(&report.to_json().expect("JSON")).expect("a report");
+    assert_eq!(read, report);
+    assert_eq!(Case::good().report().separation.ellipsoid, None);
 }

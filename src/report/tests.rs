@@ -43,6 +43,8 @@ pub(super) const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: No
 /// What a test changes about an otherwise good run.
 pub(super) struct Case {
     pub(super) audit: AuditOutcome,
+    /// Half axes of ellipsoids, and what the judge saw in metres.
+    pub(super) in_metres: Option<([f64; 3], AuditOutcome)>,
     pub(super) summary: Summary,
     pub(super) trap_dimension: Option<usize>,
     pub(super) ended_early: Option<&'static str>,
@@ -59,6 +61,7 @@ impl Case {
     pub(super) fn good() -> Self {
         let certificate = Certificate {
             certified_m: Some(2.055_307),
+            certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(3.656),
             void: vec![],
@@ -66,6 +69,7 @@ impl Case {
         };
         Self {
             audit: passing(2.4607),
+            in_metres: None,
             summary: REACHED,
             trap_dimension: None,
             ended_early: None,
@@ -84,14 +88,17 @@ impl Case {
             scenario_name: "pentagon",
             scenario_sha256: "00ff",
             delta_m: DELTA_M,
+            half_axes_m: self.in_metres.as_ref().map(|(axes, _)| *axes),
             judge: JUDGE,
             trap_dimension: self.trap_dimension,
             formation_dimension: 2,
             refused: self.refused,
             certificate: &self.certificate,
             audit: &self.audit,
+            in_metres: self.in_metres.as_ref().map(|(_, audit)| audit),
             clearance: self.clearance.as_ref(),
             obstacles: &["tower".to_owned()],
+            vehicle: None,
             engine_contact_pairs: Some(0),
             hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
             summary: &self.summary,
@@ -160,6 +167,7 @@ separation
   min_at_s
   min_pair
   certified_m
+  certified_until_s
   certificate_void
 audit
   status
@@ -284,6 +292,7 @@ fn rounding_breaks_no_certificate() {
     // A swarm that starts in its own formation certifies its own distances, and flies in single precision.
     let certificate = Certificate {
         certified_m: Some(3.0),
+        certified_until_s: None,
         certified_room_m: None,
         energy_initial: Some(0.0),
         void: vec![],

@@ -172,7 +172,9 @@ fn risen_energy(findings: &Findings<'_>) -> Option<String> {
 /// numbers that ran out of digits.
 fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
     let (certified_m, closest) = (findings.certificate.certified_m?, findings.audit.closest?);
-    breaks_certificate(closest.separation_m, certified_m, findings.delta_m).then(|| {
+    let holds = findings.certificate.certified_until_s.is_none_or(|until_s| closest.time_s <= until_s);
+    let breaks = holds && breaks_certificate(closest.separation_m, certified_m, findings.delta_m);
+    breaks.then(|| {
         format!(
             "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
              the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits.",

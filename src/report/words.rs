@@ -29,6 +29,11 @@ impl Report {
             + &refused
     }
 
+    /// What is said behind a distance that is no distance in metres.
+    fn scaled(&self) -> &'static str {
+        if self.separation.ellipsoid.is_some() { " scaled to ellipsoids" } else { "" }
+    }
+
     /// How often slots were spread, and vehicles given others; none where neither was.
     pub(super) fn changes(&self) -> Option<String> {
         let counts =
@@ -47,7 +52,8 @@ impl Report {
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
                 let broken = match (self.separation.min_m, self.separation.certified_m) {
                     (Some(min_m), Some(certified_m))
-                        if breaks_certificate(min_m, certified_m, self.separation.delta_m) =>
+                        if self.separation.is_promised()
+                            && breaks_certificate(min_m, certified_m, self.separation.delta_m) =>
                     {
                         format!(", which breaks the certificate of {} m", at_least(certified_m, 6))
                     }
@@ -59,7 +65,11 @@ impl Report {
                 };
                 let room = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::room);
                 let room = room.map(|room| format!(", {room}")).unwrap_or_default();
-                format!("CLEAR: {closest} (delta {delta} m){room}{broken}{rose}, {}", self.formation_in_words())
+                format!(
+                    "CLEAR: {closest}{} (delta {delta} m){room}{broken}{rose}, {}",
+                    self.scaled(),
+                    self.formation_in_words()
+                )
             }
             Status::Violation => {
                 let deepest = self.deepest_in_words();
@@ -117,8 +127,9 @@ impl Report {
         };
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s))).unwrap_or_default();
         format!(
-            "vehicles {first}-{second} came to {} m (delta {} m){at}",
+            "vehicles {first}-{second} came to {} m{} (delta {} m){at}",
             metres_below(min_m, delta_m),
+            self.scaled(),
             metres(delta_m)
         )
     }
@@ -131,7 +142,10 @@ impl Report {
         let [disagreement, common] = [velocity.disagreement_m_s, velocity.common_m_s].map(or_dash);
         let mut rows: Vec<(String, String)> =
             vec![("separation".to_owned(), self.separation_line()), ("audit".to_owned(), self.audit_line())];
+        let ellipsoid = self.separation.ellipsoid.iter();
+        rows.extend(ellipsoid.map(|ellipsoid| ("ellipsoids".to_owned(), ellipsoid.line())));
         rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
+        rows.extend(self.vehicle.iter().map(|vehicle| ("vehicle".to_owned(), vehicle.line())));
         rows.extend(super::legs::lines(&self.legs));
         let rest = [
             ("formation", self.formation_line()),
@@ -150,12 +164,16 @@ impl Report {
         let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         let certified = match separation.certified_m {
-            Some(certified_m) => format!("certified {} m", at_least(certified_m, 6)),
+            Some(certified_m) => {
+                let until = separation.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+                format!("certified {} m{}", at_least(certified_m, 6), until.unwrap_or_default())
+            }
             None => "not certified".to_owned(),
         };
         format!(
-            "{} m{}{} (delta {} m, {certified})",
+            "{} m{}{}{} (delta {} m, {certified})",
             separation.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6)),
+            self.scaled(),
             at.unwrap_or_default(),
             pair.unwrap_or_default(),
             metres(separation.delta_m),

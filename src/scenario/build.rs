@@ -17,6 +17,7 @@ use super::values::{Edge, PerVehicle, Point, rows};
 use crate::graph::{Graph, GraphError};
 use crate::swarm::{Rows, Swarm, set_row};
 use crate::vehicle::Quadrotor;
+use crate::wind::WindSpec;
 
 /// Completes a scenario, in double precision where none is given. It still has to be validated.
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
@@ -25,8 +26,9 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     check_memory(count, edge_count(&document, count))?;
     check_lists(&document, count)?;
     let space = space(&document)?;
-    let a22_per_s = document.a22_per_s();
-    let (law, delta_m) = (document.law.kind.complete(a22_per_s), document.law.delta_m);
+    let (a22_per_s, of_velocity_per_s) = (document.a22_per_s(), document.velocity_coefficient_per_s());
+    let (delta_m, safety) = document.safety.resolve(document.law.delta_m)?;
+    let law = document.law.kind.complete(of_velocity_per_s);
     let reference = document.reference.map(|table| table.guidance(count, document.time.duration_s)).transpose()?;
     let mut start = start(&document.start, count, space, delta_m)?;
     if let (Some(guidance), None) = (&reference, &document.start.velocities_m_s)
@@ -51,6 +53,8 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         mass_kg: per_vehicle(mass_kg, count),
         hull_radius_m,
         a22_per_s,
+        drag_per_s: document.vehicle.drag_per_s,
+        wind: document.wind.map_or_else(|| Ok(WindSpec::default()), |table| table.wind(count))?,
         legs: Vec::new(),
         obstacles,
         reference,
@@ -74,6 +78,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         space,
         law,
         delta_m,
+        safety,
     };
     legs(&mut scenario, &document.formation, &document.leg)?;
     Ok(scenario)

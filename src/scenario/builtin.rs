@@ -59,6 +59,11 @@ const ALL: &[Builtin] = &[
         toml: include_str!("../../assets/crazyflies.toml"),
     },
     Builtin {
+        name: "gusts",
+        summary: "rings in a turbulent wind with gusts on some of them: what all feel alike changes no distance, reached",
+        toml: include_str!("../../assets/gusts.toml"),
+    },
+    Builtin {
         name: "thousand",
         summary: "a thousand vehicles draw together in space: clear and reached",
         toml: include_str!("../../assets/thousand.toml"),

@@ -14,6 +14,7 @@ use super::network::NetworkSpec;
 use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
+use super::safety::SafetyTable;
 use super::sensing::SensingSpec;
 #[cfg(feature = "shapes")]
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
@@ -22,6 +23,7 @@ use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time_table::TimeTable;
 use super::values::{Edge, PerVehicle, Point};
 use super::vehicle::VehicleTable;
+use super::wind::WindTable;
 use crate::law::LawSpec;
 use crate::target::{Arrival, Breathing};
 
@@ -40,6 +42,13 @@ pub(super) struct Document {
     /// What kind of body they are: points unless given.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) vehicle: VehicleTable,
+    /// Air that moves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "WindTable"))]
+    pub(super) wind: Option<WindTable>,
+    /// What must stay empty around each: a ball unless given.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) safety: SafetyTable,
     /// Where they start.
     pub(super) start: StartTable,
     /// The slots that they shall reach.
@@ -92,6 +101,13 @@ pub(super) struct Document {
     pub(super) noise: NoiseTable,
 }
 
+impl Document {
+    /// What a vehicle's own velocity accelerates it by \[1/s\].
+    pub(super) fn velocity_coefficient_per_s(&self) -> f64 {
+        self.a22_per_s() - self.vehicle.drag_per_s
+    }
+}
+
 /// The vehicles.
 #[derive(Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
@@ -111,7 +127,8 @@ pub(super) struct SwarmTable {
     /// Radius of the solid hull of points in m, for all vehicles or for each. The hulls of any two vehicles must fit within
     /// `law.delta_m`, so they change no motion until a pair is closer than that; the ideal plant has no hulls.
     pub(super) hull_radius_m: PerVehicle,
-    /// Velocity coefficient a22 of points, p'' = a22 v + u, in 1/s: negative is drag, positive feeds energy in.
+    /// Velocity coefficient a22 of points, p'' = a22 v + u, in 1/s: negative is drag against the ground, whatever blows, positive
+    /// feeds energy in. Drag in the air is `vehicle.drag_per_s`.
     pub(super) a22_per_s: f64,
 }
 
@@ -309,8 +326,10 @@ pub(super) const DEFAULT_LAW: &str = "edge-tension";
 pub(super) struct LawTable {
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) kind: LawSpec,
-    /// Safety distance delta in m: every flight is judged by it, whatever the law.
-    pub(super) delta_m: f64,
+    /// Safety distance delta in m: every flight is judged by it, whatever the law. Needed unless `[safety]` has an ellipsoid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "f64"))]
+    pub(super) delta_m: Option<f64>,
 }
 
 /// Which vehicles sense each other.

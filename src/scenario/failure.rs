@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::error::ScenarioError;
 use super::limits::require_finite;
 use super::spec::Scenario;
+use crate::vehicle::RotorFailure;
 
 /// A vehicle of which a part fails, for the rest of the flight.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
@@ -28,8 +29,18 @@ pub struct Failure {
 #[cfg_attr(feature = "schema", derive(JsonSchema), schemars(tag = "kind"))]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub enum FailureKind {
-    /// It commands nothing any more: a point drifts on.
+    /// It commands nothing any more: a point drifts on, a quadrotor's rotors stop.
     Dead {},
+    /// A rotor of a quadrotor gives less thrust.
+    Rotor {
+        /// The rotor, counted from 1 as its model lists them.
+        #[cfg_attr(feature = "schema", schemars(range(min = 1, max = 4)))]
+        rotor: u64,
+        /// Share of its thrust that it still gives, from 0 to less than 1: none unless given.
+        #[serde(default)]
+        #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0)))]
+        share: f64,
+    },
     /// It sends nothing any more. Needs `network.rate_hz`.
     Silent {},
     /// Its command stays as it was.
@@ -75,11 +86,46 @@ impl Scenario {
             }
             match kind {
                 FailureKind::Dead {} => {}
+                FailureKind::Rotor { rotor, share } => self.check_rotor(entry, rotor, share)?,
                 FailureKind::Silent {} => self.check_silent(entry)?,
                 FailureKind::Frozen {} => self.check_frozen(entry)?,
             }
         }
         Ok(())
+    }
+
+    fn check_rotor(&self, entry: usize, rotor: u64, share: f64) -> Result<(), ScenarioError> {
+        let (said, help) = if self.airframe.quadrotor().is_none() {
+            (
+                "a rotor is to fail, and vehicles are points".to_owned(),
+                "set vehicle.model to a quadrotor, or kind to \"dead\"",
+            )
+        } else if !(1..=4).contains(&rotor) {
+            (format!("rotor {rotor} is to fail"), "a quadrotor has rotors 1 to 4")
+        } else if !(0.0..1.0).contains(&share) {
+            (
+                format!("a rotor that fails still gives a share of {share} of its thrust"),
+                "set share from 0 to less than 1",
+            )
+        } else {
+            return Ok(());
+        };
+        Err(ScenarioError::new(said).with_help(help).at_entry("failure", entry))
+    }
+
+    /// What becomes of rotors.
+    pub(super) fn rotor_failures(&self) -> Vec<RotorFailure> {
+        let of_rotors = |failure: &Failure| {
+            let (rotor, share) = match failure.kind {
+                FailureKind::Dead {} => (None, 0.0),
+                FailureKind::Rotor { rotor, share } => (Some(usize::try_from(rotor.checked_sub(1)?).ok()?), share),
+                FailureKind::Silent {} | FailureKind::Frozen {} => return None,
+            };
+            Some(RotorFailure { vehicle: failure.index(), rotor, at_s: failure.at_s, share })
+        };
+        let exists =
+            |failure: &RotorFailure| failure.vehicle < self.count() && failure.rotor.is_none_or(|rotor| rotor < 4);
+        self.failures.iter().filter_map(of_rotors).filter(exists).collect()
     }
 
     fn check_frozen(&self, entry: usize) -> Result<(), ScenarioError> {

@@ -41,9 +41,12 @@ mod reference;
 mod resolution;
 #[cfg(feature = "files")]
 mod resolved;
+#[cfg(feature = "files")]
+mod safety;
 #[cfg(feature = "schema")]
 mod schema;
 mod sensing;
+mod shape_of_safety;
 #[cfg(feature = "files")]
 mod shapes;
 #[cfg(feature = "files")]
@@ -63,10 +66,14 @@ mod text;
 mod time;
 #[cfg(feature = "files")]
 mod time_table;
+mod unicycle;
 mod validate;
 #[cfg(feature = "files")]
 mod values;
 mod vehicle;
+mod weather;
+#[cfg(feature = "files")]
+mod wind;
 
 pub use actuation::ActuationSpec;
 pub use error::{Field, Place, ScenarioError};
@@ -86,7 +93,7 @@ pub use schema::schema;
 pub use sensing::SensingSpec;
 #[cfg(feature = "files")]
 pub use source::{MAX_FILE_BYTES, Source};
-pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Scenario, Space};
+pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Safety, Scenario, Space};
 #[cfg(feature = "reports")]
 pub(crate) use start::{offset, random, scatter};
 #[cfg(feature = "files")]

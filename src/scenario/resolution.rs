@@ -58,7 +58,7 @@ impl PlantSpec {
 
 impl Scenario {
     /// What the mean velocity, and with it a rounding error of [`PlantSpec::epsilon`] m/s, comes to by the end of the flight
-    /// where it grows at this rate \[1/s\], and how far the reference goes.
+    /// where it grows at this rate \[1/s\] and the wind adds to it, and how far the reference goes.
     #[must_use]
     pub fn drift(&self, rate_per_s: f64) -> Drift {
         self.drift_in(self.plant, rate_per_s)
@@ -67,11 +67,14 @@ impl Scenario {
     fn drift_in(&self, plant: PlantSpec, rate_per_s: f64) -> Drift {
         let (epsilon, duration_s) = (plant.epsilon(), self.time.duration_s);
         let seed_m_s = self.start.mean_velocity_m_s().norm() + epsilon;
-        let grown = rate_per_s * duration_s;
         let carried_m = self.carried_m(duration_s);
-        let distance_m = carried_m + seed_m_s * if grown == 0.0 { duration_s } else { grown.exp_m1() / rate_per_s };
+        let gained_s = |per_s: f64| if per_s == 0.0 { duration_s } else { (per_s * duration_s).exp_m1() / per_s };
+        let is_held = self.reference.is_some();
+        let air_m_s = if is_held { 0.0 } else { self.wind.fastest_m_s() };
+        let blown_m_s = self.drag_per_s * air_m_s * gained_s(rate_per_s);
+        let distance_m = carried_m + seed_m_s * gained_s(rate_per_s) + blown_m_s * duration_s;
         let spacing_m = epsilon * (self.extent_m() + distance_m);
-        Drift { speed_m_s: seed_m_s * grown.exp(), distance_m, spacing_m }
+        Drift { speed_m_s: seed_m_s * (rate_per_s * duration_s).exp() + blown_m_s, distance_m, spacing_m }
     }
 
     /// How far from the middle of the start a reference carries the middle of a formation \[m\].
@@ -87,8 +90,8 @@ impl Scenario {
     #[cfg(feature = "files")]
     #[must_use]
     pub fn needed_precision(&self) -> Precision {
-        let spacing_m = self.drift_in(SINGLE, self.a22_per_s).spacing_m;
-        let is_point = self.airframe.quadrotor().is_none();
+        let spacing_m = self.drift_in(SINGLE, self.velocity_coefficient_per_s()).spacing_m;
+        let is_point = self.airframe.is_point();
         if is_point && self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
             Precision::Single
         } else {
@@ -101,7 +104,10 @@ impl Scenario {
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
         let ignored = !self.obstacles.is_empty() && !law.keeps_clear_of_obstacles();
-        self.as_far_as_told(self.promised(law)).void_where(ignored, Void::ObstaclesUnknown)
+        let is_uncounted = !self.wind.is_still() && !law.reckons_with_wind();
+        self.as_far_as_told(self.promised(law))
+            .void_where(ignored, Void::ObstaclesUnknown)
+            .void_where(is_uncounted, Void::Windblown)
     }
 
     /// Of every leg, with the breath that it begins with where it does.
@@ -147,7 +153,7 @@ impl Scenario {
             (actuation.max_accel_m_s2.is_some(), Void::AccelerationLimited),
             (actuation.lag_s > 0.0, Void::AccelerationLate),
             (self.failures.iter().any(|failure| !failure.is_silent()), Void::VehicleFails),
-            (self.airframe.quadrotor().is_some(), Void::NotAPoint),
+            (!self.airframe.is_point(), Void::NotAPoint),
         ]
     }
 
@@ -162,8 +168,17 @@ impl Scenario {
 
     /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.
     fn is_unresolved(&self, distance_m: f64) -> bool {
-        let extent_m = self.extent_m() + self.carried_m(self.time.duration_s);
-        distance_m - self.delta_m <= self.plant.epsilon() * extent_m
+        distance_m - self.delta_m <= self.resolution_m()
+    }
+
+    /// Distance between neighbouring numbers where the swarm is meant to be \[m\].
+    fn resolution_m(&self) -> f64 {
+        self.plant.epsilon() * (self.extent_m() + self.carried_m(self.time.duration_s))
+    }
+
+    /// A distance from delta that is told for certain \[m\].
+    pub(super) fn told_apart_m(&self) -> f64 {
+        2.0 * self.resolution_m()
     }
 
     /// Largest distance of a start or a slot from the middle of its swarm \[m\].
@@ -194,10 +209,10 @@ impl Scenario {
             ));
         }
         let drift_per_s = half_ulp / dt_s;
-        if self.a22_per_s != 0.0 && drift_per_s > DAMPING_RESOLUTION * self.a22_per_s.abs() {
+        let a22_per_s = self.velocity_coefficient_per_s();
+        if a22_per_s != 0.0 && drift_per_s > DAMPING_RESOLUTION * a22_per_s.abs() {
             return refuse(format!(
-                "in single precision and steps of {dt_s} s, a22 = {} 1/s is off by {drift_per_s:.1e} 1/s",
-                self.a22_per_s
+                "in single precision and steps of {dt_s} s, a22 = {a22_per_s} 1/s is off by {drift_per_s:.1e} 1/s"
             ));
         }
         let from_m = mean_row(&self.start.positions_m);
@@ -216,7 +231,7 @@ impl Scenario {
             }
         }
         let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
-        match first_within(&self.start.positions_m, rounded_m) {
+        match first_within(&self.metric().scaled_rows(&self.start.positions_m), rounded_m) {
             Some((pair, separation_m)) => refuse(format!(
                 "vehicles {pair} start {separation_m} m apart, which single precision cannot tell from delta = {} m",
                 self.delta_m

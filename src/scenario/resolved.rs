@@ -14,9 +14,11 @@ use super::laws::Laws;
 use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
+use super::safety::SafetyTable;
 use super::spec::{PlantSpec, Scenario, Space};
 use super::values::{Edge, PerVehicle, Point};
 use super::vehicle::VehicleTable;
+use super::wind::WindTable;
 use crate::swarm::Rows;
 use crate::target::{Begins, Leg};
 
@@ -70,7 +72,7 @@ impl Scenario {
 
 impl From<&Scenario> for Document {
     fn from(scenario: &Scenario) -> Self {
-        let law = scenario.law.clone().complete(scenario.a22_per_s);
+        let law = scenario.law.clone().complete(scenario.velocity_coefficient_per_s());
         let (kind, precision) = match scenario.plant {
             PlantSpec::Rapier(precision) => (PlantKind::Rapier, Some(precision)),
             PlantSpec::Ideal => (PlantKind::Ideal, None),
@@ -85,6 +87,8 @@ impl From<&Scenario> for Document {
                 a22_per_s: scenario.a22_per_s,
             },
             vehicle: VehicleTable::from(scenario),
+            wind: WindTable::of(&scenario.wind),
+            safety: SafetyTable::of(scenario),
             start: StartTable {
                 positions_m: Some(scenario.points(&scenario.start.positions_m)),
                 velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),
@@ -102,7 +106,7 @@ impl From<&Scenario> for Document {
             leg: scenario.legs.iter().skip(1).map(|leg| scenario.leg_table(leg)).collect(),
             obstacle: scenario.obstacles.iter().map(ObstacleTable::from).collect(),
             reference: scenario.reference.as_ref().map(ReferenceTable::from),
-            law: LawTable { kind: law, delta_m: scenario.delta_m },
+            law: LawTable { kind: law, delta_m: Some(scenario.delta_m) },
             laws: Laws::new(),
             graph: GraphTable {
                 kind: if scenario.graph.is_complete() {

@@ -13,12 +13,13 @@ use super::sensing::SensingSpec;
 use super::time::TimeSpec;
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::law::{EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
+use crate::law::{Blown, EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
 use crate::observation::Observation;
-use crate::space::Obstacle;
+use crate::space::{Metric, Obstacle};
 use crate::swarm::{Rows, Swarm};
 use crate::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
 use crate::vehicle::Airframe;
+use crate::wind::{Wind, WindSpec};
 
 /// Default mass of a vehicle \[kg\].
 pub const DEFAULT_MASS_KG: f64 = 1.0;
@@ -42,6 +43,10 @@ pub struct Scenario {
     pub hull_radius_m: Vec<f64>,
     /// Velocity coefficient a22 of the plant \[1/s\], equation (1): negative is drag, positive feeds energy in.
     pub a22_per_s: f64,
+    /// Drag of a point over its mass, linear in the velocity of the air past it \[1/s\].
+    pub drag_per_s: f64,
+    /// What blows.
+    pub wind: WindSpec,
     /// The formations to be reached, one after the other and at least one, up to a rigid motion for laws that control
     /// distances only.
     pub legs: Vec<Leg>,
@@ -54,8 +59,10 @@ pub struct Scenario {
     pub graph: Graph,
     /// The control law and its parameters.
     pub law: LawSpec,
-    /// Safety distance delta \[m\] that the audit judges by, whatever the law.
+    /// Safety distance delta \[m\] that the audit judges by, whatever the law: the width of what must stay empty around a vehicle.
     pub delta_m: f64,
+    /// The shape of that.
+    pub safety: Safety,
     /// The body that carries out the commands.
     pub plant: PlantSpec,
     /// Duration and rates.
@@ -74,6 +81,18 @@ pub struct Scenario {
     pub failures: Vec<Failure>,
     /// Seed of every random number that is drawn in flight.
     pub noise_seed: u64,
+}
+
+/// What must stay empty around a vehicle, delta wide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Safety {
+    /// A ball.
+    Ball,
+    /// An upright ellipsoid.
+    Ellipsoid {
+        /// Half of its height \[m\].
+        half_height_m: f64,
+    },
 }
 
 /// The space that a swarm lives in.
@@ -133,9 +152,12 @@ impl Scenario {
             mass_kg: vec![DEFAULT_MASS_KG; count],
             hull_radius_m: vec![DEFAULT_HULL_RADIUS_M; count],
             a22_per_s: 0.0,
+            drag_per_s: 0.0,
+            wind: WindSpec::default(),
             graph: Graph::complete(count),
             law: LawSpec::EdgeTension(EdgeTensionKeys::default()),
             delta_m,
+            safety: Safety::Ball,
             plant: PlantSpec::Rapier(Precision::Single),
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
@@ -149,6 +171,15 @@ impl Scenario {
             legs: vec![Leg::first(formation)],
             obstacles: Vec::new(),
             reference: None,
+        }
+    }
+
+    /// Precision of the physics engine, where one moves the vehicles: on straight lines within steps, and off what they hit.
+    #[must_use]
+    pub fn engine(&self) -> Option<Precision> {
+        match (&self.airframe, self.plant) {
+            (Airframe::Point | Airframe::Quadrotor(_), PlantSpec::Rapier(precision)) => Some(precision),
+            _ => None,
         }
     }
 
@@ -173,8 +204,52 @@ impl Scenario {
     pub fn law(&self) -> Result<Box<dyn Law>, ParameterError> {
         let guidance = self.reference.as_ref();
         let later = self.legs.get(1..).unwrap_or_default();
-        let setting = Setting::new(&self.graph, self.formation(), self.delta_m, self.a22_per_s);
-        self.law.build(&Setting { later, guidance, obstacles: &self.obstacles, ..setting })
+        let setting = Setting::new(&self.graph, self.formation(), self.delta_m, self.velocity_coefficient_per_s());
+        let blown = (!self.wind.is_still()).then(|| Blown {
+            wind: &self.wind,
+            drag_per_s: self.drag_per_s,
+            until_s: self.time.duration_s,
+            resolution_m: self.told_apart_m(),
+        });
+        self.law.build(&Setting {
+            later,
+            guidance,
+            obstacles: &self.obstacles,
+            blown,
+            metric: self.metric(),
+            ..setting
+        })
+    }
+
+    /// What a vehicle's own velocity accelerates it by, a22 less the drag of the air \[1/s\]: with the wind W,
+    /// p'' = (a22 - drag) v + u + drag W.
+    #[must_use]
+    pub fn velocity_coefficient_per_s(&self) -> f64 {
+        self.a22_per_s - self.drag_per_s
+    }
+
+    /// The lengths that distances between vehicles are judged in, of which delta is one: metres for balls.
+    #[must_use]
+    pub fn metric(&self) -> Metric {
+        match self.safety {
+            Safety::Ball => Metric::default(),
+            Safety::Ellipsoid { half_height_m } => Metric::of_ratio(half_height_m / (0.5 * self.delta_m)),
+        }
+    }
+
+    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\]; none for a ball.
+    #[must_use]
+    pub fn half_axes_m(&self) -> Option<[f64; 3]> {
+        match self.safety {
+            Safety::Ball => None,
+            Safety::Ellipsoid { half_height_m } => Some([0.5 * self.delta_m, 0.5 * self.delta_m, half_height_m]),
+        }
+    }
+
+    /// The wind at time 0, as it blows in flight.
+    #[must_use]
+    pub fn air(&self) -> Wind {
+        Wind::new(&self.wind, self.count(), self.noise_seed)
     }
 
     /// Where the reference is at a time of the flight \[s\]; at rest at the origin where there is none.

@@ -67,7 +67,7 @@ impl Template {
         let (name, toml) = source.text()?;
         let text = Text { name: &name, toml: &toml, overrides };
         let document = decoded(&text, source.folder())?;
-        let a22_per_s = document.a22_per_s();
+        let a22_per_s = document.velocity_coefficient_per_s();
         let named = document.laws.iter().map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s)));
         let laws = named.collect();
         let start_is_random = is_random(&document);
@@ -120,7 +120,7 @@ impl Template {
             );
             return Err(ScenarioError::new(format!("there is no law named `{name}`")).with_help(help));
         };
-        Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.a22_per_s) })
+        Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.velocity_coefficient_per_s()) })
     }
 
     /// The scenario under this law, from this start.

@@ -63,7 +63,7 @@ impl TimeTable {
         let Self { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz } = self;
         let record_hz = record_hz.unwrap_or_else(|| default_record_hz(count, duration_s, hold_s));
         let (default_dt_s, default_hz) = match airframe {
-            Airframe::Point => (TimeSpec::DEFAULT_DT_S, None),
+            Airframe::Point | Airframe::Unicycle(_) => (TimeSpec::DEFAULT_DT_S, None),
             Airframe::Quadrotor(_) => (QUADROTOR_DT_S, Some(QUADROTOR_CONTROL_HZ)),
         };
         let (dt_s, control_hz) = (dt_s.unwrap_or(default_dt_s), control_hz.or(default_hz));

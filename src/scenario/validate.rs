@@ -43,6 +43,7 @@ impl Scenario {
         let takes_none = self.graph.is_complete() && !self.law.keeps_edges();
         check_memory(self.count(), if takes_none { 0 } else { self.graph.edge_count() as u128 })?;
         self.check_law()?;
+        self.check_safety()?;
         self.check_vehicles()?;
         self.check_airframe()?;
         self.check_motion()?;
@@ -52,6 +53,7 @@ impl Scenario {
         self.check_obstacles()?;
         check_connected(&self.graph)?;
         self.check_time()?;
+        self.check_wind()?;
         self.check_arrival()?;
         self.check_breathing()?;
         self.check_noise()?;
@@ -287,17 +289,21 @@ impl Scenario {
                 .at_leg_entry(leg, key, pair.first())
                 .at("law.delta_m"))
         };
-        if let Some((pair, separation_m)) = first_within(&self.start.positions_m, delta_m) {
+        let metric = self.metric();
+        let apart = if metric.is_metres() { "apart," } else { "apart, scaled to the ellipsoid," };
+        if let Some((pair, separation_m)) = first_within(&metric.scaled_rows(&self.start.positions_m), delta_m) {
             let said = if separation_m == 0.0 {
                 format!("vehicles {pair} start at the same point")
             } else {
-                format!("vehicles {pair} start {separation_m} m apart, not more than delta = {delta_m} m")
+                format!("vehicles {pair} start {separation_m} m {apart} not more than delta = {delta_m} m")
             };
             let help = "move one of them away, or reduce law.delta_m: starts must be more than delta apart";
             return refuse(said, help, (0, "start.positions_m"), pair);
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
-        let too_near = |(number, leg): (usize, &Leg)| Some((number, first_within(&leg.formation.slots_m, least_m)?));
+        let too_near = |(number, leg): (usize, &Leg)| {
+            Some((number, first_within(&metric.scaled_rows(&leg.formation.slots_m), least_m)?))
+        };
         if let Some((leg, (pair, distance_m))) = self.legs.iter().enumerate().find_map(too_near) {
             let [a, b] = pair.numbers();
             let said = if distance_m == 0.0 {
@@ -321,7 +327,8 @@ impl Scenario {
         order.sort_by(|&i, &j| self.hull_radius_m[j].total_cmp(&self.hull_radius_m[i]));
         let &[i, j, ..] = &order[..] else { return Ok(()) };
         let touching_m = self.hull_radius_m[i] + self.hull_radius_m[j];
-        if touching_m + CONTACT_PREDICTION_M <= self.delta_m {
+        let least_m = self.metric().shortest_m(self.delta_m);
+        if touching_m + CONTACT_PREDICTION_M <= least_m {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
@@ -330,7 +337,7 @@ impl Scenario {
             Pair::new(i, j),
             self.delta_m
         ))
-        .with_help(match 0.5 * (self.delta_m - CONTACT_PREDICTION_M) {
+        .with_help(match 0.5 * (least_m - CONTACT_PREDICTION_M) {
             _ if self.airframe.quadrotor().is_some() => {
                 format!(
                     "enlarge law.delta_m to at least {}: the hulls are those of the model",

@@ -3,7 +3,7 @@
 #[cfg(feature = "files")]
 use std::fmt;
 #[cfg(feature = "files")]
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -26,7 +26,7 @@ use super::suggest::suggest;
 use crate::space::{Obstacle, Shape};
 #[cfg(feature = "files")]
 use crate::vehicle::{self, MODELS, Misread, Model};
-use crate::vehicle::{Airframe, Fleet, Ground, ModelError, Quadrotor};
+use crate::vehicle::{Airframe, Fleet, Ground, ModelError, Quadrotor, Unicycle};
 
 /// Default rate of the attitude loop \[Hz\].
 pub const DEFAULT_ATTITUDE_HZ: f64 = 500.0;
@@ -42,6 +42,8 @@ const ROUNDING: f64 = 1e-6;
 const MODEL: &str = "vehicle.model";
 #[cfg(feature = "files")]
 const POINT: &str = "point";
+#[cfg(feature = "files")]
+const UNICYCLE: &str = "unicycle";
 
 /// What kind of body a vehicle is.
 #[cfg(feature = "files")]
@@ -49,7 +51,7 @@ const POINT: &str = "point";
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct VehicleTable {
-    /// `point`, which carries out accelerations exactly; a quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, a file
+    /// `point`, which carries out accelerations exactly; `unicycle`, which goes where it looks and cannot stop; a quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, a file
     /// in TOML that holds one, or its keys as a table.
     model: ModelKey,
     /// How often a quadrotor's attitude loop runs in Hz, at most once a step: 500 unless given.
@@ -70,6 +72,33 @@ pub(super) struct VehicleTable {
     /// Whether its rotors blow on vehicles below. Not unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     downwash: Option<bool>,
+    /// Least speed of a unicycle in m/s, which cannot stop: 0.2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    min_speed_m_s: Option<f64>,
+    /// Its largest speed in m/s: 3 unless given. At the least one its speed never changes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    max_speed_m_s: Option<f64>,
+    /// Largest rate of its heading in rad/s: 2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    max_turn_rad_s: Option<f64>,
+    /// Its largest acceleration along its heading in m/s^2: 2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    max_accel_m_s2: Option<f64>,
+    /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
+    /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
+    #[serde(skip_serializing_if = "is_none")]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
+    pub(super) drag_per_s: f64,
+}
+
+#[cfg(feature = "files")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_none(drag_per_s: &f64) -> bool {
+    *drag_per_s == 0.0
 }
 
 /// A model by name, by file, or with all of its keys.
@@ -135,9 +164,34 @@ impl VehicleTable {
 
     /// The body that it describes.
     pub(super) fn airframe(&self) -> Result<Airframe, ScenarioError> {
-        if self.is_point() {
-            return self.point();
+        match &self.model {
+            ModelKey::Named(name) if name == POINT => {
+                self.without_rotors("a point")?;
+                self.without_limits("a point")?;
+                Ok(Airframe::Point)
+            }
+            ModelKey::Named(name) if name == UNICYCLE => {
+                self.without_rotors("a unicycle")?;
+                Ok(Airframe::Unicycle(self.unicycle()))
+            }
+            _ => {
+                self.without_limits("a quadrotor")?;
+                self.quadrotor()
+            }
         }
+    }
+
+    fn unicycle(&self) -> Unicycle {
+        let Unicycle { min_speed_m_s, max_speed_m_s, max_turn_rad_s, max_accel_m_s2 } = Unicycle::default();
+        Unicycle {
+            min_speed_m_s: self.min_speed_m_s.unwrap_or(min_speed_m_s),
+            max_speed_m_s: self.max_speed_m_s.unwrap_or(max_speed_m_s),
+            max_turn_rad_s: self.max_turn_rad_s.unwrap_or(max_turn_rad_s),
+            max_accel_m_s2: self.max_accel_m_s2.unwrap_or(max_accel_m_s2),
+        }
+    }
+
+    fn quadrotor(&self) -> Result<Airframe, ScenarioError> {
         let mut model = match &self.model {
             ModelKey::Given(model) => Model::clone(model),
             ModelKey::Named(name) => {
@@ -145,7 +199,7 @@ impl VehicleTable {
                 let found =
                     MODELS.iter().find(|(known, _)| known == name).and_then(|(_, text)| vehicle::read(text).ok());
                 found.ok_or_else(|| {
-                    let known: Vec<_> = std::iter::once(POINT).chain(known).collect();
+                    let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
                     let help = format!("{}; a model of your own is the path of a file in TOML", suggest(name, &known));
                     ScenarioError::new(format!("there is no model `{name}`")).with_help(help).at(MODEL)
                 })?
@@ -161,8 +215,8 @@ impl VehicleTable {
         })))
     }
 
-    /// A point, which has none of what quadrotors have.
-    fn point(&self) -> Result<Airframe, ScenarioError> {
+    /// Refuses what only quadrotors have.
+    fn without_rotors(&self, what: &str) -> Result<(), ScenarioError> {
         let given = [
             ("vehicle.attitude_hz", self.attitude_hz.is_some()),
             ("vehicle.attitude_rad_s", self.attitude_rad_s.is_some()),
@@ -171,11 +225,28 @@ impl VehicleTable {
             ("vehicle.downwash", self.downwash.is_some()),
         ];
         match given.into_iter().find(|(_, given)| *given) {
-            Some((key, _)) => Err(ScenarioError::new("a point has neither attitude nor rotors")
+            Some((key, _)) => Err(ScenarioError::new(format!("{what} has neither attitude nor rotors"))
                 .with_help("leave this key out, or set vehicle.model to a quadrotor such as \"crazyflie\"")
                 .at(key)
                 .at(MODEL)),
-            None => Ok(Airframe::Point),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses what only unicycles have.
+    fn without_limits(&self, what: &str) -> Result<(), ScenarioError> {
+        let given = [
+            ("vehicle.min_speed_m_s", self.min_speed_m_s.is_some()),
+            ("vehicle.max_speed_m_s", self.max_speed_m_s.is_some()),
+            ("vehicle.max_turn_rad_s", self.max_turn_rad_s.is_some()),
+            ("vehicle.max_accel_m_s2", self.max_accel_m_s2.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(ScenarioError::new(format!("{what} has no such limit"))
+                .with_help("leave this key out, or set vehicle.model to \"unicycle\"")
+                .at(key)
+                .at(MODEL)),
+            None => Ok(()),
         }
     }
 }
@@ -184,7 +255,12 @@ impl VehicleTable {
 #[cfg(feature = "files")]
 impl From<&Scenario> for VehicleTable {
     fn from(scenario: &Scenario) -> Self {
-        let Some(quadrotor) = scenario.airframe.quadrotor() else { return Self::default() };
+        let drag_per_s = scenario.drag_per_s;
+        let quadrotor = match &scenario.airframe {
+            Airframe::Point => return Self { drag_per_s, ..Self::default() },
+            Airframe::Unicycle(unicycle) => return Self { drag_per_s, ..Self::from(unicycle) },
+            Airframe::Quadrotor(quadrotor) => quadrotor,
+        };
         let model = &quadrotor.model;
         let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(text).ok()?)));
         let is_it = |(_, other): &(&str, Model)| {
@@ -199,13 +275,29 @@ impl From<&Scenario> for VehicleTable {
             attitude_damping: Some(model.attitude_damping),
             ground_effect: Some(quadrotor.ground_effect),
             downwash: Some(quadrotor.downwash),
+            drag_per_s,
+            ..Self::default()
+        }
+    }
+}
+
+#[cfg(feature = "files")]
+impl From<&Unicycle> for VehicleTable {
+    fn from(unicycle: &Unicycle) -> Self {
+        Self {
+            model: ModelKey::Named(UNICYCLE.to_owned()),
+            min_speed_m_s: Some(unicycle.min_speed_m_s),
+            max_speed_m_s: Some(unicycle.max_speed_m_s),
+            max_turn_rad_s: Some(unicycle.max_turn_rad_s),
+            max_accel_m_s2: Some(unicycle.max_accel_m_s2),
+            ..Self::default()
         }
     }
 }
 
 /// Reads the file of a model.
 #[cfg(feature = "files")]
-fn read(path: &PathBuf) -> Result<Model, ScenarioError> {
+fn read(path: &Path) -> Result<Model, ScenarioError> {
     let shown = path.display().to_string();
     let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
         ScenarioError::new(format!("{shown} is not UTF-8")).with_help("save the file as UTF-8 text").at(MODEL)
@@ -224,7 +316,9 @@ impl Scenario {
             _ => None,
         };
         let grounds: Vec<_> = self.obstacles.iter().filter_map(ground).collect();
-        Some(Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane))
+        let fleet = Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane);
+        let fleet = fleet.failing(self.rotor_failures());
+        Some(if self.wind.is_still() { fleet } else { fleet.blown(self.air()) })
     }
 
     /// Makes every vehicle one of these, with the mass, the hull and the default rates of its kind. Points of a quadrotor's mass
@@ -242,6 +336,7 @@ impl Scenario {
 
     /// A body that can be flown, and an attitude loop that steps can follow.
     pub(super) fn check_airframe(&self) -> Result<(), ScenarioError> {
+        self.check_unicycle()?;
         let Some(Quadrotor { model, attitude_hz, .. }) = self.airframe.quadrotor() else { return Ok(()) };
         let refuse = |ModelError { key, message, help }| {
             let key = match key {

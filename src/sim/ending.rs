@@ -26,6 +26,8 @@ pub struct Flight {
     pub certificate: Certificate,
     /// What the independent judge found.
     pub audit: AuditOutcome,
+    /// Where that was of scaled lengths ([`crate::space::Metric`]): what it found in metres, by the widest hulls.
+    pub in_metres: Option<AuditOutcome>,
     /// What it found of the ways past obstacles, where there are any.
     pub clearance: Option<ClearanceOutcome>,
     /// Pairs whose keep-out balls the plant's own collision detection saw overlap, in index order.

@@ -9,7 +9,7 @@ use crate::law::Law;
 use crate::plant::{HullContact, Path};
 use crate::record::Event;
 use crate::scenario::Scenario;
-use crate::space::NearPairs;
+use crate::space::{Metric, NearPairs};
 use crate::swarm::{Bounce, ClosestApproach, Pair, Rows, Swarm, row};
 
 use super::ending::SimError;
@@ -20,6 +20,11 @@ use super::obstacles::judged;
 #[derive(Clone)]
 pub(super) struct Judge {
     auditor: Auditor,
+    /// Where what must stay empty around a vehicle is an ellipsoid: the judge of distances in metres, by the widest hulls.
+    in_metres: Option<Auditor>,
+    metric: Metric,
+    /// Positions in the lengths that the first is told.
+    scaled: Rows,
     /// What judges the way past obstacles, where there are any, and these.
     clearance: Option<ClearanceAuditor>,
     obstacles: Vec<Obstacle>,
@@ -42,6 +47,7 @@ pub(super) struct Judge {
 /// What is known of a flight in the end.
 pub(super) struct Judged {
     pub(super) audit: AuditOutcome,
+    pub(super) in_metres: Option<AuditOutcome>,
     pub(super) clearance: Option<ClearanceOutcome>,
     pub(super) engine_contacts: Vec<Pair>,
     pub(super) bounces: Vec<Bounce>,
@@ -52,8 +58,14 @@ impl Judge {
         let count = scenario.count();
         let obstacles: Vec<_> = scenario.obstacles.iter().map(judged).collect();
         let clearance = if obstacles.is_empty() { None } else { Some(ClearanceAuditor::new(count, &obstacles)?) };
+        let metric = scenario.metric();
+        let widest_m = 2.0 * scenario.hull_radius_m.iter().copied().fold(0.0, f64::max);
+        let in_metres = (!metric.is_metres()).then(|| Auditor::new(count, widest_m)).transpose()?;
         Ok(Self {
             auditor: Auditor::new(count, scenario.delta_m)?,
+            in_metres,
+            metric,
+            scaled: Rows::zeros(0),
             clearance,
             obstacles,
             room_m: f64::INFINITY,
@@ -69,14 +81,22 @@ impl Judge {
     }
 
     pub(super) fn start(&mut self, time_s: f64, positions_m: &Rows, events: &mut Vec<Event>) -> Result<(), AuditError> {
-        let finding = self.auditor.start(time_s, positions_m)?;
+        let Self { auditor, in_metres, metric, scaled, .. } = self;
+        if let Some(in_metres) = in_metres {
+            in_metres.start(time_s, positions_m)?;
+        }
+        let finding = auditor.start(time_s, told(*metric, positions_m, scaled))?;
         note(finding, &mut self.closest, &mut self.nearest_m, events);
         self.clear_of_obstacles(time_s, positions_m, events)
     }
 
     /// Sweeps the straight line to these positions.
     pub(super) fn sweep(&mut self, time_s: f64, positions_m: &Rows, events: &mut Vec<Event>) -> Result<(), AuditError> {
-        let finding = self.auditor.step(time_s, positions_m)?;
+        let Self { auditor, in_metres, metric, scaled, .. } = self;
+        if let Some(in_metres) = in_metres {
+            in_metres.step(time_s, positions_m)?;
+        }
+        let finding = auditor.step(time_s, told(*metric, positions_m, scaled))?;
         note(finding, &mut self.closest, &mut self.nearest_m, events);
         self.clear_of_obstacles(time_s, positions_m, events)
     }
@@ -129,11 +149,12 @@ impl Judge {
             return true;
         }
         // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
-        if 2.0 * moved_m <= 0.5 * (self.nearest_m - barrier_m) {
+        if 2.0 * moved_m <= 0.5 * self.metric.shortest_m(self.nearest_m - barrier_m) {
             return false;
         }
+        let metric = self.metric;
         let loses_half = |(i, j): (usize, usize)| {
-            let apart = |rows: &Rows| row(rows, j) - row(rows, i);
+            let apart = |rows: &Rows| metric.scaled(row(rows, j) - row(rows, i));
             let mut from = apart(start);
             let least_m = barrier_m + 0.5 * (from.norm() - barrier_m);
             instants().map(apart).any(|to| swept_separation_m(std::mem::replace(&mut from, to), to) < least_m)
@@ -142,7 +163,7 @@ impl Judge {
             return links.edges().any(loses_half);
         }
         // A pair that begins farther apart keeps half of its clearance.
-        self.near.update(start, barrier_m + 4.0 * moved_m);
+        self.near.update(start, metric.longest_m(barrier_m) + 4.0 * metric.ratio().max(1.0 / metric.ratio()) * moved_m);
         self.near.pairs().iter().copied().any(loses_half)
     }
 
@@ -188,11 +209,21 @@ impl Judge {
     pub(super) fn finish(self) -> Judged {
         Judged {
             audit: self.auditor.finish(),
+            in_metres: self.in_metres.map(Auditor::finish),
             clearance: self.clearance.map(ClearanceAuditor::finish),
             engine_contacts: self.engine_contacts,
             bounces: self.bounces,
         }
     }
+}
+
+/// Positions in the lengths that the judge is told: the same where these are metres.
+fn told<'a>(metric: Metric, positions_m: &'a Rows, scaled: &'a mut Rows) -> &'a Rows {
+    if metric.is_metres() {
+        return positions_m;
+    }
+    metric.scale(positions_m, scaled);
+    scaled
 }
 
 /// Keeps what the judge found in a sweep.

@@ -6,7 +6,7 @@ use crate::continuous::{Continuous, IdealError, Quadrotors};
 use crate::feedback::Feedback;
 #[cfg(feature = "ideal")]
 use crate::law::LawError;
-use crate::plant::{HullContact, Path, Plant, PlantError, rapier};
+use crate::plant::{HullContact, Path, Plant, PlantError, Unicycles, rapier};
 use crate::record::Channel;
 use crate::scenario::{PlantSpec, Scenario};
 use crate::swarm::{Pair, Rows, Swarm};
@@ -46,6 +46,9 @@ impl Motion {
     /// What the scenario asks for, at its start.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
+        if let Some(unicycle) = scenario.airframe.unicycle() {
+            return Unicycles::new(*unicycle, &scenario.start).into();
+        }
         match scenario.plant {
             PlantSpec::Rapier(precision) => Self::Sampled(rapier::plant(scenario, precision)),
             #[cfg(feature = "ideal")]
@@ -112,12 +115,12 @@ impl Motion {
         matches!(self, Self::Sampled(_))
     }
 
-    /// All random numbers begin anew; continuous time has none.
+    /// All random numbers begin anew.
     pub(super) fn reseed(&mut self, seed: u64) {
         match self {
             Self::Sampled(plant) => plant.reseed(seed),
             #[cfg(feature = "ideal")]
-            Self::Continuous(_) => {}
+            Self::Continuous(solution) => solution.reseed(seed),
         }
     }
 
@@ -126,7 +129,7 @@ impl Motion {
         match self {
             Self::Sampled(plant) => plant.channels(),
             #[cfg(feature = "ideal")]
-            Self::Continuous(_) => Vec::new(),
+            Self::Continuous(solution) => solution.channels(),
         }
     }
 
@@ -135,7 +138,7 @@ impl Motion {
         match self {
             Self::Sampled(plant) => plant.write_channels(channels),
             #[cfg(feature = "ideal")]
-            Self::Continuous(_) => {}
+            Self::Continuous(solution) => solution.write_channels(channels),
         }
     }
 

@@ -269,7 +269,7 @@ impl Simulation {
     /// What the flight left behind besides its recording. One that is under way counts as interrupted here.
     #[must_use]
     pub fn finish(self) -> Flight {
-        let Judged { audit, clearance, engine_contacts, bounces } = self.judge.finish();
+        let Judged { audit, in_metres, clearance, engine_contacts, bounces } = self.judge.finish();
         Flight {
             law: self.controller.law.name().to_owned(),
             ending: self.ending.unwrap_or(Ending::Interrupted),
@@ -277,6 +277,7 @@ impl Simulation {
             steps: self.steps,
             certificate: self.certificate,
             audit,
+            in_metres,
             clearance,
             engine_contacts,
             bounces,

@@ -19,6 +19,7 @@ mod flights;
 mod html;
 mod interface;
 mod law;
+mod margins;
 mod page;
 mod rates;
 mod result;
@@ -38,7 +39,7 @@ use interface::{Judged, Progress, Untried};
 /// A file of claims: its name, its subject, the units of work that it counts, and its judgement.
 type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> Judged);
 
-const PARTS: [Part; 7] = [
+const PARTS: [Part; 8] = [
     ("tension", "The edge tension", 1, tension::judge),
     ("law", "The law at single instants", 1, law::judge),
     ("certificate", "Energy and certificate", certificate::STARTS as u64 + 1, certificate::judge),
@@ -46,6 +47,7 @@ const PARTS: [Part; 7] = [
     ("equilibria", "Where the law comes to rest", equilibria::FLIGHTS, equilibria::judge),
     ("rates", "Rates near the formation", 5, rates::judge),
     ("displacement", "The displacement law", displacement::WORK, displacement::judge),
+    ("margins", "Margins of delay and of held commands", margins::WORK, margins::judge),
 ];
 /// Convergence in both precisions, free motion, and three flights.
 const ENGINE_WORK: u64 = 2 * convergence::STEPS_HZ.len() as u64 + 1 + 3;
@@ -57,7 +59,7 @@ pub fn work() -> u64 {
 }
 
 /// Judges the claims of one group that needs no figure, by its name: `tension`, `law`, `certificate`, `figures`,
-/// `equilibria`, `rates` or `displacement`. None where there is no such group.
+/// `equilibria`, `rates`, `displacement` or `margins`. None where there is no such group.
 #[must_use]
 pub fn judge(id: &str) -> Option<Group> {
     PARTS.iter().find(|part| part.0 == id).map(|&(id, title, _, judge)| group(id, title, judge(&|_| ())))

@@ -1,9 +1,13 @@
 //! The attitude loop: from a commanded acceleration to the thrust and torque that a vehicle asks of its rotors.
 //!
-//! Lee, Leok and McClamroch, *Geometric tracking control of a quadrotor UAV on SE(3)* (CDC 2010): with
-//! F = m (a + g e3) the thrust is F.b3, the body is turned towards F at a heading, and the torque is
-//! -k_R e_R - k_W W + W x J W with k_R = J omega^2 and k_W = 2 zeta omega J. Between two commands the attitude asked for
-//! stands still, so the rates that it would have are zero.
+//! Lee, Leok and `McClamroch`, *Geometric tracking control of a quadrotor UAV on SE(3)* (CDC 2010), with u commanded:
+//!
+//! ```text
+//! F = m (u + g e3)                 the thrust is F.b3, and the body is turned towards F at a heading
+//! M = -k_R e_R - k_W W + W x J W   k_R = J omega^2, k_W = 2 zeta omega J
+//! ```
+//!
+//! Between two commands the attitude asked for stands still, so the rates that it would have are zero.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 

@@ -22,6 +22,8 @@ pub struct State {
     pub rates_rad_s: Vector3<f64>,
     /// Speed of each rotor \[rpm\].
     pub rotors_rpm: Vector4<f64>,
+    /// Share of its thrust that each still gives: 1 unless it has failed.
+    pub shares: Vector4<f64>,
 }
 
 /// What acts on a quadrotor beside gravity.
@@ -125,13 +127,15 @@ impl Dynamics {
             attitude: UnitQuaternion::identity(),
             rates_rad_s: Vector3::zeros(),
             rotors_rpm: Vector4::repeat(self.hover_rpm),
+            shares: Vector4::repeat(1.0),
         }
     }
 
     /// Thrust of each rotor \[N\], with what the ground adds.
     #[must_use]
     pub fn thrusts_n(&self, state: &State) -> Vector4<f64> {
-        let mut thrusts_n = state.rotors_rpm.map(|speed_rpm| self.curve.thrust_n(speed_rpm));
+        let thrust_n = |speed_rpm: f64, share: f64| share * self.curve.thrust_n(speed_rpm);
+        let mut thrusts_n = state.rotors_rpm.zip_map(&state.shares, thrust_n);
         if !self.grounds.is_empty() {
             for (rotor, thrust_n) in thrusts_n.iter_mut().enumerate() {
                 *thrust_n *= self.ground_factor(state, rotor);

@@ -7,6 +7,7 @@ use super::dynamics::{Drift, Dynamics, Ground, State, Wrench};
 use super::model::Quadrotor;
 use crate::record::Channel;
 use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::wind::Wind;
 
 /// Frequency of the loop that holds the height of a swarm in the plane z = 0 \[rad/s\]; it is critically damped.
 pub const HEIGHT_RAD_S: f64 = 2.0;
@@ -25,6 +26,8 @@ pub struct Fleet {
     pub states: Vec<State>,
     /// Velocity of the air around each, without what rotors blow \[m/s\].
     pub wind_m_s: Rows,
+    /// What makes it, where it is not the same all the time.
+    wind: Option<Wind>,
     asked_rpm: Vec<Vector4<f64>>,
     /// Accelerations that are commanded \[m/s^2\].
     commands: Rows,
@@ -34,8 +37,22 @@ pub struct Fleet {
     clock: Clock,
     jets: Vec<Downwash>,
     wrenches: Vec<Wrench>,
+    failures: Vec<RotorFailure>,
     /// As it was before the last [`Fleet::remember`].
     before: Before,
+}
+
+/// Rotors of which some or all thrust is lost, for the rest of the flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorFailure {
+    /// The vehicle, from 0.
+    pub vehicle: usize,
+    /// The rotor, from 0; where none is named all of them stop, as slowly as they follow anything.
+    pub rotor: Option<usize>,
+    /// From when on \[s\].
+    pub at_s: f64,
+    /// Share of its thrust that a rotor still gives.
+    pub share: f64,
 }
 
 /// What goes back where a step is taken back.
@@ -66,8 +83,10 @@ impl Fleet {
         let mut fleet = Self {
             before: Before::default(),
             wrenches: vec![Wrench::default(); count],
+            failures: Vec::new(),
             states,
             wind_m_s: Rows::zeros(count),
+            wind: None,
             asked_rpm,
             commands: Rows::zeros(count),
             holds_height,
@@ -79,6 +98,22 @@ impl Fleet {
         fleet.feel();
         fleet.remember();
         fleet
+    }
+
+    /// The same in a wind that is at the same instant.
+    #[must_use]
+    pub fn blown(mut self, wind: Wind) -> Self {
+        wind.write(&mut self.wind_m_s);
+        self.wind = Some(wind);
+        self.feel();
+        self
+    }
+
+    /// The same with rotors that fail.
+    #[must_use]
+    pub fn failing(mut self, failures: Vec<RotorFailure>) -> Self {
+        self.failures = failures;
+        self
     }
 
     /// Number of vehicles N.
@@ -108,11 +143,50 @@ impl Fleet {
         asked_rpm.clone_from(&before.asked_rpm);
         wrenches.clone_from(&before.wrenches);
         *clock = before.clock;
+        if let Some(wind) = &mut self.wind {
+            wind.undo();
+            wind.write(&mut self.wind_m_s);
+        }
     }
 
-    /// Lets the attitude loops run where they are due, and says after how many seconds they are due again.
+    /// The wind at the end of a step \[s\], which [`Fleet::go_back`] takes back.
+    pub fn blow(&mut self, dt_s: f64) {
+        if let Some(wind) = &mut self.wind {
+            wind.advance(dt_s);
+            wind.write(&mut self.wind_m_s);
+        }
+    }
+
+    /// The wind at an instant of the step that [`Fleet::blow`] came to the end of, so many seconds before it.
+    pub fn blow_before(&mut self, before_s: f64) {
+        if let Some(wind) = &self.wind {
+            let time_s = wind.now_s() - before_s;
+            (0..self.states.len()).for_each(|i| set_row(&mut self.wind_m_s, i, wind.air_at_m_s(i, time_s)));
+        }
+    }
+
+    /// How long the wind is smooth from that instant on \[s\].
+    #[must_use]
+    pub fn smooth_s(&self, before_s: f64) -> f64 {
+        self.wind.as_ref().map_or(f64::INFINITY, |wind| {
+            let time_s = wind.now_s() - before_s;
+            wind.next_turn_s(time_s) - time_s
+        })
+    }
+
+    /// Begins its random numbers anew.
+    pub fn reseed(&mut self, seed: u64) {
+        if let Some(wind) = &mut self.wind {
+            wind.reseed(seed);
+        }
+    }
+
+    /// Lets rotors fail whose time has come and the attitude loops run where they are due; says after how many seconds either is
+    /// due again.
     pub fn run_attitude(&mut self) -> f64 {
         let Clock { time_s, samples } = self.clock;
+        let now_s = time_s + ROUNDING / self.attitude_hz;
+        let next_s = self.fail(now_s) - time_s;
         if time_s * self.attitude_hz + ROUNDING >= samples {
             self.clock.samples = (time_s * self.attitude_hz + ROUNDING).floor() + 1.0;
             for i in 0..self.count() {
@@ -120,7 +194,29 @@ impl Fleet {
                 self.asked_rpm[i] = self.dynamics.asked_rpm(&self.states[i], command_m_s2);
             }
         }
-        self.clock.samples / self.attitude_hz - time_s
+        for failure in self.failures.iter().filter(|failure| failure.rotor.is_none() && failure.at_s <= now_s) {
+            self.asked_rpm[failure.vehicle].fill(0.0);
+        }
+        next_s.min(self.clock.samples / self.attitude_hz - time_s)
+    }
+
+    /// Takes their thrust from rotors that have failed by a time \[s\], and says when the next does.
+    fn fail(&mut self, time_s: f64) -> f64 {
+        let (mut next_s, mut changed) = (f64::INFINITY, false);
+        for &RotorFailure { vehicle, rotor, at_s, share } in &self.failures {
+            if at_s > time_s {
+                next_s = next_s.min(at_s);
+            } else if let Some(rotor) = rotor
+                && self.states[vehicle].shares[rotor] > share
+            {
+                self.states[vehicle].shares[rotor] = share;
+                changed = true;
+            }
+        }
+        if changed {
+            self.feel();
+        }
+        next_s
     }
 
     /// Asks the rotors of each for these speeds from now on \[rpm\]: attitude loops run no more.
@@ -181,22 +277,27 @@ impl Fleet {
         }
     }
 
-    /// The channels `attitude`, the quaternion that turns body into world, and `rotors`, the thrust of each \[N\].
+    /// The channels `attitude`, the quaternion that turns body into world, `rotors`, the thrust of each \[N\], and the wind's,
+    /// where one blows.
     #[must_use]
-    pub fn channels() -> Vec<Channel> {
-        let rotors = ["thrust_1_n", "thrust_2_n", "thrust_3_n", "thrust_4_n"];
-        vec![Channel::new("attitude", &["qw", "qx", "qy", "qz"]), Channel::new("rotors", &rotors)]
+    pub fn channels(&self) -> Vec<Channel> {
+        let attitude = Channel::new("attitude", &["qw", "qx", "qy", "qz"]);
+        let rotors = Channel::new("rotors", &["thrust_1_n", "thrust_2_n", "thrust_3_n", "thrust_4_n"]);
+        [attitude, rotors].into_iter().chain(self.wind.as_ref().map(|_| Wind::channel())).collect()
     }
 
     /// Writes the values of [`Fleet::channels`].
     pub fn write_channels(&self, channels: &mut [Channel]) {
-        let [attitude, rotors] = channels else { return };
+        let [attitude, rotors, rest @ ..] = channels else { return };
         attitude.values.clear();
         rotors.values.clear();
         for state in &self.states {
             let q = state.attitude.quaternion();
             attitude.values.extend([q.w, q.i, q.j, q.k]);
             rotors.values.extend(self.dynamics.thrusts_n(state).iter());
+        }
+        if let (Some(wind), [channel]) = (&self.wind, rest) {
+            wind.write_channel(channel);
         }
     }
 }

@@ -17,16 +17,18 @@ mod fleet;
 mod mixer;
 mod model;
 mod rotor;
+mod unicycle;
 
 pub use attitude::{Attitude, LEAST_LIFT, THRUST_RESERVE};
 pub use downwash::{AIR_DENSITY_KG_M3, Downwash};
 pub use dynamics::{Drift, Dynamics, Ground, State, Wrench};
 #[cfg(feature = "files")]
 pub use file::{MODELS, Misread, read};
-pub use fleet::{Fleet, HEIGHT_RAD_S};
+pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
 pub use mixer::Mixer;
 pub use model::{Model, ModelError, Quadrotor, Turn};
 pub use rotor::{RotorCurve, RotorLag};
+pub use unicycle::{Heading, Steering, Unicycle};
 
 /// Standard acceleration of gravity \[m/s^2\]. Some published models use 9.8 or 9.81.
 pub const GRAVITY_M_S2: f64 = 9.80665;
@@ -39,15 +41,32 @@ pub enum Airframe {
     Point,
     /// A rigid body that four rotors lift.
     Quadrotor(Box<Quadrotor>),
+    /// A vehicle in the plane that goes where it looks and cannot stop.
+    Unicycle(Unicycle),
 }
 
 impl Airframe {
+    /// Whether it is a point.
+    #[must_use]
+    pub fn is_point(&self) -> bool {
+        *self == Self::Point
+    }
+
     /// The quadrotor, where it is one.
     #[must_use]
     pub fn quadrotor(&self) -> Option<&Quadrotor> {
         match self {
-            Self::Point => None,
             Self::Quadrotor(quadrotor) => Some(quadrotor),
+            Self::Point | Self::Unicycle(_) => None,
+        }
+    }
+
+    /// The unicycle, where it is one.
+    #[must_use]
+    pub fn unicycle(&self) -> Option<&Unicycle> {
+        match self {
+            Self::Unicycle(unicycle) => Some(unicycle),
+            Self::Point | Self::Quadrotor(_) => None,
         }
     }
 }

@@ -204,7 +204,7 @@ impl Model {
         }
         let places = self.rotor_positions_m.iter().flatten().map(|&place| ("rotor_positions_m", place));
         let mut others = places.chain([("thrust_n_per_rpm", self.thrust_n_per_rpm)]);
-        match others.find(|(_, number)| !(number.abs() <= most)) {
+        match others.find(|(_, number)| !(-most..=most).contains(number)) {
             Some((key, number)) => Err(refuse(key, format!("{key} is {number}"), "give a finite number".to_owned())),
             None => Ok(()),
         }

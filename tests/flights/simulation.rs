@@ -8,7 +8,7 @@ use tautline::continuous::{self, Tolerances};
 use tautline::formation::{Formation, largest_edge_error_m};
 use tautline::graph::Graph;
 use tautline::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, Void};
-use tautline::link::{Delay, Link, Sensed};
+use tautline::link::{Link, Sensed};
 use tautline::metrics::Metrics;
 use tautline::observation::{Held, Others};
 use tautline::record::{Event, Sink, StateHash};
@@ -189,10 +189,8 @@ fn left_after(delay_s: f64) -> f64 {
     scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
     scenario.plant = PlantSpec::Ideal;
     (scenario.time.dt_s, scenario.time.record_hz, scenario.time.max_halvings) = (0.05, 20.0, 10);
-    let link = Box::new(Delay::new(delay_s, &scenario.start).expect("a delay"));
-    let parts = Parts { link, ..Parts::of(&scenario).expect("parts") };
-    let mut log = Log::default();
-    sim::fly(&scenario, parts, &mut log, &mut |_| ControlFlow::Continue(())).expect("a flight");
+    scenario.sensing.latency_s = delay_s;
+    let (_, log) = fly(&scenario);
     let late = log.samples.iter().filter(|sample| sample.time_s > 180.0);
     late.map(|sample| (sample.swarm.positions_m[(1, 0)] - sample.swarm.positions_m[(0, 0)] - 3.0).abs())
         .fold(0.0, f64::max)
@@ -216,12 +214,10 @@ fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
         start.velocities_m_s[(0, 1)] = 0.5;
         let mut scenario = Scenario::new("late", start, Formation::line(2, 3.0), 0.5, 4.0);
         (scenario.plant, scenario.time.dt_s, scenario.time.record_hz) = (PlantSpec::Ideal, dt_s, 1.0);
-        let link = Box::new(Delay::new(0.05, &scenario.start).expect("a delay"));
-        let parts = Parts { link, ..Parts::of(&scenario).expect("parts") };
-        let mut log = Log::default();
-        let flight = sim::fly(&scenario, parts, &mut log, &mut |_| ControlFlow::Continue(())).expect("a flight");
+        scenario.sensing.latency_s = 0.05;
+        let (flight, log) = fly(&scenario);
         let refused = log.events.iter().any(|event| matches!(event, Event::StepRefined { .. }));
-        assert!(flight.certificate.void.contains(&Void::InexactLink), "nothing is promised about late knowledge");
+        assert!(flight.certificate.void.contains(&Void::KnownLate), "nothing is promised about late knowledge");
         (flight.last.positions_m, refused)
     };
     let ((coarse, refused), (fine, _)) = (end(0.4), end(0.4 / 128.0));

@@ -67,7 +67,7 @@ fn assert_documented(section: &str, commands: &[&[&str]]) {
     let documented = documented(PAGE, section);
     assert_eq!(plain(&documented), printed(commands), "{section}");
     for (key, unit) in documented {
-        let units = [("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_per_s", "1/s"), ("_m", "m"), ("_s", "s")];
+        let units = [("_deg", "deg"), ("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_per_s", "1/s"), ("_m", "m"), ("_s", "s")];
         match units.iter().find(|(suffix, _)| key.ends_with(suffix)) {
             Some((_, expected)) => assert_eq!(unit, *expected, "{key}"),
             None if key.ends_with("_bytes") => assert_eq!(unit, "B", "{key}"),
@@ -85,6 +85,7 @@ fn every_key_of_the_report_is_on_its_page() {
     let mission =
         [&["run", "pentagon-leader", "--set", "leg=[{scale=1.2}]", "--set", "breathing.mode=start"], &quick[..]]
             .concat();
+    let tilting = [&["run", "crazyflies", "--plant", "ideal"], &quick[..], &["--set", "time.duration_s=1.5"]].concat();
     let into_a_pillar = "reference={kind=\"velocity\",velocity_m_s=[3,2.0,0],leader=1}";
     let among = [&["run", "obstacles", "--set", into_a_pillar], &quick[..]].concat();
     // Two who are in each other's way, head-on.
@@ -97,7 +98,7 @@ fn every_key_of_the_report_is_on_its_page() {
         "time.duration_s=12",
     ];
     let assigned = [&["run", "pentagon", "--set", "law.kind=displacement"], &quick[..], &swap].concat();
-    assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned]);
+    assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned, &tilting]);
 }
 
 #[test]

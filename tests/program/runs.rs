@@ -86,7 +86,7 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "tool.name tool.version",
         "verdict.pass verdict.refused verdict.reasons",
         "separation.delta_m separation.min_m separation.min_at_s separation.min_pair separation.certified_m",
-        "separation.certificate_void",
+        "separation.certified_until_s separation.certificate_void",
         "audit.status audit.violations audit.steps audit.pairs_checked audit.closed_form.min_m",
         "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
         "hulls.bounces hulls.passed_through",

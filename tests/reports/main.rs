@@ -5,6 +5,7 @@ mod browser;
 
 mod channels;
 mod figures;
+mod margins;
 mod opened;
 mod page;
 mod scale;

@@ -34,7 +34,7 @@ struct Question<F> {
     window: Interval,
     limits: Limits,
     above_m: Option<f64>,
-    /// Longest and shortest half axis \[m\]; 1 where there is no ellipsoid.
+    /// Longest and shortest half axis \[m\]; 1 where there is no ellipsoid, or what was told was scaled.
     longest_m: f64,
     shortest_m: f64,
     /// Whether what is drawn is all that is known between two instants: no bound on how far from it anybody was.
@@ -57,7 +57,8 @@ struct Asked {
 
 impl<F: Fn(usize) -> Option<Counted>> Question<F> {
     fn new(settings: &Settings, counts: F) -> Self {
-        let (longest_m, shortest_m) = settings.ellipsoid_m.map_or((1.0, 1.0), |axes| (axes.max(), axes.min()));
+        let axes = settings.ellipsoid_m.filter(|_| !settings.is_told_scaled);
+        let (longest_m, shortest_m) = axes.map_or((1.0, 1.0), |axes| (axes.max(), axes.min()));
         let (window, limits, above_m) = (settings.window(), settings.limits(), settings.above_m);
         let is_drawn = settings.motion != Some(Motion::Bounded);
         Self { counts, window, limits, above_m, longest_m, shortest_m, is_drawn }

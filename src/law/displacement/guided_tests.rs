@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::graph::Graph;
 use crate::swarm::Swarm;
-use crate::target::{Guidance, Leg, Reference};
+use crate::target::{Guidance, Leg, Reference, ReferenceMotion};
 
 const COUNT: usize = 6;
 const DELTA_M: f64 = 1.0;

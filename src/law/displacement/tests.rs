@@ -36,6 +36,63 @@ fn graphs() -> [Graph; 4] {
     [Graph::complete(7), Graph::star(7), Graph::ring(7), Graph::path(7)]
 }
 
+/// The state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method, with the integral of
+/// sum |w_i|^2 added to `fed`.
+fn pushed(
+    swarm: &Swarm,
+    dt_s: f64,
+    fed: &mut f64,
+    u: &mut dyn FnMut(&Swarm) -> Rows,
+    w: &dyn Fn(&Swarm) -> Rows,
+) -> Swarm {
+    let mut rates = Vec::new();
+    for (share, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+        let mut at = swarm.clone();
+        if let Some((v, a)) = rates.last() {
+            at.positions_m += v * (share * dt_s);
+            at.velocities_m_s += a * (share * dt_s);
+        }
+        let push = w(&at);
+        *fed += weight / 6.0 * dt_s * push.norm_squared();
+        let a: Rows = &at.velocities_m_s * A22_PER_S + u(&at) + push;
+        rates.push((at.velocities_m_s, a));
+    }
+    let mean = |of: &dyn Fn(&(Rows, Rows)) -> Rows| {
+        (of(&rates[0]) + of(&rates[1]) * 2.0 + of(&rates[2]) * 2.0 + of(&rates[3])) * (dt_s / 6.0)
+    };
+    Swarm {
+        positions_m: &swarm.positions_m + mean(&|(v, _)| v.clone()),
+        velocities_m_s: &swarm.velocities_m_s + mean(&|(_, a)| a.clone()),
+    }
+}
+
+/// On the complete graph dE/dt = -zeta |v~|^2 + v~.w exactly: the push 2 zeta v~ adds all that the bound allows, one half or
+/// twice as strong less, and one against v~ takes energy away.
+#[test]
+fn the_bound_under_a_push_is_reached_by_the_worst_one() -> Result<(), LawError> {
+    let (links, formation) = (Graph::complete(7), Formation::grid(7, 2.0));
+    for (gain, least, most) in [(2.0, 1.0 - 1e-9, 1.0 + 1e-9), (1.0, -9.0, 0.9), (4.0, -9.0, 0.9), (-2.0, -9.0, -0.9)] {
+        let mut law = law(&links, &formation);
+        let mut swarm = Swarm { positions_m: Formation::grid(7, 1.9).slots_m, velocities_m_s: Rows::zeros(7) };
+        swarm.velocities_m_s[(2, 0)] = 0.6;
+        swarm.velocities_m_s[(5, 1)] = -0.4;
+        let before = law.try_energy(&Observation::exact(&swarm, &links, &formation))?;
+        let mut fed = 0.0;
+        for _ in 0..300 {
+            let mut u = |at: &Swarm| command(&mut law, &Observation::exact(at, &links, &formation)).expect("clear");
+            let w = |at: &Swarm| {
+                let mean = at.mean_velocity_m_s();
+                Rows::from_fn(7, |i, axis| gain * ZETA_PER_S * (at.velocities_m_s[(i, axis)] - mean[axis]))
+            };
+            swarm = pushed(&swarm, 2.5e-4, &mut fed, &mut u, &w);
+        }
+        let gained = law.try_energy(&Observation::exact(&swarm, &links, &formation))? - before;
+        let ratio = gained / (fed / (4.0 * ZETA_PER_S));
+        assert!((least..=most).contains(&ratio), "w = {gain} zeta v~: {ratio}");
+    }
+    Ok(())
+}
+
 proptest! {
     #[test]
     fn the_command_is_the_fall_of_the_potential_and_damps_velocities_over_links(swarm in swarms()) {
@@ -143,4 +200,51 @@ fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
     assert_eq!(rate(rest_m), rate(50.0 * rest_m));
     assert!(rate(rest_m.next_down()) > rate(rest_m) && rate(1.01 * DELTA_M) > rate(rest_m.next_down()));
     assert_eq!(law.fastest_rate_per_s(None, A22_PER_S), None);
+}
+
+/// Two vehicles that meet between ellipsoids, without links: `r'' = 2 F`, whose energy is `|r'|^2/4 + V(l)`. Gives how far that
+/// rises above its start, as a share of it, where the force is made by `push`.
+fn highest_rise(law: &DisplacementLaw, angle: f64, push: &dyn Fn(Vector3<f64>) -> Vector3<f64>) -> f64 {
+    const STEP_S: f64 = 2e-4;
+    let potential = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").1;
+    let (mut r, mut v) = (Vector3::new(1.2, 0.0, 4.0 * angle.sin()), Vector3::new(-1.0, 0.0, -3.0 * angle.cos()));
+    let energy = |r, v: Vector3<f64>| 0.25 * v.norm_squared() + potential(r);
+    let (start, mut most) = (energy(r, v), 0.0_f64);
+    for _ in 0..15_000 {
+        let half = v + STEP_S * push(r);
+        r += STEP_S * half;
+        v = half + STEP_S * push(r);
+        most = most.max(energy(r, v) / start - 1.0);
+    }
+    most
+}
+
+#[test]
+fn the_push_between_ellipsoids_is_a_gradient_and_with_one_factor_too_few_it_feeds_energy_in() {
+    let (links, formation) =
+        (Graph::complete(2), Formation::points(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0])));
+    let metric = Metric::of_ratio(3.0);
+    let setting = Setting { metric, ..Setting::new(&links, &formation, DELTA_M, 0.0) };
+    let law = DisplacementLaw::new(&setting, keys()).expect("a law");
+    let right = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").0;
+    // S once: -V' S dp/l.
+    let wrong = |r: Vector3<f64>| {
+        let push = right(r);
+        Vector3::new(push.x, push.y, push.z * metric.ratio())
+    };
+    let rises = |push: &dyn Fn(Vector3<f64>) -> Vector3<f64>| {
+        (0..10).map(|k| highest_rise(&law, 0.15 * f64::from(k), push)).fold(0.0, f64::max)
+    };
+    assert!(rises(&right) < 1e-5, "{}", rises(&right));
+    assert!(rises(&wrong) > 0.1, "{}", rises(&wrong));
+    for k in 0..40 {
+        let r = Vector3::new(0.4 + 0.05 * f64::from(k), 0.3, 3.2 - 0.04 * f64::from(k));
+        let slope = |axis: usize| {
+            let mut by = Vector3::zeros();
+            by[axis] = 1e-6;
+            let value = |r| law.push(0, 1, r).expect("clear of delta").1;
+            (value(r + by) - value(r - by)) / 2e-6
+        };
+        assert!((right(r) + Vector3::new(slope(0), slope(1), slope(2))).norm() < 1e-6);
+    }
 }

@@ -212,6 +212,7 @@ fn a_swarm_without_pairs_is_left_alone() -> Result<(), LawError> {
         assert_eq!((control.amax(), law.energy(&exact(&swarm))), (0.0, Some(0.0)));
         let expected = Certificate {
             certified_m: None,
+            certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(0.0),
             void: vec![],

@@ -6,7 +6,7 @@ use engine::prelude::{
 };
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::plant::{HullContact, Path, Plant, PlantError, Quadrotors};
+use crate::plant::{Air, HullContact, Path, Plant, PlantError, Quadrotors};
 use crate::record::Channel;
 use crate::scenario::{CONTACT_PREDICTION_M, Scenario, Space};
 use crate::space::{Obstacle, Shape};
@@ -24,8 +24,10 @@ const HULL_RESTITUTION: Real = 0.5;
 pub(super) struct Bodies {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
-    /// Accelerations held over the step \[m/s^2\].
+    /// Accelerations held over the step, and what the wind adds to them at its beginning \[m/s^2\].
     held: Rows,
+    /// What blows, where anything does.
+    air: Option<Air>,
     /// Velocities of the last drift, as they were before contacts changed them \[m/s\].
     drift_m_s: Rows,
     /// Where it began, from the engine's origin \[m\].
@@ -36,6 +38,7 @@ pub(super) struct Bodies {
     /// wherever it flies.
     origin_m: Vector3<f64>,
     mass_kg: Vec<f64>,
+    /// Drag of the air included.
     a22_per_s: f64,
     /// Whether z is locked.
     is_flat: bool,
@@ -51,12 +54,13 @@ impl Bodies {
             world,
             handles,
             held: Rows::zeros(scenario.count()),
+            air: Air::of(scenario),
             drift_m_s: Rows::zeros(scenario.count()),
             began_m: Rows::zeros(scenario.count()),
             drifted_s: 0.0,
             origin_m,
             mass_kg: scenario.mass_kg.clone(),
-            a22_per_s: scenario.a22_per_s,
+            a22_per_s: scenario.velocity_coefficient_per_s(),
             is_flat: scenario.space == Space::Plane,
         }
     }
@@ -64,6 +68,16 @@ impl Bodies {
     /// What half a step of free motion multiplies a velocity by: exp(a22 dt/2).
     fn half_decay(&self, dt_s: f64) -> f64 {
         libm::exp(0.5 * self.a22_per_s * dt_s)
+    }
+
+    /// The command with what the wind adds to it now.
+    fn hold(&mut self) {
+        if let Some(air) = &self.air {
+            air.write_held(&mut self.held);
+        }
+        if self.is_flat {
+            self.held.column_mut(2).fill(0.0);
+        }
     }
 
     /// Each vehicle's velocity \[m/s\] with the second half of the held acceleration's kick, where a drift waits for it.
@@ -81,7 +95,8 @@ impl Clone for Bodies {
         let world = copied(&self.world);
         let (handles, mass_kg) = (self.handles.clone(), self.mass_kg.clone());
         let (held, drift_m_s, began_m) = (self.held.clone(), self.drift_m_s.clone(), self.began_m.clone());
-        Self { world, handles, held, drift_m_s, began_m, mass_kg, ..*self }
+        let air = self.air.clone();
+        Self { world, handles, held, air, drift_m_s, began_m, mass_kg, ..*self }
     }
 }
 
@@ -107,6 +122,10 @@ impl Plant for Bodies {
         }
         self.world.step();
         self.drifted_s = dt_s;
+        if let Some(air) = &mut self.air {
+            air.advance(dt_s);
+            self.hold();
+        }
         if let Some(lost) = self.world.quarantine().bodies().first() {
             let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
             return Err(PlantError::NotFinite { vehicle });
@@ -117,9 +136,10 @@ impl Plant for Bodies {
 
     fn apply(&mut self, command: &Rows, state: &mut Swarm) {
         self.held.copy_from(command);
-        if self.is_flat {
-            self.held.column_mut(2).fill(0.0);
+        if let Some(air) = &mut self.air {
+            air.hold(command);
         }
+        self.hold();
         if self.drifted_s > 0.0 {
             for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
                 set_row(&mut state.velocities_m_s, i, doubles(reals(velocity_m_s)));
@@ -147,6 +167,24 @@ impl Plant for Bodies {
             body.set_linvel(reals(row(&swarm.velocities_m_s, i)), true);
         }
         self.drifted_s = 0.0;
+        if let Some(air) = &mut self.air {
+            air.undo();
+            self.hold();
+        }
+    }
+
+    fn channels(&self) -> Vec<Channel> {
+        self.air.iter().map(|_| Air::channel()).collect()
+    }
+
+    fn write_channels(&self, channels: &mut [Channel]) {
+        self.air.iter().zip(channels).for_each(|(air, channel)| air.write_channel(channel));
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        if let Some(air) = &mut self.air {
+            air.reseed(seed);
+        }
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
@@ -240,7 +278,7 @@ fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vecto
     let handle = world.bodies.insert(body);
 
     let hull = hull(scenario.hull_radius_m[i], i).mass(real(scenario.mass_kg[i]));
-    for collider in [hull, keep_out(scenario.delta_m, i)] {
+    for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
         world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
     }
     world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);

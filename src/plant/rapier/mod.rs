@@ -1,7 +1,8 @@
 //! Rigid bodies in Rapier, in single and double precision: the only room that names the engine.
 //!
 //! Each vehicle is a dynamic body with rotations locked, no gravity and two ball colliders: the **hull** (the vehicle's
-//! real radius; hulls collide and bounce) and the **keep-out** ball of radius delta/2 (reports contacts, never pushes).
+//! real radius; hulls collide and bounce) and the **keep-out** ball of radius delta/2 (reports contacts, never pushes); in an
+//! ellipsoid it is the largest ball within.
 //! In the plane z = 0 translation along z is locked as well.
 //!
 //! # Motion within a step
@@ -22,6 +23,10 @@
 //! A free velocity is exactly v(0) exp(a22 t), the free motion of equation (1); a command that is held (u' = u) gives the
 //! motion under a constant acceleration exactly, where a22 = 0. Forces u m go through the engine, so that what
 //! its contacts do to a velocity stays in w.
+//!
+//! # Wind
+//! A point with a drag d in a wind W obeys p'' = (a22 - d) v + u + d W: a22 - d takes the place of a22, and u + d W that of u, with
+//! W at the beginning of the step in w and at its end in v~ and v'. That is the trapezium's rule for d W, and second order.
 //!
 //! # Quadrotors
 //! A quadrotor is a body that turns, with the model's mass, inertia and hull; gravity, rotors and drag are added around the

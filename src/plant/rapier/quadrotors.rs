@@ -35,7 +35,7 @@ impl Fliers {
             let handle = world.bodies.insert(body);
             world.bodies[handle].set_rotation(rotation(&state.attitude), true);
             let hull = hull(model.hull_radius_m, i).density(0.0).friction(HULL_FRICTION);
-            for collider in [hull, keep_out(scenario.delta_m, i)] {
+            for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
                 world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
             }
             world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
@@ -78,6 +78,7 @@ impl Fliers {
             }
             self.fleet.dynamics.predict(state, drift);
         }
+        self.fleet.blow(dt_s);
         // Also what begins the next step: it differs from what the velocities make of it by the square of the step.
         self.fleet.feel();
         self.fleet.complete(&self.drifts, dt_s);
@@ -152,11 +153,15 @@ impl Plant for Fliers {
     }
 
     fn channels(&self) -> Vec<Channel> {
-        Fleet::channels()
+        self.fleet.channels()
     }
 
     fn write_channels(&self, channels: &mut [Channel]) {
         self.fleet.write_channels(channels);
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        self.fleet.reseed(seed);
     }
 }
 

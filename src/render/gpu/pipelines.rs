@@ -21,7 +21,7 @@ fn camera_uniform(scene: &Scene) -> CameraUniform {
         Lens::Parallel(half) => (half, 0.0),
     };
     let [width, height] = camera.size_px.map(|size| size as f32);
-    let lens = [single(half[0]), single(half[1]), perspective, 0.0];
+    let lens = [single(half[0]), single(half[1]), perspective, scene.shell_ratio];
     let range = [single(scene.depth_m[0]), single(scene.depth_m[1]), width, height];
     [wide(camera.right), wide(camera.up), wide(camera.back), wide(camera.eye_m), lens, range]
 }
@@ -118,7 +118,7 @@ impl Pipelines {
             balls: call("ball_corner", "solid", &ball, size_of::<Ball>(), true),
             discs: call("disc_corner", "disc", &disc, size_of::<Disc>(), false),
             lines: call("line_corner", "stroke", &line, size_of::<Line>(), false),
-            shells: call("ball_corner", "shell", &ball, size_of::<Ball>(), false),
+            shells: call("shell_corner", "shell", &ball, size_of::<Ball>(), false),
             camera,
         }
     }

@@ -165,7 +165,9 @@ impl SceneBuilder<'_> {
         let Some(approach) = self.frame.so_far else { return Vec::new() };
         let (separation, pair) = (metres(approach.separation_m), self.pair(approach.pair));
         let at = format!("{:.2} s", approach.time_s);
-        let delta = self.timeline.delta_m.map_or(String::new(), |delta_m| format!("  (delta {})", metres(delta_m)));
+        let scaled = if self.timeline.metric.is_metres() { "" } else { ", scaled" };
+        let delta = |delta_m| format!("  (delta {}{scaled})", metres(delta_m));
+        let delta = self.timeline.delta_m.map_or(String::new(), delta);
         vec![
             format!("closest so far {separation}, vehicles {pair} at {at}{delta}"),
             format!("closest so far {separation}, {pair}{delta}"),
@@ -227,7 +229,8 @@ impl SceneBuilder<'_> {
             }
             x = write(labels, x + size_px, "reference");
         }
-        let shell = "keep-out shell, radius delta/2";
+        let is_ball = self.timeline.metric.is_metres();
+        let shell = if is_ball { "keep-out shell, radius delta/2" } else { "keep-out shell, delta wide" };
         if layers.shells && self.timeline.delta_m.is_some() && fits(x + size_px, shell) {
             labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * width_px));
             write(labels, x + 1.2 * size_px, shell);

@@ -17,11 +17,15 @@ impl Scene {
     /// Shells are in the order of the square of their centre's distance less the square of their radius, farthest first.
     /// For balls that do not overlap this is the order along every line of sight: where a line meets a ball, that number
     /// is the product of the distances to the two points. Balls that overlap are a violation, and of one colour, so their
-    /// order is of no account. So nothing pops while the camera moves.
+    /// order is of no account. So nothing pops while the camera moves. Shells that are ellipsoids are balls in scaled lengths, and in
+    /// that order there.
     #[must_use]
     pub fn compose(timeline: &Timeline, extent: &Extent, frame: &Frame, view: &View, camera: Camera) -> Self {
         let builder = SceneBuilder::new(timeline, extent, frame, view, camera);
         let mut scene = Self::empty(camera, extent.depth_m(&camera), view.theme.background());
+        #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+        let shell_ratio = timeline.metric.ratio() as f32;
+        scene.shell_ratio = shell_ratio;
         builder.vehicles(&mut scene);
         builder.rotors(&mut scene.discs);
         builder.round_obstacles(&mut scene);

@@ -129,6 +129,8 @@ pub struct Scene {
     pub discs: Vec<Disc>,
     /// Keep-out shells, in the order in which they must be drawn: see [`Scene::compose`].
     pub shells: Vec<Ball>,
+    /// Height of shells over their width.
+    pub shell_ratio: f32,
     /// Ground, trails, start marks, goal slots, edges, pairs, arms of quadrotors: a later one is drawn over those before it.
     pub lines: Vec<Line>,
     /// Words and legends.
@@ -139,7 +141,8 @@ impl Scene {
     /// Nothing, seen by this camera.
     pub(super) fn empty(camera: Camera, depth_m: [f64; 2], background: Colour) -> Self {
         let (balls, discs, shells, lines) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { camera, depth_m, background, balls, discs, shells, lines, annotations: Vec::new() }
+        let (shell_ratio, annotations) = (1.0, Vec::new());
+        Self { camera, depth_m, background, balls, discs, shells, shell_ratio, lines, annotations }
     }
 
     /// A picture of nothing.

@@ -41,7 +41,7 @@ impl SceneBuilder<'_> {
         radius_m.max(f64::from(least_px * self.view.unit_px()) / px_per_m)
     }
 
-    /// Radius of a vehicle's shell \[m\], where it is shown.
+    /// Radius of a vehicle's shell as seen from above \[m\], where it is shown.
     fn shell_m(&self, k: usize) -> Option<f64> {
         self.timeline.delta_m.filter(|_| self.view.layers.shells || self.alarmed[k]).map(|delta_m| delta_m / 2.0)
     }
@@ -52,7 +52,8 @@ impl SceneBuilder<'_> {
             let place = self.vehicle(k)?;
             let at = self.camera.project(place)?;
             let radius_m = self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]);
-            Some((at.at_px, radius_m.max(self.shell_m(k).unwrap_or(0.0)) * at.px_per_m))
+            let shell_m = self.shell_m(k).map_or(0.0, |shell_m| self.timeline.metric.longest_m(shell_m));
+            Some((at.at_px, radius_m.max(shell_m) * at.px_per_m))
         };
         (0..self.timeline.count()).filter_map(cover).collect()
     }
@@ -75,8 +76,11 @@ impl SceneBuilder<'_> {
                 let colour = if alarm { theme.alarm().at(0.85) } else { theme.shell().at(strength) };
                 let ball = ball(radius_m, colour);
                 // In parallel projection every line of sight is along the view.
+                let metric = self.timeline.metric;
+                let away = metric.scaled(place - self.camera.eye_m);
                 let power = match self.camera.lens {
-                    Lens::Perspective(_) => (place - self.camera.eye_m).norm_squared() - radius_m * radius_m,
+                    Lens::Perspective(_) => away.norm_squared() - radius_m * radius_m,
+                    Lens::Parallel(_) if !metric.is_metres() => -away.dot(&metric.scaled(self.camera.back)),
                     Lens::Parallel(_) => -self.camera.seen(Vector3::from(ball.centre_m.map(f64::from))).z,
                 };
                 shells.push((power, ball));

@@ -2,8 +2,8 @@
 
 use nalgebra::UnitQuaternion;
 
-use crate::space::closest_pair;
-use crate::swarm::{ClosestApproach, Pair, Rows, row, separation};
+use crate::space::{Metric, closest_pair};
+use crate::swarm::{ClosestApproach, Pair, Rows, row};
 
 /// Most that a closest approach may be drawn too far apart: what is written between two vehicles is what is seen.
 const AS_DRAWN: f64 = 1.01;
@@ -38,6 +38,8 @@ pub struct Frame {
     pub attitudes: Vec<Option<UnitQuaternion<f64>>>,
     /// Commanded accelerations \[m/s^2\] at the last sample, where they were recorded.
     pub control_m_s2: Option<Rows>,
+    /// What distances between vehicles are drawn in.
+    pub(super) metric: Metric,
     /// The two nearest vehicles and their distance \[m\].
     pub nearest: Option<(Pair, f64)>,
     /// Closest approach up to this time.
@@ -55,13 +57,14 @@ impl Frame {
         self.attitudes.get(vehicle).copied().flatten()
     }
 
-    /// Distance of a pair \[m\] as it is drawn; NaN where one of the two is not there.
+    /// Distance of a pair \[m\] as it is drawn, scaled where ellipsoids stay empty; NaN where one of the two is not there.
     ///
     /// It is nowhere below the recorded closest approach, since curves that are drawn as straight lines come nearer than
     /// they were flown, and the recorded one where that was, unless samples are too far apart to draw it.
     #[must_use]
     pub fn distance_m(&self, pair: Pair) -> f64 {
-        let drawn_m = separation(&self.positions_m, pair.first(), pair.second());
+        let apart_m = row(&self.positions_m, pair.second()) - row(&self.positions_m, pair.first());
+        let drawn_m = self.metric.scaled(apart_m).norm();
         let Some(around) = self.around else { return drawn_m };
         let is_it = around.pair == pair && around.time_s == self.time_s;
         if drawn_m < around.separation_m || is_it && drawn_m < AS_DRAWN * around.separation_m {
@@ -73,9 +76,9 @@ impl Frame {
 }
 
 /// The nearest two of the vehicles that are there.
-pub(super) fn nearest_present(positions_m: &Rows) -> Option<Pair> {
+pub(super) fn nearest_present(positions_m: &Rows, metric: Metric) -> Option<Pair> {
     let is_there = |i: &usize| row(positions_m, *i).iter().all(|x| x.is_finite());
     let there: Vec<usize> = (0..positions_m.nrows()).filter(is_there).collect();
-    let (pair, _) = closest_pair(&positions_m.select_rows(&there))?;
+    let (pair, _) = closest_pair(&metric.scaled_rows(&positions_m.select_rows(&there)))?;
     Some(Pair::new(there[pair.first()], there[pair.second()]))
 }

@@ -12,7 +12,8 @@ use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::render::error::{RenderError, check_lengths};
 use crate::scenario::{Scenario, Source};
-use crate::swarm::{ClosestApproach, Pair, Rows, separation};
+use crate::space::Metric;
+use crate::swarm::{ClosestApproach, Pair, Rows, row};
 
 /// Violations that have a picture of their own, at most: their worst moments are never thinned out.
 pub(in crate::render) const PICTURED: usize = 10;
@@ -40,6 +41,8 @@ pub struct Timeline {
     pub delta_m: Option<f64>,
     /// Where the rotors of every vehicle are, where the flight says it.
     pub shape: Option<QuadrotorShape>,
+    /// The lengths that delta is one of: metres unless ellipsoids stay empty.
+    pub metric: Metric,
     /// Formation and graph, where the flight has them.
     pub plan: Option<Plan>,
     /// What a person should know about how it was read, a sentence each.
@@ -78,6 +81,7 @@ impl Timeline {
             radius_m: vec![UNKNOWN_RADIUS_M; vehicles],
             delta_m: None,
             shape: None,
+            metric: Metric::default(),
             plan: None,
             notes: Vec::new(),
             keyframes: Vec::new(),
@@ -103,6 +107,7 @@ impl Timeline {
             radius_m: scenario.hull_radius_m.clone(),
             delta_m: Some(scenario.delta_m),
             shape: QuadrotorShape::of(scenario),
+            metric: scenario.metric(),
             plan: Some(Plan::of(scenario)),
             ..Self::new(&scenario.name, scenario.count())
         }
@@ -141,9 +146,10 @@ impl Timeline {
         self.vehicles.len()
     }
 
-    /// How far around a vehicle nothing may be: half of delta, or its own radius where that is more \[m\].
+    /// How far around a vehicle nothing may be: half of delta, half of an ellipsoid's longer axis, or its own radius where that is
+    /// more \[m\].
     pub(in crate::render) fn keep_out_m(&self, vehicle: usize) -> f64 {
-        self.delta_m.map_or(0.0, |delta_m| delta_m / 2.0).max(self.radius_m[vehicle])
+        self.delta_m.map_or(0.0, |delta_m| self.metric.longest_m(delta_m) / 2.0).max(self.radius_m[vehicle])
     }
 
     /// What is in memory, in order of time.
@@ -228,12 +234,12 @@ impl Timeline {
         let pair = match (around, before.closest) {
             (Some(around), _) if around.time_s == time_s => Some(around.pair),
             (_, Some(before)) if self.count() > SEARCHED_VEHICLES => Some(before.pair),
-            _ => nearest_present(&positions_m),
+            _ => nearest_present(&positions_m, self.metric),
         };
         let control_m_s2 = before.control_m_s2.clone();
-        let attitudes = self.attitudes(time_s, keyframe);
-        let nearest = None;
-        let mut frame = Frame { time_s, positions_m, attitudes, control_m_s2, nearest, so_far, around, keyframe };
+        let (attitudes, metric, nearest) = (self.attitudes(time_s, keyframe), self.metric, None);
+        let mut frame =
+            Frame { time_s, positions_m, attitudes, control_m_s2, metric, nearest, so_far, around, keyframe };
         frame.nearest = pair.map(|pair| (pair, frame.distance_m(pair)));
         let now = frame.nearest.filter(|(_, distance_m)| distance_m.is_finite());
         frame.so_far = nearer(so_far, now.map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s }));
@@ -332,7 +338,8 @@ impl Timeline {
         }
         for (&pair, &k) in &self.open {
             let violation = &mut self.violations[k];
-            let separation_m = separation(&keyframe.positions_m, pair.first(), pair.second());
+            let apart_m = row(&keyframe.positions_m, pair.second()) - row(&keyframe.positions_m, pair.first());
+            let separation_m = self.metric.scaled(apart_m).norm();
             let recorded = keyframe.closest.filter(|at| at.pair == pair && at.time_s >= violation.from_s);
             let nearest = nearer(recorded, Some(ClosestApproach { pair, separation_m, time_s }));
             if let Some(nearest) = nearest.filter(|nearest| nearest.separation_m < violation.min_m) {

@@ -155,7 +155,9 @@ impl RecordedReport {
                 min_at_s: first.and_then(|first| finite(first.time_s)),
                 min_pair: first.and_then(|first| first.pair.vehicles()).map(Pair::numbers),
                 certified_m: None,
+                certified_until_s: None,
                 certificate_void: Vec::new(),
+                ellipsoid: None,
             },
             audit: RecordedAudit {
                 flight: Audit {

@@ -32,7 +32,7 @@ impl Simulation {
     /// Longest step that is honest at the present state \[s\]. Continuous time chooses its own.
     fn longest_step_s(&self) -> f64 {
         let (law, nearest_m) = (&self.controller.law, self.judge.nearest_m);
-        let rate_per_s = law.fastest_rate_per_s(Some(nearest_m), self.scenario.a22_per_s);
+        let rate_per_s = law.fastest_rate_per_s(Some(nearest_m), self.scenario.velocity_coefficient_per_s());
         let rate_per_s = match law.obstacle_rate_squared(self.judge.room_m) {
             0.0 => rate_per_s,
             squared => rate_per_s.map(|rate_per_s| (rate_per_s.powi(2) + squared).sqrt()),

@@ -1,11 +1,11 @@
 //! What the link of a scenario tells, and when.
 
-use super::{Link, Sensed, of};
-use crate::formation::Formation;
-use crate::graph::Graph;
-use crate::observation::{Neighbour, Others, Picture};
-use crate::scenario::{Failure, FailureKind, LinkFailure, Missing, NearBy, Scenario};
-use crate::swarm::{Rows, Swarm, row};
+use tautline::formation::Formation;
+use tautline::graph::Graph;
+use tautline::link::{Link, Sensed, of};
+use tautline::observation::{Neighbour, Others, Picture};
+use tautline::scenario::{Failure, FailureKind, LinkFailure, Missing, NearBy, Scenario};
+use tautline::swarm::{Rows, Swarm, row};
 
 const DT_S: f64 = 0.01;
 const COUNT: usize = 4;
@@ -16,6 +16,10 @@ fn truth(time_s: f64) -> Swarm {
         positions_m: Rows::from_fn(COUNT, |i, axis| [10.0 * i as f64 + time_s * time_s, -time_s, 0.0][axis]),
         velocities_m_s: Rows::from_fn(COUNT, |_, axis| [2.0 * time_s, -1.0, 0.0][axis]),
     }
+}
+
+fn in_row(swarm: &Swarm, i: usize) -> Neighbour {
+    Neighbour { position_m: row(&swarm.positions_m, i), velocity_m_s: row(&swarm.velocities_m_s, i), age_s: 0.0 }
 }
 
 fn scenario() -> Scenario {
@@ -58,8 +62,7 @@ fn what_is_known_late_is_as_old_as_was_asked_for_and_no_older() {
         let mut link = of(&late, true);
         after(link.as_mut(), 0..=100, |time_s, sensed| {
             assert!(matches!(sensed.others, Others::Shared));
-            (0..COUNT)
-                .for_each(|i| assert!(is_of(Neighbour::of(sensed.own, i, 0.0), i, time_s - latency_s), "{time_s}"));
+            (0..COUNT).for_each(|i| assert!(is_of(in_row(sensed.own, i), i, time_s - latency_s), "{time_s}"));
         });
         assert!(!link.is_exact());
     }
@@ -88,7 +91,7 @@ fn near_ones_are_seen_late_or_at_once_or_heard_as_the_keys_say() {
     (own_late.sensing.latency_s, own_late.sensing.near_latency_s) = (0.05, Some(0.0));
     after(of(&own_late, true).as_mut(), 0..=50, |time_s, sensed| {
         let (seen, own_m) = (picture(&sensed).seen(1, 2), row(&sensed.own.positions_m, 1));
-        assert!(is_of(Neighbour::of(sensed.own, 1, 0.0), 1, time_s - 0.05));
+        assert!(is_of(in_row(sensed.own, 1), 1, time_s - 0.05));
         let apart_m = row(&truth(time_s).positions_m, 2) - row(&truth(time_s).positions_m, 1);
         assert!((seen.position_m - own_m - apart_m).norm() < 1e-12, "where the other is from there, now");
     });
@@ -149,12 +152,12 @@ fn errors_have_the_deviation_asked_for_and_are_drawn_with_each_measurement() {
     noisy.sensing.rate_hz = Some(50.0);
     let (mut sums, mut number, mut last) = ([0.0; 4], 0.0, None);
     after(of(&noisy, true).as_mut(), 0..=20_000, |time_s, sensed| {
-        let own = Neighbour::of(sensed.own, 1, 0.0);
+        let own = in_row(sensed.own, 1);
         let seen = picture(&sensed).seen(1, 2);
         let is_new = last.replace(own) != Some(own);
         assert_eq!(is_new, (time_s / DT_S).round() % 2.0 == 0.0, "{time_s}");
         let measured_s = (time_s * 50.0 + 1e-9).floor() / 50.0;
-        let then = Neighbour::of(&truth(measured_s), 1, 0.0);
+        let then = in_row(&truth(measured_s), 1);
         let apart_m = seen.position_m - own.position_m;
         if is_new {
             number += 1.0;

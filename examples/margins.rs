@@ -1,0 +1,10 @@
+//! Prints the table of docs/margins.md: how much of each imperfection points and Crazyflies survive.
+//!
+//! `cargo run --release --example margins`
+
+#[path = "../tests/support/margins.rs"]
+mod margins;
+
+fn main() {
+    print!("{}", margins::table());
+}

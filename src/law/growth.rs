@@ -1,0 +1,156 @@
+//! What a bounded disturbance may add to an energy.
+
+use nalgebra::Vector3;
+
+use super::setting::Blown;
+use crate::wind::Gust;
+
+/// Parts of a slope of a gust, over each of which its strength is taken for its largest.
+const PARTS: u32 = 1024;
+
+/// What the disturbance of an energy is counted from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Frame {
+    /// The mean of all: what pushes all alike pushes nobody.
+    Mean,
+    /// The ground.
+    Ground,
+}
+
+/// An upper bound on an energy `E >= 1/2 sum |v~_i|^2` whose law keeps `dE/dt <= -zeta sum |v~_i|^2` where nothing disturbs, under
+/// accelerations w. With |w|^2 the sum of `|w_i|^2` both
+///
+/// ```text
+/// dE/dt <= -zeta |v~|^2 + |v~| |w| <= |w|^2/(4 zeta)          reached by w = 2 zeta v~, as near as E's own decay is
+/// d sqrt E/dt <= |w|/sqrt 2                                   since |v~| <= sqrt(2 E)
+/// ```
+///
+/// hold, the first the better one for long winds and the second for short gusts. Over each span of time the less is taken.
+#[derive(Clone, Debug)]
+pub(super) struct Growth {
+    /// zeta \[1/s\]; where it is not positive, only the second bound is there.
+    damping_per_s: f64,
+    spans: Vec<Span>,
+    resolution_m: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    from_s: f64,
+    to_s: f64,
+    /// The largest |w| in it \[m/s^2\].
+    most_m_s2: f64,
+}
+
+/// What is left of a promise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grown {
+    /// The energy does not exceed this \[m^2/s^2\].
+    pub(super) energy: f64,
+    /// Up to then \[s\]; for ever where there is no such time.
+    pub(super) until_s: Option<f64>,
+}
+
+impl Growth {
+    /// Of a wind without turbulence that is felt, over the flight.
+    pub(super) fn new(blown: &Blown<'_>, count: usize, frame: Frame, damping_per_s: f64) -> Self {
+        let groups = groups(blown, count);
+        let corners_s = corners_s(blown);
+        let mut spans = Vec::new();
+        for ends in corners_s.windows(2) {
+            let (from_s, length_s) = (ends[0], ends[1] - ends[0]);
+            let middle_s = from_s + 0.5 * length_s;
+            let is_sloping = blown.wind.gusts.iter().any(|gust| {
+                let [begins_s, full_s, falls_s, ends_s] = gust.corners_s();
+                (begins_s..full_s).contains(&middle_s) || (falls_s..ends_s).contains(&middle_s)
+            });
+            let parts = if is_sloping { PARTS } else { 1 };
+            let at_s = |part: u32| from_s + length_s * (f64::from(part) / f64::from(parts));
+            spans.extend((0..parts).map(|part| {
+                let (from_s, to_s) = (at_s(part), at_s(part + 1));
+                Span { from_s, to_s, most_m_s2: most_m_s2(blown, &groups, frame, (from_s, to_s)) }
+            }));
+        }
+        Self { damping_per_s, spans, resolution_m: blown.resolution_m }
+    }
+
+    /// Distances above delta that are not told from it \[m\].
+    pub(super) fn resolution_m(&self) -> f64 {
+        self.resolution_m
+    }
+
+    /// The bound on an energy from a time on \[s\], until it passes `most` or the flight ends.
+    pub(super) fn of(&self, energy: f64, from_s: f64, most: f64) -> Grown {
+        if energy >= most {
+            return Grown { energy, until_s: Some(from_s) };
+        }
+        let mut now = energy;
+        for &Span { from_s: begins_s, to_s, most_m_s2 } in self.spans.iter().filter(|span| span.to_s > from_s) {
+            let begins_s = begins_s.max(from_s);
+            let length_s = to_s - begins_s;
+            let pushed = (now.sqrt() + most_m_s2 * length_s * std::f64::consts::FRAC_1_SQRT_2).powi(2);
+            let fed_per_s = most_m_s2 * most_m_s2 / (4.0 * self.damping_per_s);
+            let is_damped = self.damping_per_s > 0.0;
+            let next = if is_damped { pushed.min(now + fed_per_s * length_s) } else { pushed };
+            if next > most {
+                let steady_s = if is_damped { ((most - now) / fed_per_s).max(0.0) } else { 0.0 };
+                let short_s = (most.sqrt() - now.sqrt()) * std::f64::consts::SQRT_2 / most_m_s2;
+                return Grown { energy: most, until_s: Some(begins_s + steady_s.max(short_s).min(length_s)) };
+            }
+            now = next;
+        }
+        let blows_on = self.spans.last().is_some_and(|last| last.most_m_s2 > 0.0);
+        Grown { energy: now, until_s: self.spans.last().filter(|_| blows_on).map(|last| last.to_s) }
+    }
+}
+
+/// Which gusts meet how many vehicles.
+fn groups(blown: &Blown<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
+    let mut groups: Vec<(Vec<bool>, usize)> = Vec::new();
+    for vehicle in 0..count {
+        let met: Vec<_> = blown.wind.gusts.iter().map(|gust| gust.meets(vehicle)).collect();
+        match groups.iter_mut().find(|(known, _)| *known == met) {
+            Some((_, size)) => *size += 1,
+            None => groups.push((met, 1)),
+        }
+    }
+    groups
+}
+
+/// The beginning, the end, and what gusts do in between, in order \[s\].
+fn corners_s(blown: &Blown<'_>) -> Vec<f64> {
+    let of_gusts = blown.wind.gusts.iter().flat_map(Gust::corners_s);
+    let inside = of_gusts.filter(|&corner_s| corner_s > 0.0 && corner_s < blown.until_s);
+    let mut corners_s: Vec<_> = inside.chain([0.0, blown.until_s]).collect();
+    corners_s.sort_by(f64::total_cmp);
+    corners_s.dedup();
+    corners_s
+}
+
+/// No larger |w| in a span in which each gust grows or falls all along: that of the middle of its shares, and as much as half
+/// of their changes come to.
+fn most_m_s2(blown: &Blown<'_>, groups: &[(Vec<bool>, usize)], frame: Frame, (from_s, to_s): (f64, f64)) -> f64 {
+    let gusts = &blown.wind.gusts;
+    let shares: Vec<_> = gusts.iter().map(|gust| (gust.share(from_s), gust.share(to_s))).collect();
+    let count = groups.iter().map(|(_, size)| *size).sum::<usize>().max(1) as f64;
+    let air = |met: &[bool]| {
+        let blowing = gusts.iter().zip(&shares).zip(met).filter(|(_, met)| **met);
+        blowing.fold(blown.wind.mean_m_s, |sum, ((gust, (a, b)), _)| sum + 0.5 * (a + b) * gust.velocity_m_s)
+    };
+    let from: Vector3<f64> = match frame {
+        Frame::Ground => Vector3::zeros(),
+        Frame::Mean => groups.iter().map(|(met, size)| *size as f64 * air(met)).sum::<Vector3<f64>>() / count,
+    };
+    let alone = groups.len() == 1 && frame == Frame::Mean;
+    let square = |(met, size): &(Vec<bool>, usize)| *size as f64 * (air(met) - from).norm_squared();
+    let middle = if alone { 0.0 } else { groups.iter().map(square).sum::<f64>().sqrt() };
+    let changes = gusts.iter().zip(&shares).enumerate().map(|(k, (gust, (a, b)))| {
+        let met = groups.iter().filter(|(met, _)| met[k]).map(|(_, size)| *size).sum::<usize>() as f64;
+        let felt = if frame == Frame::Mean { met * (1.0 - met / count) } else { met };
+        0.5 * (b - a).abs() * gust.velocity_m_s.norm() * felt.max(0.0).sqrt()
+    });
+    blown.drag_per_s * (middle + changes.sum::<f64>())
+}
+
+#[cfg(test)]
+mod tests;

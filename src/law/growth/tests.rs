@@ -1,0 +1,84 @@
+//! The bound on an energy under a wind: reached where it can be, and never passed.
+
+use super::*;
+use crate::wind::WindSpec;
+
+fn gust(velocity_m_s: Vector3<f64>, vehicles: Option<Vec<usize>>) -> Gust {
+    Gust { at_s: 1.0, rise_s: 2.0, hold_s: 1.0, fall_s: 2.0, velocity_m_s, vehicles }
+}
+
+fn blown(wind: &WindSpec) -> Blown<'_> {
+    Blown { wind, drag_per_s: 0.5, until_s: 10.0, resolution_m: 1e-9 }
+}
+
+fn grown(wind: &WindSpec, frame: Frame, energy: f64) -> Grown {
+    Growth::new(&blown(wind), 4, frame, 0.8).of(energy, 0.0, f64::INFINITY)
+}
+
+#[test]
+fn a_steady_wind_adds_its_square_over_four_zeta_and_one_for_all_nothing_about_the_mean() {
+    let wind = WindSpec { mean_m_s: Vector3::new(3.0, 0.0, 4.0), ..WindSpec::default() };
+    let ground = grown(&wind, Frame::Ground, 100.0);
+    // |w|^2 = 4 (0.5 5)^2 = 25 over 10 s.
+    assert!((ground.energy - (100.0 + 25.0 * 10.0 / 3.2)).abs() < 1e-12, "{ground:?}");
+    assert_eq!(ground.until_s, Some(10.0));
+    assert_eq!(grown(&wind, Frame::Mean, 100.0), Grown { energy: 100.0, until_s: None });
+}
+
+#[test]
+fn a_short_gust_adds_to_the_root() {
+    let wind = WindSpec { gusts: vec![gust(Vector3::x(), Some(vec![2]))], ..WindSpec::default() };
+    // Without energy to begin with: the integral of |w|/sqrt 2 of one vehicle, 0.5 (1 + 1 + 1) s, or of its square.
+    let felt = 0.5 * 3.0 * std::f64::consts::FRAC_1_SQRT_2;
+    let ground = grown(&wind, Frame::Ground, 0.0);
+    assert!(ground.energy <= felt * felt && ground.energy > 0.1 * felt * felt, "{ground:?}");
+    assert_eq!(ground.until_s, None, "it is over before the flight is");
+    // About the mean of four a push of one is the less by 3/4 in its square.
+    let (large, mean) = (grown(&wind, Frame::Ground, 1e6), grown(&wind, Frame::Mean, 1e6));
+    assert!(((mean.energy - 1e6) / (large.energy - 1e6) - 0.75).abs() < 1e-3);
+    // 1/4 zeta of the integral of the square of a slope, 3/8 of its length, and of what is held: within the parts' 0.3 %.
+    let exact = 0.25 * (2.0 * 2.0 * 0.375 + 1.0) / 3.2;
+    let ratio = (large.energy - 1e6) / exact;
+    assert!((1.0..1.003).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn gusts_that_meet_different_vehicles_are_counted_each_where_it_blows() {
+    let gusts = vec![gust(Vector3::x(), Some(vec![0])), gust(-Vector3::x(), Some(vec![1])), gust(Vector3::y(), None)];
+    let wind = WindSpec { gusts, ..WindSpec::default() };
+    let held = |frame: Frame| most_m_s2(&blown(&wind), &groups(&blown(&wind), 4), frame, (3.0, 4.0));
+    assert!((held(Frame::Mean) - 0.5 * 2.0_f64.sqrt()).abs() < 1e-15);
+    assert!((held(Frame::Ground) - 0.5 * 6.0_f64.sqrt()).abs() < 1e-15);
+}
+
+#[test]
+fn a_promise_ends_where_the_energy_may_pass_what_it_bears() {
+    let wind = WindSpec { mean_m_s: Vector3::new(3.0, 0.0, 4.0), ..WindSpec::default() };
+    let growth = Growth::new(&blown(&wind), 4, Frame::Ground, 0.8);
+    let Grown { energy, until_s } = growth.of(100.0, 2.0, 139.062_5);
+    assert_eq!((energy, until_s.map(|until_s| (until_s * 1e6).round())), (139.062_5, Some(7e6)));
+    assert_eq!(growth.of(100.0, 2.0, 90.0).until_s, Some(2.0), "at once");
+    let undamped = Growth::new(&blown(&wind), 4, Frame::Ground, 0.0).of(4.0, 0.0, f64::INFINITY);
+    assert!((undamped.energy - (2.0 + 50.0 * std::f64::consts::FRAC_1_SQRT_2).powi(2)).abs() < 1e-9);
+}
+
+/// One velocity under dE/dt = -zeta v^2 + v w: the push 2 zeta v reaches the bound, others stay below it.
+#[test]
+fn the_bound_is_reached_by_the_worst_push_and_passed_by_none() {
+    let (zeta, dt_s) = (0.8, 1e-4);
+    let end = |push: &dyn Fn(f64, f64) -> f64| {
+        let (mut v, mut allowed) = (1.0_f64, 0.5_f64);
+        for step in 0..20_000 {
+            let w = push(v, f64::from(step) * dt_s);
+            allowed += dt_s * w * w / (4.0 * zeta);
+            v += dt_s * (w - zeta * v);
+        }
+        0.5 * v * v / allowed
+    };
+    // E = v^2/2 alone grows by (w - zeta v) v, which w = 2 zeta v makes zeta v^2 = w^2/(4 zeta).
+    assert!((end(&|v, _| 2.0 * zeta * v) - 1.0).abs() < 1e-3);
+    for other in [&(|_, _| 1.0) as &dyn Fn(f64, f64) -> f64, &|v, _| zeta * v, &|_, t| (3.0 * t).sin(), &|v, _| 4.0 * v]
+    {
+        assert!(end(other) < 0.98, "{}", end(other));
+    }
+}

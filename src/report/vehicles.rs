@@ -1,0 +1,58 @@
+//! What flew, in words.
+
+use crate::scenario::{PlantSpec, Precision, Scenario};
+use crate::vehicle::Airframe;
+
+/// What the vehicles were taken to be, and what becomes of a command.
+pub(super) fn plant(scenario: &Scenario) -> (String, &'static str) {
+    let bits = |precision: Precision| match precision {
+        Precision::Single => "single precision (32 bits)",
+        Precision::Double => "double precision (64 bits)",
+    };
+    match (&scenario.airframe, scenario.plant) {
+        (Airframe::Unicycle(_), _) => (
+            "The vehicles are unicycles: they go where they look, turn no faster than they can, and never stop. Their way within a \
+             step is an arc in closed form, which the audit takes for straight: they leave it by less than 1e-5 m. Mass and hull \
+             play no part."
+                .to_owned(),
+            "held over it",
+        ),
+        (Airframe::Quadrotor(quadrotor), PlantSpec::Rapier(precision)) => (
+            format!(
+                "The vehicles are quadrotors ({}): rigid bodies in Rapier with six degrees of freedom that four rotors lift, under \
+                 gravity, with the lag of their motors, drag and an attitude loop at {} Hz; within a step each moves on a straight \
+                 line at constant speed, and hulls that touch push each other. The engine computes in {}, everything else in \
+                 double precision (64 bits).",
+                quadrotor.model.name,
+                quadrotor.attitude_hz,
+                bits(precision)
+            ),
+            "held until the next one",
+        ),
+        (Airframe::Point, PlantSpec::Rapier(precision)) => (
+            format!(
+                "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
+                 at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
+                 so close that they touch. The engine computes in {}, law and audit in double precision (64 bits).",
+                bits(precision)
+            ),
+            "held over it",
+        ),
+        (Airframe::Quadrotor(quadrotor), PlantSpec::Ideal) => (
+            format!(
+                "The vehicles are quadrotors ({}) whose equations of motion are solved in continuous time by an integrator of 8th \
+                 order in double precision (64 bits); hulls play no part, and there is no engine to see contacts. The audit takes \
+                 them to move on straight lines within a step.",
+                quadrotor.model.name
+            ),
+            "held until the next one",
+        ),
+        (Airframe::Point, PlantSpec::Ideal) => (
+            "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
+             8th order in double precision (64 bits); mass and hull play no part, and there is no engine to see \
+             contacts. The audit takes them to move on straight lines within a step."
+                .to_owned(),
+            "recorded; the motion between follows the law in continuous time",
+        ),
+    }
+}

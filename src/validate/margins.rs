@@ -1,0 +1,241 @@
+//! Margins of delay and of held commands: where a disturbance of a millimetre begins to grow, against linear theory.
+
+use super::claim::Claim;
+use super::flights::{builtin, larger};
+use super::interface::{Judged, Progress, Untried, stated, try_each};
+use crate::graph::Graph;
+use crate::law::{DisplacementKeys, LawSpec, Linear};
+use crate::record::{Event, RecordError, Sample, Sink};
+use crate::scenario::{PlantSpec, Scenario};
+use crate::sim::{self, Ending, Parts};
+use crate::swarm::{Swarm, mean_row, row, set_row};
+
+/// Units of work.
+pub(super) const WORK: u64 = 3 * GRAPHS.len() as u64 + 2;
+
+const GRAPHS: [&str; 3] = ["complete", "star", "ring"];
+/// A tension that pushes nobody in the time of a flight.
+const NO_TENSION: f64 = 1e-8;
+/// Size of the disturbance \[m\].
+const DISTURBANCE_M: f64 = 1e-3;
+/// Looks at a flight, and steps of it, a second \[Hz\].
+const LOOKS_HZ: f64 = 10.0;
+/// Length of a flight in margins of what is heard, which turns slowly, and of anything else \[s\].
+const LONG_MARGINS: f64 = 25.0;
+const SHORT_S: f64 = 40.0;
+/// Commands of a flight that holds them.
+const COMMANDS: f64 = 80.0;
+/// Halvings of where a margin with the tension on may be, in its logarithm.
+const HALVINGS: u32 = 5;
+/// Length of such a flight, whose solver is held up wherever a push begins \[s\].
+const PUSHED_S: f64 = 16.0;
+
+/// Kinds of margin.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// Of all that vehicles know.
+    KnownLate,
+    /// Of what they hear of others.
+    HeardLate,
+    /// Between commands.
+    Held,
+}
+
+impl Kind {
+    fn predicted_s(self, linear: &Linear) -> f64 {
+        match self {
+            Self::KnownLate => linear.delay_margin_s(0.0),
+            Self::HeardLate => linear.heard.as_ref().and_then(|heard| heard.delay_margin_s(0.0)).unwrap_or(f64::NAN),
+            Self::Held => linear.sampling_margin_s(0.0),
+        }
+    }
+
+    fn set(self, scenario: &mut Scenario, value_s: f64) {
+        match self {
+            Self::KnownLate => scenario.sensing.latency_s = value_s,
+            Self::HeardLate => {
+                scenario.network.latency_s = value_s;
+                scenario.time.duration_s = LONG_MARGINS * value_s;
+            }
+            Self::Held => {
+                scenario.time.dt_s = value_s;
+                scenario.time.record_hz = 1.0 / value_s;
+                scenario.time.control_hz = Some(1.0 / value_s);
+                scenario.time.duration_s = COMMANDS * value_s;
+            }
+        }
+    }
+}
+
+/// The pentagon at its slots but for a millimetre, in continuous time; nobody hears anything before the start, from which on
+/// all drift by a millimetre a second.
+fn disturbed(graph: &str, alpha: f64) -> Result<Scenario, Untried> {
+    let mut scenario = builtin("pentagon")?;
+    let count = scenario.count();
+    scenario.law = LawSpec::Displacement(DisplacementKeys { alpha, ..DisplacementKeys::default() });
+    scenario.graph = match graph {
+        "star" => Graph::star(count),
+        "ring" => Graph::ring(count),
+        _ => Graph::complete(count),
+    };
+    let mut start = Swarm::at_rest(scenario.formation().slots_m.clone());
+    for i in 0..count {
+        let turn = 4.0 * i as f64;
+        let off_m = nalgebra::Vector3::new(libm::sin(turn), libm::cos(1.7 * turn), 0.0) * DISTURBANCE_M;
+        let place_m = row(&start.positions_m, i) + off_m;
+        set_row(&mut start.positions_m, i, place_m);
+        set_row(&mut start.velocities_m_s, i, nalgebra::Vector3::new(DISTURBANCE_M, 0.0, 0.0));
+    }
+    scenario.start = start;
+    (scenario.a22_per_s, scenario.plant) = (0.0, PlantSpec::Ideal);
+    scenario.time.duration_s = SHORT_S;
+    (scenario.time.dt_s, scenario.time.record_hz) = (1.0 / LOOKS_HZ, LOOKS_HZ);
+    scenario.arrival.hold_s = 0.0;
+    scenario.breathing.mode = crate::target::BreathingMode::Off;
+    Ok(scenario)
+}
+
+/// Keeps how large the disturbance is at each look: of relative motion, and of common velocity where that counts.
+struct Looks<'a> {
+    scenario: &'a Scenario,
+    counts_common: bool,
+    sizes: Vec<(f64, f64)>,
+}
+
+impl Sink for Looks<'_> {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        let errors_m = &sample.swarm.positions_m - &self.scenario.formation().slots_m;
+        let (mean_m, mean_m_s) = (mean_row(&errors_m), mean_row(&sample.swarm.velocities_m_s));
+        let of = |i: usize| {
+            let common = if self.counts_common { nalgebra::Vector3::zeros() } else { mean_m_s };
+            (row(&errors_m, i) - mean_m).norm_squared() + (row(&sample.swarm.velocities_m_s, i) - common).norm_squared()
+        };
+        self.sizes.push((sample.time_s, (0..errors_m.nrows()).map(of).sum()));
+        Ok(())
+    }
+
+    fn event(&mut self, _: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+/// Rate at which the disturbance grows \[1/s\] from the second quarter of a flight to its last; infinite where two came too near
+/// to each other.
+fn growth_per_s(scenario: &Scenario, counts_common: bool) -> Result<f64, Untried> {
+    scenario.validate()?;
+    let mut looks = Looks { scenario, counts_common, sizes: Vec::new() };
+    let flight = sim::fly(scenario, Parts::of(scenario)?, &mut looks, &mut |_| std::ops::ControlFlow::Continue(()))?;
+    if flight.ending != Ending::Completed {
+        return Ok(f64::INFINITY);
+    }
+    let mean = |from: f64, to: f64| {
+        let within = looks.sizes.iter().filter(|(time_s, _)| (from..to).contains(&(time_s / scenario.time.duration_s)));
+        let (sum, number) = within.fold((0.0, 0.0), |(sum, number), (_, size)| (sum + size, number + 1.0));
+        sum / number
+    };
+    Ok(0.5 * libm::log(mean(0.75, 1.0) / mean(0.25, 0.5)) / (0.5 * scenario.time.duration_s))
+}
+
+/// The period between commands that was measured \[s\] and the one predicted, by halving what is within 4 % of the prediction:
+/// two of its conditions may coincide, and then nothing is straight there.
+fn period_s(graph: &str) -> Result<(f64, f64), Untried> {
+    const ASIDE: f64 = 0.04;
+    let plain = disturbed(graph, NO_TENSION)?;
+    let predicted_s = Kind::Held.predicted_s(&plain.law()?.linear(plain.formation()).ok_or("no modes")?);
+    let grows = |share: f64| -> Result<bool, Untried> {
+        let mut scenario = plain.clone();
+        Kind::Held.set(&mut scenario, share * predicted_s);
+        Ok(growth_per_s(&scenario, false)? > 0.0)
+    };
+    let (mut low, mut high) = (1.0 - ASIDE, 1.0 + ASIDE);
+    if grows(low)? || !grows(high)? {
+        return Ok((f64::NAN, predicted_s));
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if grows(middle)? { high = middle } else { low = middle }
+    }
+    Ok((0.5 * (low + high) * predicted_s, predicted_s))
+}
+
+/// The margin that was measured \[s\] and the one predicted: the rate of growth is found a little below and a little above the
+/// prediction, and is 0 in between where a straight line through both is.
+fn margin_s(kind: Kind, graph: &str) -> Result<(f64, f64), Untried> {
+    const ASIDE: f64 = 0.03;
+    if kind == Kind::Held {
+        return period_s(graph);
+    }
+    let plain = disturbed(graph, NO_TENSION)?;
+    let predicted_s = kind.predicted_s(&plain.law()?.linear(plain.formation()).ok_or("no modes")?);
+    let rate = |share: f64| {
+        let mut scenario = plain.clone();
+        kind.set(&mut scenario, share * predicted_s);
+        growth_per_s(&scenario, kind == Kind::HeardLate)
+    };
+    let (below, above) = (rate(1.0 - ASIDE)?, rate(1.0 + ASIDE)?);
+    if !(below < 0.0 && above > 0.0) {
+        return Ok((f64::NAN, predicted_s));
+    }
+    let share = 1.0 - ASIDE + 2.0 * ASIDE * below / (below - above);
+    Ok((share * predicted_s, predicted_s))
+}
+
+fn free(id: &str, kind: Kind, progress: &Progress<'_>) -> Result<Claim, Untried> {
+    let margins = try_each(&GRAPHS, progress, |graph| margin_s(kind, graph))?;
+    let off = |&(measured_s, predicted_s): &(f64, f64)| (measured_s / predicted_s - 1.0).abs();
+    let worst = margins.iter().map(off).fold(0.0, larger);
+    let words: Vec<_> = GRAPHS
+        .iter()
+        .zip(&margins)
+        .map(|(graph, (measured_s, predicted_s))| format!("{graph} {measured_s:.3} s, predicted {predicted_s:.3} s"))
+        .collect();
+    Ok(stated(id)?.measured(words.join("; "), [("largest_relative_difference", worst)]).within_limit())
+}
+
+/// The delay at which a disturbance of the pentagon in contact begins to grow \[s\], between that of the contact formula and that
+/// of the free one.
+fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], Untried> {
+    let mut plain = disturbed("complete", 1.0)?;
+    plain.time.duration_s = PUSHED_S;
+    let linear = plain.law()?.linear(plain.formation()).ok_or("no modes")?;
+    let contact_s = linear.in_contact.map_or(f64::NAN, |mode| mode.delay_margin_s(0.0));
+    let free_s = linear.delay_margin_s(0.0);
+    let grows = |latency_s: f64| -> Result<bool, Untried> {
+        let mut scenario = plain.clone();
+        scenario.sensing.latency_s = latency_s;
+        scenario.sensing.near_latency_s = (!near_is_late).then_some(0.0);
+        Ok(growth_per_s(&scenario, false)? > 0.0)
+    };
+    if grows(contact_s)? || !grows(1.05 * free_s)? {
+        return Ok([f64::NAN, contact_s, free_s]);
+    }
+    let (mut low_s, mut high_s) = (contact_s, 1.05 * free_s);
+    for _ in 0..HALVINGS {
+        let middle_s = (low_s * high_s).sqrt();
+        if grows(middle_s)? { high_s = middle_s } else { low_s = middle_s }
+    }
+    Ok([(low_s * high_s).sqrt(), contact_s, free_s])
+}
+
+fn with_tension(progress: &Progress<'_>) -> Result<Claim, Untried> {
+    let measured = try_each(&[true, false], progress, |&near_is_late| in_contact_s(near_is_late))?;
+    let [[late_s, contact_s, free_s], [at_once_s, ..]] = measured[..] else { return Err("no margins".into()) };
+    Ok(stated("margin-in-contact")?
+        .measured(
+            format!(
+                "near ones seen as late as all else {late_s:.2} s, near ones seen at once {at_once_s:.2} s; contact formula \
+                 {contact_s:.3} s, free formula {free_s:.3} s"
+            ),
+            [("near_late_s", late_s), ("near_at_once_s", at_once_s), ("contact_s", contact_s), ("free_s", free_s)],
+        )
+        .pass(contact_s < late_s && late_s < at_once_s && at_once_s < free_s))
+}
+
+pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+    Ok(vec![
+        free("margin-known-late", Kind::KnownLate, progress)?,
+        free("margin-heard-late", Kind::HeardLate, progress)?,
+        free("margin-commands-held", Kind::Held, progress)?,
+        with_tension(progress)?,
+    ])
+}

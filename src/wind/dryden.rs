@@ -1,0 +1,170 @@
+//! Dryden turbulence at low altitude (MIL-F-8785C), by filters whose variance does not depend on the step.
+
+use nalgebra::Vector3;
+
+use super::normal::Normals;
+
+/// Metres of a foot.
+const FOOT_M: f64 = 0.3048;
+
+/// The least speed at which turbulence is carried past a vehicle \[m/s\]: in no wind it would never change.
+const SLOWEST_M_S: f64 = 1.0;
+
+/// Below this step, in units of L/V, the last of a filter's factors is rounding, and its leading term stands for it.
+const SHORT: f64 = 1e-3;
+
+/// How strong turbulence is and how large its eddies are, near the ground:
+///
+/// ```text
+/// sigma_w = 0.1 W20,   sigma_u = sigma_v = sigma_w/(0.177 + 0.000823 h)^0.4
+/// L_w = h,             L_u = L_v = h/(0.177 + 0.000823 h)^1.2                 h in feet, from 10 to 1000
+/// ```
+///
+/// u blows along the horizontal part of the mean wind (along x where there is none), v across it and w up. The air is frozen
+/// and carried past vehicles at the mean wind's speed V, and at 1 m/s at least. Correlations over a time t, with
+/// x = V|t|/L: sigma^2 e^-x of u, sigma^2 e^-x (1 - x/2) of v and w.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dryden {
+    /// Wind speed W20, 20 feet above the ground \[m/s\].
+    pub speed_20ft_m_s: f64,
+    /// Height h above the ground \[m\].
+    pub height_m: f64,
+}
+
+impl Dryden {
+    /// Least height that the scales are made for: 10 feet \[m\].
+    pub const LOWEST_M: f64 = 10.0 * FOOT_M;
+    /// Largest height that they are made for: 1000 feet \[m\].
+    pub const HIGHEST_M: f64 = 1000.0 * FOOT_M;
+
+    fn roughness(&self) -> f64 {
+        0.177 + 0.000_823 * self.height_m / FOOT_M
+    }
+
+    /// Standard deviations of u, v and w \[m/s\].
+    #[must_use]
+    pub fn intensity_m_s(&self) -> Vector3<f64> {
+        let up_m_s = 0.1 * self.speed_20ft_m_s;
+        let level_m_s = up_m_s / libm::pow(self.roughness(), 0.4);
+        Vector3::new(level_m_s, level_m_s, up_m_s)
+    }
+
+    /// Scales L of u, v and w \[m\].
+    #[must_use]
+    pub fn length_m(&self) -> Vector3<f64> {
+        let level_m = self.height_m / libm::pow(self.roughness(), 1.2);
+        Vector3::new(level_m, level_m, self.height_m)
+    }
+
+    /// The exact step of `dt_s` seconds in a mean wind.
+    pub(super) fn step(&self, mean_m_s: Vector3<f64>, dt_s: f64) -> Step {
+        let carried_m = mean_m_s.norm().max(SLOWEST_M_S) * dt_s;
+        let [along, across, up] = (Vector3::repeat(carried_m).component_div(&self.length_m())).into();
+        Step { intensity_m_s: self.intensity_m_s(), along: Along::new(along), across: [across, up].map(Across::new) }
+    }
+
+    /// Where u, v and w blow.
+    pub(super) fn frame(mean_m_s: Vector3<f64>) -> [Vector3<f64>; 3] {
+        let level = Vector3::new(mean_m_s.x, mean_m_s.y, 0.0);
+        let along = level.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector3::x);
+        [along, Vector3::z().cross(&along), Vector3::z()]
+    }
+}
+
+/// Factors of one step of fixed length.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    intensity_m_s: Vector3<f64>,
+    along: Along,
+    across: [Across; 2],
+}
+
+/// u+ = p u + sqrt(1 - p^2) xi with p = e^-d, d = V dt/L.
+#[derive(Clone, Copy, Debug)]
+struct Along {
+    p: f64,
+    kick: f64,
+}
+
+impl Along {
+    fn new(d: f64) -> Self {
+        Self { p: libm::exp(-d), kick: (-libm::expm1(-2.0 * d)).sqrt() }
+    }
+}
+
+/// Two lags in a row, x and then y, whose difference has the zero of the filter:
+///
+/// ```text
+/// y+ = p (y + d x) + l21 xi1 + l22 xi2,   x+ = p x + l11 xi1,   out = sqrt 3 x + (1 - sqrt 3) y
+/// ```
+///
+/// with the Cholesky factors of the covariance of what a step adds,
+/// Q11 = (1 - p^2)/2, Q12 = (1 - (1 + 2d) p^2)/4, Q22 = (1 - (1 + 2d + 2d^2) p^2)/4.
+#[derive(Clone, Copy, Debug)]
+struct Across {
+    p: f64,
+    d: f64,
+    l11: f64,
+    l21: f64,
+    l22: f64,
+}
+
+impl Across {
+    fn new(d: f64) -> Self {
+        let (p, lost) = (libm::exp(-d), -libm::expm1(-2.0 * d));
+        let squared = 1.0 - lost;
+        let q12 = 0.25 * (lost - 2.0 * d * squared);
+        let q22 = 0.25 * (lost - 2.0 * d * (1.0 + d) * squared);
+        let l11 = (0.5 * lost).sqrt();
+        let l21 = q12 / l11;
+        let l22 = if d < SHORT { (d * d * d / 12.0).sqrt() } else { (q22 - l21 * l21).max(0.0).sqrt() };
+        Self { p, d, l11, l21, l22 }
+    }
+}
+
+/// The air of one vehicle, or of all: what the filters remember, for variances of 1.
+#[derive(Clone, Debug)]
+pub(super) struct Eddy {
+    along: f64,
+    /// x and y of v and of w.
+    across: [[f64; 2]; 2],
+    normals: Normals,
+}
+
+impl Eddy {
+    /// Somewhere in the stationary distribution.
+    pub(super) fn new(normals: Normals) -> Self {
+        let mut eddy = Self { along: 0.0, across: [[0.0; 2]; 2], normals };
+        eddy.along = eddy.normals.next();
+        for state in &mut eddy.across {
+            let x = eddy.normals.next() * std::f64::consts::FRAC_1_SQRT_2;
+            *state = [x, 0.5 * x + eddy.normals.next() / 8.0_f64.sqrt()];
+        }
+        eddy
+    }
+
+    /// Goes on with other random numbers.
+    pub(super) fn reseed(&mut self, normals: Normals) {
+        self.normals = normals;
+    }
+
+    pub(super) fn advance(&mut self, step: &Step) {
+        let Self { along, across, normals } = self;
+        *along = step.along.p * *along + step.along.kick * normals.next();
+        for ([x, y], Across { p, d, l11, l21, l22 }) in across.iter_mut().zip(step.across) {
+            let (first, second) = (normals.next(), normals.next());
+            *y = p * (*y + d * *x) + l21 * first + l22 * second;
+            *x = p * *x + l11 * first;
+        }
+    }
+
+    /// u, v and w \[m/s\].
+    pub(super) fn velocity_m_s(&self, step: &Step) -> Vector3<f64> {
+        let root = 3.0_f64.sqrt();
+        let [v, w] = self.across.map(|[x, y]| root * x + (1.0 - root) * y);
+        Vector3::new(self.along, v, w).component_mul(&step.intensity_m_s)
+    }
+}
+
+#[cfg(test)]
+mod tests;

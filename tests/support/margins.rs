@@ -1,0 +1,108 @@
+//! How much of each imperfection five points and five Crazyflies survive on the same way, as the table of docs/margins.md.
+
+use std::sync::atomic::AtomicBool;
+
+use tautline::compare::Watch;
+use tautline::margin::{Asked, Margin, Plan, Question, Range};
+use tautline::scenario::{Override, Source};
+
+/// One imperfection: what it is, its key, its first and last value, runs of each value, and what else is set.
+struct Row {
+    what: &'static str,
+    key: &'static str,
+    from: f64,
+    to: f64,
+    logarithmic: bool,
+    runs: u64,
+    sets: &'static [&'static str],
+}
+
+const ROWS: [Row; 7] = [
+    Row::of("all that a vehicle knows is old", "sensing.latency_s", [0.0, 1.0]),
+    Row::of("what it hears of others is old", "network.latency_s", [0.0, 4.0]).with(&["network.rate_hz=50"]),
+    Row::of("messages are lost, twenty in a row", "network.loss", [0.0, 0.95])
+        .with(&["network.rate_hz=50", "network.loss_burst=20"])
+        .runs(3),
+    Row::of("commands are held", "time.control_hz", [100.0, 0.25]).by_ratio(),
+    Row::of("acceleration is limited", "actuation.max_accel_m_s2", [1.0, 0.002]).by_ratio(),
+    Row::of("places are measured with noise", "sensing.position_noise_m", [1e-4, 0.4])
+        .with(&["sensing.rate_hz=100"])
+        .by_ratio()
+        .runs(3),
+    Row::of("each vehicle has a turbulence of its own", "wind.dryden.speed_20ft_m_s", [0.1, 20.0])
+        .with(&["wind.dryden.height_m=6", "wind.shared=false"])
+        .by_ratio()
+        .runs(3),
+];
+
+/// Points with the drag of a Crazyflie over its mass, and Crazyflies.
+const VEHICLES: [(&str, &[&str]); 2] =
+    [("points", &["vehicle.model=point", "vehicle.drag_per_s=0.448"]), ("Crazyflies", &["vehicle.model=crazyflie"])];
+const SCAN: usize = 3;
+const HALVINGS: u32 = 4;
+const DIGITS: usize = 3;
+
+impl Row {
+    const fn of(what: &'static str, key: &'static str, [from, to]: [f64; 2]) -> Self {
+        Self { what, key, from, to, logarithmic: false, runs: 1, sets: &[] }
+    }
+
+    const fn with(self, sets: &'static [&'static str]) -> Self {
+        Self { sets, ..self }
+    }
+
+    const fn runs(self, runs: u64) -> Self {
+        Self { runs, ..self }
+    }
+
+    const fn by_ratio(self) -> Self {
+        Self { logarithmic: true, ..self }
+    }
+
+    fn margin(&self, vehicle: &[&str], question: Question) -> Margin {
+        let sets = self.sets.iter().chain(vehicle);
+        let overrides: Vec<_> = sets.map(|set| Override::parse(set).expect("a set")).collect();
+        let Self { from, to, logarithmic, runs, .. } = *self;
+        let range = Range { from, to, scan: SCAN, halvings: HALVINGS, logarithmic };
+        let source = Source::Builtin("crazyflies".to_owned());
+        let plan = Plan::new(source, &overrides, self.key, range, Asked { question, runs, seed: 0 });
+        let plan = plan.unwrap_or_else(|error| panic!("{}: {error}", self.key));
+        let watch = Watch { flown: &|_| {}, interrupted: &AtomicBool::new(false) };
+        plan.search(2, watch).unwrap_or_else(|error| panic!("{}: {error}", self.key)).expect("not interrupted")
+    }
+
+    fn cell(&self, margin: &Margin) -> String {
+        let number = |value: f64| format!("{value:.*e}", DIGITS - 1).parse::<f64>().map_or(value, |rounded| rounded);
+        match margin.sides() {
+            Some([holds, fails]) => format!("{}, not {}", number(holds.value), number(fails.value)),
+            None if margin.holds_everywhere() => format!("{}", self.to),
+            None => format!("not {}", self.from),
+        }
+    }
+}
+
+/// What a table has to say of a key for one of the two kinds of vehicles: how much keeps clear, and how much passes.
+#[allow(dead_code, reason = "not every program that shares this asks for a part")]
+pub(crate) fn cells(key: &str, vehicles: usize) -> Option<[String; 2]> {
+    let row = ROWS.iter().find(|row| row.key == key)?;
+    Some([Question::Clear, Question::Pass].map(|question| row.cell(&row.margin(VEHICLES[vehicles].1, question))))
+}
+
+/// The table in Markdown, a line an imperfection.
+pub(crate) fn table() -> String {
+    let mut table = String::from("| imperfection | key |");
+    for (vehicles, _) in VEHICLES {
+        table += &format!(" {vehicles} stay clear | {vehicles} pass |");
+    }
+    table += "\n| --- | --- | --- | --- | --- | --- |\n";
+    for row in &ROWS {
+        table += &format!("| {} | `{}` |", row.what, row.key);
+        for (_, vehicle) in VEHICLES {
+            for question in [Question::Clear, Question::Pass] {
+                table += &format!(" {} |", row.cell(&row.margin(vehicle, question)));
+            }
+        }
+        table += "\n";
+    }
+    table
+}
