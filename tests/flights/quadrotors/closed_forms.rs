@@ -153,7 +153,7 @@ fn in_a_steady_wind_it_hovers_at_the_tilt_whose_tangent_is_drag_over_weight() {
         let expected = tilt_in_wind(&model, fleet.dynamics.hover_rpm(), wind_m_s);
         let hold = &mut |_, state: &State| -state.position_m - 2.0 * state.velocity_m_s;
         let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet.clone());
-        let state = fly(plant.as_mut(), (60.0, 1.0 / 500.0), hold);
+        let state = fly(plant.as_mut(), (100.0, 1.0 / 500.0), hold);
         let up = state.attitude * Vector3::z();
         assert!((-up.x / up.z - expected).abs() <= 1e-9, "{} at {wind_m_s} m/s, {expected}", -up.x / up.z);
         assert!(state.velocity_m_s.norm() <= 1e-9 && up.y.abs() <= ROUNDING, "{}", state.velocity_m_s);

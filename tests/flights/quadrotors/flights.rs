@@ -77,7 +77,7 @@ fn a_loaded_flight_of_quadrotors_goes_on_with_the_same_bits() {
         [&["time.control_hz=70", "vehicle.attitude_hz=300"][..], &["plant.kind=ideal"], &["plant.precision=single"]]
     {
         let mut simulation = Simulation::new(&builtin("crazyflies", sets)).expect("a flight");
-        let mut run = |simulation: &mut Simulation, steps: u32| {
+        let run = |simulation: &mut Simulation, steps: u32| {
             let mut samples = Vec::new();
             for _ in 0..steps {
                 simulation.step();
