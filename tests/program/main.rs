@@ -10,6 +10,7 @@ mod compare;
 mod determinism;
 mod doors;
 mod exports;
+mod imperfections;
 mod interruption;
 mod keys;
 mod margin;
