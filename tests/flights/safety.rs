@@ -125,9 +125,16 @@ fn what_is_no_ellipsoid_or_cannot_be_kept_is_refused_with_its_remedy() {
             "ellipsoids that touch side by side at 1.2 m",
         ),
         (&["safety.shape=ellipsoid", axes, "law.kind=orca"], "keeps balls from each other"),
-        (&["safety.shape=ellipsoid", "safety.half_axes_m=[0.5, 0.5, 40.0]"], "a desired distance of"),
     ] {
         let error = wrong(sets);
         assert!(error.contains(said), "{sets:?}: {error}");
     }
+    let mut above = above_each_other("[safety]\nshape = \"ellipsoid\"\nhalf_axes_m = [0.2, 0.2, 0.6]");
+    above.start.positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.9]);
+    let refused = above.validate().expect_err("0.3 m apart in scaled lengths").to_string();
+    assert!(refused.contains("apart, scaled to the ellipsoid, not more than delta = 0.4 m"), "{refused}");
+    above.start.positions_m[(1, 2)] = 1.3;
+    above.validate().expect("0.43 m apart in scaled lengths");
+    above.hull_radius_m.fill(0.195);
+    assert!(above.validate().is_err(), "hulls must fit between ellipsoids side by side");
 }

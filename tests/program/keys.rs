@@ -7,6 +7,7 @@ use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
 
 const PAGE: &str = include_str!("../../docs/report.md");
+const ELLIPSOID: &str = "safety={shape=\"ellipsoid\", half_axes_m=[0.5, 0.5, 1.0]}";
 const COMPARE_PAGE: &str = include_str!("../../docs/compare.md");
 
 /// The keys of a section of a page, each with what stands beside it: its unit.
@@ -87,7 +88,7 @@ fn every_key_of_the_report_is_on_its_page() {
             .concat();
     let tilting = [&["run", "crazyflies", "--plant", "ideal"], &quick[..], &["--set", "time.duration_s=1.5"]].concat();
     let into_a_pillar = "reference={kind=\"velocity\",velocity_m_s=[3,2.0,0],leader=1}";
-    let among = [&["run", "obstacles", "--set", into_a_pillar], &quick[..]].concat();
+    let among = [&["run", "obstacles", "--set", into_a_pillar, "--set", ELLIPSOID], &quick[..]].concat();
     // Two who are in each other's way, head-on.
     let swap = [
         "--set",
@@ -104,7 +105,7 @@ fn every_key_of_the_report_is_on_its_page() {
 #[test]
 fn every_key_of_the_check_is_on_its_page() {
     let mission = ["check", "pentagon-leader", "--json", "--set", "leg=[{scale=1.2}]"];
-    let among = ["check", "obstacles", "--json"];
+    let among = ["check", "obstacles", "--json", "--set", ELLIPSOID];
     assert_documented("check --json", &[&["check", "--json"], &mission, &among]);
 }
 

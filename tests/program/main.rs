@@ -9,6 +9,7 @@ mod check;
 mod compare;
 mod determinism;
 mod doors;
+mod ellipsoids;
 mod exports;
 mod imperfections;
 mod interruption;

@@ -69,7 +69,7 @@ fn a_scenario_that_cannot_be_flown_is_refused_at_its_place() {
         ("[4.0, 0.0]", "[inf, 0.0]", "is infinite", ":5:5"),
         ("[4.0, 0.0]", "[0.0, 0.0]", "vehicles 1-2 start at the same point", ":5:5"),
         ("[start]", "[swarm]\nmass_kg = -1.0\n[start]", "the mass of vehicle 1 is -1", ":3:11"),
-        ("[time]", "[wind]\nmean_m_s = [1.0, 0.0]\n[time]", "points without drag, which do not feel it", ":13:2"),
+        ("[time]", "[wind]\nmean_m_s = [1.0, 0.0]\n[time]", "points without drag, which do not feel it", ":13:1"),
         ("[time]", "[time]\ndt_s = 0.0", "the time step is 0", ":14:8"),
         ("[time]", "[time]\ndt_s = -0.1", "the time step is -0.1", ":14:8"),
         ("duration_s = 1.0", "duration_s = 0", "the duration is 0", ":14:14"),

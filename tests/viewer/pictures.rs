@@ -39,6 +39,7 @@ fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
         depth_m: [1.0, 30.0],
         background: BACKGROUND,
         balls: balls.to_vec(),
+        discs: Vec::new(),
         shells: Vec::new(),
         lines: Vec::new(),
         annotations: Vec::new(),

@@ -37,7 +37,7 @@ fn graphs() -> [Graph; 4] {
 }
 
 /// The state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method, with the integral of
-/// sum |w_i|^2 added to `fed`.
+/// the sum of `|w_i|^2` added to `fed`.
 fn pushed(
     swarm: &Swarm,
     dt_s: f64,

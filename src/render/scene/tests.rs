@@ -6,6 +6,7 @@ use crate::graph::Graph;
 use crate::record::{Event, Sample};
 use crate::render::timeline::Timeline;
 use crate::scenario::Scenario;
+use crate::space::Metric;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 
 /// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
@@ -60,26 +61,33 @@ fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
 
 #[test]
 fn shells_come_farthest_first_along_every_line_of_sight() {
-    let timeline = timeline();
-    for text in ["iso", "front", "40,20,9"] {
+    let mut timeline = timeline();
+    for (text, ratio) in
+        ["iso", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
+    {
+        let metric = Metric::of_ratio(ratio);
+        timeline.metric = metric;
         let scene = scene(&timeline, 2.0, &camera(text));
+        assert_eq!(f64::from(scene.shell_ratio), ratio);
         let camera = scene.camera;
         let centre = |ball: &Ball| Vector3::from(ball.centre_m.map(f64::from));
-        // Where rays enter each shell, through points all over the picture.
+        // Where rays enter each shell, through points all over the picture, in lengths in which shells are balls.
         for n in 0..400_u32 {
             let at_px = [f64::from(n % 20) * 64.0, f64::from(n / 20) * 36.0];
             let [origin, direction] = camera.ray(at_px);
+            let direction = metric.scaled(direction);
+            let length = direction.norm_squared();
             let entries: Vec<f64> = scene
                 .shells
                 .iter()
                 .filter_map(|shell| {
-                    let to_centre = centre(shell) - origin;
-                    let along = to_centre.dot(&direction);
-                    let squared = 1.0 - (to_centre.norm_squared() - along * along);
-                    (squared > 0.0).then(|| along - squared.sqrt())
+                    let to_centre = metric.scaled(centre(shell) - origin);
+                    let along = to_centre.dot(&direction) / length;
+                    let squared = 1.0 - (to_centre.norm_squared() - along * along * length);
+                    (squared > 0.0).then(|| along - (squared / length).sqrt())
                 })
                 .collect();
-            assert!(entries.windows(2).all(|pair| pair[0] >= pair[1]), "{text}: {entries:?}");
+            assert!(entries.windows(2).all(|pair| pair[0] >= pair[1]), "{text}, {ratio}: {entries:?}");
         }
     }
 }

@@ -1,0 +1,57 @@
+//! Ellipsoids of a scenario, through the program: flown, reported, and audited from the recording.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::program::{TAUTLINE, ran_by};
+
+/// Two that change sides, the second 0.5 m above the first; what follows is their safety.
+const SCENARIO: &str = r#"[start]
+positions_m = [[-2.0, 0.1, 0.0], [2.0, 0.0, 0.5]]
+[formation]
+shape = "points"
+points_m = [[0.35, 0.0, 0.0], [-0.35, 0.0, 0.5]]
+[swarm]
+hull_radius_m = 0.1
+[time]
+duration_s = 8.0
+[law]
+kind = "displacement"
+"#;
+
+const ELLIPSOID: &str = "[safety]\nshape = \"ellipsoid\"\nhalf_axes_m = [0.2, 0.2, 0.6]\n";
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn a_flight_of_ellipsoids_is_reported_in_both_lengths_and_its_recording_judged_by_its_own_shape() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ran = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), arguments);
+    for (name, safety) in [("ellipsoids", ELLIPSOID), ("balls", "delta_m = 0.4\n")] {
+        fs::write(folder.path().join(format!("{name}.toml")), format!("{SCENARIO}{safety}")).expect("a file");
+    }
+    let flown = json(&ran(&["run", "ellipsoids.toml", "--json", "--no-snapshots"]).out);
+    let separation = &flown["separation"];
+    assert_eq!((&separation["delta_m"], &flown["audit"]["status"]), (&json("0.4"), &json("\"clear\"")));
+    assert_eq!(separation["ellipsoid"]["half_axes_m"], json("[0.2, 0.2, 0.6]"));
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let (scaled, metres) = (number(&separation["min_m"]), number(&separation["ellipsoid"]["min_distance_m"]));
+    assert!(number(&separation["certified_m"]) < scaled && scaled <= metres);
+    assert_eq!(json(&ran(&["check", "ellipsoids.toml", "--json"]).out)["half_axes_m"], json("[0.2, 0.2, 0.6]"));
+
+    // Lengths over half axes, of which 2 touch: 0.4 m of the report are 2.
+    let audited = ran(&["audit", "out/ellipsoids/run.mcap", "--json"]);
+    let judged = json(&audited.out);
+    assert_eq!((audited.exit, &judged["measure"]), (Some(0), &json("\"ellipsoids\"")), "{}", audited.err);
+    assert!((number(&judged["separation"]["min_m"]) - scaled / 0.2).abs() < 1e-6, "{}", judged["separation"]);
+    assert!(audited.err.contains("the ellipsoid is the recording's own, with half axes of 0.2, 0.2 and 0.6 m"));
+    let page = fs::read_to_string(folder.path().join("out/ellipsoids/figures/distances.svg")).expect("a figure");
+    assert!(page.contains("scaled to ellipsoids"));
+
+    assert_eq!(json(&ran(&["run", "balls.toml", "--json", "--no-snapshots"]).out)["audit"]["status"], "clear");
+    let of_balls = |more: &[&str]| ran(&[&["audit", "out/balls/run.mcap"], more].concat()).exit;
+    assert_eq!((of_balls(&[]), of_balls(&["--ellipsoid", "0.2,0.2,0.6"])), (Some(0), Some(1)));
+}
