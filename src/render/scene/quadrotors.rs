@@ -7,8 +7,9 @@ use super::colour::Colour;
 use super::draw_list::{Ball, Disc, Line, single};
 use crate::render::timeline::QuadrotorShape;
 
-/// Least radius of a hull that is drawn with arms in a picture 720 pixels high, and in any \[pixels\]: a smaller one is a ball.
-const LEAST_PX: [f64; 2] = [5.0, 4.0];
+/// Least radius of a hull that is drawn with arms in a picture 720 pixels high, and in any \[pixels\]: a smaller one is a ball,
+/// which is seen better.
+const LEAST_PX: [f64; 2] = [9.0, 6.0];
 /// In units of the arm: radius of the body and of the mark ahead, how far ahead that is, height of the rotors above the
 /// body's middle, width of an arm.
 const BODY: f64 = 0.3;
