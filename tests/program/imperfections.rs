@@ -14,7 +14,7 @@ fn a_wrong_imperfection_is_refused_with_place_value_and_remedy() {
         (&["sensing.position_noise_m=0.1"], "drawn anew with each measurement", "sensing.rate_hz"),
         (&["sensing.rate_hz=0"], "the rate of measurements is 0", "more than 0"),
         (&["sensing.latency_s=200"], "is 200 s in a flight of 120 s", "enlarge time.duration_s"),
-        (&["sensing.latency_s=1e-9"], "1e-9 s", "at least 0.000001"),
+        (&["sensing.latency_s=1e-9"], "is 0.000000001 s", "at least 0.000001"),
         (&["sensing.rate_hz=100", ideal], "continuous time", "actuation.control_hz"),
         (&["network.loss=1.5", "network.rate_hz=50"], "is 1.5", "at most 1"),
         (&["network.loss=-0.5", "network.rate_hz=50"], "is -0.5", "at least 0"),
