@@ -254,3 +254,44 @@ fn line_corner(@builtin(vertex_index) index: u32, line: Line) -> LineCorner {
 fn stroke(corner: LineCorner) -> @location(0) vec4<f32> {
     return corner.colour;
 }
+
+// Discs as flat pieces with a smooth rim.
+
+struct Disc {
+    @location(0) centre: vec3<f32>,
+    @location(1) radius: f32,
+    @location(2) normal: vec3<f32>,
+    @location(3) colour: vec4<f32>,
+}
+
+struct DiscCorner {
+    @builtin(position) position: vec4<f32>,
+    // In units of the radius from the centre.
+    @location(0) at: vec2<f32>,
+    @location(1) @interpolate(flat) colour: vec4<f32>,
+}
+
+// Room for the smooth rim, in units of the radius.
+const RIM_ROOM = 1.2;
+
+@vertex
+fn disc_corner(@builtin(vertex_index) index: u32, disc: Disc) -> DiscCorner {
+    let at = (vec2(f32(index & 1u), f32(index >> 1u)) * 2.0 - 1.0) * RIM_ROOM;
+    var helper = vec3(1.0, 0.0, 0.0);
+    if abs(disc.normal.x) > 0.7 {
+        helper = vec3(0.0, 1.0, 0.0);
+    }
+    let across = normalize(cross(disc.normal, helper));
+    let along = cross(disc.normal, across);
+    let corner = disc.centre + (across * at.x + along * at.y) * disc.radius;
+    return DiscCorner(clipped(seen(corner)), at, light_of(disc.colour));
+}
+
+@fragment
+fn disc(corner: DiscCorner) -> @location(0) vec4<f32> {
+    let out = length(corner.at);
+    let pixel = max(fwidth(out), 1e-6);
+    let covered = clamp((1.0 - out) / pixel + 0.5, 0.0, 1.0);
+    let rim = smoothstep(1.0 - max(0.14, 2.0 * pixel), 1.0 - 0.5 * pixel, out);
+    return vec4(corner.colour.rgb, corner.colour.a * covered * (0.45 + 0.55 * rim));
+}

@@ -34,7 +34,7 @@ pub(super) struct CompareArguments {
     /// Starts under each law.
     #[arg(long, value_name = "R", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=MOST_RUNS))]
     runs: u64,
-    /// Run k, from 0, is flown with `start.seed` = S + k.
+    /// Run k, from 0, is flown with `start.seed` = S + k, and where chance has a part in the flight, `noise.seed` too.
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=LAST_SEED))]
     seed: u64,
     /// Write every number as JSON; - is standard output, for this and the next three.
@@ -88,9 +88,12 @@ impl CompareArguments {
     /// The commands that fly the worst flight of each law, by the law's name.
     fn worst(&self, plan: &Plan, comparison: &Comparison) -> Vec<(String, String)> {
         let jitter = plan.jitter_m().map(|jitter_m| format!("start.jitter_m={jitter_m:?}"));
+        let is_random = plan.template().flight_is_random();
         let command = |law: &crate::compare::LawRow| {
-            let seed = format!("start.seed={}", law.worst()?.seed);
-            let sets = self.what.overrides.iter().chain(&law.overrides).chain([&seed]).chain(&jitter);
+            let seed = law.worst()?.seed;
+            let noise = is_random.then(|| format!("noise.seed={seed}"));
+            let seed = format!("start.seed={seed}");
+            let sets = self.what.overrides.iter().chain(&law.overrides).chain([&seed]).chain(&noise).chain(&jitter);
             let sets = sets.flat_map(|set| ["--set", set.as_str()]);
             Some((law.name.clone(), console::command_line(["run", &self.what.scenario].into_iter().chain(sets))))
         };

@@ -12,7 +12,7 @@ use super::reading::{self, ReadArguments, one_of};
 use super::run::interruption;
 use super::{Exit, Failure, outputs};
 use crate::export::{self, ExportOptions, WRITTEN};
-use crate::read::{Fault, Format, ReadError, Recording};
+use crate::read::{self, Fault, Format, ReadError, Recording};
 use crate::report::write_atomically_with;
 use crate::track::{Clock, Item, Tracks};
 
@@ -100,8 +100,12 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
         let (tracks, path, interrupted) = (arguments.reading.open(&reading)?, recording.clone(), interrupted.clone());
         Ok(Box::new(Interruptible { tracks, path, interrupted }))
     };
-    let exported =
-        write_atomically_with(path, |file| export::export(&open, format, &options, file).map_err(Failure::from));
+    let may_have_channels =
+        arguments.reading.paths().count() == 1 && arguments.input_format.is_none_or(|format| format == Format::Mcap);
+    let channels = || if may_have_channels { read::open_channels(recording) } else { Ok(None) };
+    let exported = write_atomically_with(path, |file| {
+        export::export_with(&open, &channels, format, &options, file).map_err(Failure::from)
+    });
     if exported.is_err() && interrupted.load(Ordering::Relaxed) {
         return Err(Failure::machine(format!("interrupted: `{}` was not written", path.display())));
     }

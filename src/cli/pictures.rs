@@ -17,6 +17,7 @@ pub(super) fn figures(scenario: &Scenario, history: &RunHistory, report: &Report
         shape: Some((&scenario.legs, &scenario.graph)),
         edge_error_m: Some(scenario.arrival.edge_error_m),
         disagreement_m_s: Some(scenario.arrival.disagreement_m_s),
+        most_thrust_n: scenario.airframe.quadrotor().map(|quadrotor| quadrotor.model.max_thrust_n),
     };
     figures::of_run(history, &criteria)
 }

@@ -52,7 +52,7 @@ pub enum CompareError {
 
 impl Plan {
     /// `runs` starts under each of the laws of these names. Run k, from 0, has `start.seed = seed + k`, whatever the file
-    /// says; a start that does not depend on it gets a jitter of 5 % of delta along each axis.
+    /// says, and `noise.seed` too where chance has a part in the flight; a start that does not depend on it gets a jitter of 5 % of delta along each axis.
     ///
     /// # Errors
     /// [`CompareError`] for no law, a law that is not known or named twice, and the first start that cannot be flown.

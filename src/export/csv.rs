@@ -20,16 +20,25 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     let columns: Vec<&Column> = POSITION.iter().chain(about.optional_columns()).collect();
     out.write_all(b"t_s,id")?;
     columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
+    for column in about.beside.columns() {
+        write!(out, ",{}", quoted(&column)?)?;
+    }
+    let mut cells = Vec::new();
     out.write_all(b"\n")?;
-    source.each_instant(|instant| {
+    source.each_instant(|instant, channels| {
         let time = instant.first().map_or_else(String::new, |first| time_text(epoch_s, first.time_s));
-        for sample in instant {
+        for (row, sample) in instant.iter().enumerate() {
             write!(out, "{time},{}", names[sample.vehicle])?;
             for column in &columns {
                 match (column.of)(sample) {
                     Some(number) => write!(out, ",{number:?}")?,
                     None => out.write_all(b",")?,
                 }
+            }
+            cells.clear();
+            about.beside.cells(channels, row, &mut cells);
+            for cell in &cells {
+                if cell.is_finite() { write!(out, ",{cell:?}") } else { out.write_all(b",") }?;
             }
             out.write_all(b"\n")?;
         }

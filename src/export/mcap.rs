@@ -1,4 +1,5 @@
-//! An MCAP file with the messages of [`crate::read`]'s exported recordings: `/vehicles` and `/tracks`.
+//! An MCAP file with the messages of [`crate::read`]'s exported recordings, `/vehicles` and `/tracks`, and a topic for each
+//! channel as in `run.mcap`, with a row for each vehicle of the message on `/tracks` behind it.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -9,6 +10,7 @@ use super::error::ExportError;
 use super::source::{About, Source};
 use crate::read::mcap::exported::{Instant, TRACKS, VEHICLES, Vehicles};
 use crate::record::mcap::topic::{TopicWriter, encode, log_time_ns};
+use crate::record::mcap::{ChannelMessage, channel_topic, topic_of_channel};
 use crate::track::Sample;
 
 /// Size at which a chunk is closed \[bytes\].
@@ -17,12 +19,20 @@ const CHUNK_BYTES: u64 = 1024 * 1024;
 pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
     let mut out = TopicWriter::new(BufWriter::new(file), WriteOptions::new().chunk_size(Some(CHUNK_BYTES)))?;
     let (vehicles, tracks) = (out.declare(&VEHICLES)?, out.declare(&TRACKS)?);
-    let epoch_ns = about.clock.epoch_ns;
+    let topics: Vec<_> = about.beside.channels.iter().map(|channel| channel_topic(&channel.name)).collect();
+    let topics = topics.iter().map(|name| out.declare(&topic_of_channel(name))).collect::<Result<Vec<_>, _>>()?;
+    let (epoch_ns, mut number) = (about.clock.epoch_ns, 0);
     let mut bytes = Vec::new();
     encode(&Vehicles { names: about.names.clone(), epoch_ns }, &mut bytes)?;
     out.write(vehicles, log_time_ns(epoch_ns, 0.0), &bytes)?;
-    source.each_instant(|instant| {
+    source.each_instant(|instant, channels| {
         let message = message(instant, about);
+        for (written, &topic) in about.beside.channels.iter().zip(&topics) {
+            let Some(channel) = written.of(channels) else { continue };
+            encode(&ChannelMessage::of(message.time_s, number, channel), &mut bytes)?;
+            out.write(topic, log_time_ns(epoch_ns, message.time_s), &bytes)?;
+        }
+        number += 1;
         encode(&message, &mut bytes)?;
         Ok(out.write(tracks, log_time_ns(epoch_ns, message.time_s), &bytes)?)
     })?;

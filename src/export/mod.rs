@@ -5,6 +5,7 @@
 //! read several times, so that memory is bounded by an instant and a block, not by the recording. Curves cannot be
 //! written as samples silently: [`ExportOptions::sample_hz`] says how often they are sampled.
 
+mod beside;
 mod csv;
 mod error;
 mod mcap;
@@ -19,7 +20,7 @@ pub use error::ExportError;
 
 use std::fs::File;
 
-use crate::read::{ReadError, Recording};
+use crate::read::{Channels, ReadError, Recording};
 use source::Source;
 
 /// The formats that are written; files of each have its name as their extension.
@@ -59,7 +60,24 @@ pub fn export(
     options: &ExportOptions,
     file: &mut File,
 ) -> Result<Exported, ExportError> {
-    let source = Source { open, sample_hz: options.sample_hz };
+    export_with(open, &|| Ok(None), format, options, file)
+}
+
+/// Writes a recording and its channels: what it says of every vehicle beside its motion. `channels` opens them, each time
+/// from the beginning.
+///
+/// Tables have a column for each of theirs, NPZ an array for each channel, MCAP a topic. Readers of motion pass them over.
+///
+/// # Errors
+/// Those of [`export`].
+pub fn export_with(
+    open: &dyn Fn() -> Result<Recording, ReadError>,
+    channels: &dyn Fn() -> Result<Option<Channels>, ReadError>,
+    format: Format,
+    options: &ExportOptions,
+    file: &mut File,
+) -> Result<Exported, ExportError> {
+    let source = Source { open, channels, sample_hz: options.sample_hz };
     let about = source.survey()?;
     let mut exported = Exported { vehicles: about.names.len(), samples: about.samples, notes: about.notes.clone() };
     match format {

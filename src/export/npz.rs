@@ -1,5 +1,6 @@
 //! An archive of `NumPy` arrays: `t`, `positions` (T x N x 3), `axes`, and where they are known `velocities`, `radii` (T x N),
-//! `names`, `seen` (T x N) and `epoch_ns`.
+//! `names`, `seen` (T x N) and `epoch_ns`. Each channel is an array of its name (T x N x its columns) beside one of the names
+//! of its columns, such as `attitude` and `attitude_columns`.
 //!
 //! The recording is read once for each array, so that none of them is in memory.
 
@@ -10,9 +11,13 @@ use nalgebra::Vector3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
+use super::beside::Written;
 use super::error::ExportError;
 use super::source::{About, Source};
 use crate::track::Sample;
+
+/// Arrays that mean something to who reads motion.
+const OWN: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "seen", "names", "epoch_ns"];
 
 /// Headers of arrays end at a multiple of this \[bytes\].
 const ALIGNMENT: usize = 64;
@@ -49,6 +54,9 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     let numbered = about.names.iter().enumerate().all(|(index, name)| *name == (index + 1).to_string());
     if !numbered {
         archive.texts("names", &about.names)?;
+    }
+    for channel in &about.beside.channels {
+        archive.channel(channel, times)?;
     }
     if about.clock.epoch_ns != 0 {
         archive.begin("epoch_ns", "<i8", &[])?.write_all(&about.clock.epoch_ns.to_le_bytes())?;
@@ -144,6 +152,25 @@ impl<'a> Archive<'a> {
         Ok(())
     }
 
+    /// Writes a channel; NaN where nothing is known.
+    fn channel(&mut self, channel: &Written, times: usize) -> Result<(), ExportError> {
+        let (source, vehicles, width) = (self.source, self.vehicles, channel.columns.len());
+        let name =
+            if OWN.contains(&&*channel.name) { format!("channel_{}", channel.name) } else { channel.name.to_string() };
+        let unknown = vec![f64::NAN; width];
+        let mut out = BufWriter::new(self.begin(&name, "<f8", &[times, vehicles, width])?);
+        source.each_instant(|instant, channels| {
+            let mut rows = vec![&unknown[..]; vehicles];
+            for (row, sample) in instant.iter().enumerate() {
+                rows[sample.vehicle] = channel.row(channels, row).unwrap_or(&unknown);
+            }
+            Ok(rows.into_iter().flatten().try_for_each(|number| out.write_all(&number.to_le_bytes()))?)
+        })?;
+        out.flush()?;
+        drop(out);
+        self.texts(&format!("{name}_columns"), &channel.columns)
+    }
+
     /// Writes an array, instant by instant.
     fn array(
         &mut self,
@@ -156,7 +183,7 @@ impl<'a> Archive<'a> {
         let zip = self.begin(name, descr, shape)?;
         // Many small writes become few: the archive computes a checksum of each.
         let mut out = BufWriter::new(zip);
-        source.each_instant(|instant| {
+        source.each_instant(|instant, _| {
             let mut slots = vec![None; vehicles];
             for sample in instant {
                 slots[sample.vehicle] = Some(sample);

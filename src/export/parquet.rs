@@ -31,17 +31,19 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     let file = file.try_clone()?;
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties.build())).map_err(write_error)?;
     let names: Vec<ByteArray> = about.names.iter().map(|name| ByteArray::from(name.as_str())).collect();
-    let mut rows = Vec::new();
-    source.each_instant(|instant| {
+    let (mut rows, mut beside) = (Vec::new(), Vec::new());
+    source.each_instant(|instant, channels| {
         rows.extend_from_slice(instant);
+        (0..instant.len()).for_each(|row| about.beside.cells(channels, row, &mut beside));
         if rows.len() >= GROUP_ROWS {
-            write_group(&mut writer, &rows, &names, about).map_err(write_error)?;
+            write_group(&mut writer, (&rows, &beside), &names, about).map_err(write_error)?;
             rows.clear();
+            beside.clear();
         }
         Ok(())
     })?;
     if !rows.is_empty() {
-        write_group(&mut writer, &rows, &names, about).map_err(write_error)?;
+        write_group(&mut writer, (&rows, &beside), &names, about).map_err(write_error)?;
     }
     writer.close().map_err(write_error)?;
     Ok(())
@@ -52,7 +54,7 @@ fn schema(about: &About) -> Result<TypePtr, ParquetError> {
         let column = Type::primitive_type_builder(name, physical).with_repetition(repetition);
         column.with_logical_type(logical).build().map(Arc::new)
     };
-    let double = |name, repetition| column(name, Physical::DOUBLE, repetition, None);
+    let double = |name: &str, repetition| column(name, Physical::DOUBLE, repetition, None);
     let mut columns = vec![
         double("t_s", Repetition::REQUIRED)?,
         column("id", Physical::BYTE_ARRAY, Repetition::REQUIRED, Some(LogicalType::String))?,
@@ -63,28 +65,38 @@ fn schema(about: &About) -> Result<TypePtr, ParquetError> {
     for optional in about.optional_columns() {
         columns.push(double(optional.name, Repetition::OPTIONAL)?);
     }
+    for beside in about.beside.columns() {
+        columns.push(double(&beside, Repetition::OPTIONAL)?);
+    }
     Type::group_type_builder("samples").with_fields(columns).build().map(Arc::new)
 }
 
 fn write_group(
     writer: &mut SerializedFileWriter<File>,
-    rows: &[Sample],
+    (rows, beside): (&[Sample], &[f64]),
     names: &[ByteArray],
     about: &About,
 ) -> Result<(), ParquetError> {
     let mut group = writer.next_row_group()?;
-    write_column::<DoubleType>(&mut group, rows, |sample| Some(sample.time_s))?;
-    write_column::<ByteArrayType>(&mut group, rows, |sample| Some(names[sample.vehicle].clone()))?;
+    let time = |sample: &Sample| Some(sample.time_s);
+    write_column::<DoubleType, _>(&mut group, rows, time)?;
+    write_column::<ByteArrayType, _>(&mut group, rows, |sample| Some(names[sample.vehicle].clone()))?;
     for column in POSITION.iter().chain(about.optional_columns()) {
-        write_column::<DoubleType>(&mut group, rows, column.of)?;
+        write_column::<DoubleType, _>(&mut group, rows, column.of)?;
+    }
+    let width = about.beside.columns().len();
+    for column in 0..width {
+        let known = |row: &&[f64]| Some(row[column]).filter(|cell| cell.is_finite());
+        let cells: Vec<_> = beside.chunks_exact(width).collect();
+        write_column::<DoubleType, _>(&mut group, &cells, known)?;
     }
     group.close().map(drop)
 }
 
-fn write_column<D: DataType>(
+fn write_column<D: DataType, R>(
     group: &mut SerializedRowGroupWriter<'_, File>,
-    rows: &[Sample],
-    cell: impl Fn(&Sample) -> Option<D::T>,
+    rows: &[R],
+    cell: impl Fn(&R) -> Option<D::T>,
 ) -> Result<(), ParquetError> {
     let Some(mut column) = group.next_column()? else {
         return Err(ParquetError::General("the schema has too few columns".to_owned()));

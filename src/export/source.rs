@@ -1,13 +1,17 @@
 //! A recording that is exported, instant by instant.
 
+use super::beside::Beside;
 use super::error::ExportError;
 use super::sampled::Sampled;
-use crate::read::{ReadError, Recording};
+use crate::read::{Channels, ReadError, Recording};
+use crate::record::Channel;
 use crate::track::{Clock, Item, Sample};
 
 /// A recording that can be read again and again.
 pub(super) struct Source<'a> {
     pub(super) open: &'a dyn Fn() -> Result<Recording, ReadError>,
+    /// Opens what it says beside the motion.
+    pub(super) channels: &'a dyn Fn() -> Result<Option<Channels>, ReadError>,
     pub(super) sample_hz: Option<f64>,
 }
 
@@ -23,6 +27,8 @@ pub(super) struct About {
     pub(super) velocities: bool,
     /// Whether some sample has a radius.
     pub(super) radii: bool,
+    /// What it says beside the motion.
+    pub(super) beside: Beside,
 }
 
 /// A column of numbers of a long table.
@@ -59,7 +65,8 @@ impl About {
 impl Source<'_> {
     pub(super) fn survey(&self) -> Result<About, ExportError> {
         let mut about = About::default();
-        let recording = self.each_instant(|instant| {
+        let recording = self.each_instant(|instant, channels| {
+            about.beside.note(channels);
             about.instants += 1;
             about.samples += instant.len() as u64;
             about.velocities |= instant.iter().any(|sample| sample.velocity_m_s.is_some());
@@ -75,16 +82,21 @@ impl Source<'_> {
         Ok(about)
     }
 
-    /// Calls `take` with the samples of each instant, in order of time.
+    /// Calls `take` with the samples of each instant, in order of time, and the channels that have a row for each of them.
     pub(super) fn each_instant(
         &self,
-        mut take: impl FnMut(&[Sample]) -> Result<(), ExportError>,
+        mut take: impl FnMut(&[Sample], &[Channel]) -> Result<(), ExportError>,
     ) -> Result<Recording, ExportError> {
         let mut recording = (self.open)()?;
         if let Some(hz) = self.sample_hz {
-            Sampled::new(recording.as_mut(), hz)?.each_instant(&mut take)?;
+            Sampled::new(recording.as_mut(), hz)?.each_instant(&mut |instant: &[Sample]| take(instant, &[]))?;
             return Ok(recording);
         }
+        let mut channels = (self.channels)()?;
+        let mut take = |instant: &[Sample]| {
+            let beside = channels.as_mut().map_or_else(|| Ok(Vec::new()), |channels| channels.next(instant.len()))?;
+            take(instant, &beside)
+        };
         let (mut items, mut instant) = (Vec::new(), Vec::<Sample>::new());
         loop {
             items.clear();

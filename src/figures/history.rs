@@ -1,6 +1,7 @@
 //! A run thinned to what a figure can show.
 
 use super::axis::{Axis, extent};
+use super::beside::{self, numbers_of};
 use crate::record::mcap::Entry;
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::space::Metric;
@@ -14,6 +15,8 @@ const FEWEST_SPANS: usize = 64;
 const MEMORY_BYTES: usize = 32 * 1024 * 1024;
 /// Memory of one vehicle in one span \[bytes\]: a position and a control effort.
 const BYTES_PER_VEHICLE: usize = 32;
+/// And each number that a channel has of it.
+const BYTES_PER_NUMBER: usize = 8;
 
 /// Most hits of hulls that are marked one by one.
 const MOST_HITS: usize = 100;
@@ -58,6 +61,8 @@ pub(super) struct Span {
     pub(super) positions_m: Rows,
     /// Largest control effort |u| of each vehicle within \[m/s^2\].
     pub(super) control_m_s2: Vec<f64>,
+    /// Largest numbers of each vehicle that channels have within; none of a channel that there is not.
+    pub(super) beside: [Vec<f64>; beside::COUNT],
     /// Largest speed relative to the mean velocity within \[m/s\].
     pub(super) disagreement_m_s: f64,
     /// Largest energy within \[m^2/s^2\].
@@ -106,7 +111,8 @@ impl RunHistory {
         let count = sample.swarm.count();
         if self.samples == 0 {
             self.vehicles = count;
-            let affordable = MEMORY_BYTES / (BYTES_PER_VEHICLE * count.max(1));
+            let numbers: usize = numbers_of(sample).iter().map(Vec::len).sum();
+            let affordable = MEMORY_BYTES / (BYTES_PER_VEHICLE * count.max(1) + BYTES_PER_NUMBER * numbers);
             self.most_spans = affordable.clamp(FEWEST_SPANS, MOST_SPANS);
             self.samples_per_span = 1;
         }
@@ -268,6 +274,7 @@ impl Span {
             time_s: sample.time_s,
             positions_m: positions_m.clone(),
             control_m_s2: (0..count).map(effort).collect(),
+            beside: numbers_of(sample),
             disagreement_m_s: sample.swarm.disagreement_m_s(),
             energy: sample.energy,
             closest: sample.separation,
@@ -290,6 +297,13 @@ impl Span {
         let raise = |kept: &mut f64, other: f64| *kept = kept.max(other);
         self.control_m_s2.iter_mut().zip(&later.control_m_s2).for_each(|(kept, &other)| raise(kept, other));
         self.pair_min_m.iter_mut().zip(&later.pair_min_m).for_each(|(kept, &other)| *kept = kept.min(other));
+        for (kept, later) in self.beside.iter_mut().zip(&later.beside) {
+            if kept.is_empty() {
+                kept.clone_from(later);
+            } else {
+                kept.iter_mut().zip(later).for_each(|(kept, &other)| raise(kept, other));
+            }
+        }
         raise(&mut self.disagreement_m_s, later.disagreement_m_s);
         self.energy = match (self.energy, later.energy) {
             (Some(kept), Some(other)) => Some(kept.max(other)),

@@ -6,6 +6,7 @@
 //! | [`paths_in_space`] | the same in space, where the run is not level |
 //! | [`distances`] | distances of pairs, with the safety distance and the certified one |
 //! | [`control`] | control effort of each vehicle |
+//! | [`channels`] | tilt, rotor thrust, wind and age of messages of each vehicle |
 //! | [`energy`] | the law's energy and its start E(0), its bound on a complete graph |
 //! | [`shape_error`] | largest error of a desired distance |
 //! | [`disagreement`] | largest speed relative to the swarm's mean |
@@ -25,9 +26,12 @@
 //! prefers dark pages, in colours that colour-blind people tell apart.
 
 mod axis;
+mod beside;
+mod channels;
 mod chart;
 mod convergence;
 mod distances;
+mod each;
 mod figure;
 mod history;
 mod margin;
@@ -39,6 +43,7 @@ mod svg;
 mod tension;
 mod thin;
 
+pub use channels::channels;
 pub use convergence::{Step, convergence};
 pub use distances::distances;
 pub use figure::Figure;

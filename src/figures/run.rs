@@ -1,5 +1,6 @@
 //! All figures of a run.
 
+use super::channels::channels;
 use super::distances::distances;
 use super::figure::Figure;
 use super::history::RunHistory;
@@ -21,6 +22,8 @@ pub struct Criteria<'a> {
     pub edge_error_m: Option<f64>,
     /// Largest velocity disagreement that counts as reached \[m/s\].
     pub disagreement_m_s: Option<f64>,
+    /// Most thrust of a rotor \[N\].
+    pub most_thrust_n: Option<f64>,
 }
 
 /// Every figure that a run has data for, in the order in which they are best read.
@@ -36,6 +39,7 @@ pub fn of_run(history: &RunHistory, criteria: &Criteria<'_>) -> Vec<Figure> {
         figures.push(distances(history, criteria.delta_m, criteria.certified_m, &title));
     }
     figures.push(control(history, "Control effort"));
+    figures.extend(channels(history, criteria.most_thrust_n));
     if history.energy_initial().is_some() {
         figures.push(energy(history, "Energy"));
     }
@@ -47,5 +51,16 @@ pub fn of_run(history: &RunHistory, criteria: &Criteria<'_>) -> Vec<Figure> {
 }
 
 /// Names of all figures that [`of_run`] can draw.
-pub const NAMES_OF_RUN: [&str; 7] =
-    ["paths", "paths-3d", "distances", "control", "energy", "shape-error", "disagreement"];
+pub const NAMES_OF_RUN: [&str; 11] = [
+    "paths",
+    "paths-3d",
+    "distances",
+    "control",
+    "attitude",
+    "rotors",
+    "wind",
+    "message-age",
+    "energy",
+    "shape-error",
+    "disagreement",
+];

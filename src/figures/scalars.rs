@@ -1,10 +1,10 @@
 //! Single numbers of a run over time.
 
 use super::axis::Axis;
-use super::chart::{Band, Chart};
-use super::distances::quantile;
+use super::chart::Chart;
+use super::each::of_each;
 use super::figure::Figure;
-use super::history::{FEW_VEHICLES, RunHistory, Span};
+use super::history::{RunHistory, Span};
 use super::svg::{INK, PALETTE, Stroke};
 use crate::formation::{edges_looked_at, largest_edge_error_m};
 use crate::graph::Graph;
@@ -25,23 +25,7 @@ pub fn control(history: &RunHistory, title: &str) -> Figure {
     let y =
         Axis::linear("control effort |u| [m/s²]", history.spans().flat_map(Span::finite_control).chain([0.0]), true);
     let mut chart = Chart::new(history.time_axis(), y);
-    if count <= FEW_VEHICLES {
-        for i in 0..count {
-            let points = history.spans().map(|span| (span.time_s, span.control_m_s2[i])).collect();
-            chart.line(points, Stroke::of_line(i), format!("vehicle {}", i + 1));
-        }
-    } else {
-        let ranks = history.spans().map(|span| {
-            let mut efforts: Vec<_> = span.finite_control().collect();
-            (span.time_s, [0.05, 0.5, 0.95, 1.0].map(|share| quantile(&mut efforts, share)))
-        });
-        let ranks: Vec<_> = ranks.collect();
-        let points = |k: usize| ranks.iter().map(|(time_s, ranks)| (*time_s, ranks[k])).collect();
-        chart.line(points(3), Stroke::solid(PALETTE[1], 1.5), "largest");
-        chart.line(points(1), Stroke::solid(PALETTE[0], 1.5), "median");
-        let points = ranks.iter().map(|&(time_s, [low, _, high, _])| (time_s, low, high)).collect();
-        chart.bands.push(Band { points, colour: PALETTE[0], opacity: 0.2, label: Some("5 to 95 %".to_owned()) });
-    }
+    of_each(&mut chart, history, |span| &span.control_m_s2);
     let description = format!("Control effort of {count} vehicles over time; at most {peak:.3} m/s².");
     chart.figure("control", title, &description)
 }

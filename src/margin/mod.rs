@@ -4,6 +4,7 @@
 //! that was tried, which it says as JSON, CSV, a page and a table.
 
 mod csv;
+mod fly;
 mod html;
 mod plan;
 mod result;
@@ -11,8 +12,9 @@ mod search;
 mod words;
 
 pub use html::MarginPage;
-pub use plan::{Asked, MarginError, Plan, Range};
-pub use result::{Flown, Margin, Probe, Question, SCHEMA_VERSION, Turn};
+pub use plan::{Asked, MarginError, Plan, Question};
+pub use result::{Flown, Margin, Probe, SCHEMA_VERSION, Turn};
+pub use search::Range;
 
 #[cfg(test)]
 mod tests;

@@ -1,33 +1,25 @@
 //! What is flown.
 
-use std::ops::ControlFlow;
-use std::sync::atomic::Ordering;
+use serde::Serialize;
 
-use super::result::{Flown, Margin, Probe, Question};
-use super::search::{Found, Halving, search};
-use crate::compare::{Watch, fly, in_parallel};
+use super::search::Range;
 use crate::preflight::{PredictedMargin, Preflight};
 use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
 use crate::sim::SimError;
 
 /// A start without randomness is moved by up to this part of delta along each axis, where it is flown more than once.
 pub(super) const JITTER: f64 = 0.05;
-/// Steps between two looks at the progress.
-const PROGRESS_EVERY: u64 = 64;
 
-/// Between which values a verdict is looked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    /// The first.
-    pub from: f64,
-    /// The last.
-    pub to: f64,
-    /// Values, evenly spaced with both ends, that are looked at first; at least 2.
-    pub scan: usize,
-    /// Times that the interval in which the verdict turns is halved.
-    pub halvings: u32,
-    /// Values are spaced and halved by their ratio, and not by their difference.
-    pub logarithmic: bool,
+/// What a flight has to show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Question {
+    /// It passes: clear, and its formation reached as far as asked.
+    Pass,
+    /// No two vehicles come closer than delta, proved to the end of the flight.
+    Clear,
+    /// The formation is reached and kept to the end.
+    Reached,
 }
 
 /// What is asked of each value.
@@ -79,24 +71,15 @@ pub enum MarginError {
     },
 }
 
-impl Range {
-    fn check(&self) -> Result<(), MarginError> {
-        let Self { from, to, logarithmic, .. } = *self;
-        let wrong = |why: String| Err(MarginError::Range(why));
-        if !from.is_finite() || !to.is_finite() {
-            return wrong(format!("a range from {from} to {to}"));
+impl Question {
+    /// What a flight that shows it does, and one that does not.
+    #[must_use]
+    pub fn words(self) -> [&'static str; 2] {
+        match self {
+            Self::Pass => ["passes", "fails"],
+            Self::Clear => ["stays clear", "does not stay clear"],
+            Self::Reached => ["reaches its formation", "does not reach its formation"],
         }
-        if from == to {
-            return wrong(format!("both ends of the range are {from}"));
-        }
-        if logarithmic && (from <= 0.0 || to <= 0.0) {
-            return wrong(format!("a logarithmic range from {from} to {to}"));
-        }
-        Ok(())
-    }
-
-    pub(super) fn scale(&self) -> Halving {
-        if self.logarithmic { Halving::Ratio } else { Halving::Difference }
     }
 }
 
@@ -115,7 +98,7 @@ impl Plan {
         range: Range,
         asked: Asked,
     ) -> Result<Self, MarginError> {
-        range.check()?;
+        check(range)?;
         let as_it_is = |error| MarginError::Scenario { set: "the keys as they are".to_owned(), error };
         let template = Template::read(&source, overrides).map_err(as_it_is)?;
         let is_drawn = asked.runs > 1 && !template.start_is_random();
@@ -197,57 +180,26 @@ impl Plan {
         let read = parsed.and_then(|more| Scenario::read(&self.source, &[self.overrides.as_slice(), &more].concat()));
         read.map_err(|error| MarginError::Scenario { set: set(), error })
     }
-
-    /// Flies values until the bracket is found, each value's runs on so many threads; the result is the same for any number
-    /// of them. None where it was interrupted before both ends were flown.
-    ///
-    /// # Errors
-    /// [`MarginError`] for the first flight that does not exist.
-    pub fn search(&self, threads: usize, watch: Watch<'_>) -> Result<Option<Margin>, MarginError> {
-        let mut probes: Vec<Probe> = Vec::new();
-        let found = search(self.range, &mut |value| {
-            let probe = self.probe(value, threads, watch)?;
-            let holds = probe.as_ref().map(Probe::holds);
-            probes.extend(probe);
-            Ok::<_, MarginError>(holds)
-        })?;
-        let interrupted = watch.interrupted.load(Ordering::Relaxed);
-        probes.sort_by(|a, b| a.value.total_cmp(&b.value));
-        let found = found.filter(|found| !matches!(found, Found::Even(_)) || !interrupted);
-        Ok(found.map(|found| Margin::new(self, probes, &found, interrupted)))
-    }
-
-    /// All runs of one value; none where they were interrupted.
-    fn probe(&self, value: f64, threads: usize, watch: Watch<'_>) -> Result<Option<Probe>, MarginError> {
-        let runs = usize::try_from(self.asked.runs).unwrap_or(usize::MAX);
-        let flown = in_parallel(runs, threads, &|run| self.one(value, run as u64, watch));
-        let flown = flown.into_iter().collect::<Result<Option<Vec<_>>, _>>()?;
-        Ok(flown.map(|flights| Probe::new(value, self.asked.question, flights)))
-    }
-
-    fn one(&self, value: f64, run: u64, watch: Watch<'_>) -> Result<Option<Flown>, MarginError> {
-        let stops = || watch.interrupted.load(Ordering::Relaxed);
-        if stops() {
-            return Ok(None);
-        }
-        let scenario = self.scenario(value, run)?;
-        let mut told = 0;
-        let mut carry_on = |step: u64| {
-            if step.is_multiple_of(PROGRESS_EVERY) {
-                (watch.flown)(step - told);
-                told = step;
-            }
-            if stops() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let row = fly(&scenario, self.asked.seed.saturating_add(run), &mut carry_on);
-        (watch.flown)(scenario.time.steps().saturating_sub(told));
-        let row = row.map_err(|error| MarginError::Flight { set: format!("{} = {value}", self.key), error })?;
-        Ok(row.map(|row| Flown::new(&row)))
-    }
 }
 
 /// Whether two keys are one: how often commands are given has two names.
 fn is_same(key: &str, other: &str) -> bool {
     let name = |key: &str| if key == "time.control_hz" { "actuation.control_hz".to_owned() } else { key.to_owned() };
     name(key) == name(other)
+}
+
+/// Refuses a range between whose ends there is nothing.
+fn check(range: Range) -> Result<(), MarginError> {
+    let Range { from, to, logarithmic, .. } = range;
+    let wrong = |why: String| Err(MarginError::Range(why));
+    if !from.is_finite() || !to.is_finite() {
+        return wrong(format!("a range from {from} to {to}"));
+    }
+    if from == to {
+        return wrong(format!("both ends of the range are {from}"));
+    }
+    if logarithmic && (from <= 0.0 || to <= 0.0) {
+        return wrong(format!("a logarithmic range from {from} to {to}"));
+    }
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::plan::Plan;
+use super::plan::{Plan, Question};
 use super::search::Found;
 use crate::compare::{FlightRow, Outcome};
 use crate::preflight::PredictedMargin;
@@ -11,18 +11,6 @@ use crate::statistics::{CONFIDENCE, Proportion};
 
 /// Version of the keys of `margin --json`: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
-
-/// What a flight has to show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Question {
-    /// It passes: clear, and its formation reached as far as asked.
-    Pass,
-    /// No two vehicles come closer than delta, proved to the end of the flight.
-    Clear,
-    /// The formation is reached and kept to the end.
-    Reached,
-}
 
 /// How a flight went.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -104,27 +92,15 @@ pub struct Margin {
     pub probes: Vec<Probe>,
 }
 
-impl Question {
-    /// What a flight that shows it does, and one that does not.
-    #[must_use]
-    pub fn words(self) -> [&'static str; 2] {
-        match self {
-            Self::Pass => ["passes", "fails"],
-            Self::Clear => ["stays clear", "does not stay clear"],
-            Self::Reached => ["reaches its formation", "does not reach its formation"],
-        }
-    }
-
-    fn is_shown_by(self, flown: &Flown) -> bool {
-        match self {
-            Self::Pass => flown.pass,
-            Self::Clear => flown.outcome == Outcome::Clear,
-            Self::Reached => flown.reached,
-        }
-    }
-}
-
 impl Flown {
+    pub(super) fn shows(&self, question: Question) -> bool {
+        match question {
+            Question::Pass => self.pass,
+            Question::Clear => self.outcome == Outcome::Clear,
+            Question::Reached => self.reached,
+        }
+    }
+
     pub(super) fn new(row: &FlightRow) -> Self {
         Self {
             seed: row.seed,
@@ -140,7 +116,7 @@ impl Flown {
 
 impl Probe {
     pub(super) fn new(value: f64, question: Question, flights: Vec<Flown>) -> Self {
-        let held = flights.iter().filter(|flown| question.is_shown_by(flown)).count();
+        let held = flights.iter().filter(|flown| flown.shows(question)).count();
         let min_m = flights.iter().filter_map(|flown| flown.min_m).reduce(f64::min);
         Self { value, held: Proportion::new(held as u64, flights.len() as u64), min_m, flights }
     }
@@ -154,7 +130,7 @@ impl Probe {
     /// The number of the first run, from 0, that did not show what was asked; of the first of all where all did.
     #[must_use]
     pub fn worst_run(&self, question: Question) -> u64 {
-        self.flights.iter().position(|flown| !question.is_shown_by(flown)).unwrap_or_default() as u64
+        self.flights.iter().position(|flown| !flown.shows(question)).unwrap_or_default() as u64
     }
 }
 

@@ -1,6 +1,19 @@
 //! Where between two values an answer turns.
 
-use super::plan::Range;
+/// Between which values a verdict is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The first.
+    pub from: f64,
+    /// The last.
+    pub to: f64,
+    /// Values, evenly spaced with both ends, that are looked at first; at least 2.
+    pub scan: usize,
+    /// Times that the interval in which the verdict turns is halved.
+    pub halvings: u32,
+    /// Values are spaced and halved by their ratio, and not by their difference.
+    pub logarithmic: bool,
+}
 
 /// How an interval is halved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +40,12 @@ pub(super) enum Found {
         /// How often the answer turned among the values that were looked at first.
         turns: usize,
     },
+}
+
+impl Range {
+    fn scale(&self) -> Halving {
+        if self.logarithmic { Halving::Ratio } else { Halving::Difference }
+    }
 }
 
 impl Halving {

@@ -2,8 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::plan::Range;
-use super::search::{Found, search};
+use super::search::{Found, Range, search};
 use super::{Asked, Margin, Plan, Question};
 use crate::compare::Watch;
 use crate::scenario::Source;

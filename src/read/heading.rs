@@ -170,6 +170,12 @@ pub(super) fn tells_no_vehicle(name: &str) -> bool {
         || stem.rsplit_once(['.', '/', '_']).is_some_and(|(start, _)| start.len() == 1 || says_a_quantity(start))
 }
 
+/// Whether a column would be read as one of a table that names the vehicle of each row: no other may be called so.
+pub(crate) fn is_read(name: &str) -> bool {
+    let is_own = |heading: Heading<'_>| heading.vehicle.is_empty() || heading.is_numbered();
+    is_clock(name) || may_be_id(name) || Heading::of(name).is_some_and(is_own)
+}
+
 /// The name of a column of time in lower case without its unit, and the unit.
 fn time_and_unit(name: &str) -> (String, Option<String>) {
     let name = name.to_lowercase();

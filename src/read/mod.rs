@@ -44,6 +44,8 @@ pub use self::parquet::is_guarded;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
 pub use format::Format;
+pub(crate) use heading::is_read;
+pub use mcap::Channels;
 pub use options::{AxisOrder, ColumnNames, Dimensions, ReadOptions};
 pub use order::Recording;
 
@@ -85,6 +87,16 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
     }
     let opened = open_folder(all, options);
     opened.map_err(|error| error.of(Path::new(&called(paths))))
+}
+
+/// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
+/// nothing, and of any other recording.
+///
+/// # Errors
+/// [`ReadError`] when it is damaged before its first instant.
+pub fn open_channels(path: &Path) -> Result<Option<Channels>, ReadError> {
+    let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::Mcap);
+    if path.is_file() && is_mcap() { Channels::open(path).map_err(|error| error.of(path)) } else { Ok(None) }
 }
 
 /// What several files that are one recording are called.

@@ -5,14 +5,15 @@ use std::io;
 
 use foxglove::messages::line_primitive::Type as LineType;
 use foxglove::messages::{
-    Color, CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate,
-    SpherePrimitive, Timestamp, Vector3,
+    CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp,
+    Vector3,
 };
 use foxglove::{Encode as _, Schema};
 use nalgebra::UnitQuaternion;
 
+use super::foxglove_parts::{ball, colour, pose, quadrotor, turned};
 use super::scene::{Colour, Theme};
-use super::timeline::Plan;
+use super::timeline::{Plan, QuadrotorShape, attitudes_of};
 use crate::graph::Graph;
 use crate::record::mcap::{ExtraTopic, Topic};
 use crate::record::{Event, Sample};
@@ -26,6 +27,8 @@ pub const SCENE_HZ: f64 = 5.0;
 const MOST_EDGES: usize = 300;
 /// Most vehicles that are, but for those that are too close to another.
 const MOST_VEHICLES: usize = 2000;
+/// Most quadrotors that are shown with arms and rotors: of more, each is a ball.
+const MOST_QUADROTORS: usize = 100;
 /// Width of an edge \[m\].
 const EDGE_M: f64 = 0.03;
 /// Side of the plate that stands for a half-space \[m\].
@@ -33,16 +36,18 @@ const PLATE_M: f64 = 100.0;
 /// Times are products of steps.
 const ROUNDING_S: f64 = 1e-6;
 
-/// Makes `foxglove.SceneUpdate` messages on `/scene`: vehicles as balls, keep-out shells, edges in the colour of their
+/// Makes `foxglove.SceneUpdate` messages on `/scene`: vehicles as balls or quadrotors, keep-out shells, edges in the colour of their
 /// tension, in the colours of [`Theme::Dark`], [`SCENE_HZ`] times a second.
 ///
 /// Of more than 2000 vehicles so many are shown, evenly chosen, and those that are closer than delta to another.
 /// A scene takes some 230 bytes for each vehicle, of which a half is its shell, and 140 for each edge (none where there
 /// are more than 300), so beside 72 bytes for each vehicle and sample at 60 Hz a recording grows by less than a third,
-/// and one of few vehicles by a half.
+/// and one of few vehicles by a half. Up to 100 quadrotors have arms and rotors, turned as they are, in some 1100 bytes
+/// each.
 pub struct FoxgloveScene {
     plan: Plan,
     radius_m: Vec<f64>,
+    shape: Option<QuadrotorShape>,
     delta_m: f64,
     /// Height of shells over their width.
     shell_ratio: f64,
@@ -59,6 +64,7 @@ impl FoxgloveScene {
         Self {
             plan: Plan::of(scenario),
             radius_m: scenario.hull_radius_m.clone(),
+            shape: QuadrotorShape::of(scenario),
             delta_m: scenario.delta_m,
             shell_ratio: scenario.metric().ratio(),
             next_s: f64::NEG_INFINITY,
@@ -67,8 +73,9 @@ impl FoxgloveScene {
         }
     }
 
-    fn scene(&self, time_s: f64, positions_m: &Rows) -> SceneUpdate {
+    fn scene(&self, sample: &Sample<'_>) -> SceneUpdate {
         let theme = Theme::Dark;
+        let (time_s, positions_m) = (sample.time_s, &sample.swarm.positions_m);
         let count = positions_m.nrows();
         let mut alarm = vec![false; count];
         for pair in self.violated.iter().filter(|pair| pair.second() < count) {
@@ -77,10 +84,18 @@ impl FoxgloveScene {
         // The share of the vehicles up to this one passes a whole number at those that are chosen.
         let share = |k: usize| k * MOST_VEHICLES / count;
         let is_shown = |k: &usize| count <= MOST_VEHICLES || alarm[*k] || share(*k) < share(*k + 1);
-        let hulls = (0..count).filter(is_shown).map(|k| {
-            let colour = if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
-            sphere(positions_m, k, self.radius_m[k], colour)
+        let hull_colour = |k: usize| if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
+        let attitudes = if count <= MOST_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
+        let attitude = |k: usize| attitudes.get(k).copied().flatten();
+        let fliers = (0..count).filter_map(|k| {
+            let shape = self.shape.unwrap_or_else(|| QuadrotorShape::within(self.radius_m[k]));
+            Some(quadrotor(&shape, row(positions_m, k), attitude(k)?, hull_colour(k)))
         });
+        let fliers: Vec<_> = fliers.collect();
+        let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
+        let hulls = hulls.map(|k| sphere(positions_m, k, self.radius_m[k], hull_colour(k)));
+        let bodies = fliers.iter().map(|flier| flier.body.clone());
+        let rotors = fliers.iter().flat_map(|flier| flier.rotors.clone());
         let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
             Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
             _ => None,
@@ -111,10 +126,14 @@ impl FoxgloveScene {
                 timestamp: Some(timestamp(time_s)),
                 frame_id: "world".to_owned(),
                 id: "swarm".to_owned(),
-                spheres: hulls.chain(shells).chain(solids).collect(),
+                spheres: bodies.chain(hulls).chain(shells).chain(solids).collect(),
                 cubes: self.plan.obstacles.iter().filter_map(cube).collect(),
-                cylinders: self.plan.obstacles.iter().filter_map(cylinder).collect(),
-                lines: if lines.points.is_empty() { Vec::new() } else { vec![lines] },
+                cylinders: self.plan.obstacles.iter().filter_map(cylinder).chain(rotors).collect(),
+                lines: Some(lines)
+                    .filter(|lines| !lines.points.is_empty())
+                    .into_iter()
+                    .chain(fliers.iter().map(|flier| flier.arms.clone()))
+                    .collect(),
                 ..SceneEntity::default()
             }],
         }
@@ -137,8 +156,7 @@ impl ExtraTopic for FoxgloveScene {
         }
         self.next_s = sample.time_s + 1.0 / SCENE_HZ;
         message.clear();
-        let scene = self.scene(sample.time_s, &sample.swarm.positions_m);
-        scene.encode(message).map_err(io::Error::other)?;
+        self.scene(sample).encode(message).map_err(io::Error::other)?;
         Ok(true)
     }
 
@@ -190,33 +208,6 @@ fn from_z(direction: nalgebra::Vector3<f64>) -> UnitQuaternion<f64> {
     let z = nalgebra::Vector3::z();
     UnitQuaternion::rotation_between(&z, &direction)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI))
-}
-
-fn turned(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
-    let [x, y, z, w] = turn.coords.into();
-    Pose {
-        position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
-        orientation: Some(Quaternion { x, y, z, w }),
-    }
-}
-
-fn ball(place: nalgebra::Vector3<f64>, radius_m: f64, shown: Colour) -> SpherePrimitive {
-    let side = 2.0 * radius_m;
-    SpherePrimitive {
-        pose: Some(pose(Vector3 { x: place.x, y: place.y, z: place.z })),
-        size: Some(Vector3 { x: side, y: side, z: side }),
-        color: Some(colour(shown)),
-    }
-}
-
-/// Moved to a place and not turned.
-fn pose(position: Vector3) -> Pose {
-    Pose { position: Some(position), orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }) }
-}
-
-fn colour(colour: Colour) -> Color {
-    let [r, g, b, a] = colour.rgba.map(|channel| f64::from(channel) / 255.0);
-    Color { r, g, b, a }
 }
 
 fn timestamp(time_s: f64) -> Timestamp {
@@ -283,6 +274,41 @@ mod tests {
         let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
         let size = |k: usize| update.entities[0].spheres[k].size.map(|size| (size.x, size.y, size.z));
         assert_eq!((size(0), size(5)), (Some((0.5, 0.5, 0.5)), Some((2.0, 2.0, 6.0))));
+    }
+
+    #[test]
+    fn a_quadrotor_is_turned_as_it_flies_and_many_are_balls() {
+        let entity = |count: usize, tilt_rad: f64| {
+            let start = Swarm::at_rest(crate::formation::Formation::grid(count, 3.0).slots_m);
+            let formation = crate::formation::Formation { slots_m: start.positions_m.clone() };
+            let mut scene = FoxgloveScene::of(&Scenario::new("fliers", start.clone(), formation, 2.0, 1.0));
+            let mut attitude = crate::record::Channel::new("attitude", &["qw", "qx", "qy", "qz"]);
+            let half = 0.5 * tilt_rad;
+            attitude.values = [half.cos(), 0.0, half.sin(), 0.0].repeat(count);
+            let (control, channels, mut bytes) = (Rows::zeros(count), [attitude], Vec::new());
+            let sample = Sample { channels: &channels, ..Sample::new(0.0, 0, &start, &control) };
+            scene.message(&sample, &mut bytes).expect("encoded");
+            (
+                SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities.remove(0),
+                row(&start.positions_m, 0),
+                bytes,
+            )
+        };
+        let (tilted, place, bytes) = entity(2, 0.4);
+        assert_eq!((tilted.spheres.len(), tilted.cylinders.len(), tilted.lines.len()), (4, 8, 3));
+        assert!(bytes.len() < 2 * (1100 + 230) + 140 + 100, "{} bytes", bytes.len());
+        let front = |entity: &SceneEntity| entity.cylinders[0].pose.clone().expect("a pose");
+        let (at, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
+        // Ahead is down where it flies ahead.
+        let x = QuadrotorShape::within(0.25).rotors_m[0].x;
+        assert!(
+            (at.x - place.x - x * 0.4_f64.cos()).abs() < 1e-12 && (at.z - place.z + x * 0.4_f64.sin()).abs() < 1e-12
+        );
+        assert!((turn.y - 0.2_f64.sin()).abs() < 1e-12 && (turn.w - 0.2_f64.cos()).abs() < 1e-12);
+        let (level, place, _) = entity(2, 0.0);
+        assert_eq!(front(&level).position.map(|at| at.z), Some(place.z));
+        let (many, ..) = entity(MOST_QUADROTORS + 1, 0.4);
+        assert_eq!((many.spheres.len(), many.cylinders.len()), (2 * (MOST_QUADROTORS + 1), 0));
     }
 
     #[test]

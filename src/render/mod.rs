@@ -18,6 +18,7 @@
 mod error;
 #[cfg(feature = "film")]
 mod film;
+mod foxglove_parts;
 mod foxglove_scene;
 pub mod gpu;
 mod picture;
@@ -35,6 +36,6 @@ pub use gpu::{AdapterChoice, Renderer};
 pub use picture::{Picture, contact_sheet, data_uri};
 pub use scene::{CameraSpec, Extent, Layers, Scene, Theme, View};
 pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
-pub use timeline::{Frame, Keyframe, Plan, Timeline, TooNear, TracksError};
+pub use timeline::{Frame, Keyframe, Plan, QuadrotorShape, Timeline, TooNear, TracksError};
 #[cfg(feature = "window")]
 pub use window::{LiveUpdate, is_in_window_library, show};

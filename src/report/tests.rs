@@ -104,6 +104,7 @@ impl Case {
             ended_legs: &self.ended_legs,
             breaths: &[],
             assignments: &[],
+            network: None,
             energy_rise: self.energy_rise,
             energy_falls: self.energy_falls,
             epsilon: f64::from(f32::EPSILON),

@@ -4,9 +4,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "files")]
 use super::error::ScenarioError;
-use super::limits::{at_least_zero, positive};
-use super::spec::Scenario;
 
 /// How commands become accelerations: as given and at once unless given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,23 +60,5 @@ impl ActuationTable {
 impl From<ActuationSpec> for ActuationTable {
     fn from(spec: ActuationSpec) -> Self {
         Self { control_hz: None, max_accel_m_s2: spec.max_accel_m_s2, lag_s: spec.lag_s }
-    }
-}
-
-impl Scenario {
-    /// A limit that lets vehicles move, and a lag that the plant can have.
-    pub(super) fn check_actuation(&self) -> Result<(), ScenarioError> {
-        let ActuationSpec { max_accel_m_s2, lag_s } = self.actuation;
-        if let Some(most_m_s2) = max_accel_m_s2 {
-            positive("actuation.max_accel_m_s2", "the largest acceleration", most_m_s2)?;
-        }
-        at_least_zero("actuation.lag_s", "the lag of the acceleration", lag_s)?;
-        if lag_s == 0.0 || self.plant.holds_commands() {
-            return Ok(());
-        }
-        Err(ScenarioError::new("the ideal plant's vehicles are accelerated as they are commanded, without a lag")
-            .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
-            .at("actuation.lag_s")
-            .at("plant.kind"))
     }
 }

@@ -38,6 +38,11 @@ const ALL: &[Builtin] = &[
         toml: include_str!("../../assets/pentagon-leader.toml"),
     },
     Builtin {
+        name: "leader-lossy",
+        summary: "a leader that flies on, heard over a radio that loses one in ten: carried along what is old does no harm",
+        toml: include_str!("../../assets/leader-lossy.toml"),
+    },
+    Builtin {
         name: "swap",
         summary: "twelve vehicles change places across a circle under the displacement law: clear and reached",
         toml: include_str!("../../assets/swap.toml"),

@@ -22,6 +22,7 @@ mod error;
 mod failure;
 #[cfg(feature = "files")]
 mod files;
+mod imperfections;
 #[cfg(feature = "files")]
 mod laws;
 #[cfg(feature = "files")]

@@ -52,7 +52,7 @@ impl NamedLaw {
 /// What is drawn for one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
-    /// In the place of `start.seed`.
+    /// In the place of `start.seed`, and where the flight is random, of `noise.seed`.
     pub seed: u64,
     /// In the place of `start.jitter_m` \[m\], where given.
     pub jitter_m: Option<f64>,
@@ -86,6 +86,13 @@ impl Template {
     #[must_use]
     pub fn start_is_random(&self) -> bool {
         self.start_is_random
+    }
+
+    /// Whether another seed of noise gives another flight.
+    #[must_use]
+    pub fn flight_is_random(&self) -> bool {
+        let Scenario { wind, sensing, network, .. } = &self.own;
+        wind.turbulence.is_some() || sensing.is_noisy() || network.loss > 0.0 || network.jitter_s > 0.0
     }
 
     /// Names of all laws that can be flown: those of `[laws.NAME]`, then every kind that is not among them.
@@ -132,6 +139,9 @@ impl Template {
         let mut document = decoded(&text, &self.folder)?;
         document.law.kind = law.law.clone();
         document.start.seed = draw.seed;
+        if self.flight_is_random() {
+            document.noise.seed = draw.seed;
+        }
         document.start.jitter_m = draw.jitter_m.unwrap_or(document.start.jitter_m);
         finish(document, &text)
     }

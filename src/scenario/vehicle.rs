@@ -164,6 +164,7 @@ impl VehicleTable {
 
     /// The body that it describes.
     pub(super) fn airframe(&self) -> Result<Airframe, ScenarioError> {
+        self.check_numbers()?;
         match &self.model {
             ModelKey::Named(name) if name == POINT => {
                 self.without_rotors("a point")?;
@@ -213,6 +214,21 @@ impl VehicleTable {
             ground_effect: self.ground_effect.unwrap_or_default(),
             downwash: self.downwash.unwrap_or_default(),
         })))
+    }
+
+    /// Refuses numbers that no kind of vehicle can have.
+    fn check_numbers(&self) -> Result<(), ScenarioError> {
+        let numbers = [
+            ("vehicle.attitude_hz", "the rate of the attitude loop", self.attitude_hz),
+            ("vehicle.attitude_rad_s", "the frequency of the attitude loop", self.attitude_rad_s),
+            ("vehicle.attitude_damping", "the damping ratio of the attitude loop", self.attitude_damping),
+            ("vehicle.min_speed_m_s", "the least speed", self.min_speed_m_s),
+            ("vehicle.max_speed_m_s", "the largest speed", self.max_speed_m_s),
+            ("vehicle.max_turn_rad_s", "the largest rate of the heading", self.max_turn_rad_s),
+            ("vehicle.max_accel_m_s2", "the largest acceleration", self.max_accel_m_s2),
+        ];
+        let mut given = numbers.into_iter().filter_map(|(key, what, number)| Some((key, what, number?)));
+        given.try_for_each(|(key, what, number)| positive(key, what, number).map(|_| ()))
     }
 
     /// Refuses what only quadrotors have.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError};
 use crate::law::{Certificate, LawError, ParameterError};
+use crate::link::Traffic;
 use crate::record::{Breath, EnergyRise, Reassignment, RecordError};
 use crate::swarm::{Bounce, Pair, Swarm};
 
@@ -41,6 +42,8 @@ pub struct Flight {
     pub breaths: Vec<Breath>,
     /// Every time that vehicles were given other slots, in the order of time.
     pub assignments: Vec<Reassignment>,
+    /// What was sent over its network, where messages were sent one by one.
+    pub traffic: Option<Traffic>,
     /// State at the end.
     pub last: Swarm,
     /// Wall-clock time by kind of work.

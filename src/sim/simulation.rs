@@ -284,6 +284,7 @@ impl Simulation {
             energy_rise: self.watch.worst(),
             breaths: self.watch.breaths,
             assignments: self.watch.assignments,
+            traffic: self.controller.link.traffic(),
             last: self.state,
             performance: self.performance,
         }

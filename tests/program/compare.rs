@@ -380,3 +380,23 @@ fn a_person_reads_a_table_and_a_quiet_program_says_nothing() {
     assert_eq!((quiet.exit, quiet.out.as_str(), quiet.err.as_str()), (Some(0), "", ""));
     assert!(folder.path().join("c.csv").exists());
 }
+
+#[test]
+fn each_start_has_a_noise_of_its_own_that_run_flies_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let noisy = ["--set", "sensing.position_noise_m=0.01", "--set", "sensing.rate_hz=50"];
+    let flown_once = [&CROSSING[..], &noisy, &["--laws", "edge-tension", "--runs", "2"]].concat();
+    let (comparison, _) = compared(folder.path(), &flown_once, &[]);
+    let law = &comparison["laws"][0];
+    for flight in list(&law["flights"]) {
+        let sets = [
+            format!("start.seed={}", flight["seed"]),
+            format!("noise.seed={}", flight["seed"]),
+            format!("start.jitter_m={}", comparison["jitter_m"]),
+        ];
+        let sets: Vec<_> = sets.iter().flat_map(|set| ["--set", set.as_str()]).collect();
+        let run = [&["run"], &CROSSING[..], &noisy, &sets, &["--json", "--no-snapshots", "--force"]].concat();
+        let report = json(&ran(folder.path(), &run).out);
+        assert_eq!(flight["state_hash"], report["run"]["state_hash"], "{run:?}");
+    }
+}

@@ -162,3 +162,33 @@ fn a_table_whose_pages_contradict_each_other_is_said_once_and_without_a_panic() 
     assert!(said(&refused).contains("flight.parquet") && said(&refused).contains("damaged"), "{}", said(&refused));
     assert!(!said(&refused).contains("panicked"), "{}", said(&refused));
 }
+
+#[test]
+fn attitudes_are_exported_and_what_is_judged_of_the_file_is_what_was_of_the_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = ["run", "crazyflies", "--set", "time.duration_s=2.5", "--no-snapshots", "--no-figures", "--out", "flown"];
+    assert_eq!(ran(folder.path(), &run).exit, Some(1), "it is not in formation yet");
+    let verdict = |file: &str| {
+        let judged = ran(folder.path(), &["audit", file, "--delta", "0.5", "--json"]);
+        assert_eq!(judged.exit, Some(1), "{file}: {}", said(&judged));
+        let report: serde_json::Value = serde_json::from_str(&judged.out).expect("JSON");
+        ["vehicles", "status", "separation", "audit"].map(|key| report[key].clone())
+    };
+    let of_the_run = verdict("flown/run.mcap");
+    for extension in ["csv", "parquet", "npz", "mcap"] {
+        let file = format!("flown.{extension}");
+        let done = ran(folder.path(), &["export", "flown/run.mcap", "-o", &file]);
+        assert_eq!(done.exit, Some(0), "{}", said(&done));
+    }
+    let table = fs::read_to_string(folder.path().join("flown.csv")).expect("a table");
+    let header = table.lines().next().expect("a header");
+    assert_eq!(header, "t_s,id,x,y,z,vx,vy,vz,qw,qx,qy,qz,thrust_1_n,thrust_2_n,thrust_3_n,thrust_4_n");
+    let first = verdict("flown.csv");
+    for extension in ["parquet", "npz", "mcap"] {
+        assert_eq!(verdict(&format!("flown.{extension}")), first, "{extension}");
+    }
+    assert_eq!(first[..2], of_the_run[..2]);
+    assert_eq!(first[0], serde_json::json!(["1", "2", "3", "4", "5"]));
+    let closest_m = |[_, _, separation, _]: &[serde_json::Value; 4]| separation["min_m"].as_f64().expect("a distance");
+    assert!((closest_m(&first) - closest_m(&of_the_run)).abs() < 1e-4, "the run saw the steps between its samples too");
+}

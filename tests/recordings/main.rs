@@ -4,6 +4,7 @@
 mod recording;
 
 mod any_bytes;
+mod beside;
 mod columns;
 mod containers;
 mod exports;

@@ -11,18 +11,18 @@ use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, separation, set_row};
 use tautline::target::Leg;
 
 /// Drawings count in tenths of a pixel.
-const PLACE: f64 = 0.2;
+pub(crate) const PLACE: f64 = 0.2;
 const DELTA_M: f64 = 2.0;
 const CERTIFIED_M: f64 = 2.5;
 /// Stroke and width of the line at delta, as in the drawing.
 const DELTA_LINE: (&str, &str) = ("#1B1F24", "2");
-const CERTIFIED_LINE: (&str, &str) = ("#1B1F24", "1.3");
+pub(crate) const CERTIFIED_LINE: (&str, &str) = ("#1B1F24", "1.3");
 
 /// A figure read back.
-struct Drawing<'a>(Document<'a>);
+pub(crate) struct Drawing<'a>(Document<'a>);
 
 impl<'a> Drawing<'a> {
-    fn of(figure: &'a Figure) -> Self {
+    pub(crate) fn of(figure: &'a Figure) -> Self {
         Self(Document::parse(&figure.svg).unwrap_or_else(|error| panic!("{}: {error}\n{}", figure.name, figure.svg)))
     }
 
@@ -30,7 +30,7 @@ impl<'a> Drawing<'a> {
         self.0.descendants().filter(|node| node.has_tag_name(("http://www.w3.org/2000/svg", tag))).collect()
     }
 
-    fn words(&self) -> Vec<String> {
+    pub(crate) fn words(&self) -> Vec<String> {
         self.all("text").iter().map(|node| node.text().unwrap_or("").trim().to_owned()).collect()
     }
 
@@ -49,21 +49,21 @@ impl<'a> Drawing<'a> {
     }
 
     /// Where a number is on an axis.
-    fn place(&self, vertical: bool, number: f64) -> f64 {
+    pub(crate) fn place(&self, vertical: bool, number: f64) -> f64 {
         let ticks = self.ticks(vertical);
         let [(a, at_a), .., (b, at_b)] = ticks[..] else { panic!("{} ticks", ticks.len()) };
         at_a + (number - a) / (b - a) * (at_b - at_a)
     }
 
     /// Corners of the polylines of a stroke and a width.
-    fn polylines(&self, (stroke, width): (&str, &str)) -> Vec<Vec<(f64, f64)>> {
+    pub(crate) fn polylines(&self, (stroke, width): (&str, &str)) -> Vec<Vec<(f64, f64)>> {
         let of_style = |node: &Node<'_, '_>| {
             node.attribute("stroke") == Some(stroke) && node.attribute("stroke-width") == Some(width)
         };
         self.all("polyline").into_iter().filter(of_style).map(|node| corners(&node)).collect()
     }
 
-    fn level(&self, style: (&str, &str)) -> f64 {
+    pub(crate) fn level(&self, style: (&str, &str)) -> f64 {
         let levels: Vec<_> = self.polylines(style).into_iter().filter(|line| length(line) > 100.0).collect();
         let [level] = &levels[..] else { panic!("{} lines of {style:?}", levels.len()) };
         assert_eq!(level.len(), 2);
@@ -141,6 +141,7 @@ fn all_of(history: &RunHistory, delta_m: f64) -> Vec<Figure> {
         shape: Some((&[Leg::first(formation.clone())], &graph)),
         edge_error_m: Some(0.01),
         disagreement_m_s: Some(0.02),
+        most_thrust_n: Some(0.12),
     };
     figures::of_run(history, &criteria)
 }
@@ -337,6 +338,7 @@ fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
         shape: Some((&[Leg::first(formation.clone())], &graph)),
         edge_error_m: None,
         disagreement_m_s: None,
+        most_thrust_n: None,
     };
     let figures = figures::of_run(&history, &criteria);
     assert_eq!(figures.len(), 7);

@@ -3,6 +3,7 @@
 #[path = "../support/browser.rs"]
 mod browser;
 
+mod channels;
 mod figures;
 mod margins;
 mod opened;

@@ -53,7 +53,14 @@ fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehic
         assert!((numbers..numbers + 8192).contains(&bytes), "{name}: {bytes} for {numbers}");
 
         let shape = Some((&scenario.legs[..], &scenario.graph));
-        let criteria = Criteria { delta_m: 1.0, certified_m: None, shape, edge_error_m: None, disagreement_m_s: None };
+        let criteria = Criteria {
+            delta_m: 1.0,
+            certified_m: None,
+            shape,
+            edge_error_m: None,
+            disagreement_m_s: None,
+            most_thrust_n: None,
+        };
         for figure in of_run(&history, &criteria) {
             let bytes = figure.svg.len();
             assert!(bytes < 150_000, "{name}: {bytes} of {}", figure.name);

@@ -30,7 +30,7 @@ const ROWS: [Row; 7] = [
         .by_ratio()
         .runs(3),
     Row::of("each vehicle has a turbulence of its own", "wind.dryden.speed_20ft_m_s", [0.1, 20.0])
-        .with(&["wind.dryden.height_m=6", "wind.shared=false"])
+        .with(&["wind.dryden={speed_20ft_m_s=0.1, height_m=6}", "wind.shared=false"])
         .by_ratio()
         .runs(3),
 ];

@@ -11,10 +11,13 @@
 //! Times are those of the messages; where no message of a channel has one, those when they were logged. All positions must be given
 //! in one frame. A file that was not closed is refused, unless the user accepts what it holds.
 
+mod channels;
 pub(crate) mod exported;
 mod foreign;
 mod messages;
 mod run;
+
+pub use channels::Channels;
 
 use super::error::{Fault, Place, ReadError};
 use super::format::Format;

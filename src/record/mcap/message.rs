@@ -25,7 +25,7 @@ impl Own {
     pub(super) const fn topic(self) -> Topic<'static> {
         match self {
             Self::Scenario => Topic::cdr("/scenario", "tautline_msgs/msg/Scenario", include_str!("scenario.msg")),
-            Self::Swarm => Topic::cdr("/swarm", "tautline_msgs/msg/Swarm", include_str!("swarm.msg")),
+            Self::Swarm => Topic::cdr("/swarm", SWARM_SCHEMA, include_str!("swarm.msg")),
             Self::Summary => Topic::cdr("/summary", "tautline_msgs/msg/Summary", include_str!("summary.msg")),
             Self::Events => Topic::cdr("/events", "tautline_msgs/msg/Event", include_str!("event.msg")),
         }
@@ -45,16 +45,19 @@ pub(super) fn fault(topic: &str, reason: impl Into<String>) -> ReadFault {
     ReadFault::Message { topic: topic.to_owned(), reason: reason.into() }
 }
 
+/// Name of the schema of every state of a swarm.
+pub(crate) const SWARM_SCHEMA: &str = "tautline_msgs/msg/Swarm";
+
 /// Name of the schema of every channel.
-pub(super) const CHANNEL_SCHEMA: &str = "tautline_msgs/msg/Channel";
+pub(crate) const CHANNEL_SCHEMA: &str = "tautline_msgs/msg/Channel";
 
 /// The name of a channel's topic.
-pub(super) fn channel_topic(channel: &str) -> String {
+pub(crate) fn channel_topic(channel: &str) -> String {
     format!("/vehicles/{channel}")
 }
 
 /// The topic of a channel.
-pub(super) fn topic_of_channel(name: &str) -> Topic<'_> {
+pub(crate) fn topic_of_channel(name: &str) -> Topic<'_> {
     Topic::cdr(name, CHANNEL_SCHEMA, include_str!("channel.msg"))
 }
 
@@ -125,23 +128,24 @@ impl SwarmMessage<Vec<f64>> {
 
 /// The fields of `channel.msg`, in order.
 #[derive(Serialize, Deserialize)]
-pub(super) struct ChannelMessage<N, C, V> {
+pub(crate) struct ChannelMessage<N, C, V> {
     time_s: f64,
     step: u64,
-    pub(super) name: N,
+    pub(crate) name: N,
     columns: C,
     values: V,
 }
 
 impl<'a> ChannelMessage<&'a str, &'a [String], &'a [f64]> {
-    pub(super) fn of(sample: &Sample<'_>, channel: &'a Channel) -> Self {
+    pub(crate) fn of(time_s: f64, step: u64, channel: &'a Channel) -> Self {
         let Channel { name, columns, values } = channel;
-        Self { time_s: sample.time_s, step: sample.step, name, columns, values }
+        Self { time_s, step, name, columns, values }
     }
 }
 
 impl ChannelMessage<String, Vec<String>, Vec<f64>> {
-    fn into_channel(self, vehicles: usize) -> Result<Channel, ReadFault> {
+    /// The channel of so many vehicles.
+    pub(crate) fn into_channel(self, vehicles: usize) -> Result<Channel, ReadFault> {
         let (columns, numbers) = (self.columns.len(), self.values.len());
         if Some(numbers) != columns.checked_mul(vehicles) {
             let reason = format!("it has {numbers} numbers, which is not {columns} for each of {vehicles} vehicles");

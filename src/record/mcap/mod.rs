@@ -50,6 +50,7 @@ mod reader;
 pub(crate) mod topic;
 mod writer;
 
+pub(crate) use message::{CHANNEL_SCHEMA, ChannelMessage, SWARM_SCHEMA, channel_topic, topic_of_channel};
 pub use reader::{Entry, McapRecording};
 pub use topic::Topic;
 pub use writer::{ExtraTopic, FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};

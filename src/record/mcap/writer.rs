@@ -133,7 +133,7 @@ impl McapRecorder {
             self.channels.push((channel.name.clone(), topic));
             topic
         };
-        self.write(topic, sample.time_s, &ChannelMessage::of(sample, channel))
+        self.write(topic, sample.time_s, &ChannelMessage::of(sample.time_s, sample.step, channel))
     }
 
     fn flush_if_due(&mut self, time_s: f64) -> Result<(), RecordError> {

@@ -1,4 +1,4 @@
-//! Balls, shells and lines as instances.
+//! Balls, discs, shells and lines as instances.
 
 use bytemuck::Pod;
 use nalgebra::Vector3;
@@ -6,7 +6,7 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use super::adapter::Gpu;
 use super::target::{DEPTH_FORMAT, LIGHT_FORMAT, SAMPLES, Target};
-use crate::render::scene::{Ball, Lens, Line, Scene};
+use crate::render::scene::{Ball, Disc, Lens, Line, Scene};
 
 /// `Camera` in shaders/scene.wgsl: right, up, back, eye, lens and range.
 type CameraUniform = [[f32; 4]; 6];
@@ -52,6 +52,7 @@ pub(super) struct Pipelines {
     camera: wgpu::Buffer,
     balls: DrawCall,
     lines: DrawCall,
+    discs: DrawCall,
     shells: DrawCall,
 }
 
@@ -111,9 +112,11 @@ impl Pipelines {
             DrawCall { pipeline, camera }
         };
         let ball = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Unorm8x4];
+        let disc = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Float32x3, 3 => Unorm8x4];
         let line = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Unorm8x4, 4 => Float32];
         Self {
             balls: call("ball_corner", "solid", &ball, size_of::<Ball>(), true),
+            discs: call("disc_corner", "disc", &disc, size_of::<Disc>(), false),
             lines: call("line_corner", "stroke", &line, size_of::<Line>(), false),
             shells: call("shell_corner", "shell", &ball, size_of::<Ball>(), false),
             camera,
@@ -145,6 +148,7 @@ impl Pipelines {
         });
         self.balls.draw(gpu, &mut pass, &scene.balls);
         self.lines.draw(gpu, &mut pass, &scene.lines);
+        self.discs.draw(gpu, &mut pass, &scene.discs);
         self.shells.draw(gpu, &mut pass, &scene.shells);
     }
 }

@@ -71,6 +71,11 @@ impl<'a> SceneBuilder<'a> {
         self.view.theme.vehicle_among(k, self.timeline.count())
     }
 
+    /// The colour of a vehicle's body: that of a violation while it is in one.
+    pub(super) fn body_colour(&self, k: usize) -> Colour {
+        if self.alarmed[k] { self.view.theme.alarm() } else { self.colour(k) }
+    }
+
     /// The closest pair, where it is not closer than delta, and its distance \[m\].
     pub(super) fn clear_nearest(&self) -> Option<(Pair, f64)> {
         self.frame.nearest.filter(|(nearest, _)| self.violated.iter().all(|(violation, _)| violation.pair != *nearest))

@@ -27,16 +27,18 @@ impl Scene {
         let shell_ratio = timeline.metric.ratio() as f32;
         scene.shell_ratio = shell_ratio;
         builder.vehicles(&mut scene);
+        builder.rotors(&mut scene.discs);
         builder.round_obstacles(&mut scene);
         let layers = view.layers;
         // In the order in which they cover each other, and in which they take room from each other.
-        let lines: [Part<'_, Vec<Line>>; 6] = [
+        let lines: [Part<'_, Vec<Line>>; 7] = [
             (layers.ground, SceneBuilder::ground),
             (true, SceneBuilder::flat_obstacles),
             (layers.trails, SceneBuilder::trails),
             (layers.marks, SceneBuilder::starts_and_goals),
             (layers.edges, SceneBuilder::edges),
             (layers.closest, SceneBuilder::pairs),
+            (true, SceneBuilder::arms),
         ];
         let words: [Part<'_, LabelLayout>; 6] = [
             (layers.caption, SceneBuilder::caption),

@@ -18,6 +18,20 @@ pub struct Ball {
     pub colour: Colour,
 }
 
+/// A flat disc that lets light through, such as what a rotor sweeps.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Disc {
+    /// Centre \[m\].
+    pub centre_m: [f32; 3],
+    /// Radius \[m\].
+    pub radius_m: f32,
+    /// Unit vector across it.
+    pub normal: [f32; 3],
+    /// Colour; the opacity is that of its rim.
+    pub colour: Colour,
+}
+
 /// A straight line of the same width near and far.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -111,11 +125,13 @@ pub struct Scene {
     pub background: Colour,
     /// Vehicles.
     pub balls: Vec<Ball>,
+    /// Rotors of those that are quadrotors, farthest first.
+    pub discs: Vec<Disc>,
     /// Keep-out shells, in the order in which they must be drawn: see [`Scene::compose`].
     pub shells: Vec<Ball>,
     /// Height of shells over their width.
     pub shell_ratio: f32,
-    /// Ground, trails, start marks, goal slots, edges, pairs: a later one is drawn over those before it.
+    /// Ground, trails, start marks, goal slots, edges, pairs, arms of quadrotors: a later one is drawn over those before it.
     pub lines: Vec<Line>,
     /// Words and legends.
     pub annotations: Vec<Annotation>,
@@ -124,8 +140,9 @@ pub struct Scene {
 impl Scene {
     /// Nothing, seen by this camera.
     pub(super) fn empty(camera: Camera, depth_m: [f64; 2], background: Colour) -> Self {
-        let (balls, shells, lines, annotations) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { camera, depth_m, background, balls, shells, shell_ratio: 1.0, lines, annotations }
+        let (balls, discs, shells, lines) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (shell_ratio, annotations) = (1.0, Vec::new());
+        Self { camera, depth_m, background, balls, discs, shells, shell_ratio, lines, annotations }
     }
 
     /// A picture of nothing.

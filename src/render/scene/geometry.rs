@@ -66,8 +66,11 @@ impl SceneBuilder<'_> {
             let alarm = self.alarmed[k];
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
             let ball = |radius_m, colour| Ball { centre_m: single(place), radius_m: radius_m as f32, colour };
-            let colour = if alarm { theme.alarm() } else { self.colour(k) };
-            scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]), colour));
+            let colour = self.body_colour(k);
+            match self.quadrotor(k) {
+                Some(quadrotor) => scene.balls.extend(quadrotor.body(colour, theme.ink())),
+                None => scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]), colour)),
+            }
             if let Some(radius_m) = self.shell_m(k) {
                 let strength = if theme == Theme::Paper { 0.75 } else { 0.6 };
                 let colour = if alarm { theme.alarm().at(0.85) } else { theme.shell().at(strength) };

@@ -1,6 +1,6 @@
 //! From a frame of a flight to a draw list.
 //!
-//! A [`Scene`] is plain data and knows nothing of how it is drawn: balls, shells and lines in metres, and [`Annotation`]s
+//! A [`Scene`] is plain data and knows nothing of how it is drawn: balls, discs, shells and lines in metres, and [`Annotation`]s
 //! (words, boxes, scales of colour) in pixels. Lengths are in the scene's coordinates, which are the recording's but for
 //! their origin: it lies amid the flight, so that single precision does for swarms far from the recording's origin.
 
@@ -15,6 +15,7 @@ mod geometry;
 mod ground;
 mod labels;
 mod obstacles;
+mod quadrotors;
 mod view;
 
 #[cfg(feature = "window")]
@@ -22,11 +23,13 @@ pub(super) use camera::TAN_HALF_VIEW;
 pub use camera::{Camera, CameraSpec, Lens, Orbit, Projected};
 pub(super) use caption::metres;
 pub use colour::{Colour, Theme};
-pub use draw_list::{Annotation, Ball, Line, Scene};
+pub use draw_list::{Annotation, Ball, Disc, Line, Scene};
 pub use extent::Extent;
 #[cfg(test)]
 pub(super) use labels::width;
 pub use view::{Layers, View};
 
+#[cfg(test)]
+mod quadrotor_tests;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,7 @@
 //! A flight at a time of it, as it was recorded and as it is drawn.
 
+use nalgebra::UnitQuaternion;
+
 use crate::space::{Metric, closest_pair};
 use crate::swarm::{ClosestApproach, Pair, Rows, row};
 
@@ -13,6 +15,8 @@ pub struct Keyframe {
     pub time_s: f64,
     /// Positions \[m\], N x 3; NaN for a vehicle that is not there.
     pub positions_m: Rows,
+    /// What turns the body of each vehicle into the world, where it was recorded; empty where none was.
+    pub attitudes: Vec<Option<UnitQuaternion<f64>>>,
     /// Commanded accelerations \[m/s^2\], where they were recorded.
     pub control_m_s2: Option<Rows>,
     /// Closest approach since the keyframe before.
@@ -30,6 +34,8 @@ pub struct Frame {
     pub time_s: f64,
     /// Positions \[m\], N x 3; NaN for a vehicle that is not there.
     pub positions_m: Rows,
+    /// What turns the body of each vehicle into the world, where it was recorded; empty where none was.
+    pub attitudes: Vec<Option<UnitQuaternion<f64>>>,
     /// Commanded accelerations \[m/s^2\] at the last sample, where they were recorded.
     pub control_m_s2: Option<Rows>,
     /// What distances between vehicles are drawn in.
@@ -45,6 +51,12 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// What turns the body of a vehicle into the world, where it is known.
+    #[must_use]
+    pub fn attitude(&self, vehicle: usize) -> Option<UnitQuaternion<f64>> {
+        self.attitudes.get(vehicle).copied().flatten()
+    }
+
     /// Distance of a pair \[m\] as it is drawn, scaled where ellipsoids stay empty; NaN where one of the two is not there.
     ///
     /// It is nowhere below the recorded closest approach, since curves that are drawn as straight lines come nearer than

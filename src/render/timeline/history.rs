@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::airframe::{Attitudes, QuadrotorShape, attitudes_of, between};
 use super::frame::{Frame, Keyframe, nearest_present};
 use super::obstacles::{AllTooNear, TooNear};
 use super::plan::Plan;
@@ -38,6 +39,8 @@ pub struct Timeline {
     pub radius_m: Vec<f64>,
     /// Safety distance delta \[m\], where one is judged by.
     pub delta_m: Option<f64>,
+    /// Where the rotors of every vehicle are, where the flight says it.
+    pub shape: Option<QuadrotorShape>,
     /// The lengths that delta is one of: metres unless ellipsoids stay empty.
     pub metric: Metric,
     /// Formation and graph, where the flight has them.
@@ -77,6 +80,7 @@ impl Timeline {
             vehicles: (1..=vehicles).map(|number| number.to_string()).collect(),
             radius_m: vec![UNKNOWN_RADIUS_M; vehicles],
             delta_m: None,
+            shape: None,
             metric: Metric::default(),
             plan: None,
             notes: Vec::new(),
@@ -102,6 +106,7 @@ impl Timeline {
         Self {
             radius_m: scenario.hull_radius_m.clone(),
             delta_m: Some(scenario.delta_m),
+            shape: QuadrotorShape::of(scenario),
             metric: scenario.metric(),
             plan: Some(Plan::of(scenario)),
             ..Self::new(&scenario.name, scenario.count())
@@ -232,8 +237,9 @@ impl Timeline {
             _ => nearest_present(&positions_m, self.metric),
         };
         let control_m_s2 = before.control_m_s2.clone();
+        let (attitudes, metric, nearest) = (self.attitudes(time_s, keyframe), self.metric, None);
         let mut frame =
-            Frame { time_s, positions_m, control_m_s2, metric: self.metric, nearest: None, so_far, around, keyframe };
+            Frame { time_s, positions_m, attitudes, control_m_s2, metric, nearest, so_far, around, keyframe };
         frame.nearest = pair.map(|pair| (pair, frame.distance_m(pair)));
         let now = frame.nearest.filter(|(_, distance_m)| distance_m.is_finite());
         frame.so_far = nearer(so_far, now.map(|(pair, separation_m)| ClosestApproach { pair, separation_m, time_s }));
@@ -252,11 +258,24 @@ impl Timeline {
         Some(positions_m)
     }
 
+    /// How the vehicles stand in space at a time \[s\] that is not before this keyframe and before the next.
+    fn attitudes(&self, time_s: f64, keyframe: usize) -> Attitudes {
+        let before = &self.keyframes[keyframe];
+        match self.keyframes.get(keyframe + 1) {
+            Some(after) if time_s > before.time_s => {
+                let part = (time_s - before.time_s) / (after.time_s - before.time_s);
+                between(&before.attitudes, &after.attitudes, part)
+            }
+            _ => before.attitudes.clone(),
+        }
+    }
+
     /// Takes one sample, which must be later than the one before.
     pub fn take(&mut self, sample: &Sample<'_>) {
         self.push(Keyframe {
             time_s: sample.time_s,
             positions_m: sample.swarm.positions_m.clone(),
+            attitudes: attitudes_of(sample),
             control_m_s2: Some(sample.control.clone()),
             closest: sample.separation.filter(|approach| self.has(approach.pair)),
             so_far: None,
@@ -333,7 +352,8 @@ impl Timeline {
         self.keyframes.push(keyframe);
         // What was around a moment so far may be so no longer.
         self.sift(self.keyframes.len().saturating_sub(3));
-        let bytes_each = self.count() * 6 * size_of::<f64>() + size_of::<Keyframe>();
+        let turns = self.keyframes.last().map_or(0, |last| size_of_val(&*last.attitudes));
+        let bytes_each = self.count() * 6 * size_of::<f64>() + turns + size_of::<Keyframe>();
         if self.keyframes.len() >= 16 && self.keyframes.len() * bytes_each > self.budget_bytes {
             self.every *= 2;
             self.sift(0);

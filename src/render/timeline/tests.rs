@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::audit::Violation;
-use crate::record::{Event, Sample};
+use crate::record::{Channel, Event, Sample};
 use crate::render::error::FARTHEST_M;
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 use crate::track::{Clock, Item, Tracks};
@@ -25,6 +25,50 @@ fn between_two_instants_vehicles_are_on_a_straight_line() {
     assert_eq!((frame.positions_m[(1, 0)], frame.nearest), (3.5, Some((Pair::new(0, 1), 3.5))));
     let beyond = timeline.at(9.0).expect("a frame");
     assert_eq!((beyond.time_s, beyond.positions_m[(1, 0)]), (1.0, 2.0));
+}
+
+/// A flight of one vehicle with these attitudes (w, x, y, z), a second apart; none where there is no number.
+fn turning(attitudes: &[[f64; 4]]) -> Timeline {
+    let mut timeline = Timeline::new("one", 1);
+    for (k, attitude) in attitudes.iter().enumerate() {
+        let channel = Channel { values: attitude.to_vec(), ..Channel::new("attitude", &["qw", "qx", "qy", "qz"]) };
+        let (swarm, control, channels) = (Swarm::at_rest(Rows::zeros(1)), Rows::zeros(1), [channel]);
+        timeline.take(&Sample { channels: &channels, ..Sample::new(k as f64, k as u64, &swarm, &control) });
+    }
+    timeline
+}
+
+fn heading_deg(timeline: &Timeline, time_s: f64) -> f64 {
+    let attitude = timeline.at(time_s).and_then(|frame| frame.attitude(0)).expect("an attitude");
+    attitude.angle().to_degrees()
+}
+
+#[test]
+fn between_two_instants_vehicles_turn_evenly_and_the_shorter_way() {
+    let quarter = [std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2];
+    let level = [1.0, 0.0, 0.0, 0.0];
+    for sign in [1.0, -1.0] {
+        let timeline = turning(&[level, quarter.map(|x| sign * x)]);
+        for (time_s, degrees) in [(-1.0, 0.0), (0.0, 0.0), (1.0 / 3.0, 30.0), (0.5, 45.0), (1.0, 90.0), (9.0, 90.0)] {
+            let found = heading_deg(&timeline, time_s);
+            assert!((found - degrees).abs() < 1e-6, "{found} instead of {degrees} degrees at {time_s} s, {sign}");
+        }
+    }
+}
+
+#[test]
+fn an_attitude_that_is_none_is_not_known_and_the_one_before_stays() {
+    let level = [1.0, 0.0, 0.0, 0.0];
+    for none in [[0.0; 4], [f64::NAN; 4]] {
+        let timeline = turning(&[level, none, level]);
+        assert_eq!(heading_deg(&timeline, 0.5), 0.0);
+        assert!([1.0, 1.5].iter().all(|&time_s| timeline.at(time_s).expect("a frame").attitude(0).is_none()));
+    }
+    let mut other = turning(&[level]);
+    let (swarm, control) = (Swarm::at_rest(Rows::zeros(1)), Rows::zeros(1));
+    let channels = [Channel { values: level.to_vec(), ..Channel::new("attitude", &["qx", "qy", "qz", "qw"]) }];
+    other.take(&Sample { channels: &channels, ..Sample::new(1.0, 1, &swarm, &control) });
+    assert!(other.at(1.0).expect("a frame").attitude(0).is_none(), "columns in another order are something else");
 }
 
 #[test]

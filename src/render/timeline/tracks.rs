@@ -72,8 +72,8 @@ impl Timeline {
                 check_lengths(position_m.iter(), "coordinate", time_s, || timeline.vehicles[k].clone())?;
                 set_row(&mut positions_m, k, position_m);
             }
-            let (control_m_s2, closest, so_far) = (None, None, None);
-            timeline.push(Keyframe { time_s, positions_m, control_m_s2, closest, so_far, number: 0 });
+            let (attitudes, control_m_s2, closest, so_far) = (Vec::new(), None, None, None);
+            timeline.push(Keyframe { time_s, positions_m, attitudes, control_m_s2, closest, so_far, number: 0 });
         }
         timeline.take_outcome(judged);
         timeline.notes.extend_from_slice(recording.notes());

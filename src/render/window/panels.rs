@@ -4,6 +4,8 @@ use egui::{
     Button, Color32, Key, PointerButton, Rect, RichText, Sense, Slider, Stroke, TextureId, Ui, Vec2, pos2, vec2,
 };
 
+use nalgebra::{UnitQuaternion, Vector3};
+
 use super::player::Player;
 use super::plot::plot;
 use super::state::WindowState;
@@ -187,6 +189,10 @@ fn vehicle(ui: &mut Ui, player: &Player, frame: &Frame, k: usize) {
     ui.label(RichText::new(format!("Vehicle {}", timeline.vehicles[k])).strong());
     let place = row(&frame.positions_m, k);
     ui.label(format!("at ({:.3}, {:.3}, {:.3}) m", place.x, place.y, place.z));
+    if let Some(attitude) = frame.attitude(k) {
+        let (tilt_deg, heading_deg) = tilt_and_heading_deg(&attitude);
+        ui.label(format!("tilted {tilt_deg:.1}\u{b0}, heading {heading_deg:.0}\u{b0}"));
+    }
     if let Some(control) = &frame.control_m_s2 {
         let control = row(control, k);
         ui.label(format!("commanded {:.3} m/s\u{b2}", control.norm()));
@@ -212,6 +218,12 @@ fn vehicle(ui: &mut Ui, player: &Player, frame: &Frame, k: usize) {
             row(ui, [&timeline.vehicles[other], &metres(distance_m), &tension.unwrap_or_default()]);
         }
     });
+}
+
+/// How far a vehicle's axis of thrust is from upright, and where it looks, from the x axis towards the y axis \[degrees\].
+fn tilt_and_heading_deg(attitude: &UnitQuaternion<f64>) -> (f64, f64) {
+    let (up, ahead) = (attitude * Vector3::z(), attitude * Vector3::x());
+    (up.xy().norm().atan2(up.z).to_degrees(), ahead.y.atan2(ahead.x).to_degrees())
 }
 
 /// How hard an edge pulls or pushes, or by how much it is too long where the law has no tension.
@@ -245,8 +257,6 @@ fn help(context: &egui::Context, open: &mut bool) {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
     use super::*;
     use crate::graph::Graph;
     use crate::scenario::{Scenario, Source};
@@ -270,6 +280,16 @@ mod tests {
         let rest_m = plan.formation_at(0.0).desired_distance(0, 1);
         assert_eq!(in_words(&plan, pair, rest_m, 0.0), "rest");
         assert_eq!(in_words(&plan, pair, 2.0, 0.0), "inside delta");
+    }
+
+    #[test]
+    fn tilt_is_from_upright_and_heading_from_x_to_y() {
+        let (ahead, left) = (Vector3::x_axis(), Vector3::y_axis());
+        let yawed = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.5);
+        let (tilt, heading) = tilt_and_heading_deg(&(yawed * UnitQuaternion::from_axis_angle(&left, 0.3)));
+        assert!((tilt.to_radians() - 0.3).abs() < 1e-12 && (heading.to_radians() - 0.5).abs() < 1e-12);
+        let (over, _) = tilt_and_heading_deg(&UnitQuaternion::from_axis_angle(&ahead, std::f64::consts::PI));
+        assert!((over - 180.0).abs() < 1e-9, "{over}");
     }
 
     #[test]

@@ -153,12 +153,12 @@ fn in_a_steady_wind_it_hovers_at_the_tilt_whose_tangent_is_drag_over_weight() {
         let expected = tilt_in_wind(&model, fleet.dynamics.hover_rpm(), wind_m_s);
         let hold = &mut |_, state: &State| -state.position_m - 2.0 * state.velocity_m_s;
         let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet.clone());
-        let state = fly(plant.as_mut(), (60.0, 1.0 / 500.0), hold);
+        let state = fly(plant.as_mut(), (100.0, 1.0 / 500.0), hold);
         let up = state.attitude * Vector3::z();
         assert!((-up.x / up.z - expected).abs() <= 1e-9, "{} at {wind_m_s} m/s, {expected}", -up.x / up.z);
         assert!(state.velocity_m_s.norm() <= 1e-9 && up.y.abs() <= ROUNDING, "{}", state.velocity_m_s);
-        let (scenario, mut flipped) =
-            alone(Model { rotor_drag_n_s_m: model.rotor_drag_n_s_m.map(|drag| -drag), ..model }, 500.0);
+        let [along, across, axial] = model.rotor_drag_n_s_m;
+        let (scenario, mut flipped) = alone(Model { rotor_drag_n_s_m: [-along, -across, axial], ..model }, 500.0);
         flipped.wind_m_s[(0, 0)] = wind_m_s;
         let mut plant = rapier::quadrotors(&scenario, Precision::Double, flipped);
         let up = fly(plant.as_mut(), (20.0, 1.0 / 500.0), hold).attitude * Vector3::z();

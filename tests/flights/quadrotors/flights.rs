@@ -77,7 +77,7 @@ fn a_loaded_flight_of_quadrotors_goes_on_with_the_same_bits() {
         [&["time.control_hz=70", "vehicle.attitude_hz=300"][..], &["plant.kind=ideal"], &["plant.precision=single"]]
     {
         let mut simulation = Simulation::new(&builtin("crazyflies", sets)).expect("a flight");
-        let mut run = |simulation: &mut Simulation, steps: u32| {
+        let run = |simulation: &mut Simulation, steps: u32| {
             let mut samples = Vec::new();
             for _ in 0..steps {
                 simulation.step();
@@ -226,4 +226,41 @@ fn what_rotors_cannot_do_they_do_as_far_as_they_go() {
     assert!((level - Vector4::repeat(dynamics.hover_rpm())).amax() <= 1e-6);
     let climbing = dynamics.asked_rpm(state, Vector3::z() * GRAVITY_M_S2);
     assert!(climbing.iter().all(|&rpm| rpm > dynamics.hover_rpm()));
+}
+
+#[test]
+fn the_engine_and_continuous_time_fly_in_the_same_turbulence() {
+    let sets = [
+        "time.duration_s=3",
+        "wind={mean_m_s=[1,0.5], dryden={speed_20ft_m_s=4, height_m=10}, shared=false}",
+        "noise.seed=5",
+    ];
+    let last = |more: &str| fly(&builtin("crazyflies", &[&sets[..], &[more]].concat())).0.last.positions_m;
+    let (bodies, ideal, still) = (
+        last("plant.precision=double"),
+        last("plant.kind=ideal"),
+        fly(&builtin("crazyflies", &["time.duration_s=3", "plant.precision=double"])).0.last.positions_m,
+    );
+    let off_m = (&bodies - &ideal).amax();
+    assert!(off_m <= 1e-4 && (&bodies - &still).amax() > 0.5, "{off_m} m from each other");
+}
+
+#[test]
+fn a_dead_quadrotor_falls_and_one_that_loses_a_rotor_turns_over_in_either_plant() {
+    for plant in ["rapier", "ideal"] {
+        let fallen = |failure: &str| {
+            let sets = ["time.duration_s=2", &format!("plant.kind={plant}"), &format!("failure=[{failure}]")];
+            let (flown, _) = fly(&builtin("crazyflies", &sets));
+            assert!(flown.certificate.void.contains(&Void::VehicleFails));
+            (flown.ending, flown.last.positions_m.column(2).iter().copied().collect::<Vec<_>>())
+        };
+        let (ending, heights_m) = fallen("{vehicle=4, at_s=1.0, kind=\"dead\"}");
+        assert_eq!(ending, Ending::Completed);
+        // A second of fall, less what rotors still push as they slow down and what their drag brakes.
+        assert!((-4.9..-3.5).contains(&heights_m[3]) && heights_m[0].abs() < 1e-3, "{plant}: {heights_m:?}");
+        let (_, heights_m) = fallen("{vehicle=4, at_s=1.0, kind=\"rotor\", rotor=2}");
+        assert!(heights_m[3] < -0.5 && heights_m[0].abs() < 1e-3, "{plant}: {heights_m:?}");
+        let (_, heights_m) = fallen("{vehicle=4, at_s=1.0, kind=\"rotor\", rotor=2, share=0.95}");
+        assert!(heights_m[3] > -0.2, "{plant}: {heights_m:?}");
+    }
 }

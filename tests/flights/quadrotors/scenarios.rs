@@ -40,6 +40,11 @@ fn what_cannot_be_flown_is_told_with_its_place_and_remedy() {
             ["a point has neither attitude nor rotors", "leave this key out", "--set:1:"],
         ),
         (&["law.delta_m=0.15"], ["the hulls of vehicles 1-2 touch at 0.14 m", "enlarge law.delta_m", "--set:1:"]),
+        (&["failure=[{vehicle=1, at_s=1, kind=\"rotor\", rotor=5}]"], ["rotor 5", "rotors 1 to 4", "--set:1:"]),
+        (
+            &["failure=[{vehicle=1, at_s=1, kind=\"rotor\", rotor=1, share=1.5}]"],
+            ["a share of 1.5", "from 0 to less than 1", "--set:1:"],
+        ),
         (&["vehicle.model=3"], ["invalid type", "`tautline schema`", "--set:1:"]),
         (&["vehicle.model={name=\"x\"}"], ["missing key `mass_kg`", "`tautline schema`", "--set:1:"]),
     ] {

@@ -1,0 +1,296 @@
+//! What imperfections must be for a swarm to be flown with them.
+
+use super::actuation::ActuationSpec;
+use super::error::ScenarioError;
+use super::failure::{Failure, FailureKind};
+use super::limits::{MAX_MEMORY_BYTES, at_least_zero, positive, require_finite};
+use super::network::{LinkFailure, NearBy, NetworkSpec};
+use super::sensing::SensingSpec;
+use super::spec::Scenario;
+use crate::vehicle::RotorFailure;
+
+/// Memory expected for a link in one direction: what was heard over it last \[bytes\].
+const BYTES_PER_LINK: u128 = 80;
+/// And for each message that may be under way on it.
+const BYTES_PER_MESSAGE: u128 = 8;
+/// Shortest latency that is not none \[s\].
+const SHORTEST_S: f64 = 1e-6;
+
+impl Scenario {
+    /// Errors and times that are such, errors with a rate at which they are drawn, and nothing that continuous time cannot have.
+    pub(super) fn check_sensing(&self) -> Result<(), ScenarioError> {
+        let SensingSpec { rate_hz, latency_s, near_latency_s, .. } = self.sensing;
+        let noises = [
+            ("sensing.position_noise_m", "the error of a measured position", self.sensing.position_noise_m),
+            ("sensing.velocity_noise_m_s", "the error of a measured velocity", self.sensing.velocity_noise_m_s),
+        ];
+        for (key, what, noise) in noises {
+            if at_least_zero(key, what, noise)? > 0.0 && rate_hz.is_none() {
+                return Err(ScenarioError::new(format!(
+                    "{what} is drawn anew with each measurement, and none has a time"
+                ))
+                .with_help("say how often it is measured: sensing.rate_hz, such as 100")
+                .at(key));
+            }
+        }
+        at_least_zero("sensing.position_bias_m", "the lasting error of a position", self.sensing.position_bias_m)?;
+        if let Some(rate_hz) = rate_hz {
+            positive("sensing.rate_hz", "the rate of measurements", rate_hz)?;
+            self.check_sampled("sensing.rate_hz")?;
+        }
+        latency("sensing.latency_s", "the latency of measurements", latency_s, self.time.duration_s)?;
+        let near = "the latency of what is seen of near ones";
+        latency("sensing.near_latency_s", near, near_latency_s.unwrap_or(0.0), self.time.duration_s).map(|_| ())
+    }
+
+    /// Refuses what happens at instants of its own where time is continuous.
+    pub(super) fn check_sampled(&self, key: &'static str) -> Result<(), ScenarioError> {
+        if self.plant.holds_commands() || self.time.control_hz.is_some() {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!(
+            "{key} makes what is known jump, and the ideal plant asks the law in continuous time, where nothing does"
+        ))
+        .with_help("set actuation.control_hz, at which commands are made and held, or plant.kind to \"rapier\"")
+        .at(key)
+        .at("plant.kind"))
+    }
+}
+
+impl Scenario {
+    /// Messages a second \[Hz\], where they are not sent all the time.
+    #[must_use]
+    pub fn message_hz(&self) -> Option<f64> {
+        self.network.rate_hz.or(self.sensing.rate_hz)
+    }
+
+    /// Times, shares and links that are such, and rates for whatever happens to a message.
+    pub(super) fn check_network(&self) -> Result<(), ScenarioError> {
+        let NetworkSpec { latency_s, jitter_s, loss, loss_burst, rate_hz, .. } = self.network;
+        latency("network.latency_s", "the latency of messages", latency_s, self.time.duration_s)?;
+        latency("network.jitter_s", "the jitter of messages", jitter_s, self.time.duration_s)?;
+        check_loss(loss, loss_burst)?;
+        if let Some(rate_hz) = rate_hz {
+            positive("network.rate_hz", "the rate of messages", rate_hz)?;
+            self.check_sampled("network.rate_hz")?;
+        }
+        let needs_rate = [
+            ("network.jitter_s", jitter_s > 0.0),
+            ("network.loss", loss > 0.0),
+            ("network.failure", !self.network.failure.is_empty()),
+        ];
+        for (key, _) in needs_rate.into_iter().filter(|&(_, is_used)| is_used) {
+            self.check_messages(key)?;
+        }
+        self.network.failure.iter().enumerate().try_for_each(|(entry, failure)| self.check_link(entry, failure))?;
+        self.check_message_memory()
+    }
+
+    /// Refuses what happens to messages where nothing says when they are sent.
+    pub(super) fn check_messages(&self, key: &'static str) -> Result<(), ScenarioError> {
+        if self.message_hz().is_some() {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!("{key} is about messages, and nothing says how often they are sent"))
+            .with_help("set network.rate_hz, such as 50")
+            .at(key))
+    }
+
+    fn check_link(&self, entry: usize, failure: &LinkFailure) -> Result<(), ScenarioError> {
+        let &LinkFailure { link: [a, b], from_s, to_s } = failure;
+        let refuse =
+            |said: String, help: &str| Err(ScenarioError::new(said).with_help(help).at_entry("network.failure", entry));
+        let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
+        let is_link = match (index(a), index(b)) {
+            (Some(i), Some(j)) if i != j && i.max(j) < self.count() => {
+                self.network.near == NearBy::Heard || self.graph.has_edge(i, j)
+            }
+            _ => false,
+        };
+        if !is_link {
+            return refuse(
+                format!("the graph has no link between vehicles {a} and {b} that could be down"),
+                "name the two ends of an edge of [graph], counted from 1",
+            );
+        }
+        let until_s = to_s.unwrap_or(self.time.duration_s);
+        let times = [("the beginning of a link failure", from_s), ("the end of a link failure", until_s)];
+        for (what, time_s) in times {
+            require_finite(what, time_s).map_err(|error| error.at_entry("network.failure", entry))?;
+        }
+        if from_s >= 0.0 && from_s < until_s && from_s < self.time.duration_s {
+            return Ok(());
+        }
+        refuse(
+            format!("the link of vehicles {a} and {b} is down from {from_s} s to {until_s} s"),
+            "it is down from 0 s or later, before the end of the flight, and until later than that",
+        )
+    }
+
+    fn check_message_memory(&self) -> Result<(), ScenarioError> {
+        let Some(rate_hz) = self.message_hz() else { return Ok(()) };
+        if self.network.is_exact() && self.sensing.is_exact() {
+            return Ok(());
+        }
+        let count = self.count() as u128;
+        let pairs = count * count.saturating_sub(1);
+        let heard = if self.network.near == NearBy::Heard { pairs } else { 2 * self.graph.edge_count() as u128 };
+        let under_way = ((self.network.latency_s + self.network.jitter_s) * rate_hz).ceil() + 2.0;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "more than 2; too many saturate")]
+        let bytes = heard.saturating_mul(BYTES_PER_LINK + BYTES_PER_MESSAGE * under_way as u128);
+        if bytes <= MAX_MEMORY_BYTES {
+            return Ok(());
+        }
+        let gib = MAX_MEMORY_BYTES >> 30;
+        Err(ScenarioError::new(format!(
+            "messages over {heard} links would take {} GiB of memory; at most {gib} GiB are used",
+            bytes >> 30
+        ))
+        .with_help("choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often")
+        .at("network.rate_hz")
+        .at("graph.kind"))
+    }
+}
+
+impl Scenario {
+    /// A limit that lets vehicles move, and a lag that the plant can have.
+    pub(super) fn check_actuation(&self) -> Result<(), ScenarioError> {
+        let ActuationSpec { max_accel_m_s2, lag_s } = self.actuation;
+        if let Some(most_m_s2) = max_accel_m_s2 {
+            positive("actuation.max_accel_m_s2", "the largest acceleration", most_m_s2)?;
+        }
+        at_least_zero("actuation.lag_s", "the lag of the acceleration", lag_s)?;
+        if lag_s == 0.0 || self.plant.holds_commands() {
+            return Ok(());
+        }
+        Err(ScenarioError::new("the ideal plant's vehicles are accelerated as they are commanded, without a lag")
+            .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
+            .at("actuation.lag_s")
+            .at("plant.kind"))
+    }
+}
+
+impl Scenario {
+    /// Vehicles that there are, times within the flight, and nothing that continuous time cannot have.
+    pub(super) fn check_failures(&self) -> Result<(), ScenarioError> {
+        for (entry, failure) in self.failures.iter().enumerate() {
+            let &Failure { vehicle, at_s, kind } = failure;
+            if vehicle == 0 || failure.index() >= self.count() {
+                return Err(ScenarioError::new(format!(
+                    "vehicle {vehicle} is to fail, and there are {}",
+                    self.count()
+                ))
+                .with_help("vehicles are counted from 1")
+                .at_entry("failure", entry));
+            }
+            require_finite("the time of a failure", at_s).map_err(|error| error.at_entry("failure", entry))?;
+            if !(0.0..self.time.duration_s).contains(&at_s) {
+                return Err(ScenarioError::new(format!(
+                    "vehicle {vehicle} is to fail at {at_s} s, in a flight from 0 s to {} s",
+                    self.time.duration_s
+                ))
+                .with_help("let it fail within the flight")
+                .at_entry("failure", entry)
+                .at("time.duration_s"));
+            }
+            match kind {
+                FailureKind::Dead {} => {}
+                FailureKind::Rotor { rotor, share } => self.check_rotor(entry, rotor, share)?,
+                FailureKind::Silent {} => self.check_silent(entry)?,
+                FailureKind::Frozen {} => self.check_frozen(entry)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn check_rotor(&self, entry: usize, rotor: u64, share: f64) -> Result<(), ScenarioError> {
+        let (said, help) = if self.airframe.quadrotor().is_none() {
+            (
+                "a rotor is to fail, and vehicles are points".to_owned(),
+                "set vehicle.model to a quadrotor, or kind to \"dead\"",
+            )
+        } else if !(1..=4).contains(&rotor) {
+            (format!("rotor {rotor} is to fail"), "a quadrotor has rotors 1 to 4")
+        } else if !(0.0..1.0).contains(&share) {
+            (
+                format!("a rotor that fails still gives a share of {share} of its thrust"),
+                "set share from 0 to less than 1",
+            )
+        } else {
+            return Ok(());
+        };
+        Err(ScenarioError::new(said).with_help(help).at_entry("failure", entry))
+    }
+
+    /// What becomes of rotors.
+    pub(super) fn rotor_failures(&self) -> Vec<RotorFailure> {
+        let of_rotors = |failure: &Failure| {
+            let (rotor, share) = match failure.kind {
+                FailureKind::Dead {} => (None, 0.0),
+                FailureKind::Rotor { rotor, share } => (Some(usize::try_from(rotor.checked_sub(1)?).ok()?), share),
+                FailureKind::Silent {} | FailureKind::Frozen {} => return None,
+            };
+            Some(RotorFailure { vehicle: failure.index(), rotor, at_s: failure.at_s, share })
+        };
+        let exists =
+            |failure: &RotorFailure| failure.vehicle < self.count() && failure.rotor.is_none_or(|rotor| rotor < 4);
+        self.failures.iter().filter_map(of_rotors).filter(exists).collect()
+    }
+
+    fn check_frozen(&self, entry: usize) -> Result<(), ScenarioError> {
+        if self.plant.holds_commands() || self.time.control_hz.is_some() {
+            return Ok(());
+        }
+        Err(ScenarioError::new("the ideal plant's vehicles hold no command that could stay as it was")
+            .with_help("set actuation.control_hz, or plant.kind to \"rapier\"")
+            .at_entry("failure", entry)
+            .at("plant.kind"))
+    }
+
+    fn check_silent(&self, entry: usize) -> Result<(), ScenarioError> {
+        if self.message_hz().is_some() {
+            return Ok(());
+        }
+        Err(ScenarioError::new("a vehicle is to send nothing any more, and nothing says how often messages are sent")
+            .with_help("set network.rate_hz, such as 50")
+            .at_entry("failure", entry))
+    }
+}
+
+/// The latency, if it is 0, or at least a microsecond and no longer than the flight.
+pub(super) fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Result<f64, ScenarioError> {
+    at_least_zero(key, what, latency_s)?;
+    if latency_s == 0.0 || (SHORTEST_S..=duration_s).contains(&latency_s) {
+        return Ok(latency_s);
+    }
+    let (said, help) = if latency_s < SHORTEST_S {
+        (format!("{what} is {latency_s} s"), format!("give at least {SHORTEST_S} s, or 0 for none"))
+    } else {
+        (
+            format!("{what} is {latency_s} s in a flight of {duration_s} s"),
+            "nothing would ever be known but the start: give less, or enlarge time.duration_s".to_owned(),
+        )
+    };
+    Err(ScenarioError::new(said).with_help(help).at(key).at("time.duration_s"))
+}
+
+/// A share, and bursts that can make it up.
+fn check_loss(loss: f64, burst: Option<f64>) -> Result<(), ScenarioError> {
+    at_least_zero("network.loss", "the share of messages that are lost", loss)?;
+    if loss > 1.0 {
+        return Err(ScenarioError::new(format!("the share of messages that are lost is {loss}"))
+            .with_help("it is at most 1; 0.02 is two in a hundred")
+            .at("network.loss"));
+    }
+    let Some(burst) = burst else { return Ok(()) };
+    require_finite("the mean burst of lost messages", burst).map_err(|error| error.at("network.loss_burst"))?;
+    // A bad link follows a good one at most always.
+    let least = if loss < 1.0 { (loss / (1.0 - loss)).max(1.0) } else { 1.0 };
+    if burst >= least {
+        return Ok(());
+    }
+    Err(ScenarioError::new(format!("bursts of {burst} lost messages in the mean cannot lose a share of {loss}"))
+        .with_help(format!("give at least {least}, or leave network.loss_burst out: then each is lost by itself"))
+        .at("network.loss_burst")
+        .at("network.loss"))
+}

@@ -1,0 +1,100 @@
+//! Figures of what else is known of each vehicle: attitude, rotors, wind, age of messages.
+
+use tautline::figures::{self, Criteria, Figure, RunHistory};
+use tautline::record::{Channel, Sample};
+use tautline::swarm::{Rows, Swarm};
+
+use crate::figures::{CERTIFIED_LINE, Drawing, PLACE};
+
+const MOST_N: f64 = 0.12;
+const NAMES: [&str; 4] = ["attitude", "rotors", "wind", "message-age"];
+
+/// The channels of vehicles that are tilted about x by 10 degrees times their number; `scale` is that of all numbers.
+fn channels(count: usize, scale: f64) -> [Channel; 4] {
+    let filled = |name, columns: &[&str], row: &dyn Fn(f64) -> Vec<f64>| {
+        let values = (0..count).flat_map(|i| row(i as f64)).collect();
+        Channel { values, ..Channel::new(name, columns) }
+    };
+    let turned = |i: f64| {
+        let half = (5.0 * i * scale).to_radians();
+        vec![half.cos(), half.sin(), 0.0, 0.0]
+    };
+    [
+        filled("attitude", &["qw", "qx", "qy", "qz"], &turned),
+        filled("rotors", &["thrust_1_n", "thrust_2_n", "thrust_3_n", "thrust_4_n"], &|i| {
+            [0.01, 0.02, 0.04, 0.03].map(|thrust| thrust * i * scale).to_vec()
+        }),
+        filled("wind", &["wind_x_m_s", "wind_y_m_s", "wind_z_m_s"], &|i| vec![3.0 * i * scale, -4.0 * i * scale, 0.0]),
+        filled("message_age", &["oldest_s", "mean_s"], &|i| vec![0.05 * i * scale, 0.01]),
+    ]
+}
+
+/// Figures of `samples` samples 0.05 s apart; in sample `k` all numbers are those of `channels` times `scale(k)`.
+fn drawn(count: usize, samples: u64, scale: impl Fn(u64) -> f64) -> Vec<Figure> {
+    let mut history = RunHistory::new();
+    let (swarm, control) = (Swarm::at_rest(Rows::from_fn(count, |i, axis| (3 * i + axis) as f64)), Rows::zeros(count));
+    for k in 0..samples {
+        let channels = channels(count, scale(k));
+        history.observe(&Sample { channels: &channels, ..Sample::new(0.05 * k as f64, k, &swarm, &control) });
+    }
+    let criteria = Criteria {
+        delta_m: 1.0,
+        certified_m: None,
+        shape: None,
+        edge_error_m: None,
+        disagreement_m_s: None,
+        most_thrust_n: Some(MOST_N),
+    };
+    let mut figures = figures::of_run(&history, &criteria);
+    assert!(figures.iter().all(|figure| figures::NAMES_OF_RUN.contains(&figure.name.as_str())));
+    figures.retain(|figure| NAMES.contains(&figure.name.as_str()));
+    figures
+}
+
+#[test]
+fn a_run_with_channels_has_a_figure_of_each_with_a_line_for_each_vehicle() {
+    let figures = drawn(3, 100, |k| if k < 50 { 1.0 } else { 0.5 });
+    assert_eq!(figures.iter().map(|figure| &*figure.name).collect::<Vec<_>>(), NAMES);
+    let labels =
+        ["tilt from upright [°]", "largest thrust of a rotor [N]", "wind speed [m/s]", "age of the oldest message [s]"];
+    for ((figure, label), third) in figures.iter().zip(labels).zip([20.0, 0.08, 10.0, 0.1]) {
+        let drawing = Drawing::of(figure);
+        assert!(drawing.words().iter().any(|word| word == label), "{label}: {:?}", drawing.words());
+        let lines = drawing.polylines(("#00936C", "1.5"));
+        let (line, [first, last]) = (&lines[0], [third, 0.5 * third].map(|number| drawing.place(true, number)));
+        assert!((line[0].1 - first).abs() <= PLACE, "{}: {line:?}", figure.name);
+        assert!((line[line.len() - 1].1 - last).abs() <= PLACE, "{}: {line:?}", figure.name);
+        let peak = format!("at most {third:.3}");
+        assert!(figure.description.contains(&peak), "{}", figure.description);
+    }
+    let rotors = Drawing::of(&figures[1]);
+    assert!((rotors.level(CERTIFIED_LINE) - rotors.place(true, MOST_N)).abs() <= PLACE);
+}
+
+#[test]
+fn an_extreme_of_one_sample_is_in_every_figure() {
+    let figures = drawn(2, 10_000, |k| if k == 7777 { 3.0 } else { 0.1 });
+    for (figure, peak) in figures.iter().zip(["30.000°", "0.120 N", "15.000 m/s", "0.150 s"]) {
+        assert!(figure.description.contains(&format!("at most {peak}.")), "{}", figure.description);
+    }
+}
+
+#[test]
+fn the_figures_of_a_large_swarm_are_bounded() {
+    let figures = drawn(3000, 60, |k| 1e-3 * (1.0 + (k as f64).sin()));
+    assert_eq!(figures.len(), 4);
+    for figure in &figures {
+        assert!(figure.svg.len() < 60_000, "{}: {} bytes", figure.name, figure.svg.len());
+        assert!(Drawing::of(figure).words().iter().any(|word| word == "5 to 95 %"), "{}", figure.name);
+    }
+}
+
+#[test]
+fn a_channel_of_other_columns_or_of_other_vehicles_has_no_figure() {
+    let mut history = RunHistory::new();
+    let (swarm, control) = (Swarm::at_rest(Rows::zeros(2)), Rows::zeros(2));
+    let euler = Channel { values: vec![0.0; 6], ..Channel::new("attitude", &["roll", "pitch", "yaw"]) };
+    let [_, rotors, ..] = channels(3, 1.0);
+    history.observe(&Sample { channels: &[euler, rotors], ..Sample::new(0.0, 0, &swarm, &control) });
+    assert!(figures::channels(&history, Some(MOST_N)).is_empty());
+}
