@@ -9,7 +9,7 @@ use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash, record_beside};
-use crate::report::{Findings, Hulls, Performance, Report, Run, VehicleNumbers, Verification};
+use crate::report::{Findings, Hulls, Network, Performance, Report, Run, VehicleNumbers, Verification};
 use crate::scenario::Scenario;
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 use crate::vehicle::Quadrotor;
@@ -131,6 +131,7 @@ fn report(
         engine_contact_pairs: scenario.engine().is_some().then_some(flight.engine_contacts.len() as u64),
         hulls: &hulls,
         vehicle: vehicle.as_ref(),
+        network: flight.traffic.map(|of| Network { sent: of.sent, lost: of.lost, age_p95_s: of.age_p95_s }),
         summary: &metrics.finish(),
         legs: scenario.legs.len(),
         ended_legs: metrics.ended_legs(),

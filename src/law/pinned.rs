@@ -67,7 +67,7 @@ impl PinnedConsensus {
         let is_star = leaves + 1 == self.graph.count()
             && matches!(self.pinning, Pinning::Nobody | Pinning::All)
             && most - least == (leaves - 1) as f64;
-        is_star.then(|| HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
+        is_star.then_some(HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
     }
 
     /// Adds to row i `scale` times the sum over neighbours j of `k (e_i - e_j) + c (v_i - v_j)`, and

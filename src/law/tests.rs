@@ -54,6 +54,49 @@ fn a_state_that_each_holds_is_answered_like_the_same_state_shared() {
 }
 
 #[test]
+fn a_vehicle_rests_on_its_own_picture_and_on_that_of_nobody_else() {
+    let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
+    let pictures = |vehicle: Option<usize>| {
+        let mut held = Held {
+            heard: vec![swarm.clone(); COUNT],
+            ages_s: vec![vec![0.0; COUNT]; COUNT],
+            seen: vec![swarm.clone(); COUNT],
+        };
+        if let Some(vehicle) = vehicle {
+            // Everybody else stands and flies a little elsewhere, as this one has it.
+            for picture in [&mut held.heard[vehicle], &mut held.seen[vehicle]] {
+                picture.positions_m.iter_mut().enumerate().for_each(|(k, x)| *x += 0.05 * libm::sin(k as f64));
+                picture.velocities_m_s.iter_mut().enumerate().for_each(|(k, v)| *v += 0.2 * libm::cos(k as f64));
+            }
+        }
+        held
+    };
+    for spec in LawSpec::all() {
+        for links in [Graph::complete(COUNT), Graph::star(COUNT), Graph::ring(COUNT)] {
+            let mut law = built(&spec, &links, &formation);
+            let mut asked = |vehicle: Option<usize>| {
+                let held = pictures(vehicle);
+                let at = Observation { others: Others::Held(&held), ..Observation::exact(&swarm, &links, &formation) };
+                command(law.as_mut(), &at)
+            };
+            let plain = asked(None);
+            let mut own = 0;
+            for vehicle in 0..COUNT {
+                let other = asked(Some(vehicle));
+                let changed = |i: usize| (0..3).any(|axis| other[(i, axis)] != plain[(i, axis)]);
+                own += u32::from(changed(vehicle));
+                assert!(
+                    (0..COUNT).all(|i| i == vehicle || !changed(i)),
+                    "{spec:?}: somebody looks at {vehicle}'s picture"
+                );
+            }
+            // Half-spaces may leave a vehicle what it wants whatever it sees.
+            assert!(own > 0, "{spec:?}: nobody looks at the own picture");
+        }
+    }
+}
+
+#[test]
 fn a_law_that_follows_new_slots_is_the_law_of_these_slots() {
     let (swarm, first, next) = (swarm(), Formation::grid(COUNT, 2.0), Formation::grid(COUNT, 2.6));
     for spec in LawSpec::all() {

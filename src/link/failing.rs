@@ -16,19 +16,19 @@ pub(super) struct Failing {
 struct Failed {
     vehicle: usize,
     at_s: f64,
-    /// Of one that keeps its command: nothing until it fails.
-    keeps: Option<Option<Vector3<f64>>>,
+    /// What it commands then \[m/s^2\]; not known yet of one that keeps its command.
+    kept: Option<Vector3<f64>>,
 }
 
 impl Failing {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let failed = scenario.failures.iter().filter_map(|failure| {
-            let keeps = match failure.kind {
-                FailureKind::Dead {} => None,
-                FailureKind::Frozen {} => Some(None),
+            let kept = match failure.kind {
+                FailureKind::Dead {} => Some(Vector3::zeros()),
+                FailureKind::Frozen {} => None,
                 FailureKind::Silent {} | FailureKind::Rotor { .. } => return None,
             };
-            Some(Failed { vehicle: failure.index(), at_s: failure.at_s, keeps })
+            Some(Failed { vehicle: failure.index(), at_s: failure.at_s, kept })
         });
         Self { all: failed.collect() }
     }
@@ -36,10 +36,7 @@ impl Failing {
     /// Changes the commands that are given at a time \[s\].
     pub(super) fn act(&mut self, time_s: f64, command: &mut Rows) {
         for failed in self.all.iter_mut().filter(|failed| time_s + SAME_S >= failed.at_s) {
-            let kept = match &mut failed.keeps {
-                None => Vector3::zeros(),
-                Some(kept) => *kept.get_or_insert_with(|| row(command, failed.vehicle)),
-            };
+            let kept = *failed.kept.get_or_insert_with(|| row(command, failed.vehicle));
             set_row(command, failed.vehicle, kept);
         }
     }

@@ -8,7 +8,7 @@ use super::messages::Messages;
 use super::sensing::{Sensing, Sight};
 use crate::observation::{Neighbour, Others, Picture};
 use crate::record::Channel;
-use crate::scenario::{Missing, NearBy, Scenario};
+use crate::scenario::{Failure, Missing, NearBy, Scenario};
 use crate::swarm::{Rows, Swarm, row};
 
 /// Solver steps of continuous time within the shortest delay, so that the past is interpolated finely enough.
@@ -63,7 +63,7 @@ impl World {
     fn new(scenario: &Scenario, senses: bool) -> Self {
         let (sensing, sight) = (Sensing::new(scenario), Sight::new(scenario));
         let late_s = scenario.network.latency_s;
-        let is_heard = !scenario.network.is_exact() || scenario.failures.iter().any(|failure| failure.is_silent());
+        let is_heard = !scenario.network.is_exact() || scenario.failures.iter().any(Failure::is_silent);
         let network = match scenario.message_hz().filter(|_| is_heard) {
             Some(rate_hz) => Network::Messages(Box::new(Messages::new(scenario, &sensing, rate_hz))),
             None if late_s > 0.0 => {

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::hulls::Hulls;
+use super::network::Network;
 use super::strain::VehicleNumbers;
 use crate::audit::{AuditOutcome, ClearanceOutcome, Status};
 use crate::law::Certificate;
@@ -46,6 +47,8 @@ pub struct Findings<'a> {
     pub hulls: &'a Hulls,
     /// What was asked of bodies that turn.
     pub vehicle: Option<&'a VehicleNumbers>,
+    /// What became of messages, where they were sent one by one.
+    pub network: Option<Network>,
     /// Numbers of the samples.
     pub summary: &'a Summary,
     /// Number of legs that were asked for.

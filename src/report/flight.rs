@@ -9,6 +9,7 @@ use super::ellipsoid::Ellipsoid;
 use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
 use super::legs::{self, LegNumbers};
+use super::network::Network;
 use super::obstacles::Obstacles;
 use super::strain::VehicleNumbers;
 use super::verdict::{Fails, Verdict, at_rest, rises};
@@ -38,6 +39,9 @@ pub struct Report {
     /// What was asked of bodies that turn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<VehicleNumbers>,
+    /// What became of messages, where they were sent one by one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network: Option<Network>,
     /// How vehicles kept clear of obstacles, where there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacles: Option<Obstacles>,
@@ -277,6 +281,7 @@ impl Report {
                 rapier: Rapier { contact_pairs: findings.engine_contact_pairs },
             },
             vehicle: findings.vehicle.cloned(),
+            network: findings.network,
             obstacles: Obstacles::of(findings),
             hulls: findings.hulls.clone(),
             formation: FormationNumbers {

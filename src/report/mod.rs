@@ -13,6 +13,7 @@ mod flight;
 mod html;
 mod hulls;
 mod legs;
+mod network;
 mod obstacles;
 pub mod page;
 pub mod recorded;
@@ -33,6 +34,7 @@ pub use flight::{
 pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
+pub use network::Network;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
 pub use strain::VehicleNumbers;
 pub use verdict::{Fails, Verdict};

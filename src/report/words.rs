@@ -145,6 +145,7 @@ impl Report {
         let ellipsoid = self.separation.ellipsoid.iter();
         rows.extend(ellipsoid.map(|ellipsoid| ("ellipsoids".to_owned(), ellipsoid.line())));
         rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
+        rows.extend(self.network.iter().map(|network| ("network".to_owned(), network.line())));
         rows.extend(self.vehicle.iter().map(|vehicle| ("vehicle".to_owned(), vehicle.line())));
         rows.extend(super::legs::lines(&self.legs));
         let rest = [

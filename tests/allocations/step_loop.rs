@@ -103,8 +103,19 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
             "formation={shape=\"circle\", radius_m=200}",
         ],
     );
+    let imperfect = builtin(
+        "pentagon",
+        &[
+            "sensing={position_noise_m=0.01, rate_hz=100, latency_s=0.01}",
+            "network={latency_s=0.01, jitter_s=0.01, loss=0.2, loss_burst=2, rate_hz=100, missing=\"extrapolate\"}",
+            "actuation={max_accel_m_s2=2, lag_s=0.05}",
+            "law.kind=displacement",
+        ],
+    );
     let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
-    for (name, scenario) in [("five vehicles", &pentagon), ("law and audit side by side", &crowd)] {
+    for (name, scenario) in
+        [("five vehicles", &pentagon), ("law and audit side by side", &crowd), ("every imperfection", &imperfect)]
+    {
         let law = || scenario.law().expect("a law");
         let euler = || {
             let (state, held) = (scenario.start.clone(), Rows::zeros(scenario.count()));

@@ -57,6 +57,31 @@ fn a_saved_and_loaded_flight_with_every_imperfection_has_the_same_bits() {
 }
 
 #[test]
+fn a_scenario_with_every_imperfection_is_written_back_as_it_was_read() {
+    let more = [
+        "sensing.near_latency_s=0.005",
+        "network.near=heard",
+        "network.failure=[{link=[1, 3], from_s=1, to_s=2.5}, {link=[4, 2], from_s=3}]",
+        "failure=[{vehicle=2, at_s=1, kind=\"dead\"}, {vehicle=5, at_s=2, kind=\"silent\"}, {vehicle=1, at_s=3, kind=\"frozen\"}]",
+        "noise.seed=7",
+    ];
+    let sets: Vec<_> = ALL.into_iter().chain(more).collect();
+    let scenario = builtin("pentagon", &sets);
+    let again = read(&scenario.resolved_toml());
+    assert_eq!(scenario, again);
+    assert_eq!((again.network.failure.len(), again.failures.len(), again.time.control_hz), (2, 3, Some(60.0)));
+    let (flight, log) = fly(&scenario);
+    assert!(flight.steps > 900, "{:?}", flight.ending);
+    let ages =
+        log.samples.last().expect("samples").channels.iter().find(|channel| channel.name.as_ref() == "message_age");
+    let ages = &ages.expect("ages of messages").values;
+    // The oldest of each, and the mean of who is heard: vehicle 5 has been silent for 2 s.
+    assert_eq!(ages.len(), 10);
+    assert!(ages.chunks(2).all(|age| age[0] >= age[1] && age[1] > 0.0), "{ages:?}");
+    assert!(ages[0] > 1.9 && ages[8] < 1.0 && flight.traffic.is_some_and(|traffic| traffic.lost > 0), "{ages:?}");
+}
+
+#[test]
 fn the_seed_changes_the_noise_and_nothing_else_and_threads_change_nothing() {
     let flown = |sets: &[&str], threads: usize| {
         let sets: Vec<_> = ALL.into_iter().chain(sets.iter().copied()).collect();

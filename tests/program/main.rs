@@ -11,6 +11,7 @@ mod determinism;
 mod doors;
 mod ellipsoids;
 mod exports;
+mod imperfections;
 mod interruption;
 mod keys;
 mod margin;

@@ -1,0 +1,75 @@
+//! Sensing, network, actuation and failures: what is wrong is refused at its place, and the built-in leader shows what it says.
+
+use serde_json::Value;
+
+use crate::program::{TAUTLINE, ran_by};
+
+#[test]
+fn a_wrong_imperfection_is_refused_with_place_value_and_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ideal = "plant.kind=ideal";
+    let cases: [(&[&str], &str, &str); 23] = [
+        (&["sensing.position_noise_m=-0.1"], "position is -0.1", "at least 0"),
+        (&["sensing.position_noise_m=nan"], "not a number", "finite"),
+        (&["sensing.position_noise_m=0.1"], "drawn anew with each measurement", "sensing.rate_hz"),
+        (&["sensing.rate_hz=0"], "the rate of measurements is 0", "more than 0"),
+        (&["sensing.latency_s=200"], "is 200 s in a flight of 120 s", "enlarge time.duration_s"),
+        (&["sensing.latency_s=1e-9"], "is 0.000000001 s", "at least 0.000001"),
+        (&["sensing.rate_hz=100", ideal], "continuous time", "actuation.control_hz"),
+        (&["network.loss=1.5", "network.rate_hz=50"], "is 1.5", "at most 1"),
+        (&["network.loss=-0.5", "network.rate_hz=50"], "is -0.5", "at least 0"),
+        (&["network.loss=0.1"], "nothing says how often", "set network.rate_hz"),
+        (&["network.jitter_s=0.1"], "nothing says how often", "set network.rate_hz"),
+        (&["network.loss=0.8", "network.loss_burst=2", "network.rate_hz=50"], "bursts of 2 lost", "at least 4"),
+        (&["network.latency_s=121"], "is 121 s in a flight", "enlarge time.duration_s"),
+        (&["network.missing=guess"], "guess", "extrapolate"),
+        (
+            &["network.rate_hz=50", "network.failure=[{link=[1, 9], from_s=1}]"],
+            "no link between vehicles 1 and 9",
+            "edge of",
+        ),
+        (
+            &["network.rate_hz=50", "network.failure=[{link=[1, 2], from_s=3, to_s=2}]"],
+            "from 3 s to 2 s",
+            "later than that",
+        ),
+        (&["actuation.max_accel_m_s2=0"], "largest acceleration is 0", "more than 0"),
+        (&["actuation.lag_s=0.1", ideal], "without a lag", "plant.kind"),
+        (&["actuation.control_hz=50", "time.control_hz=60"], "both are the control rate", "keep one"),
+        (&["failure=[{vehicle=6, at_s=1, kind=\"dead\"}]"], "vehicle 6 is to fail, and there are 5", "counted from 1"),
+        (&["failure=[{vehicle=1, at_s=500, kind=\"dead\"}]"], "at 500 s", "within the flight"),
+        (&["failure=[{vehicle=1, at_s=5, kind=\"silent\"}]"], "nothing says how often", "set network.rate_hz"),
+        (&["failure=[{vehicle=1, at_s=5, kind=\"frozen\"}]", ideal], "hold no command", "actuation.control_hz"),
+    ];
+    for (sets, said, remedy) in cases {
+        let mut arguments = vec!["check", "pentagon"];
+        sets.iter().for_each(|set| arguments.extend(["--set", set]));
+        let ran = ran_by(TAUTLINE, folder.path(), &arguments);
+        let message = ran.err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" ");
+        assert_eq!(ran.exit, Some(2), "{sets:?}: {message}");
+        assert!(message.contains(said) && message.contains(remedy), "{sets:?}: {message}");
+        assert!(message.contains("--set:1:") && !message.contains("panicked"), "{sets:?}: {message}");
+    }
+}
+
+#[test]
+fn what_is_lost_does_no_harm_where_it_is_carried_along_and_does_where_it_is_held() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let fly = |more: &[&str]| {
+        let ran =
+            ran_by(TAUTLINE, folder.path(), &[&["run", "leader-lossy", "--json", "--quiet", "--force"], more].concat());
+        let report: Value = serde_json::from_str(&ran.out).unwrap_or_else(|_| panic!("{}", ran.err));
+        (ran.exit, report)
+    };
+    let (exit, report) = fly(&[]);
+    assert_eq!((exit, &report["formation"]["reached"]), (Some(0), &Value::Bool(true)), "{report:#}");
+    let network = &report["network"];
+    let count = |key: &str| network[key].as_f64().expect(key);
+    // 40 s at 50 Hz on eight links one way, the first message at once.
+    assert_eq!(count("sent"), 2001.0 * 8.0);
+    assert!((0.08..0.13).contains(&(count("lost") / count("sent"))), "{network}");
+    assert!(count("age_p95_s") > 0.03, "{network}");
+    assert_eq!(report["separation"]["certified_m"], Value::Null);
+    let (exit, report) = fly(&["--set", "network.missing=hold"]);
+    assert_eq!((exit, &report["formation"]["reached"]), (Some(1), &Value::Bool(false)));
+}
