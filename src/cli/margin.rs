@@ -23,7 +23,7 @@ const LAST_SEED: u64 = i64::MAX as u64 - MOST_RUNS;
 #[command(after_help = "\
 Exits with 0 where the verdict turns or holds everywhere, with 1 where it holds nowhere or the search was interrupted. Flown \
 once (--runs 1) everything but the key is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and \
-a start without randomness is moved a little. docs/margins.md says more.")]
+where nothing is random the start is moved a little. docs/margins.md says more.")]
 pub(super) struct MarginArguments {
     #[command(flatten)]
     what: ScenarioArguments,

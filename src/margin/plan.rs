@@ -7,7 +7,8 @@ use crate::preflight::{PredictedMargin, Preflight};
 use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
 use crate::sim::SimError;
 
-/// A start without randomness is moved by up to this part of delta along each axis, where it is flown more than once.
+/// Where neither start nor flight has randomness, a start that is flown more than once is moved by up to this part of delta along
+/// each axis.
 pub(super) const JITTER: f64 = 0.05;
 
 /// What a flight has to show.
@@ -84,8 +85,8 @@ impl Question {
 }
 
 impl Plan {
-    /// A search over `key`. Flown more than once, a start without randomness gets a jitter of 5 % of delta along each axis,
-    /// and run k has the seed `seed` + k for start and noise; flown once, everything but the key is as the file says.
+    /// A search over `key`. Flown more than once, run k has the seed `seed` + k for start and noise, and where neither start nor
+    /// flight has any randomness, the start gets a jitter of 5 % of delta along each axis; flown once, everything but the key is as the file says.
     ///
     /// The source must be one that can be read again: standard input is read by [`Source::resolve`] once.
     ///
@@ -101,16 +102,15 @@ impl Plan {
         check(range)?;
         let as_it_is = |error| MarginError::Scenario { set: "the keys as they are".to_owned(), error };
         let template = Template::read(&source, overrides).map_err(as_it_is)?;
-        let is_drawn = asked.runs > 1 && !template.start_is_random();
-        let jitter = is_drawn.then(|| format!("start.jitter_m={:?}", JITTER * template.own().delta_m));
         // A law that does not exist is told of where it is to be flown.
         let predicted = Preflight::of(template.own()).map(|preflight| preflight.margins).unwrap_or_default();
         let predicted = predicted.into_iter().filter(|margin| is_same(margin.key, key)).collect();
         let (overrides, key) = (overrides.to_vec(), key.to_owned());
-        let plan = Self { source, overrides, template, key, range, asked, jitter, predicted };
-        for value in [range.from, range.to] {
-            plan.scenario(value, 0)?;
-        }
+        let mut plan = Self { source, overrides, template, key, range, asked, jitter: None, predicted };
+        let ends = [plan.scenario(range.from, 0)?, plan.scenario(range.to, 0)?];
+        let is_random = plan.template.start_is_random() || ends.iter().any(Scenario::is_random_in_flight);
+        let moves = asked.runs > 1 && !is_random;
+        plan.jitter = moves.then(|| format!("start.jitter_m={:?}", JITTER * plan.own().delta_m));
         Ok(plan)
     }
 

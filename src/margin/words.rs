@@ -73,7 +73,7 @@ impl Margin {
         });
         let jitter = self.jittered.then(|| {
             format!(
-                "the start has no randomness: start.seed moves each coordinate by up to {} m ({} % of delta)",
+                "neither start nor flight has any randomness: start.seed moves each coordinate by up to {} m ({} % of delta)",
                 metres(JITTER * self.delta_m),
                 100.0 * JITTER
             )

@@ -94,8 +94,8 @@ impl FoxgloveScene {
         let fliers: Vec<_> = fliers.collect();
         let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
         let hulls = hulls.map(|k| sphere(positions_m, k, self.radius_m[k], hull_colour(k)));
-        let bodies = fliers.iter().map(|flier| flier.body.clone());
-        let rotors = fliers.iter().flat_map(|flier| flier.rotors.clone());
+        let bodies = fliers.iter().map(|flier| flier.body);
+        let rotors = fliers.iter().flat_map(|flier| flier.rotors);
         let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
             Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
             _ => None,

@@ -61,11 +61,9 @@ impl Case {
     pub(super) fn good() -> Self {
         let certificate = Certificate {
             certified_m: Some(2.055_307),
-            certified_until_s: None,
-            certified_room_m: None,
             energy_initial: Some(3.656),
             void: vec![],
-            legs: vec![],
+            ..Certificate::void(Void::NoBarrier)
         };
         Self {
             audit: passing(2.4607),
@@ -291,14 +289,8 @@ fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
 #[test]
 fn rounding_breaks_no_certificate() {
     // A swarm that starts in its own formation certifies its own distances, and flies in single precision.
-    let certificate = Certificate {
-        certified_m: Some(3.0),
-        certified_until_s: None,
-        certified_room_m: None,
-        energy_initial: Some(0.0),
-        void: vec![],
-        legs: vec![],
-    };
+    let void = Vec::new();
+    let certificate = Certificate { certified_m: Some(3.0), void, ..Certificate::void(Void::NoBarrier) };
     let case = Case { audit: passing(2.999_999_88), certificate: certificate.clone(), ..Case::good() };
     assert!(case.report().verdict.pass && !case.report().headline().contains("breaks"), "{:?}", case.report().verdict);
     let case = Case { audit: passing(2.998), certificate, ..Case::good() };

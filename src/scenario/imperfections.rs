@@ -17,6 +17,13 @@ const BYTES_PER_MESSAGE: u128 = 8;
 const SHORTEST_S: f64 = 1e-6;
 
 impl Scenario {
+    /// Whether another seed of noise gives another flight.
+    #[must_use]
+    pub fn is_random_in_flight(&self) -> bool {
+        let Self { wind, sensing, network, .. } = self;
+        wind.turbulence.is_some() || sensing.is_noisy() || network.loss > 0.0 || network.jitter_s > 0.0
+    }
+
     /// Errors and times that are such, errors with a rate at which they are drawn, and nothing that continuous time cannot have.
     pub(super) fn check_sensing(&self) -> Result<(), ScenarioError> {
         let SensingSpec { rate_hz, latency_s, near_latency_s, .. } = self.sensing;

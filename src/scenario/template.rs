@@ -91,8 +91,7 @@ impl Template {
     /// Whether another seed of noise gives another flight.
     #[must_use]
     pub fn flight_is_random(&self) -> bool {
-        let Scenario { wind, sensing, network, .. } = &self.own;
-        wind.turbulence.is_some() || sensing.is_noisy() || network.loss > 0.0 || network.jitter_s > 0.0
+        self.own.is_random_in_flight()
     }
 
     /// Names of all laws that can be flown: those of `[laws.NAME]`, then every kind that is not among them.

@@ -91,7 +91,7 @@ pub(super) struct VehicleTable {
     /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
     /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
     #[serde(skip_serializing_if = "is_none")]
-    #[cfg_attr(feature = "schema", schemars(range(min = 0.0)))]
+    #[cfg_attr(feature = "schema", schemars(extend("minimum" = 0)))]
     pub(super) drag_per_s: f64,
 }
 

@@ -11,8 +11,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::GRAVITY_M_S2;
-use super::model::Model;
+use super::model::{GRAVITY_M_S2, Model};
 
 /// Least share of the weight that a command may ask the rotors to lift: one that asks for less would turn the vehicle over.
 pub const LEAST_LIFT: f64 = 0.3;

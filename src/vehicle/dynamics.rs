@@ -2,11 +2,10 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
-use super::GRAVITY_M_S2;
 use super::attitude::Attitude;
 use super::downwash::Downwash;
 use super::mixer::Mixer;
-use super::model::{Model, Quadrotor};
+use super::model::{GRAVITY_M_S2, Model, Quadrotor};
 use super::rotor::{RotorCurve, RotorLag};
 
 /// Where a quadrotor is, how it moves and how fast its rotors turn.

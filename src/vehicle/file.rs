@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use toml::de::DeTable;
 
-use super::model::{Model, ModelError};
+use super::check::ModelError;
+use super::model::Model;
 
 /// The built-in models by name, with the text of their files.
 pub const MODELS: [(&str, &str); 3] = [

@@ -9,6 +9,7 @@
 //! the order of the model.
 
 mod attitude;
+mod check;
 mod downwash;
 mod dynamics;
 #[cfg(feature = "files")]
@@ -20,18 +21,16 @@ mod rotor;
 mod unicycle;
 
 pub use attitude::{Attitude, LEAST_LIFT, THRUST_RESERVE};
+pub use check::ModelError;
 pub use downwash::{AIR_DENSITY_KG_M3, Downwash};
 pub use dynamics::{Drift, Dynamics, Ground, State, Wrench};
 #[cfg(feature = "files")]
 pub use file::{MODELS, Misread, read};
 pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
 pub use mixer::Mixer;
-pub use model::{Model, ModelError, Quadrotor, Turn};
+pub use model::{GRAVITY_M_S2, Model, Quadrotor, Turn};
 pub use rotor::{RotorCurve, RotorLag};
 pub use unicycle::{Heading, Steering, Unicycle};
-
-/// Standard acceleration of gravity \[m/s^2\]. Some published models use 9.8 or 9.81.
-pub const GRAVITY_M_S2: f64 = 9.80665;
 
 /// What kind of body a vehicle is.
 #[derive(Clone, Debug, Default, PartialEq)]

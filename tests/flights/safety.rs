@@ -51,22 +51,20 @@ fn two_that_may_pass_above_each_other_as_balls_go_around_as_ellipsoids() {
 #[test]
 fn a_hundred_random_flights_keep_what_is_certified_of_scaled_lengths() {
     let mut unlike = 0;
-    for flight in 0..100_u32 {
-        let random = |k: u32| f64::from((flight * 7919 + k * 104_729 + 31) % 4099) / 4099.0;
-        let ratio = [3.0, 2.0, 0.5, 5.0][flight as usize % 4];
+    for flight in 0..100 {
+        let random = |k: usize| ((flight * 7919 + k * 104_729 + 31) % 4099) as f64 / 4099.0;
+        let ratio = [3.0, 2.0, 0.5, 5.0][flight % 4];
         // Points of a lattice in scaled lengths, 1.5 apart and each off by less than 0.2.
-        let cloud = |seed: u32| {
+        let cloud = |seed: usize| {
             let place = |i: usize, axis: usize| 1.5 * [i % 2, (i / 2) % 2, i / 4][axis] as f64;
-            let off = |i: usize, axis: usize| 0.4 * (random(seed + (3 * i + axis) as u32) - 0.5);
+            let off = |i: usize, axis: usize| 0.4 * (random(seed + 3 * i + axis) - 0.5);
             Rows::from_fn(6, |i, axis| (place(i, axis) + off(i, axis)) * if axis == 2 { ratio } else { 1.0 })
         };
         let mut slots = cloud(200);
         slots.swap_rows(0, 5);
         slots.swap_rows(1, 4);
-        let start = Swarm {
-            positions_m: cloud(0),
-            velocities_m_s: Rows::from_fn(6, |i, k| random(400 + (3 * i + k) as u32) - 0.5),
-        };
+        let start =
+            Swarm { positions_m: cloud(0), velocities_m_s: Rows::from_fn(6, |i, k| random(400 + 3 * i + k) - 0.5) };
         let mut scenario =
             Scenario { safety: Safety::Ellipsoid { half_height_m: 0.5 * ratio }, ..five_seconds(start, slots) };
         scenario.hull_radius_m.fill(0.1);

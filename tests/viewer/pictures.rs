@@ -38,9 +38,9 @@ fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
         camera,
         depth_m: [1.0, 30.0],
         background: BACKGROUND,
+        shell_ratio: 1.0,
         balls: balls.to_vec(),
         discs: Vec::new(),
-        shell_ratio: 1.0,
         shells: Vec::new(),
         lines: Vec::new(),
         annotations: Vec::new(),
@@ -93,6 +93,21 @@ fn a_ball_is_as_many_pixels_wide_as_its_radius_asks_for() {
                 assert!((-0.6..=2.0).contains(&slack), "{radius_m} m: {width} pixels, expected {}", 2.0 * expected_px);
             }
             assert!((left + right + 1.0 - 301.0).abs() <= 1.0 && (top + bottom + 1.0 - 201.0).abs() <= 1.0);
+        }
+    }
+}
+
+#[test]
+fn a_shell_is_as_high_as_its_ratio_asks_for_and_as_wide_as_before() {
+    let mut renderer = renderer();
+    for (ratio, lens, radius_m) in [(1.0_f32, 3.0, 1.0_f32), (2.5, 3.0, 1.0), (0.4, 3.0, 2.0)] {
+        let mut scene = scene(Some(lens), &[]);
+        scene.shells.push(ball([0.0; 3], radius_m, WHITE));
+        scene.shell_ratio = ratio;
+        let [left, right, top, bottom] = extent(&renderer.paint(&scene).expect("a picture")).map(f64::from);
+        let width_px = 201.0 * f64::from(radius_m) / lens;
+        for (found, expected) in [(right - left + 1.0, width_px), (bottom - top + 1.0, width_px * f64::from(ratio))] {
+            assert!((-0.6..=2.0).contains(&(found - expected)), "{ratio}: {found} pixels, expected {expected}");
         }
     }
 }

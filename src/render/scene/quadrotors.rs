@@ -7,8 +7,8 @@ use super::colour::Colour;
 use super::draw_list::{Ball, Disc, Line, single};
 use crate::render::timeline::QuadrotorShape;
 
-/// Least radius of a hull that is drawn with arms in a picture 720 pixels high, and in any \[pixels\]: a smaller one is a ball,
-/// which is seen better.
+/// Least radius of a hull that is drawn with arms in a picture 720 pixels high, and in any \[pixels\]: a smaller one is
+/// a ball, which is seen better.
 const LEAST_PX: [f64; 2] = [9.0, 6.0];
 /// In units of the arm: radius of the body and of the mark ahead, how far ahead that is, height of the rotors above the
 /// body's middle, width of an arm.
@@ -98,8 +98,8 @@ impl SceneBuilder<'_> {
         discs.extend(ordered.into_iter().map(|(_, disc)| disc));
     }
 
-    /// Arms, the neck of the mark ahead, and in every disc its diameter across the line of sight, which is seen from its
-    /// edge too.
+    /// Arms, the neck of the mark ahead, and in every disc its diameter across the line of sight, which is seen from
+    /// its edge too.
     pub(super) fn arms(&self, lines: &mut Vec<Line>) {
         let unit_px = self.view.unit_px();
         for (quadrotor, colour) in self.quadrotors() {
