@@ -287,9 +287,9 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     if arguments.html.is_some() {
         auditor = auditor.with_smallest();
     }
-    let telling = own.as_ref().filter(|own| own.is_told_in(settings.ellipsoid_m));
-    telling.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
-    telling.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
+    own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
+    own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
+    own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
     let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);

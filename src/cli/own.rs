@@ -5,6 +5,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+use super::Failure;
 use super::own_obstacles::OwnObstacles;
 use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::mcap::{Entry, McapRecording};
@@ -95,9 +96,20 @@ impl OwnRecording {
         Some(own)
     }
 
-    /// Whether what it says of the time between samples is of the lengths that are asked about.
-    pub(super) fn is_told_in(&self, ellipsoid_m: Option<Vector3<f64>>) -> bool {
-        self.ellipsoid_m.is_none() || self.ellipsoid_m == ellipsoid_m
+    /// Refuses other lengths than those in which it says what happened between its samples: that would be lost.
+    pub(super) fn check_told_in(&self, ellipsoid_m: Option<Vector3<f64>>) -> Result<(), Failure> {
+        let Some(axes) = self.ellipsoid_m.filter(|_| !self.has_every_step && self.ellipsoid_m != ellipsoid_m) else {
+            return Ok(());
+        };
+        let (x, y, z) = (axes.x, axes.y, axes.z);
+        Err(Failure::input(
+            format!(
+                "the run says what happened between its samples in lengths over its ellipsoids, of half axes {x:?}, {y:?} and {z:?} m"
+            ),
+            format!(
+                "leave out --delta and --ellipsoid, ask with --ellipsoid {x:?},{y:?},{z:?}, or record every step of the run"
+            ),
+        ))
     }
 
     /// What a person should know about how it was flown and is judged, by clocks that were all set right alike or not.

@@ -206,7 +206,7 @@ impl fmt::Display for Void {
                 f.write_str("The wind pushes the leader off the reference: its followers are told another motion.")
             }
             Self::NotAPoint => f.write_str(
-                "The vehicles are no points: they tilt and their rotors lag before a command is carried out (vehicle.model).",
+                "The vehicles are no points: a command is not carried out at once and as it is given (vehicle.model).",
             ),
             Self::ReferenceNotFed => {
                 f.write_str("The vehicles are not told how their reference moves (reference.feed_forward).")

@@ -86,9 +86,10 @@ pub(super) fn beyond(margins: &[PredictedMargin], scenario: &Scenario) -> Option
             Bound::AtLeast => (asked < value, "least"),
         };
         is_beyond.then(|| {
+            let what = if margin.key == HEARD_LATE { "of the swarm, its common motion too," } else { "about the formation" };
             format!(
-                "{} is {asked}, and the {most} at which a small disturbance about the formation decays is {}: it will not \
-                 settle there.",
+                "{} is {asked}, and the {most} at which a small disturbance {what} decays, with everything else exact, is {}: \
+                 beyond it grows.",
                 margin.key,
                 significant(value)
             )
@@ -108,5 +109,5 @@ pub(super) fn line(margins: &[PredictedMargin]) -> Option<String> {
         Some(parts.fold(format!("{key} {first}"), |line, part| format!("{line}, {part}")))
     };
     let lines: Vec<_> = [KNOWN_LATE, HEARD_LATE, COMMANDED].into_iter().filter_map(of).collect();
-    (!lines.is_empty()).then(|| lines.join("; "))
+    (!lines.is_empty()).then(|| lines.join("; ") + " (each alone, all else exact)")
 }

@@ -85,7 +85,8 @@ impl Report {
         let closest = [pair, at].into_iter().flatten().collect::<Vec<_>>().join(" ");
         let certificate = if separation.certified_m.is_some() {
             let anew = self.changes().map(|changes| format!(", and anew at {changes}"));
-            format!("promised before the first step{}", anew.unwrap_or_default())
+            let until = separation.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+            format!("promised before the first step{}{}", anew.unwrap_or_default(), until.unwrap_or_default())
         } else {
             separation.certificate_void.join(" ")
         };
@@ -194,7 +195,7 @@ impl Report {
                 short(time.max_rate_dt),
                 time.max_halvings
             ),
-            "The audit sweeps every pair over every whole step, so nothing passes between samples: the closed form of the \
+            "The audit sweeps every pair over every whole step, along the straight line between its ends, so nothing passes between samples: the closed form of the \
              smallest distance decides, in double precision and to 4 units of rounding of the pair's distance, and a shape \
              cast by parry must agree. The engine's own contacts are evidence alone."
                 .to_owned(),

@@ -13,6 +13,7 @@ use super::slots::is_flat;
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
 use super::time::TimeSpec;
+use super::time_table::TimeTable;
 use super::values::{Edge, PerVehicle, Point, rows};
 use crate::graph::{Graph, GraphError};
 use crate::swarm::{Rows, Swarm, set_row};
@@ -46,8 +47,8 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m + CONTACT_PREDICTION_M));
     let obstacles = document.obstacle.iter().enumerate();
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
-    let time = document.time.complete(count, document.arrival.hold_s, &airframe);
-    let control_hz = document.actuation.control_hz(time.control_hz)?;
+    let control_hz = document.actuation.control_hz(document.time.control_hz)?;
+    let time = TimeTable { control_hz, ..document.time }.complete(count, document.arrival.hold_s, &airframe);
     let mut scenario = Scenario {
         start,
         mass_kg: per_vehicle(mass_kg, count),
@@ -65,7 +66,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
             }
             PlantTable { kind: PlantKind::Ideal, .. } => PlantSpec::Ideal,
         },
-        time: TimeSpec { control_hz, ..time },
+        time,
         sensing: document.sensing,
         network: document.network,
         actuation: document.actuation.spec(),

@@ -9,6 +9,8 @@ use super::sensing::SensingSpec;
 use super::spec::Scenario;
 use crate::vehicle::RotorFailure;
 
+/// Most messages that a vehicle sends in a step.
+const MESSAGES_A_STEP: f64 = 10.0;
 /// Memory expected for a link in one direction: what was heard over it last \[bytes\].
 const BYTES_PER_LINK: u128 = 80;
 /// And for each message that may be under way on it.
@@ -138,6 +140,15 @@ impl Scenario {
         let Some(rate_hz) = self.message_hz() else { return Ok(()) };
         if self.network.is_exact() && self.sensing.is_exact() {
             return Ok(());
+        }
+        if rate_hz * self.time.dt_s > MESSAGES_A_STEP {
+            return Err(ScenarioError::new(format!(
+                "{rate_hz} messages a second are more than {MESSAGES_A_STEP} in a step of {} s, and only the last one counts",
+                self.time.dt_s
+            ))
+            .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
+            .at("network.rate_hz")
+            .at("sensing.rate_hz"));
         }
         let count = self.count() as u128;
         let pairs = count * count.saturating_sub(1);

@@ -87,7 +87,7 @@ impl NetworkSpec {
     /// Whether everything that is sent is heard at once.
     #[must_use]
     pub fn is_exact(&self) -> bool {
-        Self { missing: Missing::Hold, near: NearBy::Seen, ..self.clone() } == Self::default()
+        Self { missing: Missing::Hold, near: NearBy::Seen, loss_burst: None, ..self.clone() } == Self::default()
     }
 
     /// Whether messages may be missing.

@@ -37,7 +37,7 @@ impl Parts {
         let supervisor = match law.settling_rate_per_s() {
             Some(rate_per_s) => {
                 let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-                supervisor.breathing(scenario.breathing, rate_per_s, leader)
+                supervisor.breathing(scenario.breathing, rate_per_s, leader).blown(!scenario.wind.is_still())
             }
             None => supervisor,
         };

@@ -154,6 +154,11 @@ impl Breather {
         Self { breathing, rate_per_s, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
     }
 
+    /// Looks at errors apart from what all have in common.
+    pub(super) fn forgive_common_errors(&mut self) {
+        self.freedom = Freedom::Translation;
+    }
+
     /// A leg has begun with its slots as they are given.
     pub(super) fn begin_leg(&mut self) {
         self.phase = Phase::Flying { idle_since_s: None };

@@ -90,6 +90,16 @@ impl Schedule {
         self
     }
 
+    /// The same in a wind, which moves all from their slots and keeps them there: what all have in common is no reason to spread
+    /// slots. To be said after [`Schedule::breathing`].
+    #[must_use]
+    pub fn blown(mut self, is_blown: bool) -> Self {
+        if let Some(breather) = self.breather.as_mut().filter(|_| is_blown) {
+            breather.forgive_common_errors();
+        }
+        self
+    }
+
     fn is_due(&mut self, begins: Begins, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
         match begins {
             Begins::At(from_s) => time_s >= from_s,
