@@ -64,6 +64,8 @@ fn a_scenario_with_every_imperfection_is_written_back_as_it_was_read() {
         "network.failure=[{link=[1, 3], from_s=1, to_s=2.5}, {link=[4, 2], from_s=3}]",
         "failure=[{vehicle=2, at_s=1, kind=\"dead\"}, {vehicle=5, at_s=2, kind=\"silent\"}, {vehicle=1, at_s=3, kind=\"frozen\"}]",
         "noise.seed=7",
+        // Nobody takes two for nearer than that.
+        "law.delta_m=1",
     ];
     let sets: Vec<_> = ALL.into_iter().chain(more).collect();
     let scenario = builtin("pentagon", &sets);

@@ -41,7 +41,6 @@ fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
         shell_ratio: 1.0,
         balls: balls.to_vec(),
         discs: Vec::new(),
-        shell_ratio: 1.0,
         shells: Vec::new(),
         lines: Vec::new(),
         annotations: Vec::new(),
