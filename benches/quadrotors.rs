@@ -24,7 +24,7 @@ fn lattice(physics_hz: f64, precision: Precision) -> Scenario {
     let model = vehicle::read(MODELS[0].1).expect("a model");
     let quadrotor = Quadrotor { model, attitude_hz: DEFAULT_ATTITUDE_HZ, ground_effect: false, downwash: false };
     scenario.set_airframe(Airframe::Quadrotor(Box::new(quadrotor)));
-    scenario.law = LawSpec::EdgeTension(EdgeTensionKeys { alpha: 1e-4, ..EdgeTensionKeys::default() });
+    scenario.law = LawSpec::EdgeTension(EdgeTensionKeys { alpha: 1e-4 });
     scenario.time.dt_s = 1.0 / physics_hz;
     scenario.plant = tautline::scenario::PlantSpec::Rapier(precision);
     scenario.arrival.hold_s = 0.0;

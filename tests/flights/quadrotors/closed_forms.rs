@@ -130,7 +130,7 @@ fn rotors_that_turn_one_way_faster_turn_the_vehicle_the_other_way() {
     assert!(state.position_m.norm() <= ROUNDING);
 }
 
-/// Tangent of the tilt that holds a vehicle in a wind: D_x s w/(m g), where s is the rotors' speed over that of hover.
+/// Tangent of the tilt that holds a vehicle in a wind: `D_x s w/(m g)`, where s is the rotors' speed over that of hover.
 fn tilt_in_wind(model: &Model, hover_rpm: f64, wind_m_s: f64) -> f64 {
     let curve = RotorCurve::of(model);
     let [along, _, axial] = model.rotor_drag_n_s_m;

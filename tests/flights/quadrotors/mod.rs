@@ -45,9 +45,8 @@ fn fly(
     (duration_s, dt_s): (f64, f64),
     law: &mut dyn FnMut(f64, &State) -> Vector3<f64>,
 ) -> State {
-    let steps = (duration_s / dt_s).round() as u32;
     let (mut swarm, mut command) = (Swarm::at_rest(Rows::zeros(1)), Rows::zeros(1));
-    for step in 0..steps {
+    for step in (0_u32..).take_while(|&step| f64::from(step) * dt_s < duration_s - 0.5 * dt_s) {
         set_row(&mut command, 0, law(f64::from(step) * dt_s, &plant.fleet().states[0]));
         plant.apply(&command, &mut swarm);
         let mut path = Path::default();
