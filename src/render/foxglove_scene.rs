@@ -297,7 +297,7 @@ mod tests {
         let (tilted, place, bytes) = entity(2, 0.4);
         assert_eq!((tilted.spheres.len(), tilted.cylinders.len(), tilted.lines.len()), (4, 8, 3));
         assert!(bytes.len() < 2 * (1100 + 230) + 140 + 100, "{} bytes", bytes.len());
-        let front = |entity: &SceneEntity| entity.cylinders[0].pose.clone().expect("a pose");
+        let front = |entity: &SceneEntity| entity.cylinders[0].pose.expect("a pose");
         let (at, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
         // Ahead is down where it flies ahead.
         let x = QuadrotorShape::within(0.25).rotors_m[0].x;

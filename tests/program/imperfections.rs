@@ -43,7 +43,9 @@ fn a_wrong_imperfection_is_refused_with_place_value_and_remedy() {
     ];
     for (sets, said, remedy) in cases {
         let mut arguments = vec!["check", "pentagon"];
-        sets.iter().for_each(|set| arguments.extend(["--set", set]));
+        for set in sets {
+            arguments.extend(["--set", set]);
+        }
         let ran = ran_by(TAUTLINE, folder.path(), &arguments);
         let message = ran.err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" ");
         assert_eq!(ran.exit, Some(2), "{sets:?}: {message}");
