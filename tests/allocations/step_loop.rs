@@ -103,8 +103,9 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
             "formation={shape=\"circle\", radius_m=200}",
         ],
     );
+    // Under a law whose energy of a state that it was not asked about takes no memory.
     let imperfect = builtin(
-        "pentagon",
+        "pentagon-laplacian",
         &[
             "sensing={position_noise_m=0.01, rate_hz=100, latency_s=0.01}",
             "network={latency_s=0.01, jitter_s=0.01, loss=0.2, loss_burst=2, rate_hz=100, missing=\"extrapolate\"}",

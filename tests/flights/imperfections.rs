@@ -142,11 +142,11 @@ fn nobody_is_accelerated_by_more_than_the_limit_and_what_is_recorded_is_what_was
 
 #[test]
 fn a_lagging_vehicle_flies_the_solution_of_its_equations() {
+    const PARTS: u32 = 100_000;
     // x'' = a, lag a' = -(k x + c x') - a for the distance of two, with k = c = 1: by small steps of Heun's method.
     let lag_s = 0.2;
     let (mut x, mut v, mut a) = (0.0_f64, 1.0_f64, 0.0_f64);
     let rates = |x: f64, v: f64, a: f64| (v, a, (-(x + v) - a) / lag_s);
-    const PARTS: u32 = 100_000;
     let h = 3.0 / f64::from(PARTS);
     for _ in 0..PARTS {
         let (x1, v1, a1) = rates(x, v, a);
