@@ -31,7 +31,7 @@ fn figure(history: &RunHistory, k: usize, most_thrust_n: Option<f64>) -> Figure 
     let mut description = format!("The {what} of {count} vehicles over time; at most {peak:.3}{gap}{unit}.");
     if let Some(most) = most {
         chart.level(most, Stroke::dashed(INK, 1.3), format!("most of a rotor {most} N"));
-        description.push_str(&format!(" A rotor gives at most {most} N."));
+        description.extend([" A rotor gives at most ", &most.to_string(), " N."]);
     }
     chart.figure(series.name, series.title, &description)
 }

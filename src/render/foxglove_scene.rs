@@ -94,8 +94,8 @@ impl FoxgloveScene {
         let fliers: Vec<_> = fliers.collect();
         let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
         let hulls = hulls.map(|k| sphere(positions_m, k, self.radius_m[k], hull_colour(k)));
-        let bodies = fliers.iter().map(|flier| flier.body.clone());
-        let rotors = fliers.iter().flat_map(|flier| flier.rotors.clone());
+        let bodies = fliers.iter().map(|flier| flier.body);
+        let rotors = fliers.iter().flat_map(|flier| flier.rotors);
         let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
             Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
             _ => None,
@@ -297,7 +297,7 @@ mod tests {
         let (tilted, place, bytes) = entity(2, 0.4);
         assert_eq!((tilted.spheres.len(), tilted.cylinders.len(), tilted.lines.len()), (4, 8, 3));
         assert!(bytes.len() < 2 * (1100 + 230) + 140 + 100, "{} bytes", bytes.len());
-        let front = |entity: &SceneEntity| entity.cylinders[0].pose.clone().expect("a pose");
+        let front = |entity: &SceneEntity| entity.cylinders[0].pose.expect("a pose");
         let (at, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
         // Ahead is down where it flies ahead.
         let x = QuadrotorShape::within(0.25).rotors_m[0].x;

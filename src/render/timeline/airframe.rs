@@ -45,7 +45,7 @@ impl QuadrotorShape {
     /// How far the outermost rotor is from the centre \[m\].
     #[must_use]
     pub fn arm_m(&self) -> f64 {
-        self.rotors_m.iter().map(|rotor_m| rotor_m.norm()).fold(0.0, f64::max)
+        self.rotors_m.iter().map(Vector3::norm).fold(0.0, f64::max)
     }
 }
 
