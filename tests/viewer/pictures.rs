@@ -38,7 +38,6 @@ fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
         camera,
         depth_m: [1.0, 30.0],
         background: BACKGROUND,
-        shell_ratio: 1.0,
         balls: balls.to_vec(),
         discs: Vec::new(),
         shells: Vec::new(),
