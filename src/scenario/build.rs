@@ -12,8 +12,6 @@ use super::reference::ReferenceTable;
 use super::slots::is_flat;
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
-use super::time::TimeSpec;
-use super::time_table::TimeTable;
 use super::values::{Edge, PerVehicle, Point, rows};
 use crate::graph::{Graph, GraphError};
 use crate::swarm::{Rows, Swarm, set_row};
@@ -47,8 +45,9 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m + CONTACT_PREDICTION_M));
     let obstacles = document.obstacle.iter().enumerate();
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
-    let control_hz = document.actuation.control_hz(document.time.control_hz)?;
-    let time = TimeTable { control_hz, ..document.time }.complete(count, document.arrival.hold_s, &airframe);
+    let mut time = document.time;
+    time.control_hz = document.actuation.control_hz(time.control_hz)?;
+    let time = time.complete(count, document.arrival.hold_s, &airframe);
     let mut scenario = Scenario {
         start,
         mass_kg: per_vehicle(mass_kg, count),

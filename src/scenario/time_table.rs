@@ -40,7 +40,7 @@ pub(super) struct TimeTable {
     /// second.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
-    control_hz: Option<f64>,
+    pub(super) control_hz: Option<f64>,
 }
 
 impl TimeTable {

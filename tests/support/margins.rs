@@ -90,19 +90,13 @@ pub(crate) fn cells(key: &str, vehicles: usize) -> Option<[String; 2]> {
 
 /// The table in Markdown, a line an imperfection.
 pub(crate) fn table() -> String {
-    let mut table = String::from("| imperfection | key |");
-    for (vehicles, _) in VEHICLES {
-        table += &format!(" {vehicles} stay clear | {vehicles} pass |");
-    }
-    table += "\n| --- | --- | --- | --- | --- | --- |\n";
-    for row in &ROWS {
-        table += &format!("| {} | `{}` |", row.what, row.key);
-        for (_, vehicle) in VEHICLES {
-            for question in [Question::Clear, Question::Pass] {
-                table += &format!(" {} |", row.cell(&row.margin(vehicle, question)));
-            }
-        }
-        table += "\n";
-    }
-    table
+    let headings = VEHICLES.map(|(vehicles, _)| format!("{vehicles} stay clear | {vehicles} pass"));
+    let line = |row: &Row| {
+        let cells = VEHICLES.iter().flat_map(|(_, vehicle)| {
+            [Question::Clear, Question::Pass].map(|question| row.cell(&row.margin(vehicle, question)))
+        });
+        format!("| {} | `{}` | {} |\n", row.what, row.key, cells.collect::<Vec<_>>().join(" | "))
+    };
+    let head = format!("| imperfection | key | {} |\n| --- | --- | --- | --- | --- | --- |\n", headings.join(" | "));
+    head + &ROWS.iter().map(line).collect::<String>()
 }

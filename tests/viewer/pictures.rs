@@ -35,6 +35,7 @@ fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
         camera.lens = Lens::Parallel([half_m * f64::from(SIZE[0]) / f64::from(SIZE[1]), half_m]);
     }
     Scene {
+        shell_ratio: 1.0,
         camera,
         depth_m: [1.0, 30.0],
         background: BACKGROUND,
