@@ -100,6 +100,8 @@ fn every_key_of_the_report_is_on_its_page() {
         "time.duration_s=12",
     ];
     let assigned = [&["run", "pentagon", "--set", "law.kind=displacement"], &quick[..], &swap].concat();
+    let radio = ["--set", "network={rate_hz=20, loss=0.1}", "--set", "time.duration_s=1.5"];
+    let heard = [&["run", "pentagon"], &quick[..], &radio].concat();
     assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard]);
 }
 
