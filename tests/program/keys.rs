@@ -89,7 +89,6 @@ fn every_key_of_the_report_is_on_its_page() {
     let tilting = [&["run", "crazyflies", "--plant", "ideal"], &quick[..], &["--set", "time.duration_s=1.5"]].concat();
     let into_a_pillar = "reference={kind=\"velocity\",velocity_m_s=[3,2.0,0],leader=1}";
     let among = [&["run", "obstacles", "--set", into_a_pillar, "--set", ELLIPSOID], &quick[..]].concat();
-    let heard = [&["run", "leader-lossy"], &quick[..], &["--set", "time.duration_s=9"]].concat();
     // Two who are in each other's way, head-on.
     let swap = [
         "--set",
