@@ -63,10 +63,10 @@ fn a_vehicle_rests_on_its_own_picture_and_on_that_of_nobody_else() {
             seen: vec![swarm.clone(); COUNT],
         };
         if let Some(vehicle) = vehicle {
-            // Everybody else stands and flies a little elsewhere, as this one has it.
+            // Everybody else is a little elsewhere and dashes to the middle, as this one has it.
             for picture in [&mut held.heard[vehicle], &mut held.seen[vehicle]] {
                 picture.positions_m.iter_mut().enumerate().for_each(|(k, x)| *x += 0.05 * libm::sin(k as f64));
-                picture.velocities_m_s.iter_mut().enumerate().for_each(|(k, v)| *v += 0.2 * libm::cos(k as f64));
+                picture.velocities_m_s -= 6.0 * &picture.positions_m;
             }
         }
         held
