@@ -55,3 +55,37 @@ fn a_flight_of_ellipsoids_is_reported_in_both_lengths_and_its_recording_judged_b
     let of_balls = |more: &[&str]| ran(&[&["audit", "out/balls/run.mcap"], more].concat()).exit;
     assert_eq!((of_balls(&[]), of_balls(&["--ellipsoid", "0.2,0.2,0.6"])), (Some(0), Some(1)));
 }
+
+#[test]
+fn what_a_coarse_recording_of_ellipsoids_says_binds_in_its_own_lengths_and_others_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ran = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), arguments);
+    fs::write(folder.path().join("ellipsoids.toml"), format!("{SCENARIO}{ELLIPSOID}")).expect("a file");
+    let fly = |hz: &str, out: &str| {
+        json(&ran(&["run", "ellipsoids.toml", "--set", hz, "--out", out, "--json", "--no-snapshots"]).out)
+    };
+    let flown = fly("time.record_hz=1", "coarse");
+    let scaled = flown["separation"]["min_m"].as_f64().expect("a distance") / 0.2;
+    let recording = "coarse/run.mcap";
+    for more in [&[][..], &["--ellipsoid", "0.2,0.2,0.6"]] {
+        let audit = ran(&[&["audit", recording, "--json"], more].concat());
+        let found = json(&audit.out)["separation"]["min_m"].as_f64().expect("a distance");
+        assert!((found - scaled).abs() < 1e-9, "{more:?}: {found}, and the run saw {scaled}");
+    }
+    for more in
+        [&["--delta", "0.4"][..], &["--ellipsoid", "0.22,0.22,0.66"], &["--ellipsoid", "0.2,0.2,0.6", "--scale", "2"]]
+    {
+        let audit = ran(&[&["audit", recording], more].concat());
+        assert_eq!(audit.exit, Some(2), "{more:?}: {}", audit.out);
+        assert!(
+            audit.err.contains("in lengths over its ellipsoids") && audit.err.contains("record every step"),
+            "{}",
+            audit.err
+        );
+    }
+    // Every step that was flown is there: any lengths can be asked about.
+    fly("time.record_hz=240", "fine");
+    let fine = ran(&["audit", "fine/run.mcap", "--delta", "0.01"]);
+    let refined = fine.err.contains("in lengths over its ellipsoids");
+    assert!(fine.exit == Some(0) || refined, "{}", fine.err);
+}

@@ -8,7 +8,7 @@ use crate::program::{TAUTLINE, ran_by};
 fn a_wrong_imperfection_is_refused_with_place_value_and_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
     let ideal = "plant.kind=ideal";
-    let cases: [(&[&str], &str, &str); 23] = [
+    let cases: [(&[&str], &str, &str); 24] = [
         (&["sensing.position_noise_m=-0.1"], "position is -0.1", "at least 0"),
         (&["sensing.position_noise_m=nan"], "not a number", "finite"),
         (&["sensing.position_noise_m=0.1"], "drawn anew with each measurement", "sensing.rate_hz"),
@@ -33,6 +33,7 @@ fn a_wrong_imperfection_is_refused_with_place_value_and_remedy() {
             "from 3 s to 2 s",
             "later than that",
         ),
+        (&["network.rate_hz=1e8"], "messages a second are more than 10 in a step", "send at most 2400"),
         (&["actuation.max_accel_m_s2=0"], "largest acceleration is 0", "more than 0"),
         (&["actuation.lag_s=0.1", ideal], "without a lag", "plant.kind"),
         (&["actuation.control_hz=50", "time.control_hz=60"], "both are the control rate", "keep one"),

@@ -102,3 +102,17 @@ fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
         assert!(err.contains(said), "{arguments:?}: {err}");
     }
 }
+
+#[test]
+fn keys_of_whole_numbers_and_the_control_rate_of_quadrotors_are_keys_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let short = ["--set", "time.duration_s=1.5", "--scan", "2", "--halvings", "0", "--verdict", "clear"];
+    for (scenario, key, from, to) in
+        [("pentagon", "noise.seed", "1", "2"), ("crazyflies", "actuation.control_hz", "50", "100")]
+    {
+        let ran =
+            ran(folder.path(), &[&["margin", scenario, "--key", key, "--from", from, "--to", to], &short[..]].concat());
+        assert_eq!(ran.exit, Some(0), "{}", ran.err);
+        assert!(ran.out.contains(&format!("stays clear at every value of {key} tried")), "{}", ran.out);
+    }
+}
