@@ -26,9 +26,9 @@ const SHORT_S: f64 = 40.0;
 /// Commands of a flight that holds them.
 const COMMANDS: f64 = 80.0;
 /// Halvings of where a margin with the tension on may be, in its logarithm.
-const HALVINGS: u32 = 5;
+const HALVINGS: u32 = 6;
 /// Length of such a flight, whose solver is held up wherever a push begins \[s\].
-const PUSHED_S: f64 = 16.0;
+const PUSHED_S: f64 = 40.0;
 
 /// Kinds of margin.
 #[derive(Clone, Copy, PartialEq)]
