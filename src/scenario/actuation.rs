@@ -2,6 +2,7 @@
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
+#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "files")]

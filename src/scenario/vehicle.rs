@@ -25,8 +25,10 @@ use super::spec::{Scenario, Space};
 use super::suggest::suggest;
 use crate::space::{Obstacle, Shape};
 #[cfg(feature = "files")]
+use crate::vehicle::Unicycle;
+#[cfg(feature = "files")]
 use crate::vehicle::{self, MODELS, Misread, Model};
-use crate::vehicle::{Airframe, Fleet, Ground, ModelError, Quadrotor, Unicycle};
+use crate::vehicle::{Airframe, Fleet, Ground, ModelError, Quadrotor};
 
 /// Default rate of the attitude loop \[Hz\].
 pub const DEFAULT_ATTITUDE_HZ: f64 = 500.0;
