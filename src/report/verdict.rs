@@ -132,6 +132,13 @@ fn disagreement(findings: &Findings<'_>) -> Option<String> {
 }
 
 fn undecided(findings: &Findings<'_>) -> Option<String> {
+    if findings.audit.status == Status::Undecided && findings.audit.unresolved > 0 {
+        return Some(
+            "Two vehicles came so near to delta that the audit cannot tell whether they kept it: rounding, or paths that bend \
+             within a step, leave more room than there was."
+                .to_owned(),
+        );
+    }
     (findings.audit.status == Status::Undecided && findings.audit.parry.disagreements == 0).then(|| {
         "The audit could not judge everything it was shown, so it cannot say that no two vehicles came too close."
             .to_owned()

@@ -2,7 +2,7 @@
 
 use crate::audit::{
     AuditError, AuditOutcome, Auditor, ClearanceAuditor, ClearanceFinding, ClearanceOutcome, ObjectPair, Obstacle,
-    StepFinding, Violation, swept_distance_m, swept_separation_m,
+    Status, StepFinding, Violation, swept_distance_m, swept_separation_m,
 };
 use crate::graph::Graph;
 use crate::law::Law;
@@ -25,6 +25,10 @@ pub(super) struct Judge {
     metric: Metric,
     /// Positions in the lengths that the first is told.
     scaled: Rows,
+    delta_m: f64,
+    /// Sweeps that were clear of everything by less than paths may bend away from what was swept.
+    bent: u64,
+    bent_past_obstacles: u64,
     /// What judges the way past obstacles, where there are any, and these.
     clearance: Option<ClearanceAuditor>,
     obstacles: Vec<Obstacle>,
@@ -66,6 +70,9 @@ impl Judge {
             in_metres,
             metric,
             scaled: Rows::zeros(0),
+            delta_m: scenario.delta_m,
+            bent: 0,
+            bent_past_obstacles: 0,
             clearance,
             obstacles,
             room_m: f64::INFINITY,
@@ -87,29 +94,41 @@ impl Judge {
         }
         let finding = auditor.start(time_s, told(*metric, positions_m, scaled))?;
         note(finding, &mut self.closest, &mut self.nearest_m, events);
-        self.clear_of_obstacles(time_s, positions_m, events)
+        self.clear_of_obstacles(time_s, positions_m, 0.0, events)
     }
 
-    /// Sweeps the straight line to these positions.
-    pub(super) fn sweep(&mut self, time_s: f64, positions_m: &Rows, events: &mut Vec<Event>) -> Result<(), AuditError> {
+    /// Sweeps the straight line to these positions, from which no true path leaves by more than `bend_m` \[m\].
+    pub(super) fn sweep(
+        &mut self,
+        time_s: f64,
+        positions_m: &Rows,
+        bend_m: f64,
+        events: &mut Vec<Event>,
+    ) -> Result<(), AuditError> {
         let Self { auditor, in_metres, metric, scaled, .. } = self;
         if let Some(in_metres) = in_metres {
             in_metres.step(time_s, positions_m)?;
         }
         let finding = auditor.step(time_s, told(*metric, positions_m, scaled))?;
+        if let Some(closest) = finding.closest {
+            let nearer_m = 2.0 * metric.most_scaled(bend_m);
+            self.bent += u64::from(is_open(closest.separation_m, nearer_m, self.delta_m));
+        }
         note(finding, &mut self.closest, &mut self.nearest_m, events);
-        self.clear_of_obstacles(time_s, positions_m, events)
+        self.clear_of_obstacles(time_s, positions_m, bend_m, events)
     }
 
     fn clear_of_obstacles(
         &mut self,
         time_s: f64,
         positions_m: &Rows,
+        bend_m: f64,
         events: &mut Vec<Event>,
     ) -> Result<(), AuditError> {
         if let Some(clearance) = &mut self.clearance {
             let ClearanceFinding { least_room_m, began, ended } = clearance.step(time_s, positions_m)?;
             self.room_m = least_room_m;
+            self.bent_past_obstacles += u64::from(is_open(least_room_m, bend_m, 0.0));
             for &Violation { pair, from_s: time_s, .. } in began {
                 if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
                     events.push(Event::ObstacleViolationBegan { vehicle, obstacle, time_s });
@@ -207,10 +226,21 @@ impl Judge {
     }
 
     pub(super) fn finish(self) -> Judged {
+        let unless = |open: u64, status: Status| match status {
+            Status::Clear if open > 0 => Status::Undecided,
+            known => known,
+        };
+        let mut audit = self.auditor.finish();
+        audit.unresolved += self.bent;
+        audit.status = unless(self.bent, audit.status);
+        let mut clearance = self.clearance.map(ClearanceAuditor::finish);
+        if let Some(clearance) = &mut clearance {
+            clearance.status = unless(self.bent_past_obstacles, clearance.status);
+        }
         Judged {
-            audit: self.auditor.finish(),
+            audit,
             in_metres: self.in_metres.map(Auditor::finish),
-            clearance: self.clearance.map(ClearanceAuditor::finish),
+            clearance,
             engine_contacts: self.engine_contacts,
             bounces: self.bounces,
         }
@@ -226,6 +256,11 @@ fn told<'a>(metric: Metric, positions_m: &'a Rows, scaled: &'a mut Rows) -> &'a 
     scaled
 }
 
+/// Whether it cannot be told that a limit is kept by what was swept at a distance and may be nearer by so much.
+fn is_open(distance_m: f64, nearer_m: f64, limit_m: f64) -> bool {
+    distance_m >= limit_m && distance_m - nearer_m < limit_m
+}
+
 /// Keeps what the judge found in a sweep.
 fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest_m: &mut f64, events: &mut Vec<Event>) {
     if let Some(new) = finding.closest {
@@ -238,5 +273,28 @@ fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest
     for violation in finding.ended {
         let &Violation { pair, to_s, min_m, .. } = violation;
         events.push(Event::ViolationEnded { pair, time_s: to_s, min_m });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formation::Formation;
+
+    #[test]
+    fn a_distance_is_clear_only_beyond_what_paths_may_bend() {
+        let line = |spacing_m: f64| Formation::line(2, spacing_m).slots_m;
+        let judged = |bend_m: f64, past_m: f64| {
+            let scenario = Scenario::new("two", Swarm::at_rest(line(3.0)), Formation::line(2, 3.0), 2.0, 1.0);
+            let (mut judge, mut events) = (Judge::new(&scenario).expect("a judge"), Vec::new());
+            judge.start(0.0, &line(3.0), &mut events).expect("judged");
+            judge.sweep(1.0, &line(past_m), bend_m, &mut events).expect("judged");
+            let audit = judge.finish().audit;
+            (audit.status, audit.unresolved)
+        };
+        assert_eq!(judged(0.0, 2.0 + 1e-6), (Status::Clear, 0));
+        assert_eq!(judged(1e-6, 2.0 + 1e-6), (Status::Undecided, 1), "each of the two may be nearer");
+        assert_eq!(judged(1e-6, 2.0 + 3e-6), (Status::Clear, 0));
+        assert_eq!(judged(1e-6, 2.0 - 1e-6).0, Status::Violation);
     }
 }

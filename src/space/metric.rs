@@ -69,6 +69,12 @@ impl Metric {
         length * self.ratio.max(1.0)
     }
 
+    /// The most that so many metres may be in scaled lengths.
+    #[must_use]
+    pub fn most_scaled(self, length_m: f64) -> f64 {
+        length_m / self.ratio.min(1.0)
+    }
+
     /// The fewest metres that a scaled length may be.
     #[must_use]
     pub fn shortest_m(self, length: f64) -> f64 {

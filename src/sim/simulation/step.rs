@@ -107,8 +107,9 @@ impl Simulation {
     pub(super) fn judge_and_command(&mut self, step: Option<(u64, f64)>, is_whole: bool) -> Result<(), Ending> {
         let (number, from_s) = step.unwrap_or((0, self.time_s));
         let refused = |why| Ending::from(Breakdown::Audit { step: number, why });
+        let bend_m = self.path.bend_m();
         for (after_s, positions_m) in self.path.passed() {
-            self.judge.sweep(from_s + after_s, positions_m, &mut self.events).map_err(refused)?;
+            self.judge.sweep(from_s + after_s, positions_m, bend_m, &mut self.events).map_err(refused)?;
         }
         self.controller.accept(self.time_s, &self.state);
         self.controller.link.settle(self.time_s);
@@ -127,7 +128,7 @@ impl Simulation {
             let positions_m = &state.positions_m;
             let judged = match step {
                 None => judge.start(time_s, positions_m, events),
-                Some(_) => judge.sweep(time_s, positions_m, events),
+                Some(_) => judge.sweep(time_s, positions_m, bend_m, events),
             };
             (judged, began.elapsed())
         };
