@@ -9,7 +9,7 @@ use crate::law::{Certificate, Void};
 use crate::metrics::Metrics;
 use crate::preflight::Preflight;
 use crate::record::{Sink, StateHash, record_beside};
-use crate::report::{Findings, Hulls, Network, Performance, Report, Run, VehicleNumbers, Verification};
+use crate::report::{FailedVehicle, Findings, Hulls, Network, Performance, Report, Run, VehicleNumbers, Verification};
 use crate::scenario::Scenario;
 use crate::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 use crate::vehicle::Quadrotor;
@@ -114,6 +114,8 @@ fn report(
             max_tilt_deg: strain.max_tilt_rad.to_degrees(),
             thrust_share: strain.max_thrust_n / model.max_thrust_n,
         });
+    let failed = scenario.failures.iter().filter(|failure| failure.at_s <= flight.duration_s).map(FailedVehicle::from);
+    let failed: Vec<_> = failed.collect();
     Report::new(&Findings {
         scenario_name: &scenario.name,
         scenario_sha256: &scenario.sha256_hex(),
@@ -132,6 +134,8 @@ fn report(
         hulls: &hulls,
         vehicle: vehicle.as_ref(),
         network: flight.traffic.map(|of| Network { sent: of.sent, lost: of.lost, age_p95_s: of.age_p95_s }),
+        failures: &failed,
+        is_disturbed: !scenario.wind.is_still() || !scenario.is_exact() || !scenario.airframe.is_point(),
         summary: &metrics.finish(),
         legs: scenario.legs.len(),
         ended_legs: metrics.ended_legs(),

@@ -8,6 +8,8 @@ use super::flight::{FlightRow, fly};
 use super::parallel::in_parallel;
 use super::plan::{CompareError, Plan};
 use super::result::Comparison;
+use crate::scenario::Scenario;
+use crate::sim::SimError;
 
 /// Steps between two looks at the progress.
 const PROGRESS_EVERY: u64 = 64;
@@ -39,24 +41,31 @@ impl Plan {
 
     /// A flight by its number; none where it was interrupted.
     fn one(&self, flight: usize, watch: Watch<'_>) -> Result<Option<FlightRow>, CompareError> {
-        let stops = || watch.interrupted.load(Ordering::Relaxed);
+        let count = self.laws().len();
+        let (seed, law) = (self.seed((flight / count) as u64), &self.laws()[flight % count]);
+        let row = watch.fly(&self.scenario(law, seed)?, seed);
+        row.map_err(|error| CompareError::Flight { law: law.name.clone(), seed, error })
+    }
+}
+
+impl Watch<'_> {
+    /// Flies a scenario to its end and keeps its row; none where it was interrupted.
+    pub(crate) fn fly(self, scenario: &Scenario, seed: u64) -> Result<Option<FlightRow>, SimError> {
+        let stops = || self.interrupted.load(Ordering::Relaxed);
         if stops() {
             return Ok(None);
         }
-        let count = self.laws().len();
-        let (seed, law) = (self.seed((flight / count) as u64), &self.laws()[flight % count]);
-        let scenario = self.scenario(law, seed)?;
         let mut told = 0;
         let mut carry_on = |step: u64| {
             if step.is_multiple_of(PROGRESS_EVERY) {
-                (watch.flown)(step - told);
+                (self.flown)(step - told);
                 told = step;
             }
             if stops() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let row = fly(&scenario, seed, &mut carry_on);
-        (watch.flown)(scenario.time.steps() - told);
-        row.map_err(|error| CompareError::Flight { law: law.name.clone(), seed, error })
+        let row = fly(scenario, seed, &mut carry_on);
+        (self.flown)(scenario.time.steps().saturating_sub(told));
+        row
     }
 }
 

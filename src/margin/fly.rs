@@ -1,15 +1,11 @@
 //! The flights of a search.
 
-use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
 use super::plan::{MarginError, Plan};
 use super::result::{Flown, Margin, Probe};
 use super::search::{Found, search};
-use crate::compare::{Watch, fly, in_parallel};
-
-/// Steps between two looks at the progress.
-const PROGRESS_EVERY: u64 = 64;
+use crate::compare::{Watch, in_parallel};
 
 impl Plan {
     /// Flies values until the bracket is found, each value's runs on so many threads; the result is the same for any number
@@ -40,21 +36,7 @@ impl Plan {
     }
 
     fn one(&self, value: f64, run: u64, watch: Watch<'_>) -> Result<Option<Flown>, MarginError> {
-        let stops = || watch.interrupted.load(Ordering::Relaxed);
-        if stops() {
-            return Ok(None);
-        }
-        let scenario = self.scenario(value, run)?;
-        let mut told = 0;
-        let mut carry_on = |step: u64| {
-            if step.is_multiple_of(PROGRESS_EVERY) {
-                (watch.flown)(step - told);
-                told = step;
-            }
-            if stops() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let row = fly(&scenario, self.asked().seed.saturating_add(run), &mut carry_on);
-        (watch.flown)(scenario.time.steps().saturating_sub(told));
+        let row = watch.fly(&self.scenario(value, run)?, self.asked().seed.saturating_add(run));
         let row = row.map_err(|error| MarginError::Flight { set: format!("{} = {value}", self.key()), error })?;
         Ok(row.map(|row| Flown::new(&row)))
     }

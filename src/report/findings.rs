@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::failures::FailedVehicle;
 use super::hulls::Hulls;
 use super::network::Network;
 use super::strain::VehicleNumbers;
@@ -49,6 +50,10 @@ pub struct Findings<'a> {
     pub vehicle: Option<&'a VehicleNumbers>,
     /// What became of messages, where they were sent one by one.
     pub network: Option<Network>,
+    /// Vehicles of which a part failed before the flight ended.
+    pub failures: &'a [FailedVehicle],
+    /// Whether something holds against commands, so that vehicles that are commanded may be at rest: wind, for one.
+    pub is_disturbed: bool,
     /// Numbers of the samples.
     pub summary: &'a Summary,
     /// Number of legs that were asked for.

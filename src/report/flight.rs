@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
 use super::ellipsoid::Ellipsoid;
+use super::failures::FailedVehicle;
 use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
 use super::legs::{self, LegNumbers};
@@ -42,6 +43,9 @@ pub struct Report {
     /// What became of messages, where they were sent one by one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network: Option<Network>,
+    /// Vehicles of which a part failed, in the scenario's order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<FailedVehicle>,
     /// How vehicles kept clear of obstacles, where there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacles: Option<Obstacles>,
@@ -282,6 +286,7 @@ impl Report {
             },
             vehicle: findings.vehicle.cloned(),
             network: findings.network,
+            failures: findings.failures.to_vec(),
             obstacles: Obstacles::of(findings),
             hulls: findings.hulls.clone(),
             formation: FormationNumbers {
@@ -289,7 +294,7 @@ impl Report {
                 reached_at_s: summary.reached_at_s.and_then(finite),
                 held_s: summary.held_s.and_then(finite),
                 fails: Fails::of(summary, findings.judge),
-                at_rest: at_rest(summary, findings.judge),
+                at_rest: at_rest(findings),
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),
             },

@@ -97,8 +97,12 @@ impl Report {
         };
         let sweep = format!("{} steps and {} pairs swept", audit.steps, audit.pairs_checked);
         let contacts = audit.rapier.contact_pairs.map_or(NOT_KNOWN.to_owned(), |pairs| pairs.to_string());
+        let caption = match &separation.ellipsoid {
+            Some(ellipsoid) => &format!("Separation, in lengths scaled to ellipsoids; {}", ellipsoid.line()),
+            None => "Separation",
+        };
         numbers(
-            "Separation",
+            caption,
             [
                 ("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
                 ("Smallest distance", proved_m(separation.min_m), &closest),
@@ -182,7 +186,15 @@ impl Report {
         };
         let (time, judge) = (&scenario.time, &scenario.arrival);
         let (plant, command) = plant(scenario);
-        vec![
+        let lengths = self.separation.ellipsoid.as_ref().map(|ellipsoid| {
+            let [_, _, half_height_m] = ellipsoid.half_axes_m;
+            format!(
+                "What must stay empty around a vehicle is an ellipsoid {half_height_m} m high above and below its centre. Distances of \
+                 the audit, certificate and violations are scaled lengths: level as in metres, and upwards divided by {}.",
+                short(half_height_m / ellipsoid.half_axes_m[0])
+            )
+        });
+        let mut assumptions = vec![
             certificate,
             plant,
             format!(
@@ -210,7 +222,9 @@ impl Report {
                  the peak control are those of the whole run.",
                 short(time.record_hz)
             ),
-        ]
+        ];
+        assumptions.splice(2..2, lengths);
+        assumptions
     }
 
     fn repetition(&self, page: &RunPage<'_>) -> Markup {

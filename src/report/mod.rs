@@ -8,6 +8,7 @@
 mod artefact;
 mod ellipsoid;
 mod energy;
+mod failures;
 mod findings;
 mod flight;
 mod html;
@@ -26,6 +27,7 @@ mod words;
 pub use crate::audit::Status;
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
 pub use ellipsoid::Ellipsoid;
+pub use failures::FailedVehicle;
 pub use findings::{Findings, INTERRUPTED, Performance, Run};
 pub use flight::{
     Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,

@@ -105,6 +105,8 @@ impl Case {
             breaths: &[],
             assignments: &[],
             network: None,
+            failures: &[],
+            is_disturbed: false,
             energy_rise: self.energy_rise,
             energy_falls: self.energy_falls,
             epsilon: f64::from(f32::EPSILON),

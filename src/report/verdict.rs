@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::energy::{INTEGRATION, highest_honest};
+use super::failures::FailedVehicle;
 use super::findings::Findings;
 use super::legs;
 use super::obstacles::Obstacles;
@@ -88,11 +89,18 @@ impl Fails {
 /// rest.
 const REST: f64 = 0.1;
 
-/// Where a formation is not reached: whether the vehicles have come to rest elsewhere; none where that is not known.
-pub(super) fn at_rest(summary: &Summary, judge: Arrival) -> Option<bool> {
+/// Where a formation is not reached: whether the vehicles have come to rest elsewhere; none where that is not known, as of
+/// vehicles that stand while they are commanded, for something may hold against that.
+pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
+    let Findings { summary, judge, is_disturbed, .. } = findings;
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
-    let known = summary.reached_at_s.is_none() && speed_m_s.is_finite() && command_m_s2.is_finite();
-    known.then_some(speed_m_s.max(command_m_s2) <= REST * judge.disagreement_m_s)
+    let is_known = summary.reached_at_s.is_none() && speed_m_s.is_finite() && command_m_s2.is_finite();
+    let rests = [speed_m_s, command_m_s2].map(|number| number <= REST * judge.disagreement_m_s);
+    match rests {
+        _ if !is_known => None,
+        [true, false] if *is_disturbed => None,
+        [stands, is_left_alone] => Some(stands && is_left_alone),
+    }
 }
 
 fn refused(findings: &Findings<'_>) -> Option<String> {
@@ -219,7 +227,10 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
             judge.disagreement_m_s
         ),
     };
-    let then = match at_rest(summary, judge) {
+    let failed =
+        (!findings.failures.is_empty()).then(|| format!(" Failed: {}.", FailedVehicle::line(findings.failures)));
+    let then = match at_rest(findings) {
+        _ if failed.is_some() => "",
         Some(true) if summary.held_s.is_none() => " The vehicles have come to rest elsewhere: more time does not help.",
         Some(false) if summary.held_s.is_none() && findings.refused.is_empty() => {
             " The vehicles are still moving: more time may help."
@@ -227,7 +238,7 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
         Some(false) if summary.held_s.is_none() => " The vehicles are still moving.",
         _ => "",
     };
-    Some(format!("The formation was not reached: {why}.{then}"))
+    Some(format!("The formation was not reached: {why}.{then}{}", failed.unwrap_or_default()))
 }
 
 /// A start flatter than the formation: forces along the lines between vehicles never leave it.

@@ -1,5 +1,6 @@
 //! A report in words: one line, and a table.
 
+use super::failures::FailedVehicle;
 use super::findings::Performance;
 use super::flight::Report;
 use super::verdict::{Fails, breaks_certificate};
@@ -146,6 +147,8 @@ impl Report {
         rows.extend(ellipsoid.map(|ellipsoid| ("ellipsoids".to_owned(), ellipsoid.line())));
         rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
         rows.extend(self.network.iter().map(|network| ("network".to_owned(), network.line())));
+        let failed = (!self.failures.is_empty()).then(|| FailedVehicle::line(&self.failures));
+        rows.extend(failed.map(|line| ("failed".to_owned(), line)));
         rows.extend(self.vehicle.iter().map(|vehicle| ("vehicle".to_owned(), vehicle.line())));
         rows.extend(super::legs::lines(&self.legs));
         let rest = [

@@ -22,7 +22,7 @@ use super::shapes::{HelixKeys, SpacingKeys, VKeys};
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time_table::TimeTable;
 use super::values::{Edge, PerVehicle, Point};
-use super::vehicle::VehicleTable;
+use super::vehicle_table::VehicleTable;
 use super::wind::WindTable;
 use crate::law::LawSpec;
 use crate::target::{Arrival, Breathing};

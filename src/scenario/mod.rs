@@ -72,6 +72,8 @@ mod validate;
 #[cfg(feature = "files")]
 mod values;
 mod vehicle;
+#[cfg(feature = "files")]
+mod vehicle_table;
 mod weather;
 #[cfg(feature = "files")]
 mod wind;

@@ -17,7 +17,7 @@ use super::reference::ReferenceTable;
 use super::safety::SafetyTable;
 use super::spec::{PlantSpec, Scenario, Space};
 use super::values::{Edge, PerVehicle, Point};
-use super::vehicle::VehicleTable;
+use super::vehicle_table::VehicleTable;
 use super::wind::WindTable;
 use crate::swarm::Rows;
 use crate::target::{Begins, Leg};

@@ -99,7 +99,14 @@ fn every_key_of_the_report_is_on_its_page() {
         "time.duration_s=12",
     ];
     let assigned = [&["run", "pentagon", "--set", "law.kind=displacement"], &quick[..], &swap].concat();
-    let radio = ["--set", "network={rate_hz=20, loss=0.1}", "--set", "time.duration_s=1.5"];
+    let radio = [
+        "--set",
+        "network={rate_hz=20, loss=0.1}",
+        "--set",
+        "failure=[{vehicle=2, at_s=1, kind=\"silent\"}]",
+        "--set",
+        "time.duration_s=1.5",
+    ];
     let heard = [&["run", "pentagon", "--force"], &quick[..], &radio].concat();
     assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard]);
 }

@@ -1,0 +1,291 @@
+//! The table `[vehicle]`: what kind of body a vehicle is.
+
+use std::fmt;
+use std::path::Path;
+
+#[cfg(feature = "schema")]
+use schemars::JsonSchema;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::error::{Place, ScenarioError};
+use super::files;
+use super::limits::positive;
+use super::spec::Scenario;
+use super::suggest::suggest;
+use super::vehicle::DEFAULT_ATTITUDE_HZ;
+use crate::vehicle::{self, Airframe, MODELS, Misread, Model, Quadrotor, Unicycle};
+
+const MODEL: &str = "vehicle.model";
+const POINT: &str = "point";
+const UNICYCLE: &str = "unicycle";
+
+/// What kind of body a vehicle is.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct VehicleTable {
+    /// `point`, which carries out accelerations exactly; `unicycle`, which goes where it looks and cannot stop; a quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, a file
+    /// in TOML that holds one, or its keys as a table.
+    model: ModelKey,
+    /// How often a quadrotor's attitude loop runs in Hz, at most once a step: 500 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    attitude_hz: Option<f64>,
+    /// Frequency that its attitude loop asks for in rad/s, in the place of the model's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    attitude_rad_s: Option<f64>,
+    /// Damping ratio that it asks for, in the place of the model's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    attitude_damping: Option<f64>,
+    /// Whether a quadrotor's thrust grows near a ground: a half-space among the obstacles. Not unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ground_effect: Option<bool>,
+    /// Whether its rotors blow on vehicles below. Not unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    downwash: Option<bool>,
+    /// Least speed of a unicycle in m/s, which cannot stop: 0.2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    min_speed_m_s: Option<f64>,
+    /// Its largest speed in m/s: 3 unless given. At the least one its speed never changes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    max_speed_m_s: Option<f64>,
+    /// Largest rate of its heading in rad/s: 2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    max_turn_rad_s: Option<f64>,
+    /// Its largest acceleration along its heading in m/s^2: 2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    max_accel_m_s2: Option<f64>,
+    /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
+    /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
+    #[serde(skip_serializing_if = "is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("minimum" = 0)))]
+    pub(super) drag_per_s: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_none(drag_per_s: &f64) -> bool {
+    *drag_per_s == 0.0
+}
+
+/// A model by name, by file, or with all of its keys.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(untagged)]
+enum ModelKey {
+    /// A built-in model, or the path of a file.
+    Named(String),
+    /// Its keys.
+    Given(Box<Model>),
+}
+
+impl Default for ModelKey {
+    fn default() -> Self {
+        Self::Named(POINT.to_owned())
+    }
+}
+
+impl<'de> Deserialize<'de> for ModelKey {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ModelVisitor;
+
+        impl<'de> Visitor<'de> for ModelVisitor {
+            type Value = ModelKey;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a model, the path of its file, or a table of its keys")
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<ModelKey, E> {
+                Ok(ModelKey::Named(name.to_owned()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<ModelKey, A::Error> {
+                Model::deserialize(MapAccessDeserializer::new(keys)).map(|model| ModelKey::Given(Box::new(model)))
+            }
+        }
+
+        deserializer.deserialize_any(ModelVisitor)
+    }
+}
+
+impl VehicleTable {
+    /// Reads the file of a model that is named by one, relative to a folder.
+    pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+        if let ModelKey::Named(name) = &self.model
+            && name.contains(['/', '\\', '.'])
+        {
+            self.model = ModelKey::Given(Box::new(read(&folder.join(name))?));
+        }
+        Ok(())
+    }
+
+    /// Whether vehicles are points.
+    pub(super) fn is_point(&self) -> bool {
+        matches!(&self.model, ModelKey::Named(name) if name == POINT)
+    }
+
+    /// The body that it describes.
+    pub(super) fn airframe(&self) -> Result<Airframe, ScenarioError> {
+        self.check_numbers()?;
+        match &self.model {
+            ModelKey::Named(name) if name == POINT => {
+                self.without_rotors("a point")?;
+                self.without_limits("a point")?;
+                Ok(Airframe::Point)
+            }
+            ModelKey::Named(name) if name == UNICYCLE => {
+                self.without_rotors("a unicycle")?;
+                Ok(Airframe::Unicycle(self.unicycle()))
+            }
+            _ => {
+                self.without_limits("a quadrotor")?;
+                self.quadrotor()
+            }
+        }
+    }
+
+    fn unicycle(&self) -> Unicycle {
+        let Unicycle { min_speed_m_s, max_speed_m_s, max_turn_rad_s, max_accel_m_s2 } = Unicycle::default();
+        Unicycle {
+            min_speed_m_s: self.min_speed_m_s.unwrap_or(min_speed_m_s),
+            max_speed_m_s: self.max_speed_m_s.unwrap_or(max_speed_m_s),
+            max_turn_rad_s: self.max_turn_rad_s.unwrap_or(max_turn_rad_s),
+            max_accel_m_s2: self.max_accel_m_s2.unwrap_or(max_accel_m_s2),
+        }
+    }
+
+    fn quadrotor(&self) -> Result<Airframe, ScenarioError> {
+        let mut model = match &self.model {
+            ModelKey::Given(model) => Model::clone(model),
+            ModelKey::Named(name) => {
+                let known = MODELS.map(|(known, _)| known);
+                let found =
+                    MODELS.iter().find(|(known, _)| known == name).and_then(|(_, text)| vehicle::read(text).ok());
+                found.ok_or_else(|| {
+                    let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
+                    let help = format!("{}; a model of your own is the path of a file in TOML", suggest(name, &known));
+                    ScenarioError::new(format!("there is no model `{name}`")).with_help(help).at(MODEL)
+                })?
+            }
+        };
+        model.attitude_rad_s = self.attitude_rad_s.unwrap_or(model.attitude_rad_s);
+        model.attitude_damping = self.attitude_damping.unwrap_or(model.attitude_damping);
+        Ok(Airframe::Quadrotor(Box::new(Quadrotor {
+            model,
+            attitude_hz: self.attitude_hz.unwrap_or(DEFAULT_ATTITUDE_HZ),
+            ground_effect: self.ground_effect.unwrap_or_default(),
+            downwash: self.downwash.unwrap_or_default(),
+        })))
+    }
+
+    /// Refuses numbers that no kind of vehicle can have.
+    fn check_numbers(&self) -> Result<(), ScenarioError> {
+        let numbers = [
+            ("vehicle.attitude_hz", "the rate of the attitude loop", self.attitude_hz),
+            ("vehicle.attitude_rad_s", "the frequency of the attitude loop", self.attitude_rad_s),
+            ("vehicle.attitude_damping", "the damping ratio of the attitude loop", self.attitude_damping),
+            ("vehicle.min_speed_m_s", "the least speed", self.min_speed_m_s),
+            ("vehicle.max_speed_m_s", "the largest speed", self.max_speed_m_s),
+            ("vehicle.max_turn_rad_s", "the largest rate of the heading", self.max_turn_rad_s),
+            ("vehicle.max_accel_m_s2", "the largest acceleration", self.max_accel_m_s2),
+        ];
+        let mut given = numbers.into_iter().filter_map(|(key, what, number)| Some((key, what, number?)));
+        given.try_for_each(|(key, what, number)| positive(key, what, number).map(|_| ()))
+    }
+
+    /// Refuses what only quadrotors have.
+    fn without_rotors(&self, what: &str) -> Result<(), ScenarioError> {
+        let given = [
+            ("vehicle.attitude_hz", self.attitude_hz.is_some()),
+            ("vehicle.attitude_rad_s", self.attitude_rad_s.is_some()),
+            ("vehicle.attitude_damping", self.attitude_damping.is_some()),
+            ("vehicle.ground_effect", self.ground_effect.is_some()),
+            ("vehicle.downwash", self.downwash.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(ScenarioError::new(format!("{what} has neither attitude nor rotors"))
+                .with_help("leave this key out, or set vehicle.model to a quadrotor such as \"crazyflie\"")
+                .at(key)
+                .at(MODEL)),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses what only unicycles have.
+    fn without_limits(&self, what: &str) -> Result<(), ScenarioError> {
+        let given = [
+            ("vehicle.min_speed_m_s", self.min_speed_m_s.is_some()),
+            ("vehicle.max_speed_m_s", self.max_speed_m_s.is_some()),
+            ("vehicle.max_turn_rad_s", self.max_turn_rad_s.is_some()),
+            ("vehicle.max_accel_m_s2", self.max_accel_m_s2.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(ScenarioError::new(format!("{what} has no such limit"))
+                .with_help("leave this key out, or set vehicle.model to \"unicycle\"")
+                .at(key)
+                .at(MODEL)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What was read stands there: a built-in model by its name, another one with its keys.
+impl From<&Scenario> for VehicleTable {
+    fn from(scenario: &Scenario) -> Self {
+        let drag_per_s = scenario.drag_per_s;
+        let quadrotor = match &scenario.airframe {
+            Airframe::Point => return Self { drag_per_s, ..Self::default() },
+            Airframe::Unicycle(unicycle) => return Self { drag_per_s, ..Self::from(unicycle) },
+            Airframe::Quadrotor(quadrotor) => quadrotor,
+        };
+        let model = &quadrotor.model;
+        let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(text).ok()?)));
+        let is_it = |(_, other): &(&str, Model)| {
+            let (attitude_rad_s, attitude_damping) = (model.attitude_rad_s, model.attitude_damping);
+            Model { attitude_rad_s, attitude_damping, ..other.clone() } == *model
+        };
+        let name = built_in.into_iter().find(is_it).map(|(name, _)| name.to_owned());
+        Self {
+            model: name.map_or_else(|| ModelKey::Given(Box::new(model.clone())), ModelKey::Named),
+            attitude_hz: Some(quadrotor.attitude_hz),
+            attitude_rad_s: Some(model.attitude_rad_s),
+            attitude_damping: Some(model.attitude_damping),
+            ground_effect: Some(quadrotor.ground_effect),
+            downwash: Some(quadrotor.downwash),
+            drag_per_s,
+            ..Self::default()
+        }
+    }
+}
+
+impl From<&Unicycle> for VehicleTable {
+    fn from(unicycle: &Unicycle) -> Self {
+        Self {
+            model: ModelKey::Named(UNICYCLE.to_owned()),
+            min_speed_m_s: Some(unicycle.min_speed_m_s),
+            max_speed_m_s: Some(unicycle.max_speed_m_s),
+            max_turn_rad_s: Some(unicycle.max_turn_rad_s),
+            max_accel_m_s2: Some(unicycle.max_accel_m_s2),
+            ..Self::default()
+        }
+    }
+}
+
+/// Reads the file of a model.
+fn read(path: &Path) -> Result<Model, ScenarioError> {
+    let shown = path.display().to_string();
+    let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
+        ScenarioError::new(format!("{shown} is not UTF-8")).with_help("save the file as UTF-8 text").at(MODEL)
+    })?;
+    vehicle::read(&text).map_err(|Misread { message, help, span }| {
+        ScenarioError::new(message).with_help(help).with_place(Place::new(&shown, &text, span))
+    })
+}
