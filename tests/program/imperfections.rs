@@ -76,3 +76,47 @@ fn what_is_lost_does_no_harm_where_it_is_carried_along_and_does_where_it_is_held
     let (exit, report) = fly(&["--set", "network.missing=hold"]);
     assert_eq!((exit, &report["formation"]["reached"]), (Some(1), &Value::Bool(false)));
 }
+
+/// Three on their slots around a place, in a wind that does not change.
+const LEANING: &str = r#"[start]
+positions_m = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]]
+[formation]
+shape = "points"
+points_m = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]]
+[reference]
+kind = "rest"
+[vehicle]
+drag_per_s = 0.5
+[wind]
+mean_m_s = [3.0, 0.0]
+[law]
+kind = "displacement"
+delta_m = 0.6
+[time]
+duration_s = 40.0
+"#;
+
+#[test]
+fn a_swarm_that_leans_into_a_wind_spreads_no_slots_and_is_promised_no_arrival() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("leaning.toml"), LEANING).expect("a file");
+    let ran = ran_by(TAUTLINE, folder.path(), &["run", "leaning.toml", "--json", "--no-snapshots"]);
+    let report: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
+    assert!(report.get("breaths").is_none(), "{}", report["breaths"]);
+    let formation = &report["formation"];
+    assert_eq!((&formation["reached"], &formation["at_rest"]), (&false.into(), &serde_json::Value::Null));
+    assert!(formation["max_edge_error_m"].as_f64().expect("a number") < 0.01, "they lean alike");
+    assert!(!ran.err.contains("more time may help"), "{}", ran.err);
+}
+
+#[test]
+fn a_vehicle_that_failed_is_named_where_it_matters() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let dead = ["--set", "failure=[{vehicle=3, at_s=1, kind=\"dead\"}]"];
+    let quick = ["--set", "time.duration_s=6", "--json", "--no-snapshots"];
+    let ran = ran_by(TAUTLINE, folder.path(), &[&["run", "pentagon"], &dead[..], &quick].concat());
+    let report: serde_json::Value = serde_json::from_str(&ran.out).expect(&ran.err);
+    assert_eq!(report["failures"], serde_json::json!([{"vehicle": 3, "at_s": 1.0, "kind": "dead"}]));
+    assert!(ran.err.contains("Failed: vehicle 3 (dead) at 1 s."), "{}", ran.err);
+    assert!(!ran.err.contains("more time may help"), "{}", ran.err);
+}
