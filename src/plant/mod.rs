@@ -12,6 +12,8 @@ pub(crate) use air::Air;
 pub use path::Path;
 pub use unicycle::Unicycles;
 
+use std::time::Duration;
+
 use dyn_clone::DynClone;
 
 use crate::record::Channel;
@@ -55,6 +57,11 @@ pub trait Plant: DynClone + Send {
     /// Appends the pairs whose solid hulls pushed each other apart in the last [`Plant::advance`]. A plant of points
     /// appends nothing.
     fn hull_contacts(&self, _contacts: &mut Vec<HullContact>) {}
+
+    /// Wall-clock time spent so far in the forces, rotors and attitude loops of its vehicles, where they have them.
+    fn airframe_time(&self) -> Duration {
+        Duration::ZERO
+    }
 
     /// What is known of its vehicles beside position and velocity: a channel each, without values yet.
     fn channels(&self) -> Vec<Channel> {

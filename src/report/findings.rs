@@ -110,7 +110,7 @@ pub struct Run {
 }
 
 /// Wall-clock times. Work done side by side counts in each kind.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Performance {
     /// From first to last step \[s\].
     pub wall_s: f64,
@@ -118,8 +118,14 @@ pub struct Performance {
     pub real_time_factor: Option<f64>,
     /// In the law \[s\].
     pub law_s: f64,
+    /// In the law's energy \[s\].
+    #[serde(default)]
+    pub energy_s: f64,
     /// In the plant \[s\].
     pub physics_s: f64,
+    /// Of that, in the forces, rotors and attitude loops of vehicles that have them \[s\].
+    #[serde(default)]
+    pub airframe_s: f64,
     /// In the judge \[s\].
     pub audit_s: f64,
     /// In the recorders \[s\].

@@ -245,7 +245,9 @@ impl Performance {
             ("From first to last step", Some(self.wall_s), "s"),
             ("Time flown over that", self.real_time_factor, ""),
             ("In the law", Some(self.law_s), "s"),
+            ("In its energy", Some(self.energy_s), "s"),
             ("In the physics", Some(self.physics_s), "s"),
+            ("Of that, in forces, rotors and attitude loops", Some(self.airframe_s), "s"),
             ("In the audit", Some(self.audit_s), "s"),
             ("In the recorders", Some(self.record_s), "s"),
         ];

@@ -118,14 +118,7 @@ impl Case {
                 vehicles: 5,
                 state_hash: "0123456789abcdef".to_owned(),
             },
-            performance: Performance {
-                wall_s: 0.5,
-                real_time_factor: Some(240.0),
-                law_s: 0.1,
-                physics_s: 0.2,
-                audit_s: 0.1,
-                record_s: 0.05,
-            },
+            performance: Performance { wall_s: 0.5, real_time_factor: Some(240.0), ..Performance::default() },
         })
     }
 
@@ -221,7 +214,9 @@ performance
   wall_s
   real_time_factor
   law_s
+  energy_s
   physics_s
+  airframe_s
   audit_s
   record_s";
     let json = case.report().to_json().expect("JSON");

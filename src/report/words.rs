@@ -242,11 +242,13 @@ impl Report {
     }
 
     fn performance_line(&self) -> String {
-        let Performance { wall_s, real_time_factor, law_s, physics_s, audit_s, record_s } = self.performance;
+        let Performance { wall_s, real_time_factor, law_s, energy_s, physics_s, airframe_s, audit_s, record_s } =
+            self.performance;
+        let airframe = if airframe_s > 0.0 { format!(", {airframe_s:.3} of it airframes") } else { String::new() };
         let factor = real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
         format!(
-            "{wall_s:.3} s wall, {factor} x real time (law {law_s:.3}, physics {physics_s:.3}, audit {audit_s:.3}, record \
-             {record_s:.3} s)"
+            "{wall_s:.3} s wall, {factor} x real time (law {law_s:.3}, energy {energy_s:.3}, physics \
+             {physics_s:.3}{airframe}, audit {audit_s:.3}, record {record_s:.3} s)"
         )
     }
 }

@@ -70,8 +70,12 @@ pub struct Performance {
     pub wall: Duration,
     /// In the law.
     pub law: Duration,
+    /// In the law's energy, which every step is looked at for.
+    pub energy: Duration,
     /// In the plant.
     pub physics: Duration,
+    /// Of that, in the forces, rotors and attitude loops of vehicles that have them.
+    pub airframe: Duration,
     /// In the audit.
     pub audit: Duration,
     /// In what receives the recording.

@@ -1,5 +1,7 @@
 //! What moves the vehicles between two instants at which the law is asked.
 
+use std::time::Duration;
+
 #[cfg(feature = "ideal")]
 use crate::continuous::{Continuous, IdealError, Quadrotors};
 #[cfg(feature = "ideal")]
@@ -121,6 +123,15 @@ impl Motion {
             Self::Sampled(plant) => plant.reseed(seed),
             #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.reseed(seed),
+        }
+    }
+
+    /// Time spent so far in airframes.
+    pub(super) fn airframe_time(&self) -> Duration {
+        match self {
+            Self::Sampled(plant) => plant.airframe_time(),
+            #[cfg(feature = "ideal")]
+            Self::Continuous(_) => Duration::ZERO,
         }
     }
 

@@ -287,7 +287,7 @@ impl Simulation {
             assignments: self.watch.assignments,
             traffic: self.controller.link.traffic(),
             last: self.state,
-            performance: self.performance,
+            performance: Performance { airframe: self.motion.airframe_time(), ..self.performance },
         }
     }
 }

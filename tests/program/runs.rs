@@ -96,8 +96,8 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "control.peak_m_s2 control.final_m_s2",
         "velocity.disagreement_m_s velocity.common_m_s",
         "run.duration_s run.dt_s run.steps run.ended_early run.vehicles run.state_hash",
-        "performance.wall_s performance.real_time_factor performance.law_s performance.physics_s",
-        "performance.audit_s performance.record_s",
+        "performance.wall_s performance.real_time_factor performance.law_s performance.energy_s",
+        "performance.physics_s performance.airframe_s performance.audit_s performance.record_s",
     ];
     let mut expected: Vec<&str> = expected.iter().flat_map(|line| line.split(' ')).collect();
     let report = json(&run(folder().path(), &["pentagon-laplacian", "--json", "--set", "time.duration_s=6"]).out);

@@ -1,5 +1,7 @@
 // The plant itself, for whichever engine the including module calls `engine`.
 
+use std::time::{Duration, Instant};
+
 use engine::prelude::{
     ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, LockedAxes, MassProperties,
     PhysicsWorld, Real, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape, Vector,

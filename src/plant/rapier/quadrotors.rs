@@ -15,6 +15,8 @@ pub(super) struct Fliers {
     drift_m_s: Rows,
     began_m: Rows,
     origin_m: Vector3<f64>,
+    /// Spent beside the engine.
+    airframe: Duration,
 }
 
 impl Fliers {
@@ -44,7 +46,16 @@ impl Fliers {
         let (handles, count): (Vec<_>, _) = (handles.collect(), scenario.count());
         scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
         let (drift_m_s, began_m) = (Rows::zeros(count), Rows::zeros(count));
-        Self { world, handles, fleet, drifts: Vec::with_capacity(count), drift_m_s, began_m, origin_m }
+        Self {
+            world,
+            handles,
+            fleet,
+            drifts: Vec::with_capacity(count),
+            drift_m_s,
+            began_m,
+            origin_m,
+            airframe: Duration::ZERO,
+        }
     }
 
     /// Half of the kick, and what the engine is to drift with.
@@ -95,6 +106,7 @@ impl Clone for Fliers {
             drift_m_s: self.drift_m_s.clone(),
             began_m: self.began_m.clone(),
             origin_m: self.origin_m,
+            airframe: self.airframe,
         }
     }
 }
@@ -112,17 +124,21 @@ impl Plant for Fliers {
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
         self.world.integration_parameters.dt = real(dt_s);
+        let began = Instant::now();
         self.fleet.remember();
         self.fleet.run_attitude();
         self.begin(dt_s);
+        self.airframe += began.elapsed();
         self.world.step();
         if let Some(lost) = self.world.quarantine().bodies().first() {
             let vehicle = self.handles.iter().position(|handle| handle == lost).unwrap_or_default();
             return Err(PlantError::NotFinite { vehicle });
         }
+        let began = Instant::now();
         self.end(dt_s);
         self.fleet.pass(dt_s);
         self.fleet.observe(predicted);
+        self.airframe += began.elapsed();
         Ok(())
     }
 
@@ -150,6 +166,10 @@ impl Plant for Fliers {
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
         hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+    }
+
+    fn airframe_time(&self) -> Duration {
+        self.airframe
     }
 
     fn channels(&self) -> Vec<Channel> {
