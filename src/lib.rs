@@ -36,6 +36,8 @@
 //! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
 
 pub mod audit;
+#[cfg(feature = "campaigns")]
+pub mod campaign;
 #[cfg(feature = "program")]
 pub mod cli;
 #[cfg(feature = "reports")]

@@ -5,6 +5,8 @@
 
 mod audit;
 mod audits;
+mod campaign;
+mod campaign_worst;
 mod check;
 mod compare;
 mod completions;
@@ -74,6 +76,8 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Find how much of one key a scenario survives: where between two values its verdict turns.
     Margin(margin::MarginArguments),
+    /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
+    Campaign(campaign::CampaignArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
     Export(export::ExportArguments),
     /// Draw a recording: pictures, films and contact sheets, without a screen.
@@ -121,7 +125,7 @@ pub fn main() -> ExitCode {
     if match &command {
         Command::Run(run) => run.draws(),
         Command::Compare(compare) => compare.draws(),
-        other => matches!(other, Command::Render(_) | Command::View(_)),
+        other => matches!(other, Command::Campaign(_) | Command::Render(_) | Command::View(_)),
     } {
         driver::silence();
     }
@@ -132,6 +136,7 @@ pub fn main() -> ExitCode {
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Margin(arguments) => margin::margin(&arguments),
+        Command::Campaign(arguments) => campaign::campaign(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),

@@ -19,6 +19,7 @@ use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
 use crate::record::mcap::{Header, McapRecorder};
+use crate::report::page::Picture;
 use crate::report::{INTERRUPTED, Report, RunPage};
 use crate::run::{run_while, verify};
 use crate::scenario::Scenario;
@@ -80,6 +81,22 @@ impl RunArguments {
         !self.no_snapshots
     }
 
+    /// Everything as by default into a folder, without a word.
+    pub(super) fn for_folder(out: PathBuf) -> Self {
+        Self { out: Some(out), force: true, quiet: true, ..Self::parse_from(["run"]) }
+    }
+
+    /// The same, with a summary.
+    pub(super) fn aloud(self) -> Self {
+        Self { quiet: false, ..self }
+    }
+
+    /// The same, perhaps without pictures.
+    #[cfg(feature = "viewer")]
+    pub(super) fn without_pictures(self, none: bool) -> Self {
+        Self { no_snapshots: none, ..self }
+    }
+
     /// The command that flies the same again, for a shell.
     fn command(&self) -> String {
         let sets = self.what.overrides.iter().flat_map(|text| ["--set", text]);
@@ -89,12 +106,32 @@ impl RunArguments {
 }
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let plant = arguments.plant.as_ref().map(|kind| format!("plant.kind={kind}"));
     let scenario = scenario::read(&arguments.what.scenario, arguments.what.overrides.iter().chain(&plant))?;
+    let interrupted = interruption()?;
+    let left = fly_into(arguments, &scenario, &arguments.command(), &interrupted)?;
+    Ok(if left.report.verdict.pass { Exit::Good } else { Exit::Bad })
+}
+
+/// What a run left beside its files.
+pub(super) struct Left {
+    pub(super) report: Report,
+    /// Its pictures, in the order of their names.
+    #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "nothing is drawn"))]
+    pub(super) pictures: Vec<Picture>,
+}
+
+/// Flies a scenario, which `command` flies again, and leaves everything that is asked for.
+pub(super) fn fly_into(
+    arguments: &RunArguments,
+    scenario: &Scenario,
+    command: &str,
+    interrupted: &AtomicBool,
+) -> Result<Left, Failure> {
+    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))?;
-    let preflight = Preflight::of(&scenario)?;
+    let preflight = Preflight::of(scenario)?;
     if preflight.refuses() {
         console.warn(&preflight.headline());
     }
@@ -103,33 +140,26 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     }
     let warnings: Vec<_> =
         preflight.warnings.iter().map(|warning| (warning.code.name().to_owned(), warning.message.clone())).collect();
-    let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
     let mut history = RunHistory::new().scaled_by(scenario.metric());
     #[cfg(feature = "viewer")]
-    let mut watched = Watched::new(&scenario, !arguments.no_snapshots, &arguments.adapter);
+    let mut watched = Watched::new(scenario, !arguments.no_snapshots, &arguments.adapter);
     #[cfg(not(feature = "viewer"))]
     let mut watched = ();
     let mut watchers = (&mut history, &mut watched);
-    let mut report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
+    let mut report = threads.install(|| fly(scenario, &preflight, &folder, console, interrupted, &mut watchers))?;
     if arguments.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
-        report.verification = Some(threads.install(|| verify(&scenario, &report))?);
+        report.verification = Some(threads.install(|| verify(scenario, &report))?);
     }
     #[cfg(feature = "viewer")]
     let snapshots = watched.snapshots(folder.path(), console)?;
     #[cfg(not(feature = "viewer"))]
     let snapshots = Vec::new();
-    let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(&scenario, &history, &report) };
-    let page = RunPage {
-        scenario: &scenario,
-        warnings: &warnings,
-        figures: &figures,
-        pictures: &snapshots,
-        command: &arguments.command(),
-    };
+    let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(scenario, &history, &report) };
+    let page = RunPage { scenario, warnings: &warnings, figures: &figures, pictures: &snapshots, command };
     let page = pictures::write(folder.path(), &report, &page)?;
     report.write(&folder.report())?;
 
@@ -149,7 +179,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     if arguments.json {
         console::json(&report)?;
     }
-    Ok(if report.verdict.pass { Exit::Good } else { Exit::Bad })
+    Ok(Left { report, pictures: snapshots })
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.

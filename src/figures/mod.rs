@@ -16,6 +16,8 @@
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
 //! | [`convergence`] | an integrator's error over its step |
 //! | [`margin`](margin()) | the share of flights that show something over the values of a key |
+//! | [`shares`] | the same of several laws |
+//! | [`histograms`] | how often a number of many flights falls where |
 //!
 //! [`of_run`] draws every one that a run has data for. All of them draw a [`RunHistory`], which watches a run or reads a
 //! recording in bounded memory, and never fail for what is in it: what is not a finite number breaks a line, and a
@@ -33,6 +35,7 @@ mod convergence;
 mod distances;
 mod each;
 mod figure;
+mod histogram;
 mod history;
 mod margin;
 mod paths;
@@ -47,8 +50,9 @@ pub use channels::channels;
 pub use convergence::{Step, convergence};
 pub use distances::distances;
 pub use figure::Figure;
+pub use histogram::{Histogram, histograms};
 pub use history::RunHistory;
-pub use margin::{Share, margin};
+pub use margin::{Share, margin, shares};
 pub use paths::{paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
 pub use run::{Criteria, NAMES_OF_RUN, of_run};

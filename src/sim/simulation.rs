@@ -54,6 +54,8 @@ pub struct Simulation {
     events: Vec<Event>,
     /// The fewest parts at once in the last step.
     shortest: u64,
+    /// Steps that were flown in parts.
+    refined_steps: u64,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     watch: Watch,
@@ -113,6 +115,7 @@ impl Simulation {
             steps: 0,
             events: other_law.into_iter().collect(),
             shortest: 0,
+            refined_steps: 0,
             energy: None,
             watch: Watch::default(),
             peaks: Peaks::default(),
@@ -285,6 +288,7 @@ impl Simulation {
             ending: self.ending.unwrap_or(Ending::Interrupted),
             duration_s: self.time_s,
             steps: self.steps,
+            refined_steps: self.refined_steps,
             certificate: self.certificate,
             audit,
             in_metres,

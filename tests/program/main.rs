@@ -5,6 +5,7 @@ mod program;
 
 mod archives;
 mod audit;
+mod campaign;
 mod check;
 mod compare;
 mod determinism;
