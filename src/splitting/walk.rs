@@ -29,7 +29,7 @@ enum Sight {
     /// The last multiple of this that its height is not below.
     Grains(f64),
     /// How near this height it is in units of what it may still go, which tells better how likely it will come above: the spread of
-    /// estimates is a fifth. Above 0 where it is above.
+    /// estimates at 1e-6 is about a quarter. Above 0 where it is above.
     Chance(f64),
 }
 
@@ -165,8 +165,8 @@ fn estimates(walk: &Walk, rule: Rule, repetitions: u64) -> Vec<f64> {
     (0..repetitions).map(one).collect()
 }
 
-/// How many standard errors the mean of estimates is above a value. The estimates of 100 walks at 1e-9 have a skewness near 2, so
-/// that of the mean of 200 is 0.14, and within three standard errors it is as good as normal.
+/// How many standard errors the mean of estimates is above a value. The estimates of 100 walks at 1e-9, with a score that
+/// tells much, have a skewness below 2, so that of the mean of 200 is 0.14 and it is as good as normal within three standard errors.
 fn errors_above(estimates: &[f64], value: f64) -> f64 {
     let count = estimates.len() as f64;
     let mean = estimates.iter().sum::<f64>() / count;
@@ -217,7 +217,6 @@ fn estimates_of_1e_6_and_1e_9_have_no_bias() {
         let truth = above(height, 45.0, 6);
         assert!((0.5..2.0).contains(&(truth / near)), "{truth}");
         let estimates = estimates(&Walk::new(Sight::Chance(height)), Rule::new(100, 1, 0.0), repetitions());
-        println!("{}", told(&estimates, truth));
         assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", told(&estimates, truth));
         // The continuous formula is a fifth and a quarter too high, and the same check sees it.
         let reflected = reflected(height);
@@ -226,12 +225,13 @@ fn estimates_of_1e_6_and_1e_9_have_no_bias() {
     }
 }
 
-/// A score that tells little costs spread, but no bias.
+/// A score that tells little costs spread, but no bias. By height, estimates of 100 walks have a skewness near 5, with which the mean
+/// of even 2000 is not normal enough for this check; those of 400 have one near 1. Of 100, 20,000 estimates gave 0.997 of the truth with a
+/// standard error of 0.011.
 #[test]
 fn estimates_by_height_alone_have_no_bias_and_a_larger_spread() {
     let truth = above(HEIGHT_1E6, 45.0, 6);
-    let estimates = estimates(&Walk::new(Sight::Height), Rule::new(100, 5, HEIGHT_1E6), repetitions());
-    println!("{}", told(&estimates, truth));
+    let estimates = estimates(&Walk::new(Sight::Height), Rule::new(400, 20, HEIGHT_1E6), repetitions() / 4);
     assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", told(&estimates, truth));
 }
 
@@ -246,7 +246,6 @@ fn ties_leave_no_bias_and_branching_at_the_level_instead_of_above_it_does() {
     let walk = Walk::new(Sight::Grains(1.0));
     let off = [right, wrong].map(|rule| {
         let estimates = estimates(&walk, rule, repetitions());
-        println!("{}", told(&estimates, truth));
         errors_above(&estimates, truth)
     });
     assert!(off[0].abs() < 3.0, "{} standard errors", off[0]);
