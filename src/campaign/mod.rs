@@ -7,6 +7,7 @@
 
 mod bins;
 mod error;
+mod fly;
 mod folder;
 mod html;
 mod manifest;

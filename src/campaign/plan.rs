@@ -20,6 +20,8 @@ const MOST_TRIED: usize = 1000;
 /// Seeds that are drawn by run where nobody says otherwise.
 const START_SEED: &str = "start.seed";
 const NOISE_SEED: &str = "noise.seed";
+/// Tables that bring chance into a flight.
+const FLIGHT: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
 
 /// The flights of every run.
 #[derive(Clone, Debug)]
@@ -150,8 +152,8 @@ impl Campaign {
         }
         let is_open = |key: &str| !sets.contains_key(key) && !variations.contains_key(key);
         let open = [
-            (START_SEED, template.start_is_random() || variations.contains_key("start.jitter_m")),
-            (NOISE_SEED, template.flight_is_random() || changes_flight(&variations)),
+            (START_SEED, template.start_is_random() || varies(&variations, &["start."])),
+            (NOISE_SEED, template.flight_is_random() || varies(&variations, &FLIGHT)),
         ];
         let drawn: Vec<_> = open.into_iter().filter(|&(key, is_random)| is_random && is_open(key)).collect();
         variations.extend(drawn.into_iter().map(|(key, _)| (key.to_owned(), Variation::Seed {})));
@@ -291,10 +293,9 @@ fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item 
     drawn.iter().map(|(key, value)| format!("{key}={value}"))
 }
 
-/// Whether what is drawn may bring chance into the flight.
-fn changes_flight(variations: &BTreeMap<String, Variation>) -> bool {
-    const ROOMS: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
-    variations.keys().any(|key| ROOMS.iter().any(|room| key.starts_with(room)))
+/// Whether a key of one of these tables is varied, which may bring chance into it.
+fn varies(variations: &BTreeMap<String, Variation>, tables: &[&str]) -> bool {
+    variations.keys().any(|key| tables.iter().any(|table| key.starts_with(table)))
 }
 
 /// The number of runs: what is asked for, or one for each point of the grids.

@@ -9,7 +9,7 @@ use super::error::CampaignError;
 use super::vary::Variation;
 
 /// Words by which a table of `[vary]` says how it draws; another table holds keys of the scenario.
-const DRAWS: [&str; 7] = ["seed", "uniform", "log_uniform", "normal", "integer", "list", "grid"];
+const DRAWS: [&str; 6] = ["uniform", "log_uniform", "normal", "integer", "list", "grid"];
 
 /// The keys of a specification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

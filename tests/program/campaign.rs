@@ -182,7 +182,7 @@ fn a_manifest_of_another_program_or_changed_by_hand_is_refused_with_both_hashes(
 #[test]
 fn enough_is_enough_and_later_rows_are_left_out_however_much_was_flown() {
     let spec = SPEC.replace("runs = 60", "runs = 400").replace("laws = [\"edge-tension\", \"displacement\"]", "");
-    let place = Place::of(&spec.replace("duration_s = 1.0", "duration_s = 0.2"));
+    let place = Place::of(&spec.replace("duration_s = 1.0", "duration_s = 0.2\n    arrival.hold_s = 0.1"));
     let early = place.run("early", &["--until-width", "0.2", "--shards", "8"]);
     let answer = json(&early[1]);
     let runs = answer["runs"].as_u64().expect("a number");
@@ -292,7 +292,7 @@ fn what_is_wrong_is_said_with_its_key_and_remedy() {
 
 #[test]
 fn starts_in_a_random_order_are_all_orders() {
-    let spec = "scenario = \"pentagon\"\nruns = 40\n[set]\ntime.duration_s = 0.05\nstart.shuffle = true\n";
+    let spec = "scenario = \"pentagon\"\nruns = 40\n[set]\ntime.duration_s = 0.05\narrival.hold_s = 0.02\nstart.shuffle = true\n";
     let place = Place::of(spec);
     let answer = json(&place.run("camp", &[])[1]);
     assert_eq!(answer["laws"][0]["violated"]["of"], Value::from(40), "{answer}");
