@@ -3,6 +3,7 @@
 //! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
+mod attack;
 mod audit;
 mod audits;
 mod check;
@@ -74,6 +75,8 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Find how much of one key a scenario survives: where between two values its verdict turns.
     Margin(margin::MarginArguments),
+    /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
+    Attack(attack::AttackArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
     Export(export::ExportArguments),
     /// Draw a recording: pictures, films and contact sheets, without a screen.
@@ -121,6 +124,7 @@ pub fn main() -> ExitCode {
     if match &command {
         Command::Run(run) => run.draws(),
         Command::Compare(compare) => compare.draws(),
+        Command::Attack(attack) => attack.draws(),
         other => matches!(other, Command::Render(_) | Command::View(_)),
     } {
         driver::silence();
@@ -132,6 +136,7 @@ pub fn main() -> ExitCode {
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Margin(arguments) => margin::margin(&arguments),
+        Command::Attack(arguments) => attack::attack(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),

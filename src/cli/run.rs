@@ -80,6 +80,12 @@ impl RunArguments {
         !self.no_snapshots
     }
 
+    /// Leaves everything in this folder, whatever it holds, and says nothing.
+    pub(super) fn leave_in(&mut self, folder: &Path) {
+        self.out = Some(folder.to_owned());
+        (self.force, self.quiet) = (true, true);
+    }
+
     /// The command that flies the same again, for a shell.
     fn command(&self) -> String {
         let sets = self.what.overrides.iter().flat_map(|text| ["--set", text]);
@@ -89,12 +95,18 @@ impl RunArguments {
 }
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let plant = arguments.plant.as_ref().map(|kind| format!("plant.kind={kind}"));
     let scenario = scenario::read(&arguments.what.scenario, arguments.what.overrides.iter().chain(&plant))?;
+    let interrupted = interruption()?;
+    leave(arguments, &scenario, &interrupted)
+}
+
+/// Flies the scenario of the arguments, which has been read, and leaves recording, figures and report.
+pub(super) fn leave(arguments: &RunArguments, scenario: &Scenario, interrupted: &AtomicBool) -> Result<Exit, Failure> {
+    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))?;
-    let preflight = Preflight::of(&scenario)?;
+    let preflight = Preflight::of(scenario)?;
     if preflight.refuses() {
         console.warn(&preflight.headline());
     }
@@ -103,28 +115,27 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     }
     let warnings: Vec<_> =
         preflight.warnings.iter().map(|warning| (warning.code.name().to_owned(), warning.message.clone())).collect();
-    let interrupted = interruption()?;
     // Nothing is written before everything that can be wrong with the input has been looked at.
     let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(arguments.force)?;
     let mut history = RunHistory::new().scaled_by(scenario.metric());
     #[cfg(feature = "viewer")]
-    let mut watched = Watched::new(&scenario, !arguments.no_snapshots, &arguments.adapter);
+    let mut watched = Watched::new(scenario, !arguments.no_snapshots, &arguments.adapter);
     #[cfg(not(feature = "viewer"))]
     let mut watched = ();
     let mut watchers = (&mut history, &mut watched);
-    let mut report = threads.install(|| fly(&scenario, &preflight, &folder, console, &interrupted, &mut watchers))?;
+    let mut report = threads.install(|| fly(scenario, &preflight, &folder, console, interrupted, &mut watchers))?;
     if arguments.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
-        report.verification = Some(threads.install(|| verify(&scenario, &report))?);
+        report.verification = Some(threads.install(|| verify(scenario, &report))?);
     }
     #[cfg(feature = "viewer")]
     let snapshots = watched.snapshots(folder.path(), console)?;
     #[cfg(not(feature = "viewer"))]
     let snapshots = Vec::new();
-    let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(&scenario, &history, &report) };
+    let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(scenario, &history, &report) };
     let page = RunPage {
-        scenario: &scenario,
+        scenario,
         warnings: &warnings,
         figures: &figures,
         pictures: &snapshots,
