@@ -63,9 +63,7 @@ fn a_search_that_finds_nothing_is_exit_0_and_says_that_it_is_no_proof() {
     };
     let [csv, html, json] = files("one", "1");
     assert_eq!([&csv, &html, &json], files("two", "2").each_ref());
-    assert!(
-        html.contains("a search, not a proof") && html.contains("tautline attack pentagon --vary law.alpha=0.5..2")
-    );
+    assert!(html.contains("a search, not a proof") && html.contains("tautline attack pentagon --vary"));
     assert!(csv.starts_with("flight,noise_seed,outcome,min_m,min_at_s,certified_m,law.alpha\n1,"), "{csv}");
 }
 

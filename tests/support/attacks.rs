@@ -22,20 +22,20 @@ pub(crate) const CASES: [Case; 2] = [
     Case {
         name: "potential field, acceleration limited",
         scenario: "pentagon",
-        sets: &["law.kind=potential", "law.max_accel_m_s2=1", "time.duration_s=12"],
+        sets: &["law.kind=potential", "law.max_accel_m_s2=1", "time.duration_s=12", "time.dt_s=0.02"],
         start_m: 0.5,
         apart_m: 2.5,
         vary: &[],
-        flights: 300,
+        flights: 200,
     },
     Case {
         name: "star with loss",
         scenario: "leader-lossy",
-        sets: &["time.duration_s=12"],
+        sets: &["time.duration_s=12", "time.dt_s=0.02"],
         start_m: 0.5,
         apart_m: 2.5,
         vary: &["network.loss=0..0.3"],
-        flights: 300,
+        flights: 200,
     },
 ];
 
@@ -44,7 +44,7 @@ pub(crate) const SEEDS: u64 = 20;
 
 /// The laws whose worst start on the pentagon is looked for.
 const LAWS: [&str; 7] = ["edge-tension", "displacement", "laplacian", "potential", "orca", "cbf-qp", "flocking"];
-const LAW_FLIGHTS: u64 = 400;
+const LAW_FLIGHTS: u64 = 300;
 
 impl Case {
     fn search(&self, law: Option<&str>, method: Method, seed: u64) -> Attack {
