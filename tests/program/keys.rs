@@ -1,4 +1,5 @@
-//! docs/report.md names every key that the program prints, with its unit, and no other; docs/compare.md those of `compare`.
+//! docs/report.md names every key that the program prints, with its unit, and no other; docs/compare.md those of `compare`,
+//! docs/attack.md those of `attack`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -9,6 +10,7 @@ use serde_json::Value;
 const PAGE: &str = include_str!("../../docs/report.md");
 const ELLIPSOID: &str = "safety={shape=\"ellipsoid\", half_axes_m=[0.5, 0.5, 1.0]}";
 const COMPARE_PAGE: &str = include_str!("../../docs/compare.md");
+const ATTACK_PAGE: &str = include_str!("../../docs/attack.md");
 
 /// The keys of a section of a page, each with what stands beside it: its unit.
 fn documented(page: &'static str, section: &str) -> BTreeMap<&'static str, &'static str> {
@@ -122,6 +124,13 @@ fn every_key_of_the_check_is_on_its_page() {
 fn every_key_of_a_comparison_is_on_its_page() {
     let quick = ["compare", "--laws", "edge-tension", "--runs", "1", "--json", "-", "--set", "time.duration_s=1.5"];
     assert_eq!(plain(&documented(COMPARE_PAGE, "compare --json")), printed(&[&quick]));
+}
+
+#[test]
+fn every_key_of_an_attack_is_on_its_page() {
+    let quick =
+        ["attack", "--vary", "law.alpha=0.9..1.1", "--flights", "1", "--json", "-", "--set", "time.duration_s=1.5"];
+    assert_eq!(plain(&documented(ATTACK_PAGE, "attack --json")), printed(&[&quick]));
 }
 
 #[test]
