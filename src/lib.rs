@@ -74,6 +74,8 @@ pub mod scenario;
 pub mod sim;
 pub mod space;
 #[cfg(feature = "reports")]
+pub mod splitting;
+#[cfg(feature = "reports")]
 pub mod statistics;
 pub mod swarm;
 pub mod target;

@@ -1,5 +1,6 @@
 //! Flying runs of a campaign.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::error::CampaignError;
@@ -7,6 +8,11 @@ use super::plan::Campaign;
 use super::result::{Gathered, Summary};
 use super::row::Row;
 use crate::compare::{Watch, in_parallel};
+use crate::scenario::Scenario;
+use crate::splitting::{self, Settings, Splitting, SplittingError};
+
+/// Steps of an estimate between two looks at the progress.
+const TOLD_EVERY: u64 = 1024;
 
 /// Flights that are flown before it is asked whether enough has been: memory is that of so many rows.
 const AT_ONCE: u64 = 1024;
@@ -24,19 +30,44 @@ impl Campaign {
         if watch.interrupted.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        let row = |not_flown, flight| Row { run, law, drawn: self.values(run), not_flown, flight };
+        let row =
+            |not_flown, flight, splitting| Row { run, law, drawn: self.values(run), not_flown, flight, splitting };
         let scenario = match self.scenario(run, named) {
             Ok(scenario) => scenario,
             Err(error) => {
                 (watch.flown)(self.own().time.steps());
-                return Ok(Some(row(Some(error.message().to_owned()), None)));
+                return Ok(Some(row(Some(error.message().to_owned()), None, None)));
             }
         };
+        if let Some(settings) = self.splitting() {
+            let split = self.estimate(&scenario, settings, run, watch);
+            let named = |error| CampaignError::Splitting { run, law: named.name.clone(), error: Box::new(error) };
+            return Ok(split.map_err(named)?.map(|splitting| row(None, None, Some(splitting))));
+        }
         let never = AtomicBool::new(false);
         let flown = Watch { interrupted: &never, ..watch }.fly(&scenario, run);
         let flown =
             flown.map_err(|error| CampaignError::Flight { run, law: named.name.clone(), error: Box::new(error) })?;
-        Ok(flown.map(|flight| row(None, Some(flight))))
+        Ok(flown.map(|flight| row(None, Some(flight), None)))
+    }
+
+    /// One estimate; none where it was interrupted, for it may take long.
+    fn estimate(
+        &self,
+        scenario: &Scenario,
+        settings: &Settings,
+        run: u64,
+        watch: Watch<'_>,
+    ) -> Result<Option<Splitting>, SplittingError> {
+        let mut told = 0;
+        let mut carry_on = |steps: u64| {
+            if steps - told >= TOLD_EVERY {
+                (watch.flown)(steps - told);
+                told = steps;
+            }
+            if watch.interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        splitting::estimate(scenario, settings, [self.seed(), run], &mut carry_on)
     }
 
     /// Flies everything on so many threads and keeps no file: the answer that [`super::Folder::merge`] gives, or none where it
