@@ -55,6 +55,7 @@ pub enum Method {
 }
 
 impl Method {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
     fn is_flights(&self) -> bool {
         *self == Self::Flights
     }
