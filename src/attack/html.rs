@@ -52,7 +52,7 @@ impl Attack {
         if let Some(worst) = page.worst {
             sections.push(section("Fly the worst again", &[page::command(worst)]));
         }
-        let tone = if self.violated > 0 || self.certificates_broken > 0 { Tone::Bad } else { Tone::Neutral };
+        let tone = if self.is_bad() { Tone::Bad } else { Tone::Neutral };
         Page {
             title: self.scenario.name.clone(),
             kind: "Attack",

@@ -199,6 +199,7 @@ impl Plan {
     pub(super) fn candidate(&self, values: &[f64]) -> Result<Vec<Scenario>, String> {
         let flight = |k: u64| {
             let scenario = self.scenario(values, k).map_err(|error| error.message().to_owned())?;
+            scenario.law().map_err(|error| error.to_string())?;
             let near_m = self.asked.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {
                 Some((apart_m, near_m)) if near_m < apart_m => {
@@ -226,7 +227,7 @@ impl Plan {
     fn check_key(&self, key: &str) -> Result<(), AttackError> {
         let Asked { start_m, velocity_m_s, .. } = self.asked;
         let same = |a: &str, b: &str| a == b || a.starts_with(&format!("{b}.")) || b.starts_with(&format!("{a}."));
-        let twice = self.bounds.iter().any(|bound| same(&bound.key, key));
+        let twice = self.bounds.iter().any(|bound| same(&numbered(&bound.key), &numbered(key)));
         let of_start = (start_m.is_some() || velocity_m_s.is_some()) && same(key, "start");
         if twice || of_start {
             return Err(AttackError::Twice(key.to_owned()));
@@ -308,6 +309,12 @@ impl Plan {
         };
         (0..rows.nrows()).map(point).collect::<Vec<_>>().join(", ")
     }
+}
+
+/// A key with the numbers of axes for their names.
+fn numbered(key: &str) -> String {
+    let number = |part: &str| AXES.iter().position(|axis| *axis == part).map(|axis| (axis + 1).to_string());
+    key.split('.').map(|part| number(part).unwrap_or_else(|| part.to_owned())).collect::<Vec<_>>().join(".")
 }
 
 /// Smallest distance of two starts in the lengths that delta is one of \[m\].

@@ -201,6 +201,12 @@ impl Attack {
         self.progress.last()
     }
 
+    /// Whether a flight violated, or came closer than its certificate.
+    #[must_use]
+    pub fn is_bad(&self) -> bool {
+        self.violated > 0 || self.certificates_broken > 0
+    }
+
     /// `attack --json`.
     ///
     /// # Errors

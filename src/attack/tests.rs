@@ -109,6 +109,17 @@ fn a_search_that_finds_nothing_says_that_it_proves_nothing() {
 }
 
 #[test]
+fn a_flight_below_its_certificate_is_said_to_be_a_defect_first_of_all() {
+    let attack = searched(&["law.kind=displacement"], asked(Method::CmaEs, 4));
+    let says_so = |attack: &Attack| {
+        let noted = attack.notes().iter().any(|note| note.starts_with("DEFECT: in 1 flight two came closer"));
+        (attack.headline().starts_with("CERTIFICATE BROKEN, "), noted, attack.is_bad())
+    };
+    assert_eq!(says_so(&attack), (false, false, false));
+    assert_eq!(says_so(&Attack { certificates_broken: 1, ..attack }), (true, true, true));
+}
+
+#[test]
 fn what_cannot_be_flown_costs_no_flight_and_is_never_the_worst() {
     // The second may start anywhere around the first, within delta too.
     let near = ["start.positions_m.2.x=-1.2..1.2", "start.positions_m.2.y=-1.2..1.2"];
@@ -199,6 +210,8 @@ fn what_is_no_search_is_refused() {
     assert!(refused(varied(&["name=0..1"], 10)).contains("name = 0"));
     assert!(refused(varied(&["noise.seed=0..9"], 10)).contains("is a seed"));
     assert!(refused(varied(&["law.f1_per_s2=1..2", "law.f1_per_s2=1..3"], 10)).contains("varied twice"));
+    let x = ["start.positions_m.1.x=0..1", "start.positions_m.1.1=0..1"];
+    assert!(refused(varied(&x, 10)).contains("varied twice"));
     let both = Asked { start_m: Some(1.0), ..varied(&["start.positions_m.1.x=0..1"], 10) };
     assert!(refused(both).contains("start.positions_m.1.x is varied twice"));
 }

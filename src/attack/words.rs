@@ -22,11 +22,12 @@ impl Attack {
     /// What was found, in two sentences.
     #[must_use]
     pub fn headline(&self) -> String {
-        format!("{}. {CAVEAT}", self.found())
+        let broken = if self.certificates_broken > 0 { "CERTIFICATE BROKEN, " } else { "" };
+        format!("{broken}{}. {CAVEAT}", self.found())
     }
 
     /// What was found, in a sentence without its end.
-    pub(super) fn found(&self) -> String {
+    fn found(&self) -> String {
         let flights = counted(self.flights, "flight", "flights");
         let delta = exact(self.delta_m);
         let Some(worst) = self.worst() else { return "no flight was flown: no candidate could be".to_owned() };
@@ -62,7 +63,8 @@ impl Attack {
         });
         let whole = self.certified > 0 && self.certified == self.flights && self.certificates_broken == 0;
         let certified = whole.then(|| {
-            "every flight has a certificate of its law and kept it: no start, wind or loss that is certified can violate".to_owned()
+            "every flight had a certificate of its law and kept it; a certificate, unlike a search, is a proof"
+                .to_owned()
         });
         let obstacle = self.worst().filter(|worst| {
             worst.flown.outcome == Outcome::Violated && worst.flown.min_m.is_some_and(|min_m| min_m >= self.delta_m)

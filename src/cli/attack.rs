@@ -184,12 +184,12 @@ pub(super) fn attack(arguments: &AttackArguments) -> Result<Exit, Failure> {
     let again = command.as_ref().map_or_else(String::new, |command| format!("\nFly the worst again:\n  {command}"));
     console.say(&format!("{}\n\n{}{again}", attack.headline(), attack.text()));
     leave(arguments, &attack, command.as_deref(), console)?;
-    if let (Some(command), Some(folder)) = (&command, folder) {
+    if let (Some(command), Some(folder), false) = (&command, folder, attack.interrupted) {
         fly_worst(&plan, &attack, command, folder, &interrupted)?;
         let recording = folder.join(run::RECORDING);
         console.say(&format!("wrote {} and the report beside it", recording.display()));
     }
-    Ok(if attack.violated > 0 || attack.interrupted { Exit::Bad } else { Exit::Good })
+    Ok(if attack.is_bad() || attack.interrupted { Exit::Bad } else { Exit::Good })
 }
 
 /// Flies the worst again as `tautline run` does.

@@ -3,7 +3,7 @@
 #[path = "../support/attacks.rs"]
 mod tables;
 
-use tables::{CASES, SEEDS};
+use tables::{CASES, Case, SEEDS};
 
 const PAGE: &str = include_str!("../../docs/attack.md");
 /// Seeds of twenty in which CMA-ES has to find less.
@@ -30,12 +30,12 @@ fn is_long() -> bool {
 
 #[test]
 fn with_as_many_flights_cma_es_finds_less_than_random_search_and_random_search_does_not() {
-    for case in 0..CASES.len() {
+    for (case, Case { name, .. }) in CASES.iter().enumerate() {
         let count = |less: &dyn Fn(u64) -> bool| (0..SEEDS).filter(|&seed| less(seed)).count() as u64;
         let better = count(&|seed| found_m(seed)[2 * case] < found_m(seed)[2 * case + 1]);
-        assert!(better >= ENOUGH, "{}: {better} of {SEEDS}", CASES[case].name);
+        assert!(better >= ENOUGH, "{name}: {better} of {SEEDS}");
         let of_itself = count(&|seed| found_m(seed)[2 * case + 1] < found_m((seed + 1) % SEEDS)[2 * case + 1]);
-        assert!(of_itself < ENOUGH, "{}: {of_itself} of {SEEDS}", CASES[case].name);
+        assert!(of_itself < ENOUGH, "{name}: {of_itself} of {SEEDS}");
     }
 }
 

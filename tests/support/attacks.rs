@@ -95,9 +95,9 @@ pub(crate) fn beside_random() -> String {
     )
 }
 
-/// A separation as the tables have it \[m\].
+/// A separation as the tables have it \[m\], rounded down: what is below delta is shown below it.
 fn shown(found_m: f64) -> String {
-    format!("{found_m:.4}")
+    format!("{:.4}", (1e4 * found_m).floor() / 1e4)
 }
 
 /// The worst start found for each law on the pentagon, a line a law.
