@@ -38,6 +38,8 @@
 #[cfg(feature = "reports")]
 pub mod attack;
 pub mod audit;
+#[cfg(feature = "campaigns")]
+pub mod campaign;
 #[cfg(feature = "program")]
 pub mod cli;
 #[cfg(feature = "reports")]
@@ -71,6 +73,8 @@ pub mod run;
 pub mod scenario;
 pub mod sim;
 pub mod space;
+#[cfg(feature = "reports")]
+pub mod splitting;
 #[cfg(feature = "reports")]
 pub mod statistics;
 pub mod swarm;

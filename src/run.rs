@@ -148,6 +148,7 @@ fn report(
             duration_s: flight.duration_s,
             dt_s: scenario.time.dt_s,
             steps: flight.steps,
+            refined_steps: flight.refined_steps,
             ended_early,
             vehicles: scenario.count(),
             state_hash,

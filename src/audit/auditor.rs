@@ -92,6 +92,12 @@ impl Auditor {
         &self.ledger.violations
     }
 
+    /// The closest approach of two vehicles so far.
+    #[must_use]
+    pub fn closest(&self) -> Option<ClosestApproach> {
+        self.outcome.closest
+    }
+
     /// The verdict over everything judged.
     #[must_use]
     pub fn finish(self) -> AuditOutcome {

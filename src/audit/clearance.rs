@@ -171,6 +171,12 @@ impl ClearanceAuditor {
         &self.results.obstacles.kept
     }
 
+    /// Whether a vehicle has been nearer to an obstacle than its clearance.
+    #[must_use]
+    pub fn is_violated(&self) -> bool {
+        !self.results.ledger.violations.is_empty()
+    }
+
     /// The verdict over everything judged.
     #[must_use]
     pub fn finish(self) -> ClearanceOutcome {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use clap::{Args, Parser as _, ValueEnum};
+use clap::{Args, ValueEnum};
 
 use super::console::{self, Console};
 use super::folder::OutFolder;
@@ -184,8 +184,8 @@ pub(super) fn attack(arguments: &AttackArguments) -> Result<Exit, Failure> {
     let again = command.as_ref().map_or_else(String::new, |command| format!("\nFly the worst again:\n  {command}"));
     console.say(&format!("{}\n\n{}{again}", attack.headline(), attack.text()));
     leave(arguments, &attack, command.as_deref(), console)?;
-    if let (Some(words), Some(folder), false) = (&worst, folder, attack.interrupted) {
-        fly_worst(&plan, &attack, words, folder, &interrupted)?;
+    if let (Some(command), Some(folder), false) = (&command, folder, attack.interrupted) {
+        fly_worst(&plan, &attack, command, folder, &interrupted)?;
         let recording = folder.join(run::RECORDING);
         console.say(&format!("wrote {} and the report beside it", recording.display()));
     }
@@ -196,15 +196,14 @@ pub(super) fn attack(arguments: &AttackArguments) -> Result<Exit, Failure> {
 fn fly_worst(
     plan: &Plan,
     attack: &Attack,
-    words: &[&str],
+    command: &str,
     folder: &Path,
     interrupted: &AtomicBool,
 ) -> Result<(), Failure> {
     let Some(worst) = attack.worst() else { return Ok(()) };
     let scenario = plan.scenario(&worst.values, worst.run)?;
-    let mut arguments = RunArguments::parse_from(words);
-    arguments.leave_in(folder);
-    run::leave(&arguments, &scenario, interrupted).map(drop)
+    let options = RunArguments::for_folder(folder.to_owned());
+    run::fly_into(&options, &scenario, command, interrupted).map(drop)
 }
 
 /// Writes what was asked for.

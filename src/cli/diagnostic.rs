@@ -77,6 +77,12 @@ impl Failure {
         self
     }
 
+    /// The same failure, whose help says FOLDER for one.
+    pub(super) fn naming(mut self, folder: &str) -> Self {
+        self.said.help = self.said.help.map(|help| harmless(&help.replace("FOLDER", folder)));
+        self
+    }
+
     /// The same failure, said of a file.
     pub(super) fn of(mut self, file: &Path) -> Self {
         self.said.message = harmless(&format!("{}: {}", file.display(), self.said.message));

@@ -6,6 +6,8 @@
 mod attack;
 mod audit;
 mod audits;
+mod campaign;
+mod campaign_worst;
 mod check;
 mod compare;
 mod completions;
@@ -75,6 +77,8 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Find how much of one key a scenario survives: where between two values its verdict turns.
     Margin(margin::MarginArguments),
+    /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
+    Campaign(campaign::CampaignArguments),
     /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
     Attack(attack::AttackArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
@@ -125,7 +129,7 @@ pub fn main() -> ExitCode {
         Command::Run(run) => run.draws(),
         Command::Compare(compare) => compare.draws(),
         Command::Attack(attack) => attack.draws(),
-        other => matches!(other, Command::Render(_) | Command::View(_)),
+        other => matches!(other, Command::Campaign(_) | Command::Render(_) | Command::View(_)),
     } {
         driver::silence();
     }
@@ -136,6 +140,7 @@ pub fn main() -> ExitCode {
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Margin(arguments) => margin::margin(&arguments),
+        Command::Campaign(arguments) => campaign::campaign(&arguments),
         Command::Attack(arguments) => attack::attack(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]

@@ -19,6 +19,7 @@ use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
 use crate::record::mcap::{Header, McapRecorder};
+use crate::report::page::Picture;
 use crate::report::{INTERRUPTED, Report, RunPage};
 use crate::run::{run_while, verify};
 use crate::scenario::Scenario;
@@ -80,10 +81,20 @@ impl RunArguments {
         !self.no_snapshots
     }
 
-    /// Leaves everything in this folder, whatever it holds, and says nothing.
-    pub(super) fn leave_in(&mut self, folder: &Path) {
-        self.out = Some(folder.to_owned());
-        (self.force, self.quiet) = (true, true);
+    /// Everything as by default into a folder, without a word.
+    pub(super) fn for_folder(out: PathBuf) -> Self {
+        Self { out: Some(out), force: true, quiet: true, ..Self::parse_from(["run"]) }
+    }
+
+    /// The same, with a summary.
+    pub(super) fn aloud(self) -> Self {
+        Self { quiet: false, ..self }
+    }
+
+    /// The same, perhaps without pictures.
+    #[cfg(feature = "viewer")]
+    pub(super) fn without_pictures(self, none: bool) -> Self {
+        Self { no_snapshots: none, ..self }
     }
 
     /// The command that flies the same again, for a shell.
@@ -98,11 +109,25 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let plant = arguments.plant.as_ref().map(|kind| format!("plant.kind={kind}"));
     let scenario = scenario::read(&arguments.what.scenario, arguments.what.overrides.iter().chain(&plant))?;
     let interrupted = interruption()?;
-    leave(arguments, &scenario, &interrupted)
+    let left = fly_into(arguments, &scenario, &arguments.command(), &interrupted)?;
+    Ok(if left.report.verdict.pass { Exit::Good } else { Exit::Bad })
 }
 
-/// Flies the scenario of the arguments, which has been read, and leaves recording, figures and report.
-pub(super) fn leave(arguments: &RunArguments, scenario: &Scenario, interrupted: &AtomicBool) -> Result<Exit, Failure> {
+/// What a run left beside its files.
+pub(super) struct Left {
+    pub(super) report: Report,
+    /// Its pictures, in the order of their names.
+    #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "nothing is drawn"))]
+    pub(super) pictures: Vec<Picture>,
+}
+
+/// Flies a scenario, which `command` flies again, and leaves everything that is asked for.
+pub(super) fn fly_into(
+    arguments: &RunArguments,
+    scenario: &Scenario,
+    command: &str,
+    interrupted: &AtomicBool,
+) -> Result<Left, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = threads(arguments.threads.map_or_else(cores, usize::from).min(THREADS_OF_USE))?;
@@ -134,13 +159,7 @@ pub(super) fn leave(arguments: &RunArguments, scenario: &Scenario, interrupted: 
     #[cfg(not(feature = "viewer"))]
     let snapshots = Vec::new();
     let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(scenario, &history, &report) };
-    let page = RunPage {
-        scenario,
-        warnings: &warnings,
-        figures: &figures,
-        pictures: &snapshots,
-        command: &arguments.command(),
-    };
+    let page = RunPage { scenario, warnings: &warnings, figures: &figures, pictures: &snapshots, command };
     let page = pictures::write(folder.path(), &report, &page)?;
     report.write(&folder.report())?;
 
@@ -160,7 +179,7 @@ pub(super) fn leave(arguments: &RunArguments, scenario: &Scenario, interrupted: 
     if arguments.json {
         console::json(&report)?;
     }
-    Ok(if report.verdict.pass { Exit::Good } else { Exit::Bad })
+    Ok(Left { report, pictures: snapshots })
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::effort::Effort;
 use crate::preflight::Preflight;
@@ -12,7 +12,7 @@ use crate::scenario::Scenario;
 use crate::sim::SimError;
 
 /// How a flight went, in a word; the first that applies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// Two vehicles came closer than delta.
@@ -26,7 +26,7 @@ pub enum Outcome {
 }
 
 /// One flight. Every number but `law_s` is the same for any number of threads.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightRow {
     /// What stood in the place of `start.seed`.
     pub seed: u64,
@@ -42,6 +42,8 @@ pub struct FlightRow {
     pub reached: bool,
     /// From when on \[s\].
     pub reached_at_s: Option<f64>,
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
     /// Smallest distance of two centres \[m\].
     pub min_m: Option<f64>,
     /// When that was \[s\].
@@ -63,6 +65,8 @@ pub struct FlightRow {
     pub energy_max_over_initial: Option<f64>,
     /// Steps flown.
     pub steps: u64,
+    /// Those of them that were flown in parts.
+    pub refined_steps: u64,
     /// SHA-256 of the resolved scenario.
     pub scenario_sha256: String,
     /// Hash over the bits of every recorded state.
@@ -100,6 +104,7 @@ impl FlightRow {
             ended_early: report.run.ended_early,
             reached: report.formation.reached && report.legs.iter().all(|leg| leg.reached_at_s.is_some()),
             reached_at_s: report.formation.reached_at_s,
+            delta_m: report.separation.delta_m,
             min_m: report.separation.min_m,
             min_at_s: report.separation.min_at_s,
             min_pair: report.separation.min_pair,
@@ -110,6 +115,7 @@ impl FlightRow {
             total_control_m_s: effort.total_control_m_s(),
             energy_max_over_initial: report.energy.max_over_initial,
             steps: report.run.steps,
+            refined_steps: report.run.refined_steps,
             scenario_sha256: report.scenario.sha256,
             state_hash: report.run.state_hash,
             law_s: report.performance.law_s,

@@ -61,3 +61,20 @@ pub fn margin(
     };
     chart.figure("margin", &format!("Share that {does}"), &description)
 }
+
+/// Shares of flights of several laws that show something over the values of a key, with their 95 % intervals.
+#[must_use]
+pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)], logarithmic: bool) -> Figure {
+    let values = series.iter().flat_map(|(_, shares)| shares.iter().map(|share| share.value));
+    let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
+    let mut chart = Chart::new(x, Axis::spanning(&format!("share that {does}"), 0.0, 1.0, 5.0));
+    for (k, (law, shares)) in series.iter().enumerate() {
+        for share in shares {
+            let ends = share.interval.into_iter().flatten().map(|end| (share.value, end));
+            chart.lines.push(Line { points: ends.collect(), stroke: Stroke::of_line(k), label: None });
+        }
+        chart.line(shares.iter().map(|share| (share.value, share.share)).collect(), Stroke::of_line(k), law.clone());
+    }
+    let title = format!("Share that {does} over {key}");
+    chart.figure(name, &title, &format!("{title}, with 95 % intervals."))
+}

@@ -17,6 +17,8 @@
 //! | [`convergence`] | an integrator's error over its step |
 //! | [`attack`](attack()) | the smallest separation that a search had found over its flights |
 //! | [`margin`](margin()) | the share of flights that show something over the values of a key |
+//! | [`shares`] | the same of several laws |
+//! | [`histograms`] | how often a number of many flights falls where |
 //!
 //! [`of_run`] draws every one that a run has data for. All of them draw a [`RunHistory`], which watches a run or reads a
 //! recording in bounded memory, and never fail for what is in it: what is not a finite number breaks a line, and a
@@ -35,6 +37,7 @@ mod convergence;
 mod distances;
 mod each;
 mod figure;
+mod histogram;
 mod history;
 mod margin;
 mod paths;
@@ -50,8 +53,9 @@ pub use channels::channels;
 pub use convergence::{Step, convergence};
 pub use distances::distances;
 pub use figure::Figure;
+pub use histogram::{Histogram, histograms};
 pub use history::RunHistory;
-pub use margin::{Share, margin};
+pub use margin::{Share, margin, shares};
 pub use paths::{paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
 pub use run::{Criteria, NAMES_OF_RUN, of_run};

@@ -119,7 +119,7 @@ impl Messages {
     }
 
     pub(super) fn reseed(&mut self, seed: u64) {
-        self.noise.reseed(seed);
+        self.noise.reseed(seed, self.next - 1);
     }
 
     /// Messages that were sent, and how many of them were lost.

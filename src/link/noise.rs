@@ -28,20 +28,27 @@ pub(super) enum Source {
 pub(super) struct Noise {
     random: ChaCha8Rng,
     source: Source,
+    /// The last number of a draw that was made before the seed was changed, and what it is drawn from.
+    before: Option<(u64, ChaCha8Rng)>,
 }
 
 impl Noise {
     pub(super) fn new(seed: u64, source: Source) -> Self {
-        Self { random: ChaCha8Rng::seed_from_u64(seed), source }
+        Self { random: ChaCha8Rng::seed_from_u64(seed), source, before: None }
     }
 
-    pub(super) fn reseed(&mut self, seed: u64) {
-        *self = Self::new(seed, self.source);
+    /// Goes on with another seed after the draw of this number, which was made: it stays what it is, however often it is asked
+    /// for. Nobody may ask for numbers before it again.
+    pub(super) fn reseed(&mut self, seed: u64, made: u64) {
+        let before = self.before.take().filter(|(last, _)| made <= *last);
+        let random = std::mem::replace(&mut self.random, ChaCha8Rng::seed_from_u64(seed));
+        self.before = Some(before.unwrap_or((made, random)));
     }
 
     /// The numbers of two vehicles' draw, of which each takes at most `doubles`.
     pub(super) fn draw(&self, vehicle: usize, other: usize, number: u64, doubles: usize) -> Draw {
-        let mut random = self.random.clone();
+        let made = self.before.as_ref().filter(|(last, _)| number <= *last);
+        let mut random = made.map_or(&self.random, |(_, random)| random).clone();
         // Two bits for the source, 31 for each vehicle.
         random.set_stream((self.source as u64) << 62 | (vehicle as u64) << 31 | other as u64);
         let blocks = (doubles * DOUBLE_WORDS).div_ceil(BLOCK_WORDS as usize) as u128;
@@ -97,6 +104,21 @@ mod tests {
         for mut other in others {
             assert!(other.six_normals().iter().zip(first).all(|(a, b)| *a != b));
         }
+    }
+
+    #[test]
+    fn what_was_drawn_stays_under_other_seeds_and_what_was_not_is_theirs() {
+        let draw = |noise: &Noise, number: u64| noise.draw(3, 0, number, 6).six_normals();
+        let (first, second, third) =
+            (Noise::new(7, Source::Own), Noise::new(8, Source::Own), Noise::new(9, Source::Own));
+        let mut noise = first.clone();
+        noise.reseed(8, 41);
+        assert_eq!([draw(&noise, 41), draw(&noise, 42)], [draw(&first, 41), draw(&second, 42)]);
+        let mut at_once = noise.clone();
+        at_once.reseed(9, 41);
+        assert_eq!([draw(&at_once, 41), draw(&at_once, 42)], [draw(&first, 41), draw(&third, 42)]);
+        noise.reseed(9, 50);
+        assert_eq!([draw(&noise, 50), draw(&noise, 51)], [draw(&second, 50), draw(&third, 51)]);
     }
 
     #[test]

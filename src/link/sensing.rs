@@ -69,10 +69,9 @@ pub(super) struct Sensing {
     clock: Clock,
     errors: Errors,
     noise: Noise,
-    bias: Noise,
-    bias_deviation_m: f64,
+    /// Errors that vehicles keep, N x 3 \[m\].
     bias_m: Rows,
-    axes: usize,
+    is_biased: bool,
     /// Number of the measurement that vehicles know themselves by, where it is held.
     held: Option<u64>,
 }
@@ -80,33 +79,19 @@ pub(super) struct Sensing {
 impl Sensing {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let SensingSpec { rate_hz, latency_s, position_bias_m, .. } = scenario.sensing;
-        let mut sensing = Self {
+        Self {
             clock: Clock { rate_hz, latency_s },
             errors: errors(scenario),
             noise: Noise::new(scenario.noise_seed, Source::Own),
-            bias: Noise::new(scenario.noise_seed, Source::Bias),
-            bias_deviation_m: position_bias_m,
-            bias_m: Rows::zeros(scenario.count()),
-            axes: scenario.space.dimensions(),
+            bias_m: bias_m(scenario, position_bias_m),
+            is_biased: position_bias_m > 0.0,
             held: None,
-        };
-        sensing.draw_bias();
-        sensing
-    }
-
-    fn draw_bias(&mut self) {
-        for vehicle in (0..self.bias_m.nrows()).filter(|_| self.bias_deviation_m > 0.0) {
-            let lasting = Errors { position_m: self.bias_deviation_m, velocity_m_s: 0.0, axes: self.axes };
-            let (bias_m, _) = lasting.of(self.bias.draw(vehicle, 0, 0, 6).six_normals());
-            set_row(&mut self.bias_m, vehicle, bias_m);
         }
     }
 
+    /// What is measured from now on has errors of another seed; what was measured keeps its own, and so do lasting errors.
     pub(super) fn reseed(&mut self, seed: u64) {
-        self.noise.reseed(seed);
-        self.bias.reseed(seed);
-        self.draw_bias();
-        self.held = None;
+        self.noise.reseed(seed, self.held.unwrap_or_default());
     }
 
     pub(super) fn span_s(&self) -> f64 {
@@ -124,7 +109,7 @@ impl Sensing {
 
     /// Whether what a vehicle knows of itself is off the state that it was measured of.
     fn errs(&self) -> bool {
-        !self.errors.are_none() || self.bias_deviation_m > 0.0
+        !self.errors.are_none() || self.is_biased
     }
 
     /// When what is known at a time was measured \[s\].
@@ -166,6 +151,18 @@ impl Sensing {
             set_row(&mut known.velocities_m_s, vehicle, velocity_m_s);
         }
     }
+}
+
+/// Errors of this standard deviation \[m\] that vehicles keep, N x 3 \[m\].
+fn bias_m(scenario: &Scenario, position_m: f64) -> Rows {
+    let mut bias_m = Rows::zeros(scenario.count());
+    let bias = Noise::new(scenario.noise_seed, Source::Bias);
+    let lasting = Errors { position_m, velocity_m_s: 0.0, axes: scenario.space.dimensions() };
+    for vehicle in (0..scenario.count()).filter(|_| position_m > 0.0) {
+        let (off_m, _) = lasting.of(bias.draw(vehicle, 0, 0, 6).six_normals());
+        set_row(&mut bias_m, vehicle, off_m);
+    }
+    bias_m
 }
 
 fn errors(scenario: &Scenario) -> Errors {
@@ -215,8 +212,9 @@ impl Sight {
         }
     }
 
+    /// What is seen from now on has errors of another seed.
     pub(super) fn reseed(&mut self, seed: u64) {
-        self.noise.reseed(seed);
+        self.noise.reseed(seed, self.number);
     }
 
     pub(super) fn span_s(&self) -> f64 {

@@ -101,6 +101,9 @@ pub struct Run {
     pub dt_s: f64,
     /// Steps flown.
     pub steps: u64,
+    /// Those of them that were flown in parts, for a law too fast for them or vehicles too near each other.
+    #[serde(default)]
+    pub refined_steps: u64,
     /// Why the run ended before its time, such as [`INTERRUPTED`]; null where it did not.
     pub ended_early: Option<String>,
     /// Number of vehicles N.

@@ -114,6 +114,7 @@ impl Case {
                 duration_s: 120.0,
                 dt_s: 1.0 / 240.0,
                 steps: 28_800,
+                refined_steps: 0,
                 ended_early: self.ended_early.map(str::to_owned),
                 vehicles: 5,
                 state_hash: "0123456789abcdef".to_owned(),
@@ -172,6 +173,7 @@ audit
       min_m
       min_at_s
   steps
+  refined_steps
   pairs_checked
   closed_form
     min_m

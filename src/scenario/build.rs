@@ -160,7 +160,11 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
     };
     start::jitter(&mut positions_m, table.jitter_m, space, &mut random)?;
     let velocities_m_s = table.velocities_m_s.as_deref().map_or_else(|| Rows::zeros(count), rows);
-    Ok(Swarm { positions_m, velocities_m_s })
+    let mut swarm = Swarm { positions_m, velocities_m_s };
+    if table.shuffle {
+        start::shuffle(&mut swarm, &mut random);
+    }
+    Ok(swarm)
 }
 
 /// Number of edges, at most, that memory will be taken for, without making them.

@@ -150,6 +150,10 @@ pub(super) struct StartTable {
     #[serde(default, skip_serializing_if = "is_default")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = 0)))]
     pub(super) seed: u64,
+    /// Whether vehicles take the start's places in an order that is drawn by `seed`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = false)))]
+    pub(super) shuffle: bool,
     #[cfg_attr(feature = "schema", schemars(flatten))]
     pub(super) shape: Option<StartShape>,
 }

@@ -94,6 +94,7 @@ impl From<&Scenario> for Document {
                 velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),
                 jitter_m: 0.0,
                 seed: 0,
+                shuffle: false,
                 shape: None,
             },
             formation: FormationTable {

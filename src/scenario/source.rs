@@ -34,6 +34,15 @@ pub enum Source {
         /// The TOML.
         text: String,
     },
+    /// TOML in memory that was a file's, whose paths count from a folder.
+    Embedded {
+        /// What to call it in messages.
+        name: String,
+        /// The TOML.
+        text: String,
+        /// The folder.
+        folder: PathBuf,
+    },
 }
 
 impl Source {
@@ -58,20 +67,25 @@ impl Source {
     }
 
     /// The folder that paths in a scenario count from: the file's own, or else where the program runs.
-    pub(super) fn folder(&self) -> &Path {
+    #[must_use]
+    pub fn folder(&self) -> &Path {
         match self {
             Self::File(path) => path.parent().unwrap_or(Path::new("")),
+            Self::Embedded { folder, .. } => folder,
             Self::Builtin(_) | Self::Text { .. } => Path::new(""),
         }
     }
 
     /// What it is called and its text.
-    pub(super) fn text(&self) -> Result<(String, String), ScenarioError> {
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where it cannot be read.
+    pub fn text(&self) -> Result<(String, String), ScenarioError> {
         match self {
             Self::Builtin(name) => {
                 builtin::find(name).map(|b| (b.name.to_owned(), b.toml.to_owned())).ok_or_else(|| unknown_builtin(name))
             }
-            Self::Text { name, text } => Ok((name.clone(), text.clone())),
+            Self::Text { name, text } | Self::Embedded { name, text, .. } => Ok((name.clone(), text.clone())),
             Self::File(path) => Ok((path.display().to_string(), read_file(path)?)),
         }
     }

@@ -13,7 +13,7 @@ use super::limits::positive;
 use super::spec::Space;
 use crate::formation::Formation;
 use crate::space::Spaced;
-use crate::swarm::{Rows, row, set_row};
+use crate::swarm::{Rows, Swarm, row, set_row};
 
 /// Smallest distance of random positions unless given, as a multiple of delta.
 const DEFAULT_SEPARATION: f64 = 1.5;
@@ -75,6 +75,27 @@ pub(super) fn jitter(
         set_row(positions_m, i, moved);
     }
     Ok(())
+}
+
+/// Puts the vehicles into a random order, every one as likely as any other, each with its position and velocity.
+pub(super) fn shuffle(swarm: &mut Swarm, random: &mut ChaCha8Rng) {
+    for last in (1..swarm.count()).rev() {
+        let other = below(last as u64 + 1, random);
+        swarm.positions_m.swap_rows(last, other);
+        swarm.velocities_m_s.swap_rows(last, other);
+    }
+}
+
+/// A whole number below `end`, each as likely as any other: words that would favour the smaller ones are drawn again.
+#[expect(clippy::cast_possible_truncation, reason = "it is below a number of vehicles")]
+fn below(end: u64, random: &mut ChaCha8Rng) -> usize {
+    let fair = u64::MAX - u64::MAX % end;
+    loop {
+        let word = random.next_u64();
+        if word < fair {
+            return (word % end) as usize;
+        }
+    }
 }
 
 /// Uniform positions, one after the other, each tried again until it keeps its distance from those before it.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::document::{Document, StartShape};
+use super::document::{Document, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::laws::{kind, law_overrides};
 use super::overrides::Override;
@@ -94,6 +94,12 @@ impl Template {
         self.own.is_random_in_flight()
     }
 
+    /// The file's own law.
+    #[must_use]
+    pub fn own_law(&self) -> NamedLaw {
+        NamedLaw { name: kind(&self.own.law), law: self.own.law.clone() }
+    }
+
     /// Names of all laws that can be flown: those of `[laws.NAME]`, then every kind that is not among them.
     #[must_use]
     pub fn law_names(&self) -> Vec<String> {
@@ -147,5 +153,6 @@ impl Template {
 }
 
 fn is_random(document: &Document) -> bool {
-    document.start.jitter_m != 0.0 || matches!(document.start.shape, Some(StartShape::Random { .. }))
+    let StartTable { jitter_m, shuffle, .. } = document.start;
+    shuffle || jitter_m != 0.0 || matches!(document.start.shape, Some(StartShape::Random { .. }))
 }

@@ -23,6 +23,8 @@ pub struct Flight {
     pub duration_s: f64,
     /// Whole steps flown.
     pub steps: u64,
+    /// Those of them that were flown in parts.
+    pub refined_steps: u64,
     /// The law's promise, made before the first step.
     pub certificate: Certificate,
     /// What the independent judge found.

@@ -143,6 +143,18 @@ impl Judge {
         Ok(())
     }
 
+    /// The smallest clearance so far \[m\], below 0 exactly where there is a violation.
+    pub(super) fn least_clearance_m(&self) -> Option<f64> {
+        let pairs = self.auditor.closest().map(|closest| closest.separation_m - self.delta_m);
+        let obstacles = self.clearance.as_ref().and_then(|clearance| clearance.closest().first());
+        let beyond = obstacles.map(|approach| approach.upper_m - approach.limit_m);
+        let is_violated =
+            !self.auditor.violations().is_empty() || self.clearance.as_ref().is_some_and(ClearanceAuditor::is_violated);
+        let least_m = pairs.into_iter().chain(beyond).reduce(f64::min)?;
+        // Rounding never moves a distance across its limit.
+        Some(if is_violated { least_m.min(-f64::MIN_POSITIVE) } else { least_m.max(0.0) })
+    }
+
     /// Who came closest to which obstacle so far.
     pub(super) fn closest_to_obstacles(&self) -> impl Iterator<Item = Event> + '_ {
         let closest = self.clearance.iter().flat_map(ClearanceAuditor::closest);

@@ -44,13 +44,26 @@ pub fn fly(
     sink: &mut dyn Sink,
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Flight, SimError> {
+    let simulation = Simulation::with(scenario, parts)?;
+    fly_on(simulation, sink, &mut |simulation| carry_on(simulation.steps()))
+}
+
+/// Flies a simulation on from where it is, as [`fly`] does; `after` is given it after each step, may load it, and ends the flight
+/// with [`ControlFlow::Break`].
+///
+/// # Errors
+/// [`SimError`] where what is recorded cannot be kept.
+pub fn fly_on(
+    mut simulation: Simulation,
+    sink: &mut dyn Sink,
+    after: &mut dyn FnMut(&mut Simulation) -> ControlFlow<()>,
+) -> Result<Flight, SimError> {
     let began = Instant::now();
-    let mut simulation = Simulation::with(scenario, parts)?;
     hand_over(&mut simulation, sink)?;
     while simulation.ending().is_none() {
         simulation.step();
         hand_over(&mut simulation, sink)?;
-        if simulation.ending().is_none() && carry_on(simulation.steps()).is_break() {
+        if simulation.ending().is_none() && after(&mut simulation).is_break() {
             simulation.interrupt();
             hand_over(&mut simulation, sink)?;
         }

@@ -54,6 +54,8 @@ pub struct Simulation {
     events: Vec<Event>,
     /// The fewest parts at once in the last step.
     shortest: u64,
+    /// Steps that were flown in parts.
+    refined_steps: u64,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     watch: Watch,
@@ -113,6 +115,7 @@ impl Simulation {
             steps: 0,
             events: other_law.into_iter().collect(),
             shortest: 0,
+            refined_steps: 0,
             energy: None,
             watch: Watch::default(),
             peaks: Peaks::default(),
@@ -228,6 +231,14 @@ impl Simulation {
         self.steps
     }
 
+    /// The smallest clearance so far \[m\], between steps included: of two vehicles, their distance less delta in the lengths that
+    /// delta is meant in ([`crate::space::Metric`]); of a vehicle and an obstacle, its distance less the obstacle's clearance. Below 0
+    /// exactly where the judge has found a violation; none where nothing can come near anything.
+    #[must_use]
+    pub fn least_clearance_m(&self) -> Option<f64> {
+        self.judge.least_clearance_m()
+    }
+
     /// Takes what happened since this was asked last, in its order.
     pub fn events(&mut self) -> impl Iterator<Item = Event> + '_ {
         self.events.drain(..)
@@ -258,7 +269,8 @@ impl Simulation {
     }
 
     /// Becomes what was saved, of whatever scenario, and goes on with the same bits as if it had never been interrupted;
-    /// with a `noise_seed`, all random numbers begin anew from it and nothing else changes.
+    /// with a `noise_seed`, all that is drawn from now on is drawn from it and nothing else changes: the air that vehicles are
+    /// in, a measurement that they hold, a sensor's lasting error and messages under way stay what they are.
     pub fn load(&mut self, saved: &Saved, noise_seed: Option<u64>) {
         self.clone_from(&saved.0);
         if let Some(seed) = noise_seed {
@@ -276,6 +288,7 @@ impl Simulation {
             ending: self.ending.unwrap_or(Ending::Interrupted),
             duration_s: self.time_s,
             steps: self.steps,
+            refined_steps: self.refined_steps,
             certificate: self.certificate,
             audit,
             in_metres,

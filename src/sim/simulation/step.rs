@@ -26,6 +26,7 @@ impl Simulation {
             self.events.push(Event::StepRefined { time_s, dt_s });
         }
         self.shortest = shortest;
+        self.refined_steps += u64::from(shortest < whole);
         flown
     }
 

@@ -1,32 +1,9 @@
-//! What some runs say of all that could have been flown: shares, means and quantiles with 95 % intervals.
-//!
-//! All intervals are two-sided, with at most 2.5 % on either side, and for a number of runs that was fixed beforehand.
+//! Means and quantiles of what was measured.
 
 use serde::Serialize;
-use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _, StudentsT};
+use statrs::distribution::{Binomial, ContinuousCDF as _, DiscreteCDF as _, StudentsT};
 
-/// How often an interval holds the true value.
-pub const CONFIDENCE: f64 = 0.95;
-
-/// What an interval leaves out on either side.
-const TAIL: f64 = 0.5 * (1.0 - CONFIDENCE);
-
-/// So many of so many, with the interval of their share.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Proportion {
-    /// How many.
-    pub count: u64,
-    /// Of how many.
-    pub of: u64,
-    /// One over the other, from 0 to 1; none of none.
-    pub share: Option<f64>,
-    /// The true share is at least this.
-    pub low: f64,
-    /// And at most this.
-    pub high: f64,
-    /// [`CONFIDENCE`].
-    pub confidence: f64,
-}
+use super::confidence::TAIL;
 
 /// An estimate with its interval; a bound that so few values do not give is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -37,32 +14,6 @@ pub struct Estimate {
     pub low: Option<f64>,
     /// And at most this.
     pub high: Option<f64>,
-}
-
-impl Proportion {
-    /// `count` of `of`, with the interval of Clopper and Pearson (Biometrika 26, 1934): the shares that are not rejected by
-    /// either one-sided binomial test. It never covers less than [`CONFIDENCE`], and holds for 0 and for all of them. A count
-    /// beyond `of` is taken for `of`.
-    #[must_use]
-    pub fn new(count: u64, of: u64) -> Self {
-        let count = count.min(of);
-        let (hits, misses) = (count as f64, (of - count) as f64);
-        let low = if count == 0 { None } else { beta_quantile(hits, misses + 1.0, TAIL) };
-        let high = if count == of { None } else { beta_quantile(hits + 1.0, misses, 1.0 - TAIL) };
-        Self {
-            count,
-            of,
-            share: (of > 0).then(|| hits / of as f64),
-            low: low.unwrap_or(0.0),
-            high: high.unwrap_or(1.0),
-            confidence: CONFIDENCE,
-        }
-    }
-}
-
-/// Where the distribution function of Beta(a, b) reaches p.
-fn beta_quantile(a: f64, b: f64, p: f64) -> Option<f64> {
-    Beta::new(a, b).map(|beta| beta.inverse_cdf(p)).ok()
 }
 
 impl Estimate {
@@ -114,54 +65,8 @@ fn middle(sorted: &[f64], p: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::{binomial_up_to, near};
     use super::*;
-
-    fn near(found: f64, expected: f64, tolerance: f64) {
-        assert!((found - expected).abs() <= tolerance, "{found} instead of {expected}");
-    }
-
-    /// Share of `Binomial(n, p)` up to and with k, by its sum from the side where it does not begin with nothing.
-    fn binomial_up_to(k: u64, n: u64, p: f64) -> f64 {
-        if p > 0.5 {
-            return if k >= n { 1.0 } else { 1.0 - binomial_up_to(n - k - 1, n, 1.0 - p) };
-        }
-        let mut term = (1.0 - p).powi(i32::try_from(n).expect("small"));
-        let mut sum = 0.0;
-        for i in 0..=k.min(n) {
-            sum += term;
-            term *= (n - i) as f64 / (i + 1) as f64 * p / (1.0 - p);
-        }
-        sum
-    }
-
-    #[test]
-    fn a_share_has_the_interval_of_clopper_and_pearson() {
-        for (count, of, low, high) in
-            [(26, 60, 0.306, 0.568), (100, 100, 0.9637, 1.0), (0, 500, 0.0, 0.00735), (20, 20, 0.8316, 1.0)]
-        {
-            let share = Proportion::new(count, of);
-            near(share.low, low, 5e-4);
-            near(share.high, high, 5e-4);
-        }
-        assert_eq!(Proportion::new(0, 0).share, None);
-        assert_eq!((Proportion::new(0, 0).low, Proportion::new(0, 0).high), (0.0, 1.0));
-        assert_eq!(Proportion::new(9, 4).count, 4);
-    }
-
-    #[test]
-    fn its_bounds_are_where_the_one_sided_tests_turn() {
-        for of in [1_u64, 2, 7, 20, 60, 300] {
-            for count in 0..=of {
-                let Proportion { low, high, .. } = Proportion::new(count, of);
-                if count > 0 {
-                    near(1.0 - binomial_up_to(count - 1, of, low), TAIL, 1e-9);
-                }
-                if count < of {
-                    near(binomial_up_to(count, of, high), TAIL, 1e-9);
-                }
-            }
-        }
-    }
 
     #[test]
     fn a_mean_has_students_interval() {

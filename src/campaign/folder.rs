@@ -1,0 +1,226 @@
+//! The folder of a campaign: its manifest, its parts, and which of them are missing.
+
+use std::collections::hash_map::RandomState;
+use std::fs;
+use std::hash::BuildHasher as _;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::error::CampaignError;
+use super::manifest::{Manifest, Program};
+use super::part::{self, Found};
+use super::plan::Campaign;
+use super::row::Row;
+
+/// A folder and the campaign in it.
+#[derive(Clone, Debug)]
+pub struct Folder {
+    path: PathBuf,
+    campaign: Campaign,
+}
+
+impl Folder {
+    /// Puts the manifest of a campaign into a folder; one that holds the same campaign is left as it is, with its own number
+    /// of shards unless another is asked for.
+    ///
+    /// # Errors
+    /// [`CampaignError::Foreign`] where the folder holds another campaign, or this one in another number of shards.
+    pub fn plan(path: &Path, campaign: Campaign, shards_asked: bool) -> Result<Self, CampaignError> {
+        let file = path.join("manifest.json");
+        if file.exists() {
+            let there = Manifest::read(&file, &campaign.manifest().tool)?;
+            let (here, other) = (campaign.manifest(), &there);
+            if here.campaign != other.campaign {
+                return Err(CampaignError::Foreign {
+                    path: path.to_owned(),
+                    why: format!("the folder holds the campaign {}, and this one is {}", other.campaign, here.campaign),
+                    help: "give another folder with --out".to_owned(),
+                });
+            }
+            if shards_asked && here.shards != other.shards {
+                return Err(CampaignError::Foreign {
+                    path: path.to_owned(),
+                    why: format!("the folder holds this campaign in {} shards, not {}", other.shards, here.shards),
+                    help: "leave --shards out to go on, or give another folder with --out".to_owned(),
+                });
+            }
+            return Self::of(path, Campaign::of(there)?);
+        }
+        let folder = Self::of(path, campaign)?;
+        folder.campaign.manifest().write(&file)?;
+        Ok(folder)
+    }
+
+    /// The campaign in a folder.
+    ///
+    /// # Errors
+    /// As [`Manifest::read`] and [`Campaign::of`].
+    pub fn open(path: &Path, program: &Program) -> Result<Self, CampaignError> {
+        let file = if path.is_file() { path.to_owned() } else { path.join("manifest.json") };
+        let campaign = Campaign::of(Manifest::read(&file, program)?)?;
+        Self::of(if path.is_file() { path.parent().unwrap_or(Path::new("")) } else { path }, campaign)
+    }
+
+    fn of(path: &Path, campaign: Campaign) -> Result<Self, CampaignError> {
+        let parts = path.join("parts");
+        fs::create_dir_all(&parts).map_err(|error| CampaignError::writing(&parts, error))?;
+        Ok(Self { path: path.to_owned(), campaign })
+    }
+
+    /// What is flown.
+    #[must_use]
+    pub fn campaign(&self) -> &Campaign {
+        &self.campaign
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A file beside the manifest.
+    #[must_use]
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// The part of a shard.
+    pub(super) fn part(&self, shard: u64) -> PathBuf {
+        self.path.join("parts").join(format!("{}.jsonl", stem(shard)))
+    }
+
+    /// Wall-clock times of a shard.
+    pub(super) fn times(&self, shard: u64) -> PathBuf {
+        self.path.join("parts").join(format!("{}.times.json", stem(shard)))
+    }
+
+    /// A name for a file of a shard that no other process takes.
+    pub(super) fn own(&self, shard: u64, kind: &str) -> PathBuf {
+        let number = RandomState::new().hash_one(std::process::id());
+        self.path.join("parts").join(format!("{}.{number:016x}.{kind}", stem(shard)))
+    }
+
+    /// Files of a shard of this kind that some process left.
+    pub(super) fn left(&self, shard: u64, kind: &str) -> Result<Vec<PathBuf>, CampaignError> {
+        let folder = self.path.join("parts");
+        let (begin, end) = (format!("{}.", stem(shard)), format!(".{kind}"));
+        let is_one = |path: &PathBuf| {
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            name.starts_with(&begin) && name.ends_with(&end)
+        };
+        let entries = fs::read_dir(&folder).map_err(|error| CampaignError::reading(&folder, error))?;
+        let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>();
+        let mut paths = paths.map_err(|error| CampaignError::reading(&folder, error))?;
+        paths.retain(is_one);
+        paths.sort();
+        Ok(paths)
+    }
+
+    /// Reads the part of a shard.
+    ///
+    /// # Errors
+    /// [`CampaignError::Alarm`] where it was flown twice with different results, and as [`part::read`].
+    pub fn read(&self, shard: u64) -> Result<Found, CampaignError> {
+        let kept = self.part(shard);
+        if let Some(other) = self.left(shard, DIFFERS)?.into_iter().next() {
+            return Err(CampaignError::Alarm { shard, kept, other });
+        }
+        part::read(&kept, self.campaign.manifest(), shard, self.campaign.laws().len())
+    }
+
+    /// The row of a run under a law, counted from 0; none where it has not been flown.
+    ///
+    /// # Errors
+    /// As [`Folder::read`].
+    pub fn row(&self, run: u64, law: usize) -> Result<Option<Row>, CampaignError> {
+        let manifest = self.campaign.manifest();
+        let Some(shard) = (0..manifest.shards).find(|&shard| manifest.range(shard).contains(&run)) else {
+            return Ok(None);
+        };
+        Ok(match self.read(shard)? {
+            Found::Whole(rows) => rows.into_iter().find(|row| row.place() == (run, law)),
+            Found::Nothing | Found::Broken => None,
+        })
+    }
+
+    /// Shards that are not flown, in their order.
+    ///
+    /// # Errors
+    /// As [`Folder::read`].
+    pub fn missing(&self) -> Result<Vec<u64>, CampaignError> {
+        let is_missing = |shard: u64| self.read(shard).map(|found| !matches!(found, Found::Whole(_)));
+        let shards = 0..self.campaign.manifest().shards;
+        shards.filter_map(|shard| is_missing(shard).map(|missing| missing.then_some(shard)).transpose()).collect()
+    }
+}
+
+/// A part that says something else than the one that was there.
+pub(super) const DIFFERS: &str = "differs.jsonl";
+/// Rows of a process that is under way, or was killed.
+pub(super) const JOURNAL: &str = "journal";
+
+fn stem(shard: u64) -> String {
+    format!("shard-{shard:09}")
+}
+
+/// Shards as a list that [`parse`] reads: `13,500-502`.
+#[must_use]
+pub fn listed(shards: &[u64]) -> String {
+    let mut spans: Vec<[u64; 2]> = Vec::new();
+    for &shard in shards {
+        match spans.last_mut() {
+            Some([_, last]) if *last + 1 == shard => *last = shard,
+            _ => spans.push([shard, shard]),
+        }
+    }
+    let said = |[first, last]: &[u64; 2]| if first == last { first.to_string() } else { format!("{first}-{last}") };
+    spans.iter().map(said).collect::<Vec<_>>().join(",")
+}
+
+/// The shards of a list such as `7`, `3-5`, `13,500-502`, or `env:NAME` with such a list in that variable.
+///
+/// # Errors
+/// [`CampaignError::Plan`] for what is no list, and for a shard beyond the last one.
+pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, CampaignError> {
+    let help = "give numbers from 0 on, such as 7, 3-5, 13,500-502, or env:SLURM_ARRAY_TASK_ID";
+    let wrong = |why: String| CampaignError::plan(why, help);
+    if let Some(name) = list.strip_prefix("env:") {
+        let value = std::env::var(name).map_err(|_| wrong(format!("the environment has no variable {name}")))?;
+        return if value.starts_with("env:") { Err(wrong(format!("{name} = {value}"))) } else { parse(&value, shards) };
+    }
+    let mut parsed = Vec::new();
+    for span in list.split(',').map(str::trim) {
+        let (first, last) = span.split_once('-').unwrap_or((span, span));
+        let number =
+            |text: &str| text.trim().parse::<u64>().map_err(|_| wrong(format!("`{span}` is no number of a shard")));
+        let (first, last) = (number(first)?, number(last)?);
+        if first > last || last >= shards {
+            return Err(wrong(format!("`{span}`, but the shards are 0 to {}", shards - 1)));
+        }
+        parsed.extend(first..=last);
+    }
+    parsed.sort_unstable();
+    parsed.dedup();
+    Ok(parsed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_of_shards_reads_back() {
+        for shards in [vec![], vec![7], vec![0, 1, 2], vec![13, 500, 501, 502, 504]] {
+            let list = listed(&shards);
+            if !shards.is_empty() {
+                assert_eq!(parse(&list, 505).expect(&list), shards);
+            }
+        }
+        assert_eq!(listed(&[13, 500, 501, 502]), "13,500-502");
+        assert_eq!(parse("5, 3-4 ,3", 6).expect("a list"), [3, 4, 5]);
+        for wrong in ["", "a", "6", "4-3", "1,", "-1", "1-", "env:TAUTLINE_NO_SUCH_VARIABLE"] {
+            assert!(parse(wrong, 6).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Rows counted in their order, up to where enough has been flown.
+
+use super::row::{Known, Row};
+use super::spec::{Asked, Stop};
+use crate::statistics::{Proportion, anytime};
+
+/// Runs after which it is first asked whether enough has been flown; then after twice as many, and so on.
+const FIRST_LOOK: u64 = 100;
+
+/// A share with the interval that holds the true one. What is not known of some flights widens it: at the lower end they
+/// count as not, at the upper end as well.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Share {
+    /// How many show it.
+    pub count: u64,
+    /// Of how many.
+    pub of: u64,
+    /// One over the other; none of none.
+    pub share: Option<f64>,
+    /// The true share is at least this.
+    pub low: f64,
+    /// And at most this.
+    pub high: f64,
+    /// How often an interval holds the true share.
+    pub confidence: f64,
+}
+
+/// Which intervals are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Intervals {
+    /// Of Clopper and Pearson, for a number of runs that was fixed beforehand.
+    ClopperPearson,
+    /// A confidence sequence, which holds whenever one stops.
+    ConfidenceSequence,
+}
+
+impl Intervals {
+    /// The share of `count`, or `count` and `unknown` more, of so many.
+    #[must_use]
+    pub fn share(self, count: u64, unknown: u64, of: u64) -> Share {
+        let at = |count: u64| match self {
+            Self::ClopperPearson => Proportion::new(count, of),
+            Self::ConfidenceSequence => anytime(count, of),
+        };
+        Share {
+            count,
+            of,
+            share: (of > 0).then(|| count as f64 / of as f64),
+            low: at(count).low,
+            high: at(count.saturating_add(unknown).min(of)).high,
+            confidence: crate::statistics::CONFIDENCE,
+        }
+    }
+}
+
+/// How many flights of a law showed what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Flown.
+    pub flown: u64,
+    /// Not flown.
+    pub not_flown: u64,
+    /// Clear to the end.
+    pub clear: u64,
+    /// With a violation.
+    pub violated: u64,
+    /// Neither is known.
+    pub unknown: u64,
+    /// Reached and kept.
+    pub reached: u64,
+    /// Passed.
+    pub pass: u64,
+}
+
+impl Counts {
+    fn take(&mut self, row: &Row) {
+        let counter = match row.known() {
+            Known::Clear => &mut self.clear,
+            Known::Violated => &mut self.violated,
+            Known::Unknown => &mut self.unknown,
+            Known::NotFlown => &mut self.not_flown,
+            Known::Estimated => return,
+        };
+        *counter += 1;
+        self.flown += u64::from(row.flight.is_some());
+        self.reached += u64::from(row.flight.as_ref().is_some_and(|flight| flight.reached));
+        self.pass += u64::from(row.flight.as_ref().is_some_and(|flight| flight.pass));
+    }
+
+    /// The share that shows what is asked.
+    #[must_use]
+    pub fn share(&self, asked: Asked, intervals: Intervals) -> Share {
+        match asked {
+            Asked::Clear => intervals.share(self.clear, self.unknown, self.flown),
+            Asked::Reached => intervals.share(self.reached, 0, self.flown),
+            Asked::Pass => intervals.share(self.pass, 0, self.flown),
+        }
+    }
+
+    /// The share with a violation.
+    #[must_use]
+    pub fn violated(&self, intervals: Intervals) -> Share {
+        intervals.share(self.violated, self.unknown, self.flown)
+    }
+}
+
+/// Rows counted in the order of their runs.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    stop: Option<Stop>,
+    counts: Vec<Counts>,
+    runs: u64,
+    next_look: u64,
+    is_enough: bool,
+}
+
+impl Tally {
+    /// Nothing counted, of so many laws.
+    #[must_use]
+    pub fn new(laws: usize, stop: Option<Stop>) -> Self {
+        Self { stop, counts: vec![Counts::default(); laws], runs: 0, next_look: FIRST_LOOK, is_enough: false }
+    }
+
+    /// Counts a row, unless enough has been flown before it; says whether it was.
+    pub fn take(&mut self, row: &Row) -> bool {
+        if self.is_enough {
+            return false;
+        }
+        if let Some(counts) = self.counts.get_mut(row.law) {
+            counts.take(row);
+        }
+        if row.law + 1 == self.counts.len() {
+            self.runs += 1;
+            if self.runs == self.next_look {
+                self.next_look = self.next_look.saturating_mul(2);
+                self.is_enough = self.stop.is_some_and(|stop| self.decides(stop));
+            }
+        }
+        true
+    }
+
+    fn decides(&self, stop: Stop) -> bool {
+        self.counts.iter().all(|counts| {
+            let share = counts.share(stop.of, Intervals::ConfidenceSequence);
+            let is_narrow = stop.width.is_none_or(|width| share.high - share.low <= width);
+            let is_decided = stop.decided.is_none_or(|at| share.low > at || share.high < at);
+            is_narrow && is_decided
+        })
+    }
+
+    /// Whether enough has been flown.
+    #[must_use]
+    pub fn is_enough(&self) -> bool {
+        self.is_enough
+    }
+
+    /// Runs that were counted under every law.
+    #[must_use]
+    pub fn runs(&self) -> u64 {
+        self.runs
+    }
+
+    /// Counts of each law.
+    #[must_use]
+    pub fn counts(&self) -> &[Counts] {
+        &self.counts
+    }
+}

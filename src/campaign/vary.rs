@@ -1,0 +1,292 @@
+//! What differs from run to run: a key of the scenario, and how its value is drawn.
+
+use std::f64::consts::TAU;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+
+use super::error::CampaignError;
+
+/// Seeds that are drawn have this many bits, so that every reader of a table keeps them whole.
+const SEED_BITS: u32 = 53;
+
+/// The word that draws a seed by run.
+const BY_RUN: &str = "run";
+
+/// How the value of a key is drawn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Variation {
+    /// A seed of 53 bits.
+    Seed {},
+    /// Uniform between two numbers.
+    Uniform([f64; 2]),
+    /// Uniform in the logarithm between two positive numbers.
+    LogUniform([f64; 2]),
+    /// Normal with this mean and standard deviation.
+    Normal([f64; 2]),
+    /// A whole number between two, both included, each as likely as any other.
+    Integer([i64; 2]),
+    /// One of these, each as likely as any other.
+    List(Vec<toml::Value>),
+    /// These in turn, crossed with every other grid.
+    Grid(Grid),
+}
+
+/// Values that are flown in turn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Grid {
+    /// As they are listed.
+    Listed(Vec<toml::Value>),
+    /// Evenly spaced, both ends included.
+    Spaced {
+        /// The first.
+        from: f64,
+        /// The last.
+        to: f64,
+        /// How many.
+        count: u64,
+    },
+}
+
+impl Grid {
+    fn len(&self) -> u64 {
+        match self {
+            Self::Listed(values) => values.len() as u64,
+            Self::Spaced { count, .. } => *count,
+        }
+    }
+
+    fn at(&self, number: u64) -> toml::Value {
+        match self {
+            Self::Listed(values) => {
+                let listed = usize::try_from(number).ok().and_then(|number| values.get(number));
+                listed.cloned().unwrap_or(toml::Value::Boolean(false))
+            }
+            Self::Spaced { from, to, count } => {
+                let part = number as f64 / (*count - 1) as f64;
+                toml::Value::Float((1.0 - part) * from + part * to)
+            }
+        }
+    }
+}
+
+impl Variation {
+    /// What a table `[vary]` says of a key.
+    ///
+    /// # Errors
+    /// [`CampaignError::Vary`] for what is no variation, and for one between whose ends there is nothing.
+    pub fn read(key: &str, said: &toml::Value) -> Result<Self, CampaignError> {
+        let wrong = |why: String| CampaignError::Vary { key: key.to_owned(), why };
+        if said.as_str() == Some(BY_RUN) {
+            return Ok(Self::Seed {});
+        }
+        let read = said.clone().try_into::<Self>();
+        let variation = read.map_err(|error| wrong(error.message().trim_end().to_owned()))?;
+        match &variation {
+            Self::Uniform([low, high]) | Self::LogUniform([low, high])
+                if !(low < high && low.is_finite() && high.is_finite()) =>
+            {
+                Err(wrong(format!("there is nothing to draw between {low} and {high}")))
+            }
+            Self::LogUniform([low, _]) if *low <= 0.0 => Err(wrong(format!("{low} has no logarithm"))),
+            Self::Normal([mean, deviation]) if !(mean.is_finite() && *deviation > 0.0 && deviation.is_finite()) => {
+                Err(wrong(format!("no normal numbers have the mean {mean} and the standard deviation {deviation}")))
+            }
+            Self::Integer([low, high]) if low >= high => {
+                Err(wrong(format!("there is nothing to draw between {low} and {high}")))
+            }
+            Self::List(values) | Self::Grid(Grid::Listed(values)) if values.is_empty() => {
+                Err(wrong("the list is empty".to_owned()))
+            }
+            Self::Grid(Grid::Spaced { from, to, count })
+                if *count < 2 || !(from < to && from.is_finite() && to.is_finite()) =>
+            {
+                Err(wrong(format!(
+                    "{count} values from {from} to {to} are no grid: at least 2, from the smaller one on"
+                )))
+            }
+            _ => Ok(variation),
+        }
+    }
+
+    /// How many values it flies in turn; none for what is drawn.
+    #[must_use]
+    pub fn grid_len(&self) -> Option<u64> {
+        if let Self::Grid(grid) = self { Some(grid.len()) } else { None }
+    }
+
+    /// Values that show whether the key takes what may be drawn: the ends, or everything that is listed.
+    #[must_use]
+    pub fn samples(&self) -> Vec<toml::Value> {
+        let ends = |[low, high]: [f64; 2]| vec![toml::Value::Float(low), toml::Value::Float(high)];
+        match self {
+            Self::Seed {} => vec![toml::Value::Integer(0)],
+            Self::Uniform(between) | Self::LogUniform(between) => ends(*between),
+            Self::Normal([mean, _]) => vec![toml::Value::Float(*mean)],
+            Self::Integer(between) => between.map(toml::Value::Integer).to_vec(),
+            Self::List(values) | Self::Grid(Grid::Listed(values)) => values.clone(),
+            Self::Grid(Grid::Spaced { from, to, .. }) => ends([*from, *to]),
+        }
+    }
+
+    /// The value of a run: drawn from the campaign's seed, the key and the run's number alone, or the one of a grid with this
+    /// number.
+    #[must_use]
+    pub fn value(&self, seed: u64, key: &str, run: u64, place: u64) -> toml::Value {
+        let mut random = Random::of(seed, key, run);
+        match self {
+            Self::Seed {} => toml::Value::Integer((random.word() >> (u64::BITS - SEED_BITS)).cast_signed()),
+            Self::Uniform([low, high]) => toml::Value::Float(between(*low, *high, random.unit())),
+            Self::LogUniform([low, high]) => {
+                let drawn = libm::exp(between(libm::log(*low), libm::log(*high), random.unit()));
+                toml::Value::Float(drawn.clamp(*low, *high))
+            }
+            Self::Normal([mean, deviation]) => toml::Value::Float(mean + deviation * random.normal()),
+            Self::Integer([low, high]) => {
+                let drawn = random.below(high.abs_diff(*low).saturating_add(1));
+                toml::Value::Integer(low.saturating_add_unsigned(drawn))
+            }
+            Self::List(values) => {
+                let drawn = usize::try_from(random.below(values.len() as u64)).ok();
+                drawn.and_then(|drawn| values.get(drawn)).cloned().unwrap_or(toml::Value::Boolean(false))
+            }
+            Self::Grid(grid) => grid.at(place),
+        }
+    }
+}
+
+fn between(low: f64, high: f64, part: f64) -> f64 {
+    ((1.0 - part) * low + part * high).clamp(low, high)
+}
+
+/// `ChaCha8` words of a key and a run: no other key and no other run has a part in them.
+struct Random(ChaCha8Rng);
+
+impl Random {
+    fn of(seed: u64, key: &str, run: u64) -> Self {
+        let hash = Sha256::new().chain_update(seed.to_le_bytes()).chain_update(key.as_bytes()).finalize();
+        let mut random = ChaCha8Rng::from_seed(hash.into());
+        random.set_stream(run);
+        Self(random)
+    }
+
+    fn word(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+
+    /// Uniform in \[0, 1), a multiple of 2^-53.
+    fn unit(&mut self) -> f64 {
+        const SCALE: f64 = 1.0 / (1_u64 << SEED_BITS) as f64;
+        (self.word() >> (u64::BITS - SEED_BITS)) as f64 * SCALE
+    }
+
+    /// Below `end`; words that would favour the smaller numbers are drawn again.
+    fn below(&mut self, end: u64) -> u64 {
+        let fair = u64::MAX - u64::MAX % end.max(1);
+        loop {
+            let word = self.word();
+            if word < fair {
+                return word % end.max(1);
+            }
+        }
+    }
+
+    /// Of mean 0 and variance 1, by Box and Muller.
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
+        radius * libm::cos(TAU * self.unit())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(text: &str) -> Result<Variation, CampaignError> {
+        let table: toml::Table = text.parse().expect("TOML");
+        Variation::read("key", &table["key"])
+    }
+
+    fn numbers(text: &str, count: u64) -> Vec<f64> {
+        let variation = said(text).expect("a variation");
+        let value = |run| match variation.value(7, "key", run, run) {
+            toml::Value::Float(value) => value,
+            toml::Value::Integer(value) => value as f64,
+            other => panic!("{other}"),
+        };
+        (0..count).map(value).collect()
+    }
+
+    #[test]
+    fn numbers_are_drawn_as_they_say() {
+        const COUNT: u64 = 20_000;
+        let mean =
+            |values: &[f64], of: &dyn Fn(f64) -> f64| values.iter().map(|&value| of(value)).sum::<f64>() / COUNT as f64;
+        // Five standard deviations of a mean of so many.
+        let near = |found: f64, expected: f64, variance: f64| {
+            assert!((found - expected).abs() < 5.0 * (variance / COUNT as f64).sqrt(), "{found} for {expected}");
+        };
+        let uniform = numbers("key = { uniform = [2.0, 6.0] }", COUNT);
+        near(mean(&uniform, &|x| x), 4.0, 16.0 / 12.0);
+        assert!(uniform.iter().all(|x| (2.0..=6.0).contains(x)));
+        let spread = numbers("key = { log_uniform = [0.01, 100.0] }", COUNT);
+        near(mean(&spread, &f64::log10), 0.0, 16.0 / 12.0);
+        let normal = numbers("key = { normal = [3.0, 0.5] }", COUNT);
+        near(mean(&normal, &|x| x), 3.0, 0.25);
+        near(mean(&normal, &|x| (x - 3.0).powi(2)), 0.25, 2.0 * 0.25 * 0.25);
+        let whole = numbers("key = { integer = [-1, 4] }", COUNT);
+        near(mean(&whole, &|x| x), 1.5, 35.0 / 12.0);
+        for value in -1..=4 {
+            near(mean(&whole, &|x| f64::from(x == f64::from(value))), 1.0 / 6.0, 5.0 / 36.0);
+        }
+        near(mean(&numbers("key = { list = [10, 20] }", COUNT), &|x| x), 15.0, 25.0);
+        let seeds = numbers("key = 'run'", COUNT);
+        assert!(seeds.iter().all(|seed| (0.0..9.1e15).contains(seed)));
+        let mut distinct: Vec<_> = seeds.iter().map(|seed| seed.to_bits()).collect();
+        distinct.sort_unstable();
+        distinct.dedup();
+        assert_eq!(distinct.len() as u64, COUNT);
+    }
+
+    #[test]
+    fn a_grid_is_flown_in_turn() {
+        assert_eq!(numbers("key = { grid = { from = 1.0, to = 3.0, count = 5 } }", 5), [1.0, 1.5, 2.0, 2.5, 3.0]);
+        assert_eq!(numbers("key = { grid = [4, 2] }", 2), [4.0, 2.0]);
+    }
+
+    #[test]
+    fn another_key_another_run_and_another_seed_draw_other_numbers() {
+        let uniform = Variation::Uniform([0.0, 1.0]);
+        let drawn = [(7, "a", 0), (7, "b", 0), (7, "a", 1), (8, "a", 0)]
+            .map(|(seed, key, run)| uniform.value(seed, key, run, 0).as_float().expect("a number").to_bits());
+        assert!((0..4).all(|i| (0..i).all(|j| drawn[i] != drawn[j])), "{drawn:?}");
+        assert_eq!(uniform.value(7, "a", 0, 0), uniform.value(7, "a", 0, 5));
+    }
+
+    #[test]
+    fn what_is_no_variation_is_refused_with_its_key() {
+        for wrong in [
+            "key = 3",
+            "key = 'seed'",
+            "key = { unifrom = [0, 1] }",
+            "key = { uniform = [1.0, 1.0] }",
+            "key = { uniform = [0.0, inf] }",
+            "key = { uniform = [0.0, nan] }",
+            "key = { uniform = [0.0, 1.0, 2.0] }",
+            "key = { log_uniform = [0.0, 1.0] }",
+            "key = { normal = [0.0, 0.0] }",
+            "key = { integer = [2, 2] }",
+            "key = { list = [] }",
+            "key = { grid = [] }",
+            "key = { grid = { from = 0.0, to = 1.0, count = 1 } }",
+            "key = { grid = { from = 1.0, to = 0.0, count = 3 } }",
+        ] {
+            let refused = said(wrong).expect_err(wrong).to_string();
+            assert!(refused.contains("key"), "{wrong}: {refused}");
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! A path with what it takes to branch off from it.
+
+use std::ops::ControlFlow;
+use std::rc::Rc;
+
+use super::genealogy::{Branch, Genealogy};
+use super::path::Path;
+
+/// Most states that are kept of a path besides the one that it began with.
+const KEPT: usize = 8;
+
+/// Steps between two states that are kept, at first.
+const FIRST_APART: u64 = 16;
+
+/// Steps that were flown, and who is asked after each whether to go on.
+pub(super) struct Watch<'a> {
+    pub(super) steps: u64,
+    pub(super) carry_on: &'a mut dyn FnMut(u64) -> ControlFlow<()>,
+}
+
+impl Watch<'_> {
+    fn flown(&mut self) -> ControlFlow<()> {
+        self.steps += 1;
+        (self.carry_on)(self.steps)
+    }
+}
+
+/// A path that was made to its end: its score, and where it was the first time past each lower one.
+///
+/// A path can be branched off wherever its score was higher than ever before. Of these steps it keeps number and score (16 bytes
+/// each), and of some of them the state, at most nine: the others are made again from the one before, to the same bits.
+pub struct Lineage<S> {
+    genealogy: Genealogy,
+    score: f64,
+    records: Vec<Record>,
+    /// The first is not after the first record.
+    states: Vec<State<S>>,
+    /// Steps between two states, at least.
+    apart: u64,
+}
+
+/// A step at which the score was higher than ever before.
+#[derive(Clone, Copy)]
+struct Record {
+    step: u64,
+    score: f64,
+}
+
+/// A path at a step; with a seed, other random numbers take over from there.
+struct State<S> {
+    step: u64,
+    saved: Rc<S>,
+    noise_seed: Option<u64>,
+}
+
+/// Where a path was past a level for the first time.
+pub(super) struct Crossing<S> {
+    step: u64,
+    score: f64,
+    saved: Rc<S>,
+}
+
+impl<S> Lineage<S> {
+    /// Its largest score; of one that is past the target, the first that is.
+    #[must_use]
+    pub fn score(&self) -> f64 {
+        self.score
+    }
+
+    /// The random numbers that it was made of.
+    #[must_use]
+    pub fn genealogy(&self) -> &Genealogy {
+        &self.genealogy
+    }
+
+    /// A path from its start, to its end or past the target.
+    pub(super) fn begin<P: Path<Saved = S>>(
+        path: &mut P,
+        noise_seed: u64,
+        target: f64,
+        watch: &mut Watch<'_>,
+    ) -> Result<ControlFlow<(), Self>, P::Error> {
+        path.begin(noise_seed)?;
+        let mut lineage = Self {
+            genealogy: Genealogy::new(noise_seed),
+            score: f64::NEG_INFINITY,
+            records: Vec::new(),
+            states: vec![State { step: 0, saved: Rc::new(path.save()), noise_seed: None }],
+            apart: FIRST_APART,
+        };
+        lineage.observe(path, 0);
+        Ok(lineage.grow(path, 0, target, watch))
+    }
+
+    /// A copy up to a crossing, with fresh noise from there.
+    pub(super) fn branch<P: Path<Saved = S>>(
+        &self,
+        path: &mut P,
+        at: &Crossing<S>,
+        noise_seed: u64,
+        target: f64,
+        watch: &mut Watch<'_>,
+    ) -> ControlFlow<(), Self> {
+        let &Crossing { step, score, ref saved } = at;
+        path.restore(saved, Some(noise_seed));
+        let lineage = Self {
+            genealogy: self.genealogy.branched(Branch { step, noise_seed }),
+            score,
+            records: vec![Record { step, score }],
+            states: vec![State { step, saved: Rc::clone(saved), noise_seed: Some(noise_seed) }],
+            apart: FIRST_APART,
+        };
+        lineage.grow(path, step, target, watch)
+    }
+
+    /// Goes on from a step with the path as it is there.
+    fn grow<P: Path<Saved = S>>(
+        mut self,
+        path: &mut P,
+        mut step: u64,
+        target: f64,
+        watch: &mut Watch<'_>,
+    ) -> ControlFlow<(), Self> {
+        while self.score <= target && path.step() {
+            step += 1;
+            if watch.flown().is_break() {
+                return ControlFlow::Break(());
+            }
+            self.observe(path, step);
+        }
+        ControlFlow::Continue(self)
+    }
+
+    /// Notes where the path is, where it is nearer than ever before.
+    fn observe<P: Path<Saved = S>>(&mut self, path: &P, step: u64) {
+        let score = path.score();
+        if score > self.score {
+            self.score = score;
+            self.records.push(Record { step, score });
+            if self.states.last().is_none_or(|last| step - last.step >= self.apart) {
+                self.states.push(State { step, saved: Rc::new(path.save()), noise_seed: None });
+            }
+            if self.states.len() > KEPT + 1 {
+                let mut index = 0;
+                self.states.retain(|_| (index % 2 == 0, index += 1).0);
+                self.apart *= 2;
+            }
+        }
+    }
+
+    /// Forgets what lies before the first record of which `is_past` holds: nothing will branch off there any more.
+    pub(super) fn forget_before(&mut self, is_past: impl Fn(f64) -> bool) {
+        self.records.drain(..self.records.partition_point(|record| !is_past(record.score)));
+        if let Some(first) = self.records.first() {
+            let later = self.states.partition_point(|state| state.step <= first.step);
+            self.states.drain(..later.saturating_sub(1));
+        }
+    }
+
+    /// Takes the path to the first record of which `is_past` holds, if there is one.
+    pub(super) fn crossing<P: Path<Saved = S>>(
+        &self,
+        path: &mut P,
+        is_past: impl Fn(f64) -> bool,
+        watch: &mut Watch<'_>,
+    ) -> Option<ControlFlow<(), Crossing<S>>> {
+        let &Record { step, score } = self.records.iter().find(|record| is_past(record.score))?;
+        Some(match self.reach(path, step, watch) {
+            ControlFlow::Continue(()) => ControlFlow::Continue(Crossing { step, score, saved: Rc::new(path.save()) }),
+            ControlFlow::Break(()) => ControlFlow::Break(()),
+        })
+    }
+
+    /// Takes the path to its last record, and says which step that is.
+    pub(super) fn last<P: Path<Saved = S>>(&self, path: &mut P) -> Option<u64> {
+        let step = self.records.last()?.step;
+        let reached = self.reach(path, step, &mut Watch { steps: 0, carry_on: &mut |_| ControlFlow::Continue(()) });
+        reached.is_continue().then_some(step)
+    }
+
+    /// Makes the path again up to a step, from the last state that is kept before it.
+    fn reach<P: Path<Saved = S>>(&self, path: &mut P, step: u64, watch: &mut Watch<'_>) -> ControlFlow<()> {
+        if let Some(state) = self.states.iter().rev().find(|state| state.step <= step) {
+            path.restore(&state.saved, state.noise_seed);
+            for _ in state.step..step {
+                path.step();
+                watch.flown()?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A path that comes a step nearer with each step, and remembers where it has been restored.
+    struct Climb(u64);
+
+    impl Path for Climb {
+        type Saved = u64;
+        type Error = std::convert::Infallible;
+
+        fn begin(&mut self, _noise_seed: u64) -> Result<(), Self::Error> {
+            self.0 = 0;
+            Ok(())
+        }
+
+        fn step(&mut self) -> bool {
+            self.0 += u64::from(self.0 < 10_000);
+            self.0 < 10_000
+        }
+
+        fn score(&self) -> f64 {
+            self.0 as f64
+        }
+
+        fn save(&self) -> u64 {
+            self.0
+        }
+
+        fn restore(&mut self, saved: &u64, _noise_seed: Option<u64>) {
+            self.0 = *saved;
+        }
+    }
+
+    #[test]
+    fn few_states_are_kept_and_every_record_is_found_again() {
+        let mut carry_on = |_| ControlFlow::Continue(());
+        let mut watch = Watch { steps: 0, carry_on: &mut carry_on };
+        let mut path = Climb(0);
+        let ControlFlow::Continue(mut climb) = Lineage::begin(&mut path, 1, f64::INFINITY, &mut watch).expect("a path")
+        else {
+            panic!("interrupted");
+        };
+        assert!((2..=KEPT + 1).contains(&climb.states.len()));
+        assert_eq!((climb.score(), climb.records.len()), (9_999.0, 10_000));
+        for level in [-1.0, 0.0, 77.5, 5_000.0, 9_998.0] {
+            climb.forget_before(|score| score > level);
+            let found = climb.crossing(&mut path, |score| score > level, &mut watch);
+            let Some(ControlFlow::Continue(Crossing { step, score, saved })) = found else { panic!("no crossing") };
+            assert_eq!((step, score, *saved), (path.0, path.score(), path.0));
+            assert_eq!(score, level.floor() + 1.0);
+            assert!(climb.states[0].step <= step && climb.states.get(1).is_none_or(|next| next.step > step));
+        }
+        assert!(climb.crossing(&mut path, |score| score > 9_999.0, &mut watch).is_none());
+    }
+}

@@ -1,0 +1,168 @@
+//! Intervals that hold however often they are looked at.
+
+use super::confidence::CONFIDENCE;
+use super::proportion::Proportion;
+
+/// Both parameters of the beta mixture, Jeffreys' prior. Against 1 it has a third less to say against few: 0 of 10,000 bound the
+/// share by 0.00082 and not by 0.00122, and a campaign looks for what seldom happens; near one half it is 2 % wider.
+const PRIOR: f64 = 0.5;
+
+/// Runs of the first look; each further one has twice as many.
+const FIRST_LOOK: u64 = 100;
+
+/// `count` of the first `of` runs, with an interval that may be looked at after every run: the true share is in all of those from
+/// the first run to the last, whenever one stops and why, with probability [`CONFIDENCE`].
+///
+/// It is the beta-mixture confidence sequence (Robbins, Annals of Mathematical Statistics 41, 1970):
+///
+/// ```text
+/// { p : B(a + k, a + n - k) / [B(a, a) p^k (1 - p)^(n - k)] < 1/alpha },   a = 1/2
+/// ```
+///
+/// The ratio is a martingale under p that begins with 1, and by Ville's inequality it ever comes to 1/alpha with a probability of
+/// alpha at most. Bounds are the first numbers outside. A count beyond `of` is taken for `of`.
+#[must_use]
+pub fn anytime(count: u64, of: u64) -> Proportion {
+    let count = count.min(of);
+    let low = if count == 0 { 0.0 } else { bound(count, of, 0.0) };
+    let high = if count == of { 1.0 } else { bound(count, of, 1.0) };
+    Proportion::between(count, of, [low, high])
+}
+
+/// The number next to the sequence that it leaves out, between the share and `out`, which is left out.
+fn bound(count: u64, of: u64, mut out: f64) -> f64 {
+    let (hits, misses) = (count as f64, (of - count) as f64);
+    let mixture = ln_beta(PRIOR + hits, PRIOR + misses) - ln_beta(PRIOR, PRIOR);
+    let limit = -libm::log(1.0 - CONFIDENCE);
+    let times = |number: f64, logarithm: f64| if number > 0.0 { number * logarithm } else { 0.0 };
+    let is_out = |p: f64| mixture - times(hits, libm::log(p)) - times(misses, libm::log1p(-p)) >= limit;
+    let mut within = hits / (hits + misses);
+    loop {
+        let middle = f64::midpoint(out, within);
+        // Neighbouring numbers have nothing between them.
+        if middle == out || middle == within {
+            return out;
+        }
+        *(if is_out(middle) { &mut out } else { &mut within }) = middle;
+    }
+}
+
+/// Logarithm of the beta function, by `libm` alone: whether a campaign stops is the same on every machine.
+fn ln_beta(a: f64, b: f64) -> f64 {
+    libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b)
+}
+
+/// The numbers of runs at which a campaign of at most `runs` looks at its answer: 100, 200, 400, ... and `runs`.
+pub fn looks(runs: u64) -> impl Iterator<Item = u64> {
+    let doubled = std::iter::successors(Some(FIRST_LOOK), |look| look.checked_mul(2));
+    doubled.take_while(move |&look| look < runs).chain((runs > 0).then_some(runs))
+}
+
+/// What is left of the share after several looks: what all of their [`anytime`] intervals have in common.
+///
+/// All of them hold the true share at once with probability [`CONFIDENCE`], and so does what they have in common. It depends on
+/// which looks are taken, so these are fixed beforehand: [`looks`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ConfidenceSequence {
+    bounds: Option<[f64; 2]>,
+}
+
+impl ConfidenceSequence {
+    /// Before the first look.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Takes a look, `count` of the first `of` runs, and says what is left.
+    ///
+    /// Where nothing is left, which happens only where one of the looks does not hold the true share, this look alone counts from
+    /// here on.
+    pub fn look(&mut self, count: u64, of: u64) -> Proportion {
+        let now = anytime(count, of);
+        let [low, high] = self.bounds.unwrap_or([0.0, 1.0]);
+        let common = [low.max(now.low), high.min(now.high)];
+        let bounds = if common[0] <= common[1] { common } else { [now.low, now.high] };
+        self.bounds = Some(bounds);
+        Proportion::between(count, of, bounds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::near;
+    use super::*;
+
+    /// The same ratio by its product, run by run: all hits first.
+    fn ratio(count: u64, of: u64, p: f64) -> f64 {
+        let hit = |k: u64| (PRIOR + k as f64) / (2.0 * PRIOR + k as f64) / p;
+        let miss = |k: u64| (PRIOR + k as f64) / (2.0 * PRIOR + (count + k) as f64) / (1.0 - p);
+        (0..count).map(hit).product::<f64>() * (0..of - count).map(miss).product::<f64>()
+    }
+
+    #[test]
+    fn its_bounds_are_where_the_ratio_comes_to_twenty() {
+        for of in [1, 7, 100, 400] {
+            for count in (0..=of).step_by(usize::try_from(of).expect("few").div_ceil(20)) {
+                let Proportion { low, high, share, .. } = anytime(count, of);
+                assert!(0.0 <= low && share.is_some_and(|share| low <= share && share <= high) && high <= 1.0);
+                for bound in [low, high].into_iter().filter(|bound| (0.0..1.0).contains(bound) && *bound > 0.0) {
+                    near(ratio(count, of, bound), 20.0, 1e-9);
+                }
+            }
+        }
+        assert_eq!((anytime(0, 0).low, anytime(0, 0).high, anytime(0, 0).share), (0.0, 1.0, None));
+        assert_eq!(anytime(9, 4), anytime(4, 4));
+    }
+
+    #[test]
+    fn it_is_monotone_in_the_count_mirrored_and_wider_than_one_for_a_fixed_number() {
+        for of in [1, 10, 100, 5_000] {
+            let all: Vec<_> = (0..=of).map(|count| anytime(count, of)).collect();
+            assert!(all.windows(2).all(|next| next[0].low < next[1].low && next[0].high < next[1].high), "{of}");
+            for (one, count) in all.iter().zip(0..) {
+                let fixed = Proportion::new(count, of);
+                // Of one run both leave the same out.
+                assert!(one.low <= fixed.low + 1e-12 && fixed.high <= one.high + 1e-12, "{count} of {of}");
+                near(one.low, 1.0 - anytime(of - count, of).high, 1e-14);
+            }
+        }
+    }
+
+    /// What the choice of the prior rests on: bounds with 1 in its place, where the ratio has a closed form.
+    #[test]
+    fn jeffreys_prior_bounds_what_never_happens_a_third_lower() {
+        let uniform = |of: f64| -libm::expm1(-libm::log(20.0 * (of + 1.0)) / of);
+        near(anytime(0, 10_000).high, 0.000_817, 1e-6);
+        near(uniform(10_000.0), 0.001_220, 1e-6);
+        assert!(anytime(0, 1_000_000).high < 0.64 * uniform(1e6));
+    }
+
+    #[test]
+    fn great_numbers_have_narrow_bounds() {
+        let half = anytime(500_000_000, 1_000_000_000);
+        near(half.high - half.low, 1.6e-4, 1e-5);
+        near(1e12 * anytime(0, 1_000_000_000_000).high, 17.38, 0.05);
+        near(anytime(1, 1_000_000_000).low, 0.0, 1e-10);
+    }
+
+    #[test]
+    fn looks_double_and_end_with_the_last_run() {
+        assert_eq!(looks(1000).collect::<Vec<_>>(), [100, 200, 400, 800, 1000]);
+        assert_eq!(looks(400).collect::<Vec<_>>(), [100, 200, 400]);
+        assert_eq!(looks(7).collect::<Vec<_>>(), [7]);
+        assert_eq!(looks(0).count(), 0);
+        assert_eq!(looks(u64::MAX).last(), Some(u64::MAX));
+    }
+
+    #[test]
+    fn what_looks_have_in_common_never_grows_but_where_nothing_is_left() {
+        let mut sequence = ConfidenceSequence::new();
+        let first = sequence.look(50, 100);
+        assert_eq!(first, anytime(50, 100));
+        let second = sequence.look(80, 200);
+        assert_eq!((second.low, second.high), (first.low, anytime(80, 200).high), "each bound is the tighter of two");
+        let third = sequence.look(0, 400);
+        assert_eq!(third, anytime(0, 400), "nothing is left");
+    }
+}

@@ -1,0 +1,307 @@
+//! `tautline campaign`: one answer, whatever it was split into, on however many threads and after however many kills.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+/// Five vehicles from random starts, under two laws, for a second.
+const SPEC: &str = r#"
+    scenario = "pentagon"
+    runs = 60
+    seed = 5
+    laws = ["edge-tension", "displacement"]
+    [set]
+    time.duration_s = 1.0
+    [vary]
+    "start.jitter_m" = { uniform = [0.0, 0.4] }
+    "law.delta_m" = { list = [1.5, 2.0] }
+"#;
+
+/// A folder with a specification.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn of(spec: &str) -> Self {
+        let place = Self(tempfile::tempdir().expect("a folder"));
+        fs::write(place.0.path().join("spec.toml"), spec).expect("written");
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn campaign(&self, arguments: &[&str]) -> Ran {
+        ran_by(TAUTLINE, self.0.path(), &[&["campaign"], arguments].concat())
+    }
+
+    /// Flies everything into a folder, and gives the bytes of table and answer.
+    fn run(&self, out: &str, more: &[&str]) -> [Vec<u8>; 2] {
+        let fixed = ["run", "spec.toml", "--out", out, "--worst", "0", "--quiet"];
+        let ran = self.campaign(&[&fixed[..], more].concat());
+        assert!(matches!(ran.exit, Some(0 | 1)), "{}", ran.err);
+        self.left(out)
+    }
+
+    fn left(&self, out: &str) -> [Vec<u8>; 2] {
+        ["results.parquet", "campaign.json"].map(|name| fs::read(self.path(out).join(name)).expect("left"))
+    }
+
+    fn parts(&self, out: &str) -> Vec<PathBuf> {
+        let entries = fs::read_dir(self.path(out).join("parts")).expect("parts");
+        let mut parts: Vec<_> = entries.map(|entry| entry.expect("an entry").path()).collect();
+        parts.retain(|path| path.extension().is_some_and(|extension| extension == "jsonl"));
+        parts.sort();
+        parts
+    }
+}
+
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).expect("JSON")
+}
+
+#[test]
+fn the_answer_is_the_same_for_any_shards_threads_and_order() {
+    let place = Place::of(SPEC);
+    let whole = place.run("one", &["--shards", "1", "--threads", "1"]);
+    assert_eq!(place.run("seven", &["--shards", "7", "--threads", "2"]), whole);
+    let planned = place.campaign(&["plan", "spec.toml", "--shards", "60", "--out", "many"]);
+    assert_eq!(planned.exit, Some(0), "{}", planned.err);
+    // In an order of its own, some of them twice, from the folder and from the manifest.
+    for shards in ["59", "0-20", "30-58", "10-35"] {
+        let folder = if shards == "59" { "many/manifest.json" } else { "many" };
+        let flown = place.campaign(&["shard", folder, "--shard", shards, "--threads", "2", "--quiet"]);
+        assert_eq!(flown.exit, Some(0), "{}", flown.err);
+    }
+    let missing = place.campaign(&["missing", "many"]);
+    assert_eq!((missing.exit, missing.out.as_str()), (Some(0), ""));
+    let merged = place.campaign(&["merge", "many", "--worst", "0"]);
+    assert!(merged.out.contains("results.parquet") && merged.out.contains("flights violated"), "{}", merged.out);
+    assert_eq!(place.left("many"), whole);
+    let answer = json(&whole[1]);
+    assert_eq!((&answer["runs"], answer["laws"][0]["violated"]["of"].as_u64()), (&Value::from(60), Some(60)));
+    assert_eq!(answer["pairs"].as_array().map(Vec::len), Some(1));
+    // Another seed draws other flights.
+    fs::write(place.path("spec.toml"), SPEC.replace("seed = 5", "seed = 6")).expect("written");
+    assert_ne!(place.run("other", &[])[0], whole[0]);
+}
+
+#[test]
+fn a_campaign_that_is_killed_again_and_again_ends_as_one_that_is_not() {
+    let place = Place::of(SPEC);
+    let whole = place.run("whole", &[]);
+    let kills = if std::env::var_os("TAUTLINE_LONG").is_some() { 20 } else { 5 };
+    for kill in 0..kills {
+        let mut child = Command::new(TAUTLINE)
+            .args(["campaign", "run", "spec.toml", "--out", "killed", "--shards", "4", "--worst", "0", "--quiet"])
+            .current_dir(place.0.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        std::thread::sleep(Duration::from_millis(150 + 97 * kill % 700));
+        child.kill().expect("it can be killed");
+        child.wait().expect("it ends");
+    }
+    assert_eq!(place.run("killed", &[]), whole);
+}
+
+#[test]
+fn a_torn_part_is_flown_again_and_a_foreign_one_refused() {
+    let place = Place::of(SPEC);
+    let whole = place.run("camp", &["--shards", "3"]);
+    let part = place.parts("camp")[1].clone();
+    let bytes = fs::read(&part).expect("a part");
+    for torn in [bytes.len() / 2, bytes.len() - 1, 0] {
+        fs::write(&part, &bytes[..torn]).expect("torn");
+        let missing = place.campaign(&["missing", "camp"]);
+        assert_eq!((missing.exit, missing.out.trim()), (Some(1), "1"), "{torn}");
+        let holes = place.campaign(&["merge", "camp", "--worst", "0"]);
+        assert_eq!(holes.exit, Some(2));
+        assert!(holes.err.contains("shards 1 of 3 are missing") && holes.err.contains("--shard 1"), "{}", holes.err);
+    }
+    let changed = String::from_utf8(bytes.clone()).expect("text").replacen("\"pass\":", "\"pass\" :", 1);
+    fs::write(&part, changed).expect("changed");
+    assert_eq!(place.campaign(&["missing", "camp"]).exit, Some(1), "a part that was changed is no part");
+    assert_eq!(place.run("camp", &[]), whole);
+    // The part of another campaign.
+    fs::write(place.path("spec.toml"), SPEC.replace("seed = 5", "seed = 6")).expect("written");
+    place.run("other", &["--shards", "3"]);
+    fs::copy(&place.parts("other")[1], &part).expect("copied");
+    let refused = place.campaign(&["merge", "camp", "--worst", "0"]);
+    assert_eq!(refused.exit, Some(2), "{}", refused.out);
+    assert!(refused.err.contains("of campaign"), "{}", refused.err);
+    // Two results of one shard.
+    fs::write(&part, &bytes).expect("restored");
+    let differs = part.with_file_name("shard-000000001.0123456789abcdef.differs.jsonl");
+    fs::write(&differs, &bytes).expect("written");
+    let alarm = place.campaign(&["merge", "camp", "--worst", "0"]);
+    assert_eq!(alarm.exit, Some(3), "{}", alarm.err);
+    assert!(alarm.err.contains("different results"), "{}", alarm.err);
+}
+
+#[test]
+fn a_manifest_of_another_program_or_changed_by_hand_is_refused_with_both_hashes() {
+    let place = Place::of(SPEC);
+    assert_eq!(place.campaign(&["plan", "spec.toml", "--shards", "2", "--out", "camp"]).exit, Some(0));
+    let path = place.path("camp/manifest.json");
+    let text = fs::read_to_string(&path).expect("a manifest");
+    let manifest = json(text.as_bytes());
+    fs::write(&path, text.replace("\"runs\": 60", "\"runs\": 59")).expect("written");
+    let changed = place.campaign(&["shard", "camp", "--shard", "0"]);
+    assert_eq!(changed.exit, Some(2));
+    let campaign = manifest["campaign"].as_str().expect("a hash");
+    assert!(changed.err.contains(&campaign[..32]) && changed.err.contains("its contents are"), "{}", changed.err);
+    fs::write(&path, &text).expect("written");
+    // The same folder for another specification.
+    fs::write(place.path("spec.toml"), SPEC.replace("runs = 60", "runs = 61")).expect("written");
+    let other = place.campaign(&["run", "spec.toml", "--out", "camp"]);
+    assert_eq!(other.exit, Some(2));
+    assert!(other.err.contains(&campaign[..32]) && other.err.contains("this one is"), "{}", other.err);
+    // A copy of the program with one byte more is another program.
+    let copy = place.path("tautline-copy");
+    let mut bytes = fs::read(TAUTLINE).expect("the program");
+    bytes.push(0);
+    fs::write(&copy, bytes).expect("written");
+    fs::set_permissions(&copy, fs::metadata(TAUTLINE).expect("it is there").permissions()).expect("allowed");
+    let refused =
+        ran_by(copy.to_str().expect("a path"), place.0.path(), &["campaign", "shard", "camp", "--shard", "0"]);
+    assert_eq!(refused.exit, Some(2), "{}", refused.out);
+    assert!(
+        refused.err.contains("it was planned by") && refused.err.contains("use the same program"),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
+fn enough_is_enough_and_later_rows_are_left_out_however_much_was_flown() {
+    let spec = SPEC.replace("runs = 60", "runs = 400").replace("laws = [\"edge-tension\", \"displacement\"]", "");
+    let place = Place::of(&spec.replace("duration_s = 1.0", "duration_s = 0.2\n    arrival.hold_s = 0.1"));
+    let early = place.run("early", &["--until-width", "0.2", "--shards", "8"]);
+    let answer = json(&early[1]);
+    let runs = answer["runs"].as_u64().expect("a number");
+    assert!(runs < 400 && answer["stopped_early"] == Value::Bool(true), "{answer}");
+    assert_eq!(answer["intervals"], "confidence-sequence");
+    assert!(place.parts("early").len() < 8, "shards beyond are not flown");
+    // Flown whole elsewhere, the same rows count.
+    let planned = ["plan", "spec.toml", "--until-width", "0.2", "--shards", "5", "--out", "all"];
+    assert_eq!(place.campaign(&planned).exit, Some(0));
+    assert_eq!(place.campaign(&["shard", "all", "--shard", "0-4", "--threads", "2", "--quiet"]).exit, Some(0));
+    assert!(matches!(place.campaign(&["merge", "all", "--worst", "0"]).exit, Some(0 | 1)));
+    assert_eq!(place.left("all"), early);
+    let whole = json(&place.run("whole", &[])[1]);
+    assert_eq!((whole["runs"].as_u64(), &whole["intervals"]), (Some(400), &Value::from("clopper-pearson")));
+}
+
+#[test]
+fn a_full_disk_is_the_machines_fault_and_loses_nothing() {
+    let place = Place::of(SPEC);
+    let whole = place.run("whole", &[]);
+    let limited = |blocks: u32| {
+        let shell = format!(
+            "trap '' XFSZ; ulimit -f {blocks}; exec {TAUTLINE} campaign run spec.toml --out full --shards 2 --worst 0 --quiet"
+        );
+        Command::new("sh").args(["-c", &shell]).current_dir(place.0.path()).output().expect("it runs")
+    };
+    let full = limited(16);
+    assert_eq!(full.status.code(), Some(3), "{}", String::from_utf8_lossy(&full.stderr));
+    assert!(String::from_utf8_lossy(&full.stderr).contains("cannot write"));
+    assert_eq!(place.run("full", &[]), whole);
+}
+
+#[test]
+fn a_run_is_flown_again_to_the_same_hash_and_the_worst_have_their_recordings() {
+    let place = Place::of(&SPEC.replace("runs = 60", "runs = 6"));
+    let ran = place.campaign(&["run", "spec.toml", "--out", "camp", "--worst", "2", "--no-snapshots"]);
+    assert!(ran.out.contains("an hour") && ran.out.contains("displacement"), "{}{}", ran.out, ran.err);
+    let answer = json(&fs::read(place.path("camp/campaign.json")).expect("an answer"));
+    let worst = &answer["laws"][0]["worst"][0];
+    let run = worst["run"].to_string();
+    let again = ["replay", "camp", "--run", &run, "--law", "edge-tension", "--out", "again", "--no-snapshots"];
+    let again = place.campaign(&again);
+    assert!(again.out.contains(worst["state_hash"].as_str().expect("a hash")), "{}{}", again.out, again.err);
+    let page = fs::read_to_string(place.path("camp/campaign.html")).expect("a page");
+    for part in ["flights violated", "tautline run pentagon --set", "worst/", "Over law.delta_m", "<svg"] {
+        assert!(page.contains(part), "{part}");
+    }
+    let recordings = fs::read_dir(place.path("camp/worst")).expect("flown again");
+    assert_eq!(
+        recordings.filter(|entry| entry.as_ref().is_ok_and(|entry| entry.path().join("run.mcap").exists())).count(),
+        2
+    );
+    // The command on the page flies the same bits.
+    let report = fs::read(place.path("again/report.json")).expect("a report");
+    assert_eq!(json(&report)["run"]["state_hash"], worst["state_hash"]);
+}
+
+#[test]
+fn what_is_wrong_is_said_with_its_key_and_remedy() {
+    let refused = |spec: &str, says: &[&str]| {
+        let place = Place::of(spec);
+        let ran = place.campaign(&["run", "spec.toml", "--out", "camp"]);
+        assert_eq!(ran.exit, Some(2), "{spec}: {}", ran.out);
+        assert!(says.iter().all(|said| ran.err.contains(said)), "{spec}: {}", ran.err);
+        assert!(!place.path("camp").exists(), "{spec}");
+    };
+    let vary = |vary: &str| format!("scenario = \"pentagon\"\nruns = 10\n[vary]\n{vary}\n");
+    refused("scenario = \"pentagon\"\nrums = 10", &["rums", "line 2"]);
+    refused("scenario = \"pentagan\"\nruns = 10", &["pentagan", "pentagon"]);
+    refused("scenario = \"pentagon\"\nruns = 10", &["all 10 runs are the same flight", "[vary]"]);
+    refused(
+        "scenario = \"pentagon\"\n[vary]\nstart.jitter_m = { uniform = [0.0, 0.1] }",
+        &["number of runs", "runs = 1000"],
+    );
+    refused(&vary("start.jiter_m = { uniform = [0.0, 0.1] }"), &["jiter_m", "jitter_m"]);
+    refused(&vary("start.jitter_m = { uniform = [0.2, 0.1] }"), &["start.jitter_m", "0.2"]);
+    refused(&vary("start.jitter_m = { uniform = [0.0, -1.0] }"), &["start.jitter_m"]);
+    refused(&vary("swarm.a22_per_s = { list = [-1.0, \"fast\"] }"), &["swarm.a22_per_s", "fast"]);
+    let grids = "law.alpha = { grid = { from = 0.1, to = 9.0, count = 1000000 } }\nlaw.delta_m = { grid = { from = 0.1, to = 1.0, count = 1000000 } }";
+    refused(&format!("scenario = \"pentagon\"\n[vary]\n{grids}"), &["grids", "1000000000"]);
+    refused(&vary("law.alpha = { grid = [1.0, 2.0, 3.0] }"), &["10 runs", "multiple of 3"]);
+    refused("scenario = \"pentagon\"\nruns = 10\nlaws = [\"edge-tensoin\"]", &["edge-tensoin", "edge-tension"]);
+    refused(&format!("{}[stop]\nwidth = 1.5", vary("start.jitter_m = { uniform = [0.0, 0.1] }")), &["stop.width"]);
+    let place = Place::of(SPEC);
+    for (arguments, says) in [
+        (&["shard", "nowhere", "--shard", "0"][..], "there is no campaign"),
+        (&["run", "nowhere.toml"], "cannot read nowhere.toml"),
+        (&["plan", "spec.toml", "--out", "camp", "--shards", "61"], "61 shards"),
+    ] {
+        let ran = place.campaign(arguments);
+        assert_eq!(ran.exit, Some(2), "{arguments:?}: {}", ran.out);
+        assert!(ran.err.contains(says), "{arguments:?}: {}", ran.err);
+    }
+    assert_eq!(place.campaign(&["plan", "spec.toml", "--out", "camp", "--shards", "3"]).exit, Some(0));
+    for (arguments, says) in [
+        (&["shard", "camp", "--shard", "3"][..], "the shards are 0 to 2"),
+        (&["shard", "camp", "--shard", "env:TAUTLINE_NO_SUCH"], "TAUTLINE_NO_SUCH"),
+        (&["replay", "camp", "--run", "60"], "no run 60"),
+        (&["replay", "camp", "--run", "0", "--law", "orca"], "edge-tension, displacement"),
+        (&["merge", "camp"], "shards 0-2 of 3 are missing"),
+    ] {
+        let ran = place.campaign(arguments);
+        assert_eq!(ran.exit, Some(2), "{arguments:?}: {}", ran.out);
+        assert!(ran.err.contains(says), "{arguments:?}: {}", ran.err);
+    }
+}
+
+#[test]
+fn starts_in_a_random_order_are_all_orders() {
+    let spec = "scenario = \"pentagon\"\nruns = 40\n[set]\ntime.duration_s = 0.05\narrival.hold_s = 0.02\nstart.shuffle = true\n";
+    let place = Place::of(spec);
+    let answer = json(&place.run("camp", &[])[1]);
+    assert_eq!(answer["laws"][0]["violated"]["of"], Value::from(40), "{answer}");
+    let rows = place.parts("camp").iter().map(|part| fs::read_to_string(part).expect("a part")).collect::<String>();
+    let mut flown: Vec<_> = rows
+        .lines()
+        .filter_map(|line| json(line.as_bytes())["flight"]["scenario_sha256"].as_str().map(str::to_owned))
+        .collect();
+    flown.sort();
+    flown.dedup();
+    assert!(flown.len() > 20, "{} different starts of 40", flown.len());
+}
