@@ -101,7 +101,7 @@ class RayCluster(unittest.TestCase):
         self.assertIn("hash", flown.stderr)
 
     def test_kill_freeze_and_add_leave_the_same_bytes(self) -> None:
-        camp = Campaign(self.folder, runs=120, duration_s=4.0)
+        camp = Campaign(self.folder, runs=120, duration_s=2.0)
         hasty = ["--tautline", str(TAUTLINE), "--hedge-after", "4"]
         log = self.folder / "driver.log"
 
