@@ -7,5 +7,6 @@ mod campaigns;
 
 fn main() {
     let most_runs = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(1000);
-    print!("{}\n{}", campaigns::table(most_runs), campaigns::lossy(most_runs));
+    campaigns::table(most_runs, &mut |line| print!("{line}"));
+    print!("\n{}", campaigns::lossy(most_runs));
 }

@@ -275,7 +275,9 @@ fn run_whole(arguments: &RunCampaign) -> Result<Exit, Failure> {
     if flights > 0 {
         let seconds = began.elapsed().as_secs_f64();
         let an_hour = 3600.0 * flights as f64 / seconds;
-        console.say(&format!("{flights} flights in {seconds:.1} s on {threads} threads: {an_hour:.0} an hour"));
+        let what = if campaign.splitting().is_some() { "estimates" } else { "flights" };
+        let on = if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") };
+        console.say(&format!("{flights} {what} in {seconds:.1} s on {on}: {an_hour:.0} an hour"));
     }
     merged(&folder, &arguments.says, &interrupted)
 }

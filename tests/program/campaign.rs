@@ -290,7 +290,7 @@ fn what_is_wrong_is_said_with_its_key_and_remedy() {
     }
 }
 
-/// Two vehicles close up to 1.3 m while their places are measured with errors: about one flight of some hundred comes below 1 m.
+/// Two vehicles close up to 1.3 m and swing to where errors of measurement decide whether they come below 1 m: of 20,000 flights 43 % do.
 const RARE: &str = r#"
     scenario = "pair.toml"
     runs = 4
@@ -302,10 +302,10 @@ const RARE: &str = r#"
     keep = 2
 "#;
 const PAIR: &str = r#"
-    formation = { points_m = [[0.0, 0.0], [1.3, 0.0]] }
+    formation = { shape = "points", points_m = [[0.0, 0.0], [1.3, 0.0]] }
     start = { positions_m = [[0.0, 0.0], [3.0, 0.0]] }
     law = { kind = "laplacian", delta_m = 1.0 }
-    sensing = { position_noise_m = 0.3, rate_hz = 10.0 }
+    sensing = { position_noise_m = 0.12, rate_hz = 10.0 }
     time = { duration_s = 6.0, dt_s = 0.02 }
     arrival = { hold_s = 1.0 }
 "#;
@@ -319,7 +319,7 @@ fn rare_violations_are_estimated_and_bad_flights_flown_again_to_the_same_state()
     let answer = json(&whole[1]);
     let law = &answer["laws"][0];
     let probability = law["splitting"]["probability"]["value"].as_f64().expect("a probability");
-    assert!(probability > 0.0 && probability < 0.5, "{answer}");
+    assert!(probability > 0.15 && probability < 0.8, "{answer}");
     let bad = &law["bad"][0];
     let (run, number) = (bad["run"].to_string(), bad["bad"].to_string());
     let again = place.campaign(&["replay", "one", "--run", &run, "--bad", &number, "--out", "again"]);
@@ -334,7 +334,7 @@ fn rare_violations_are_estimated_and_bad_flights_flown_again_to_the_same_state()
     let none = place.campaign(&["replay", "one", "--run", "0", "--bad", "7"]);
     assert!(none.exit == Some(2) && none.err.contains("no bad flight 7"), "{}", none.err);
     // Nothing random from step to step: two flights from one state are one flight.
-    fs::write(place.path("pair.toml"), PAIR.replace("position_noise_m = 0.3, ", "")).expect("written");
+    fs::write(place.path("pair.toml"), PAIR.replace("position_noise_m = 0.12, ", "")).expect("written");
     let still = place.campaign(&["run", "spec.toml", "--out", "still"]);
     assert!(still.exit == Some(2) && still.err.contains("random from step to step"), "{}{}", still.out, still.err);
 }

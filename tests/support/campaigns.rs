@@ -109,13 +109,13 @@ fn row(cells: &[String]) -> String {
     format!("| {} |\n", cells.join(" | "))
 }
 
-/// Reach and clearance of each law; at most so many runs of each.
-pub(crate) fn table(most_runs: u64) -> String {
+/// Reach and clearance of each law, told line by line as they are known; at most so many runs of each.
+pub(crate) fn table(most_runs: u64, tell: &mut dyn FnMut(&str)) {
     let folder = std::env::temp_dir().join(format!("tautline-campaigns-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
     let heading =
         ["vehicles", "law", "flights", "violated", "reached", "reached at, median", "least clearance", "median"];
-    let mut text = row(&heading.map(str::to_owned)) + &row(&heading.map(|_| "---".to_owned()));
+    tell(&(row(&heading.map(str::to_owned)) + &row(&heading.map(|_| "---".to_owned()))));
     for starts in &STARTS {
         std::fs::write(folder.join("scenario.toml"), starts.scenario()).expect("written");
         let laws = LAWS.map(|law| format!("{law:?}")).join(", ");
@@ -123,11 +123,10 @@ pub(crate) fn table(most_runs: u64) -> String {
         let spec = format!("scenario = \"scenario.toml\"\nruns = {runs}\nseed = 1\nlaws = [{laws}]\n");
         for law in &answer(&spec, &folder).laws {
             let named = vec![starts.named(), format!("`{}`", law.name), law.violated.of.to_string()];
-            text += &row(&[named, cells(law)].concat());
+            tell(&row(&[named, cells(law)].concat()));
         }
     }
     std::fs::remove_dir_all(&folder).expect("removed");
-    text
 }
 
 /// The leader star over a radio that loses 2 % of its messages.
