@@ -35,6 +35,8 @@
 //! per vehicle. Vehicles are counted from 0 in code and from 1 in everything a person reads. Equation numbers are those
 //! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
 
+#[cfg(feature = "reports")]
+pub mod attack;
 pub mod audit;
 #[cfg(feature = "campaigns")]
 pub mod campaign;

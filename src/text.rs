@@ -116,6 +116,12 @@ pub(crate) fn table<N: std::fmt::Display>(rows: impl IntoIterator<Item = (N, Str
     text
 }
 
+/// A number as a whole one where it is, which keys of either kind take.
+pub(crate) fn as_toml(value: f64) -> String {
+    const WHOLE: f64 = 1e15;
+    if value.abs() < WHOLE { value.to_string() } else { format!("{value:?}") }
+}
+
 /// So many of a thing.
 pub(crate) fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })

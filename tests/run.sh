@@ -15,3 +15,8 @@ sh tests/setup.sh
 # debug, are held against the same hashes.
 cargo test --release --no-default-features --test bits
 cargo test "$@"
+
+# Campaigns on a cluster, with the program that was just built; arguments ask for some of cargo's tests alone.
+if [ $# = 0 ]; then
+    target/cluster/bin/python -m unittest discover --verbose --start-directory tests/cluster
+fi

@@ -2,6 +2,7 @@
 # Installs what building and testing need beside the Rust toolchain, where it is not there. From anywhere:
 # sh tests/setup.sh
 set -eu
+cd "$(dirname "$0")/.."
 
 # The C and C++ toolchain that linking and the H.264 encoder need; everything else comes with cargo.
 if ! command -v cc >/dev/null 2>&1 || ! command -v c++ >/dev/null 2>&1; then
@@ -30,4 +31,27 @@ if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; th
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 \
         libxkbcommon-x11-0
+fi
+
+# Ray, in a virtual environment of its own, for tests/cluster.
+if ! target/cluster/bin/python -c 'import ray' 2>/dev/null; then
+    if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
+        sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+        $sudo apt-get update
+        $sudo apt-get install -y --no-install-recommends python3 python3-venv
+    fi
+    rm -rf target/cluster
+    mkdir -p target
+    python3 -m venv target/cluster
+    if ! target/cluster/bin/pip install --quiet --disable-pip-version-check 'ray>=2.40,<3'; then
+        echo "tests/cluster needs Ray, which cannot be installed for $(python3 --version) here" >&2
+        exit 1
+    fi
+fi
+
+# Slurm, of which tests/cluster starts a node of its own.
+if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) >/dev/null; then
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    $sudo apt-get update
+    $sudo apt-get install -y --no-install-recommends munge slurmctld slurmd slurm-client
 fi

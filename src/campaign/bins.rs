@@ -80,7 +80,7 @@ impl KeyColumn {
 
     /// Takes a flight.
     pub(super) fn take(&mut self, law: usize, value: &Value, known: Known, reached: bool) {
-        if !self.is_seed && known != Known::NotFlown {
+        if !self.is_seed && !matches!(known, Known::NotFlown | Known::Estimated) {
             self.flights.push(Flight { law, value: value.clone(), known, reached });
         }
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::report::ArtefactError;
 use crate::scenario::ScenarioError;
 use crate::sim::SimError;
+use crate::splitting::SplittingError;
 
 /// Why a campaign cannot be planned, flown or put together.
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +52,16 @@ pub enum CampaignError {
         law: String,
         /// What is wrong.
         error: Box<SimError>,
+    },
+    /// A run that cannot be split.
+    #[error("run {run} under the law {law}: {error}")]
+    Splitting {
+        /// Number of the run.
+        run: u64,
+        /// The law's name.
+        law: String,
+        /// What is wrong.
+        error: Box<SplittingError>,
     },
     /// A folder that holds another campaign, or a manifest that is not this program's.
     #[error("{path}: {why}")]
@@ -123,6 +134,9 @@ impl CampaignError {
             Self::Plan { help, .. } | Self::Foreign { help, .. } => help.clone(),
             Self::Scenario { error, .. } => return error.help().map(str::to_owned),
             Self::Flight { .. } => return None,
+            Self::Splitting { .. } => "let chance have a part in every step (wind, noise of sensing, loss on the network), and split \
+                                       into 2 flights at least, with fewer to end in a round"
+                .to_owned(),
             Self::Holes { list, .. } => format!("fly them with: tautline campaign shard FOLDER --shard {list}"),
             Self::Alarm { .. } => "the same flight has the same bits everywhere: look for a faulty machine, or one whose program \
                                    is another; remove the wrong part to go on"

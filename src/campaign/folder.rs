@@ -10,6 +10,7 @@ use super::error::CampaignError;
 use super::manifest::{Manifest, Program};
 use super::part::{self, Found};
 use super::plan::Campaign;
+use super::row::Row;
 
 /// A folder and the campaign in it.
 #[derive(Clone, Debug)]
@@ -126,6 +127,21 @@ impl Folder {
             return Err(CampaignError::Alarm { shard, kept, other });
         }
         part::read(&kept, self.campaign.manifest(), shard, self.campaign.laws().len())
+    }
+
+    /// The row of a run under a law, counted from 0; none where it has not been flown.
+    ///
+    /// # Errors
+    /// As [`Folder::read`].
+    pub fn row(&self, run: u64, law: usize) -> Result<Option<Row>, CampaignError> {
+        let manifest = self.campaign.manifest();
+        let Some(shard) = (0..manifest.shards).find(|&shard| manifest.range(shard).contains(&run)) else {
+            return Ok(None);
+        };
+        Ok(match self.read(shard)? {
+            Found::Whole(rows) => rows.into_iter().find(|row| row.place() == (run, law)),
+            Found::Nothing | Found::Broken => None,
+        })
     }
 
     /// Shards that are not flown, in their order.

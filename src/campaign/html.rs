@@ -48,10 +48,19 @@ const ASSUMED: [&str; 4] = [
     "An interval holds the true value in at least 95 of 100 campaigns. Of many intervals on one page some will miss.",
 ];
 
+/// What estimates of rare violations rest on.
+const ASSUMED_OF_SPLITTING: [&str; 2] = [
+    "Each estimate is without bias for any number of flights; their mean has Student's interval, which is that of normal values.",
+    "Flights from one start differ by their noise from step to step; a run draws its start, and whatever else is varied, anew.",
+];
+
 impl Summary {
     /// The answer as a self-contained page.
     #[must_use]
     pub fn to_html(&self, page: &CampaignPage<'_>) -> String {
+        if self.laws.iter().any(|law| law.splitting.is_some()) {
+            return self.rare_page(page);
+        }
         let is_clear = self.is_clear();
         let mut sections =
             vec![section("How flights ended", &[self.shares_table(), page::figures(&self.histograms())])];
@@ -82,6 +91,41 @@ impl Summary {
             reasons: Vec::new(),
             warnings: Vec::new(),
             sections,
+        }
+        .render()
+    }
+
+    /// The page of estimates of rare violations.
+    fn rare_page(&self, page: &CampaignPage<'_>) -> String {
+        let columns = ["Law", "Estimates", "Probability of a violation", "Came to nothing", "Steps flown"];
+        let rows = self.laws.iter().filter_map(|law| {
+            let of = law.splitting.as_ref()?;
+            let said = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2e}"));
+            let interval = format!("{} to {}", said(of.probability.low), said(of.probability.high));
+            Some([
+                law.name.render(),
+                number(of.repetitions).render(),
+                noted(&said(of.probability.value), &interval),
+                number(of.extinct.count).render(),
+                number(of.steps).render(),
+            ])
+        });
+        let table = page::numbers("By adaptive multilevel splitting, with 95 % intervals", &columns, rows);
+        let notes = [self.notes(), ASSUMED_OF_SPLITTING.map(str::to_owned).to_vec()].concat();
+        let found = self.laws.iter().any(|law| !law.bad.is_empty());
+        Page {
+            title: self.name.clone(),
+            kind: "Rare violations",
+            badge: Badge { tone: Tone::Bad, word: if found { "violations" } else { "nothing known" }.to_owned() },
+            verdict: self.headline(),
+            reasons: Vec::new(),
+            warnings: Vec::new(),
+            sections: vec![
+                section("How rare a violation is", &[table]),
+                section("What to know", &[page::list(&notes)]),
+                section("Flights that were violated", &worst(page)),
+                section("Repeat it", &[page::command(page.command), page::command(page.spec)]),
+            ],
         }
         .render()
     }
@@ -194,7 +238,7 @@ fn numbers(law: &LawSummary) -> Markup {
 
 fn worst(page: &CampaignPage<'_>) -> Vec<Markup> {
     if page.worst.is_empty() {
-        return vec![page::list(&["No flight has a smallest separation."])];
+        return vec![page::list(&["There are none."])];
     }
     let mut blocks = Vec::new();
     if let Some(why) = page.no_pictures {

@@ -7,6 +7,7 @@
 
 mod bins;
 mod error;
+mod fly;
 mod folder;
 mod html;
 mod manifest;
@@ -31,10 +32,10 @@ pub use manifest::{Manifest, Program};
 pub use merge::{ANSWER, Merged, RESULTS};
 pub use part::Found;
 pub use plan::{Campaign, Law, MOST_RUNS};
-pub use result::{LawSummary, Pair, Quantiles, SCHEMA_VERSION, Summary};
+pub use result::{BadRun, LawSummary, Pair, Quantiles, SCHEMA_VERSION, Summary};
 pub use row::{Known, Row};
 pub use shard::Shard;
-pub use spec::{Asked, Spec, Stop};
+pub use spec::{Asked, Method, Spec, SplittingKeys, Stop};
 pub use tally::{Intervals, Share, Tally};
 pub use vary::{Grid, Variation};
 pub use worst::Worst;

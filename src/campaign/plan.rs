@@ -7,9 +7,10 @@ use serde_json::Value;
 
 use super::error::CampaignError;
 use super::manifest::{Manifest, Program, SCHEMA_VERSION};
-use super::spec::{Spec, Stop};
+use super::spec::{Method, Spec, Stop};
 use super::vary::Variation;
 use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
+use crate::splitting::{self, Settings};
 
 /// Most runs of a campaign.
 pub const MOST_RUNS: u64 = 1_000_000_000;
@@ -20,6 +21,8 @@ const MOST_TRIED: usize = 1000;
 /// Seeds that are drawn by run where nobody says otherwise.
 const START_SEED: &str = "start.seed";
 const NOISE_SEED: &str = "noise.seed";
+/// Tables that bring chance into a flight.
+const FLIGHT: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
 
 /// The flights of every run.
 #[derive(Clone, Debug)]
@@ -31,6 +34,7 @@ pub struct Campaign {
     variations: BTreeMap<String, Variation>,
     seed: u64,
     stop: Option<Stop>,
+    splitting: Option<Settings>,
     own: Scenario,
     argument: String,
 }
@@ -150,15 +154,27 @@ impl Campaign {
         }
         let is_open = |key: &str| !sets.contains_key(key) && !variations.contains_key(key);
         let open = [
-            (START_SEED, template.start_is_random() || variations.contains_key("start.jitter_m")),
-            (NOISE_SEED, template.flight_is_random() || changes_flight(&variations)),
+            (START_SEED, template.start_is_random() || varies(&variations, &["start."])),
+            (NOISE_SEED, template.flight_is_random() || varies(&variations, &FLIGHT)),
         ];
         let drawn: Vec<_> = open.into_iter().filter(|&(key, is_random)| is_random && is_open(key)).collect();
         variations.extend(drawn.into_iter().map(|(key, _)| (key.to_owned(), Variation::Seed {})));
+        let splitting = (spec.method == Method::Splitting).then(|| spec.splitting.unwrap_or_default().into());
         let file = manifest.folder.join(&manifest.scenario_name);
         let is_builtin = crate::scenario::builtin::find(&manifest.scenario_name).is_some();
         let argument = if is_builtin { manifest.scenario_name.clone() } else { file.display().to_string() };
-        Ok(Self { manifest, source, base, laws, variations, seed: spec.seed, stop: spec.stop, own, argument })
+        Ok(Self {
+            manifest,
+            source,
+            base,
+            laws,
+            variations,
+            seed: spec.seed,
+            stop: spec.stop,
+            splitting,
+            own,
+            argument,
+        })
     }
 
     /// Refuses keys that do not take what may be drawn, and runs that are all the same.
@@ -170,7 +186,13 @@ impl Campaign {
                 "draw the values instead (list, uniform), or leave [stop] out",
             ));
         }
-        if self.variations.is_empty() && self.manifest.runs > 1 {
+        if self.splitting.is_some() && self.stop.is_some() {
+            return Err(CampaignError::plan(
+                "[stop] is about shares of flights, and splitting estimates a probability",
+                "leave [stop] out and fix the number of runs, or leave method out",
+            ));
+        }
+        if self.variations.is_empty() && self.manifest.runs > 1 && self.splitting.is_none() {
             return Err(CampaignError::plan(
                 format!("all {} runs are the same flight", self.manifest.runs),
                 "let something differ: \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], a random start, or wind",
@@ -189,6 +211,14 @@ impl Campaign {
             let flight = |error| CampaignError::Flight { run: 0, law: law.name.clone(), error: Box::new(error) };
             let built = self.scenario(0, law).map_err(plain_of(law))?.law();
             built.map_err(|error| flight(error.into()))?;
+            if let Some(settings) = &self.splitting {
+                let ready = splitting::check(&self.scenario(0, law).map_err(plain_of(law))?, settings);
+                ready.map_err(|error| CampaignError::Splitting {
+                    run: 0,
+                    law: law.name.clone(),
+                    error: Box::new(error),
+                })?;
+            }
         }
         Ok(())
     }
@@ -228,10 +258,23 @@ impl Campaign {
         self.stop
     }
 
+    /// How each run is split, where runs are no flights.
+    #[must_use]
+    pub fn splitting(&self) -> Option<&Settings> {
+        self.splitting.as_ref()
+    }
+
+    /// What all random numbers begin from.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// Steps of all flights of so many runs, as far as they are flown to their end.
     #[must_use]
     pub fn steps(&self, runs: u64) -> u64 {
-        self.own.time.steps().saturating_mul(runs).saturating_mul(self.laws.len() as u64)
+        let flights = self.splitting.map_or(1, |settings| settings.flights as u64);
+        self.own.time.steps().saturating_mul(runs).saturating_mul(self.laws.len() as u64).saturating_mul(flights)
     }
 
     /// What `tautline run` takes for its scenario: a built-in one's name, or a path.
@@ -291,10 +334,9 @@ fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item 
     drawn.iter().map(|(key, value)| format!("{key}={value}"))
 }
 
-/// Whether what is drawn may bring chance into the flight.
-fn changes_flight(variations: &BTreeMap<String, Variation>) -> bool {
-    const ROOMS: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
-    variations.keys().any(|key| ROOMS.iter().any(|room| key.starts_with(room)))
+/// Whether a key of one of these tables is varied, which may bring chance into it.
+fn varies(variations: &BTreeMap<String, Variation>, tables: &[&str]) -> bool {
+    variations.keys().any(|key| tables.iter().any(|table| key.starts_with(table)))
 }
 
 /// The number of runs: what is asked for, or one for each point of the grids.

@@ -9,8 +9,9 @@ use super::plan::Campaign;
 use super::row::{Known, Row};
 use super::spec::Asked;
 use super::tally::{Intervals, Share, Tally};
-use super::worst::{Worst, WorstList};
+use super::worst::{WORST, Worst, WorstList};
 use crate::figures::Histogram;
+use crate::splitting::{Repetitions, Splitting};
 use crate::statistics::{Estimate, Paired};
 
 /// Version of the keys of `campaign.json`: raised when one is renamed, removed or changes its meaning.
@@ -78,6 +79,27 @@ pub struct LawSummary {
     pub reached_histogram_s: Option<Histogram>,
     /// The flights with the least clearance, the worst first.
     pub worst: Vec<Worst>,
+    /// The probability of a violation, where runs are estimates of it and no flights; all numbers above are of none then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub splitting: Option<Repetitions>,
+    /// Flights that were violated in them, those furthest into a violation first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bad: Vec<BadRun>,
+}
+
+/// A flight of an estimate that was violated.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BadRun {
+    /// Number of the run.
+    pub run: u64,
+    /// Its number among the run's bad flights, from 0.
+    pub bad: usize,
+    /// Smallest separation less delta, up to the step in which it was violated \[m\].
+    pub clearance_m: f64,
+    /// The step, from 1.
+    pub violated_at_step: u64,
+    /// Hash over the state after that step.
+    pub state_hash: String,
 }
 
 /// What so many parts of all flights are not above. Intervals are those of order statistics; none where the number of runs
@@ -125,6 +147,8 @@ struct Numbers {
     reached_at_s: Vec<f64>,
     path_length_m: Vec<f64>,
     not_flown_because: Option<String>,
+    estimates: Vec<Splitting>,
+    bad: Vec<BadRun>,
 }
 
 impl Gathered {
@@ -156,6 +180,8 @@ impl Gathered {
             numbers.reached_at_s.extend(flight.reached_at_s.filter(|_| flight.reached));
             numbers.path_length_m.push(flight.path_length_m);
             self.worst[row.law].take(row);
+        } else if let Some(splitting) = &row.splitting {
+            numbers.take_estimate(row.run, splitting);
         } else if numbers.not_flown_because.is_none() {
             numbers.not_flown_because.clone_from(&row.not_flown);
         }
@@ -196,6 +222,8 @@ impl Gathered {
             clearance_histogram_m: Histogram::of(&numbers.clearance_m, HISTOGRAM_INTERVALS),
             reached_histogram_s: Histogram::of(&numbers.reached_at_s, HISTOGRAM_INTERVALS),
             worst: worst.finish(),
+            splitting: campaign.splitting().map(|_| Repetitions::new(&numbers.estimates)),
+            bad: numbers.bad,
         });
         let manifest = campaign.manifest();
         Summary {
@@ -208,10 +236,29 @@ impl Gathered {
             stopped_early: tally.is_enough() && tally.runs() < manifest.runs,
             intervals,
             // Tests of pairs hold for a number of runs that was fixed beforehand.
-            pairs: if intervals == Intervals::ClopperPearson { pairs(&names, &outcomes) } else { Vec::new() },
+            pairs: if intervals == Intervals::ClopperPearson && campaign.splitting().is_none() {
+                pairs(&names, &outcomes)
+            } else {
+                Vec::new()
+            },
             varied: keys.into_iter().filter_map(|column| column.finish(intervals)).collect(),
             laws: laws.collect(),
         }
+    }
+}
+
+impl Numbers {
+    fn take_estimate(&mut self, run: u64, splitting: &Splitting) {
+        self.bad.extend(splitting.bad.iter().enumerate().map(|(bad, flight)| BadRun {
+            run,
+            bad,
+            clearance_m: flight.clearance_m,
+            violated_at_step: flight.violated_at_step,
+            state_hash: flight.state_hash.clone(),
+        }));
+        self.bad.sort_by(|a, b| a.clearance_m.total_cmp(&b.clearance_m));
+        self.bad.truncate(WORST);
+        self.estimates.push(Splitting { bad: Vec::new(), ..splitting.clone() });
     }
 }
 
@@ -253,10 +300,10 @@ fn pairs(names: &[String], outcomes: &[Vec<Option<[bool; 2]>>]) -> Vec<Pair> {
 }
 
 impl Summary {
-    /// Whether no flight violated, and that is known of each.
+    /// Whether no flight violated, and that is known of each; estimates of rare violations never say so.
     #[must_use]
     pub fn is_clear(&self) -> bool {
-        self.laws.iter().all(|law| law.violated.count == 0 && law.unknown == 0)
+        self.laws.iter().all(|law| law.violated.count == 0 && law.unknown == 0 && law.splitting.is_none())
     }
 
     /// Flights that were impossible, by law.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::compare::{FlightRow, Outcome};
+use crate::splitting::Splitting;
 
 /// One flight: a run under a law.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +20,9 @@ pub struct Row {
     pub not_flown: Option<String>,
     /// How it went.
     pub flight: Option<FlightRow>,
+    /// What was estimated, where a run is no flight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub splitting: Option<Splitting>,
 }
 
 /// What is known of a flight's separation.
@@ -32,6 +36,8 @@ pub enum Known {
     Unknown,
     /// What was drawn cannot be flown.
     NotFlown,
+    /// It is no flight but an estimate.
+    Estimated,
 }
 
 impl Row {
@@ -39,6 +45,7 @@ impl Row {
     #[must_use]
     pub fn known(&self) -> Known {
         match self.flight.as_ref().map(|flight| flight.outcome) {
+            None if self.splitting.is_some() => Known::Estimated,
             None => Known::NotFlown,
             Some(Outcome::Clear) => Known::Clear,
             Some(Outcome::Violated) => Known::Violated,

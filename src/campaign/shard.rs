@@ -5,7 +5,6 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::Path;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::error::CampaignError;
@@ -52,7 +51,7 @@ impl Folder {
         let journal = Mutex::new(Journal::create(self.own(shard, JOURNAL))?);
         let made = in_parallel(missing.len(), threads, &|number| {
             let (run, law) = missing[number];
-            let row = self.one(run, law, watch)?;
+            let row = self.campaign().row(run, law, watch)?;
             if let Some(row) = &row {
                 // Whoever panics with the journal in hand ends the flight anyway.
                 journal.lock().unwrap_or_else(std::sync::PoisonError::into_inner).add(row)?;
@@ -82,28 +81,6 @@ impl Folder {
         rows.sort_by_key(Row::place);
         rows.dedup_by_key(|row| row.place());
         Ok(rows)
-    }
-
-    /// One flight; none where flying was interrupted before it. One that has begun is flown to its end.
-    fn one(&self, run: u64, law: usize, watch: Watch<'_>) -> Result<Option<Row>, CampaignError> {
-        if watch.interrupted.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
-        let never = AtomicBool::new(false);
-        let watch = Watch { interrupted: &never, ..watch };
-        let named = &self.campaign().laws()[law];
-        let row = |not_flown, flight| Row { run, law, drawn: self.campaign().values(run), not_flown, flight };
-        let scenario = match self.campaign().scenario(run, named) {
-            Ok(scenario) => scenario,
-            Err(error) => {
-                (watch.flown)(self.campaign().own().time.steps());
-                return Ok(Some(row(Some(error.message().to_owned()), None)));
-            }
-        };
-        let flown = watch.fly(&scenario, run);
-        let flown =
-            flown.map_err(|error| CampaignError::Flight { run, law: named.name.clone(), error: Box::new(error) })?;
-        Ok(flown.map(|flight| row(None, Some(flight))))
     }
 
     /// Puts a part in its place, whole, unless there is one: then both must say the same.

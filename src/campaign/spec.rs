@@ -7,9 +7,10 @@ use toml::{Table, Value};
 
 use super::error::CampaignError;
 use super::vary::Variation;
+use crate::splitting::Settings;
 
 /// Words by which a table of `[vary]` says how it draws; another table holds keys of the scenario.
-const DRAWS: [&str; 7] = ["seed", "uniform", "log_uniform", "normal", "integer", "list", "grid"];
+const DRAWS: [&str; 6] = ["uniform", "log_uniform", "normal", "integer", "list", "grid"];
 
 /// The keys of a specification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +35,55 @@ pub struct Spec {
     /// When enough has been flown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
+    /// What a run is.
+    #[serde(default, skip_serializing_if = "Method::is_flights")]
+    pub method: Method,
+    /// How many flights each estimate has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub splitting: Option<SplittingKeys>,
+}
+
+/// What a run is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// A flight.
+    #[default]
+    Flights,
+    /// An estimate of the probability of a violation, by adaptive multilevel splitting ([`crate::splitting`]).
+    Splitting,
+}
+
+impl Method {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+    fn is_flights(&self) -> bool {
+        *self == Self::Flights
+    }
+}
+
+/// `[splitting]`: the numbers of an estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SplittingKeys {
+    /// Flights at a time.
+    pub flights: usize,
+    /// At least so many are ended in a round.
+    pub kill: usize,
+    /// Most bad flights that are kept of each estimate.
+    pub keep: usize,
+}
+
+impl Default for SplittingKeys {
+    fn default() -> Self {
+        let Settings { flights, kill, keep } = Settings::default();
+        Self { flights, kill, keep }
+    }
+}
+
+impl From<SplittingKeys> for Settings {
+    fn from(keys: SplittingKeys) -> Self {
+        Self { flights: keys.flights, kill: keys.kill, keep: keys.keep }
+    }
 }
 
 /// When enough has been flown. What is decided is decided by intervals that hold at every look.

@@ -15,6 +15,7 @@ use serde_json::Value;
 use super::plan::Campaign;
 use super::row::Row;
 use crate::compare::{FlightRow, Outcome};
+use crate::splitting::Splitting;
 
 /// Rows of a group, which is built in memory.
 const GROUP_ROWS: usize = 50_000;
@@ -106,6 +107,21 @@ fn columns(campaign: &Campaign) -> Vec<(String, Cells<'_>)> {
         ("scenario_sha256", text(|flight| Some(flight.scenario_sha256.clone()))),
         ("state_hash", text(|flight| Some(flight.state_hash.clone()))),
     ];
+    if campaign.splitting().is_some() {
+        let estimate =
+            |of: fn(&Splitting) -> f64| Cells::Number(Box::new(move |row: &Row| row.splitting.as_ref().map(of)));
+        let count = |of: fn(&Splitting) -> u64| {
+            Cells::Whole(Box::new(move |row: &Row| row.splitting.as_ref().map(of).map(u64::cast_signed)))
+        };
+        columns.extend([
+            ("probability".to_owned(), estimate(|of| of.probability)),
+            ("iterations".to_owned(), count(|of| of.iterations)),
+            ("extinct".to_owned(), Cells::Flag(Box::new(|row: &Row| row.splitting.as_ref().map(|of| of.extinct)))),
+            ("steps".to_owned(), count(|of| of.steps)),
+            ("not_flown_because".to_owned(), Cells::Text(Box::new(|row: &Row| row.not_flown.clone()))),
+        ]);
+        return columns;
+    }
     columns.extend(flight.into_iter().map(|(name, cells)| (name.to_owned(), cells)));
     columns
 }

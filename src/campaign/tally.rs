@@ -80,6 +80,7 @@ impl Counts {
             Known::Violated => &mut self.violated,
             Known::Unknown => &mut self.unknown,
             Known::NotFlown => &mut self.not_flown,
+            Known::Estimated => return,
         };
         *counter += 1;
         self.flown += u64::from(row.flight.is_some());

@@ -2,6 +2,7 @@
 
 use super::result::{LawSummary, Summary};
 use super::tally::{Intervals, Share};
+use crate::splitting::Repetitions;
 use crate::text::{aligned, at_least, at_most, counted, fixed, metres, seconds, significant};
 
 /// Decimals that show two digits of a share in per cent, at most 8.
@@ -58,6 +59,9 @@ impl LawSummary {
     /// Violations in a sentence, such as `0 of 10,000 flights violated: below 0.037 % with 95 % confidence`.
     #[must_use]
     pub fn sentence(&self) -> String {
+        if let Some(splitting) = &self.splitting {
+            return rare(splitting);
+        }
         let Share { count, of, low, high, confidence, .. } = self.violated;
         let sure = format!("with {:.0} % confidence", 100.0 * confidence);
         if of == 0 {
@@ -77,7 +81,44 @@ impl LawSummary {
     }
 }
 
+/// The probability of a violation in a sentence.
+fn rare(splitting: &Repetitions) -> String {
+    let Repetitions { repetitions, probability, confidence, extinct, .. } = splitting;
+    let number = |value: f64| format!("{value:.2e}");
+    let range = match (probability.low, probability.high) {
+        (Some(low), Some(high)) => {
+            format!(": between {} and {} with {:.0} % confidence", number(low), number(high), 100.0 * confidence)
+        }
+        _ => ": how far off that is is not known".to_owned(),
+    };
+    let estimates = counted(*repetitions, "estimate", "estimates");
+    match probability.value {
+        Some(0.0) => format!("no violation was found in {estimates}: nothing is known of how rare one is"),
+        Some(value) => format!(
+            "a flight is violated with a probability of {}{range}, from {estimates}, of which {} came to nothing",
+            number(value),
+            extinct.count
+        ),
+        None => "nothing was estimated".to_owned(),
+    }
+}
+
 impl Summary {
+    /// A table of estimated probabilities.
+    fn estimates(&self) -> String {
+        let names = ["law", "estimates", "probability", "at least", "at most", "came to nothing", "steps flown"];
+        let mut rows = vec![names.map(str::to_owned).to_vec()];
+        let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2e}"));
+        rows.extend(self.laws.iter().filter_map(|law| {
+            let of = law.splitting.as_ref()?;
+            let Repetitions { repetitions, probability, extinct, steps, .. } = of;
+            let numbers = [probability.value, probability.low, probability.high].map(number);
+            let counts = [extinct.count, *steps].map(self::number);
+            Some([&[law.name.clone(), self::number(*repetitions)][..], &numbers, &counts].concat())
+        }));
+        aligned(&rows)
+    }
+
     /// The answer in a sentence for each law.
     #[must_use]
     pub fn headline(&self) -> String {
@@ -119,12 +160,17 @@ impl Summary {
                 if law.unknown == 1 { "it" } else { "them" }
             )
         });
-        early.into_iter().chain(sequence).chain(impossible).chain(unknown).collect()
+        let advice = self.laws.iter().filter_map(|law| Some((law, law.splitting.as_ref()?)));
+        let advice = advice.flat_map(|(law, of)| of.advice.iter().map(move |said| format!("{}: {said}", law.name)));
+        advice.chain(early).chain(sequence).chain(impossible).chain(unknown).collect()
     }
 
     /// A table of the laws, and one of each two of them.
     #[must_use]
     pub fn text(&self) -> String {
+        if self.laws.iter().any(|law| law.splitting.is_some()) {
+            return self.estimates();
+        }
         let names = [
             "law",
             "flown",

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use super::campaign_worst::{self, Looks};
 use super::console::{self, Console};
-use super::run::{RunArguments, interruption};
+use super::run::{RECORDING, RunArguments, interruption};
 use super::{Exit, Failure};
 use crate::campaign::{
     ANSWER, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally, listed, parse,
@@ -144,6 +144,9 @@ struct Replay {
     /// The law, where several fly each run; the first unless given.
     #[arg(long, value_name = "NAME")]
     law: Option<String>,
+    /// The flight among those that were violated in this run, from 0, where runs are estimates of rare violations.
+    #[arg(long, value_name = "K")]
+    bad: Option<usize>,
     /// Folder for the recording and the report; by default worst/LAW-run-I in the campaign's.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -272,7 +275,9 @@ fn run_whole(arguments: &RunCampaign) -> Result<Exit, Failure> {
     if flights > 0 {
         let seconds = began.elapsed().as_secs_f64();
         let an_hour = 3600.0 * flights as f64 / seconds;
-        console.say(&format!("{flights} flights in {seconds:.1} s on {threads} threads: {an_hour:.0} an hour"));
+        let what = if campaign.splitting().is_some() { "estimates" } else { "flights" };
+        let on = if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") };
+        console.say(&format!("{flights} {what} in {seconds:.1} s on {on}: {an_hour:.0} an hour"));
     }
     merged(&folder, &arguments.says, &interrupted)
 }
@@ -360,6 +365,14 @@ fn fly_again(arguments: &Replay) -> Result<Exit, Failure> {
     if arguments.run >= runs {
         let help = format!("its runs are 0 to {}", runs - 1);
         return Err(Failure::input(format!("the campaign has no run {}", arguments.run), help));
+    }
+    if campaign.splitting().is_some() {
+        let bad = arguments.bad.unwrap_or_default();
+        let default = || campaign_worst::place_of_bad(&folder, &law.name, arguments.run, bad);
+        let place = arguments.out.clone().unwrap_or_else(default);
+        let hash = campaign_worst::fly_bad(&folder, law, [arguments.run, bad as u64], &place)?;
+        console::data(&format!("state hash {hash}, as in the campaign\nwrote {}\n", place.join(RECORDING).display()))?;
+        return Ok(Exit::Bad);
     }
     let mut options = RunArguments::for_folder(
         arguments.out.clone().unwrap_or_else(|| campaign_worst::place(&folder, &law.name, arguments.run)),

@@ -1,6 +1,6 @@
 //! Flights of a campaign flown again: the worst of them for its page, and any of them by its number.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
@@ -8,9 +8,19 @@ use clap::Args;
 use super::console::{self, Console};
 use super::run::{Left, RECORDING, RunArguments, fly_into};
 use super::{Exit, Failure};
-use crate::campaign::{Campaign, CampaignPage, Folder, Found, Law, Summary, Worst, WorstFlight};
+use crate::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
+use crate::record::mcap::{Header, McapRecorder};
 use crate::report::page::Picture;
+use crate::splitting::{self, StateAt};
 use crate::text::metres;
+
+/// What helps where a flight that is flown again is another one.
+const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine";
+
+/// The number of a law of a campaign, from 0.
+fn number_of(campaign: &Campaign, law: &Law) -> usize {
+    campaign.laws().iter().position(|other| other == law).unwrap_or_default()
+}
 
 /// Which flights are flown again for the page.
 #[derive(Debug, Args)]
@@ -51,6 +61,9 @@ pub(super) fn flown_again(
     interrupted: &AtomicBool,
 ) -> Result<Again, Failure> {
     let campaign = folder.campaign();
+    if campaign.splitting().is_some() {
+        return bad_again(folder, summary, looks, interrupted);
+    }
     let laws = std::iter::zip(campaign.laws(), &summary.laws);
     let mut worst: Vec<(&Law, &Worst)> =
         laws.flat_map(|(law, of)| of.worst.iter().map(move |worst| (law, worst))).collect();
@@ -74,6 +87,76 @@ pub(super) fn flown_again(
     Ok(again)
 }
 
+/// Flies flights again that were violated in estimates, those furthest into a violation first.
+fn bad_again(folder: &Folder, summary: &Summary, looks: &Looks, interrupted: &AtomicBool) -> Result<Again, Failure> {
+    let laws = std::iter::zip(folder.campaign().laws(), &summary.laws);
+    let mut worst: Vec<_> = laws.flat_map(|(law, of)| of.bad.iter().map(move |bad| (law, bad))).collect();
+    worst.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
+    worst.truncate(looks.worst.into());
+    let mut again = Again { flights: Vec::new(), no_pictures: None };
+    for (law, bad) in worst {
+        if interrupted.load(Ordering::Relaxed) {
+            break;
+        }
+        let place = place_of_bad(folder, &law.name, bad.run, bad.bad);
+        fly_bad(folder, law, [bad.run, bad.bad as u64], &place)?;
+        let (run, number) = (bad.run.to_string(), bad.bad.to_string());
+        let shown = folder.path().display().to_string();
+        let command = ["campaign", "replay", &shown, "--run", &run, "--law", &law.name, "--bad", &number];
+        again.flights.push(WorstFlight {
+            run: bad.run,
+            law: law.name.clone(),
+            said: format!(
+                "Bad flight {} of run {} under {}: {} m below delta in step {}.",
+                bad.bad,
+                bad.run,
+                law.name,
+                metres(-bad.clearance_m),
+                bad.violated_at_step
+            ),
+            command: console::command_line(command.into_iter()),
+            recording: Some(format!("worst/{}-run-{}-bad-{}/{RECORDING}", law.name, bad.run, bad.bad)),
+            picture: None,
+        });
+    }
+    Ok(again)
+}
+
+/// Where a bad flight of an estimate leaves its recording.
+pub(super) fn place_of_bad(folder: &Folder, law: &str, run: u64, bad: usize) -> PathBuf {
+    folder.file("worst").join(format!("{law}-run-{run}-bad-{bad}"))
+}
+
+/// Flies a bad flight of an estimate again, with its recording, and compares the state in which it was violated.
+pub(super) fn fly_bad(folder: &Folder, law: &Law, [run, bad]: [u64; 2], place: &Path) -> Result<String, Failure> {
+    let campaign = folder.campaign();
+    let row = folder.row(run, number_of(campaign, law))?;
+    let flights = row.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
+    let Some(flight) = usize::try_from(bad).ok().and_then(|bad| flights.get(bad)) else {
+        let help = format!("{} are kept of it, counted from 0", flights.len());
+        return Err(Failure::input(format!("run {run} under {} has no bad flight {bad}", law.name), help));
+    };
+    let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
+    std::fs::create_dir_all(place)
+        .map_err(|error| Failure::machine(format!("cannot write {}: {error}", place.display())))?;
+    let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+    let mut recording = McapRecorder::create(&place.join(RECORDING), &header)?;
+    let mut state = StateAt::violation_of(flight);
+    let flown = splitting::replay(&scenario, &flight.genealogy, &mut (&mut recording, &mut state));
+    let closed = recording.finish();
+    flown?;
+    closed?;
+    let found = state.hash().unwrap_or("none").to_owned();
+    if found == flight.state_hash {
+        return Ok(found);
+    }
+    let message = format!(
+        "bad flight {bad} of run {run} under {}: flown again it has the state hash {found}, and in the campaign it had {}",
+        law.name, flight.state_hash
+    );
+    Err(Failure::machine(message).with_help(FAULTY))
+}
+
 /// Refuses a flight that did not end as it did in the campaign.
 fn check(left: &Left, run: u64, law: &Law, state_hash: &str) -> Result<(), Failure> {
     if left.report.run.ended_early.as_deref() == Some(crate::report::INTERRUPTED) {
@@ -87,7 +170,7 @@ fn check(left: &Left, run: u64, law: &Law, state_hash: &str) -> Result<(), Failu
         "run {run} under {}: flown again it has the state hash {found}, and in the campaign it had {state_hash}",
         law.name
     );
-    Err(Failure::machine(message).with_help("the same flight has the same bits everywhere: look for a faulty machine"))
+    Err(Failure::machine(message).with_help(FAULTY))
 }
 
 fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &Left) -> WorstFlight {
@@ -146,13 +229,7 @@ pub(super) fn replay(
     let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
     let left = fly_into(options, &scenario, &command(campaign, run, law), interrupted)?;
     let console = Console { data_on_stdout: false, quiet: false };
-    let manifest = campaign.manifest();
-    let shard = (0..manifest.shards).find(|&shard| manifest.range(shard).contains(&run)).unwrap_or_default();
-    let place = campaign.laws().iter().position(|other| other == law).unwrap_or_default();
-    let row = match folder.read(shard)? {
-        Found::Whole(rows) => rows.into_iter().find(|row| row.place() == (run, place)),
-        Found::Nothing | Found::Broken => None,
-    };
+    let row = folder.row(run, number_of(campaign, law))?;
     match row.and_then(|row| row.flight) {
         Some(flight) => {
             check(&left, run, law, &flight.state_hash)?;

@@ -3,6 +3,7 @@
 //! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
+mod attack;
 mod audit;
 mod audits;
 mod campaign;
@@ -78,6 +79,8 @@ enum Command {
     Margin(margin::MarginArguments),
     /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
     Campaign(campaign::CampaignArguments),
+    /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
+    Attack(attack::AttackArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
     Export(export::ExportArguments),
     /// Draw a recording: pictures, films and contact sheets, without a screen.
@@ -125,6 +128,7 @@ pub fn main() -> ExitCode {
     if match &command {
         Command::Run(run) => run.draws(),
         Command::Compare(compare) => compare.draws(),
+        Command::Attack(attack) => attack.draws(),
         other => matches!(other, Command::Campaign(_) | Command::Render(_) | Command::View(_)),
     } {
         driver::silence();
@@ -137,6 +141,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Margin(arguments) => margin::margin(&arguments),
         Command::Campaign(arguments) => campaign::campaign(&arguments),
+        Command::Attack(arguments) => attack::attack(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),

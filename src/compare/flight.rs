@@ -52,6 +52,9 @@ pub struct FlightRow {
     pub min_pair: Option<[usize; 2]>,
     /// What the law's certificate promised \[m\].
     pub certified_m: Option<f64>,
+    /// Whether two came closer than that, by more than integration may cost.
+    #[serde(skip)]
+    pub breaks_certificate: bool,
     /// Ways flown, summed over the vehicles \[m\].
     pub path_length_m: f64,
     /// Largest commanded acceleration of a vehicle \[m/s^2\].
@@ -92,6 +95,7 @@ pub fn fly(
 
 impl FlightRow {
     fn new(report: Report, seed: u64, effort: &Effort) -> Self {
+        let breaks_certificate = report.breaks_certificate();
         Self {
             seed,
             outcome: Outcome::of(&report),
@@ -105,6 +109,7 @@ impl FlightRow {
             min_at_s: report.separation.min_at_s,
             min_pair: report.separation.min_pair,
             certified_m: report.separation.certified_m,
+            breaks_certificate,
             path_length_m: effort.path_length_m(),
             peak_control_m_s2: report.control.peak_m_s2,
             total_control_m_s: effort.total_control_m_s(),
@@ -119,6 +124,17 @@ impl FlightRow {
 }
 
 impl Outcome {
+    /// Its stable name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Violated => "violated",
+            Self::EndedEarly => "ended_early",
+            Self::Undecided => "undecided",
+            Self::Clear => "clear",
+        }
+    }
+
     fn of(report: &Report) -> Self {
         match report.audit.status {
             Status::Violation => Self::Violated,

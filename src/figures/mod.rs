@@ -15,6 +15,7 @@
 //! | [`smallest`] | the smallest distance of all of a recording |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
 //! | [`convergence`] | an integrator's error over its step |
+//! | [`attack`](attack()) | the smallest separation that a search had found over its flights |
 //! | [`margin`](margin()) | the share of flights that show something over the values of a key |
 //! | [`shares`] | the same of several laws |
 //! | [`histograms`] | how often a number of many flights falls where |
@@ -27,6 +28,7 @@
 //! Charts use no fonts and no style but their own. They are drawn on a panel that is white, and dark where the reader
 //! prefers dark pages, in colours that colour-blind people tell apart.
 
+mod attack;
 mod axis;
 mod beside;
 mod channels;
@@ -46,6 +48,7 @@ mod svg;
 mod tension;
 mod thin;
 
+pub use attack::attack;
 pub use channels::channels;
 pub use convergence::{Step, convergence};
 pub use distances::distances;

@@ -6,6 +6,7 @@ use super::search::Range;
 use crate::preflight::{PredictedMargin, Preflight};
 use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
 use crate::sim::SimError;
+use crate::text::as_toml;
 
 /// Where neither start nor flight has randomness, a start that is flown more than once is moved by up to this part of delta along
 /// each axis.
@@ -160,7 +161,7 @@ impl Plan {
     /// The overrides that fly run `run` with a value of the key.
     #[must_use]
     pub fn sets(&self, value: f64, run: u64) -> Vec<String> {
-        let mut sets = vec![format!("{}={}", self.key, toml(value))];
+        let mut sets = vec![format!("{}={}", self.key, as_toml(value))];
         if self.asked.runs > 1 {
             let seed = self.asked.seed.saturating_add(run);
             sets.extend([format!("start.seed={seed}"), format!("noise.seed={seed}")]);
@@ -202,10 +203,4 @@ fn check(range: Range) -> Result<(), MarginError> {
         return wrong(format!("a logarithmic range from {from} to {to}"));
     }
     Ok(())
-}
-
-/// A number as a whole one where it is, which keys of either kind take.
-fn toml(value: f64) -> String {
-    const WHOLE: f64 = 1e15;
-    if value.abs() < WHOLE { value.to_string() } else { format!("{value:?}") }
 }

@@ -44,6 +44,14 @@ impl Report {
         (!said.is_empty()).then(|| said.join(" and "))
     }
 
+    /// Whether two vehicles came closer than the law's certificate promises, by more than integration may cost.
+    #[must_use]
+    pub fn breaks_certificate(&self) -> bool {
+        let both = self.separation.min_m.zip(self.separation.certified_m);
+        let breaks = |(min_m, certified_m)| breaks_certificate(min_m, certified_m, self.separation.delta_m);
+        both.is_some_and(breaks) && self.separation.is_promised()
+    }
+
     /// What was judged of what was flown.
     fn judged(&self) -> String {
         let delta = metres(self.separation.delta_m);
@@ -51,14 +59,9 @@ impl Report {
             Status::Clear => {
                 let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
                 let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
-                let broken = match (self.separation.min_m, self.separation.certified_m) {
-                    (Some(min_m), Some(certified_m))
-                        if self.separation.is_promised()
-                            && breaks_certificate(min_m, certified_m, self.separation.delta_m) =>
-                    {
-                        format!(", which breaks the certificate of {} m", at_least(certified_m, 6))
-                    }
-                    _ => String::new(),
+                let broken = match self.separation.certified_m.filter(|_| self.breaks_certificate()) {
+                    Some(certified_m) => format!(", which breaks the certificate of {} m", at_least(certified_m, 6)),
+                    None => String::new(),
                 };
                 let rose = match self.energy.max_over_leg_start.filter(|_| self.energy.rose) {
                     Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),

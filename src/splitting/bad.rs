@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use serde::{Deserialize, Serialize};
 
 use super::genealogy::Genealogy;
-use crate::record::Sink;
+use crate::record::{Event, RecordError, Sample, Sink, StateHash, Step};
 use crate::scenario::Scenario;
 use crate::sim::{Flight, SimError, Simulation, fly_on};
 
@@ -20,6 +20,47 @@ pub struct BadFlight {
     pub clearance_m: f64,
     /// SHA-256 over time, positions, velocities and commands after that step, as [`crate::record::StateHash`] has it.
     pub state_hash: String,
+}
+
+/// Hash over the state after one step, as [`BadFlight::state_hash`] has it.
+#[derive(Clone, Debug)]
+pub struct StateAt {
+    step: u64,
+    seen: u64,
+    hash: Option<String>,
+}
+
+impl StateAt {
+    /// Of the step in which a flight was violated.
+    #[must_use]
+    pub fn violation_of(flight: &BadFlight) -> Self {
+        Self { step: flight.violated_at_step, seen: 0, hash: None }
+    }
+
+    /// The hash, once the step has been flown.
+    #[must_use]
+    pub fn hash(&self) -> Option<&str> {
+        self.hash.as_deref()
+    }
+}
+
+impl Sink for StateAt {
+    fn sample(&mut self, _sample: &Sample<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        if self.seen == self.step {
+            let mut hash = StateHash::new();
+            hash.observe(&Sample::new(step.time_s, self.seen, step.swarm, step.control));
+            self.hash = Some(hash.finish());
+        }
+        self.seen += 1;
+    }
 }
 
 /// Flies a flight again to its end, with the same bits, and hands what is recorded to `sink`.

@@ -54,10 +54,7 @@ pub fn estimate(
     [seed, repetition]: [u64; 2],
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Option<Splitting>, SplittingError> {
-    settings.check()?;
-    if !is_noisy(scenario) {
-        return Err(SplittingError::NoNoise);
-    }
+    check(scenario, settings)?;
     let mut path = Flown { scenario, simulation: begun(scenario, scenario.noise_seed)? };
     let rule = Rule::new(settings.flights, settings.kill, 0.0);
     let Some(mut split) = split(&mut path, rule, [seed, repetition], carry_on)? else { return Ok(None) };
@@ -65,6 +62,15 @@ pub fn estimate(
     let Split { probability, iterations, extinct, steps, .. } = split;
     let [flights, kill] = [settings.flights, settings.kill].map(|number| number as u64);
     Ok(Some(Splitting { repetition, probability, flights, kill, iterations, extinct, steps, bad }))
+}
+
+/// Refuses what [`estimate`] refuses before it flies.
+///
+/// # Errors
+/// [`SplittingError`] for settings that leave nothing to split, and a scenario without noise from step to step.
+pub fn check(scenario: &Scenario, settings: &Settings) -> Result<(), SplittingError> {
+    settings.check()?;
+    if is_noisy(scenario) { Ok(()) } else { Err(SplittingError::NoNoise) }
 }
 
 /// Whether two flights from one state differ: errors that last are drawn once.

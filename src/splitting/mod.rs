@@ -18,8 +18,8 @@ mod path;
 mod repetitions;
 mod settings;
 
-pub use bad::{BadFlight, replay};
-pub use estimate::{Splitting, estimate};
+pub use bad::{BadFlight, StateAt, replay};
+pub use estimate::{Splitting, check, estimate};
 pub use genealogy::{Branch, Genealogy};
 pub use levels::{Rule, Split, split};
 pub use lineage::Lineage;

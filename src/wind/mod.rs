@@ -10,4 +10,6 @@ mod spec;
 
 pub use air::Wind;
 pub use dryden::Dryden;
+#[cfg(feature = "reports")]
+pub(crate) use normal::Normals;
 pub use spec::{Gust, WindSpec};

@@ -7,7 +7,7 @@ use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
 /// Normal numbers of mean 0 and variance 1: Box and Muller's pairs from `ChaCha8` words, by `libm` alone.
 #[derive(Clone, Debug)]
-pub(super) struct Normals {
+pub(crate) struct Normals {
     random: ChaCha8Rng,
     /// The second of a pair, until it is asked for.
     second: Option<f64>,
@@ -15,13 +15,13 @@ pub(super) struct Normals {
 
 impl Normals {
     /// Those of a seed; each stream of it is independent of the others.
-    pub(super) fn new(seed: u64, stream: u64) -> Self {
+    pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(stream);
         Self { random, second: None }
     }
 
-    pub(super) fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         if let Some(second) = self.second.take() {
             return second;
         }
@@ -33,7 +33,7 @@ impl Normals {
     }
 
     /// Uniform in \[0, 1), a multiple of 2^-53.
-    fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.random.next_u64() >> 11) as f64 * SCALE
     }

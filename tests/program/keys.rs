@@ -1,4 +1,5 @@
-//! docs/report.md names every key that the program prints, with its unit, and no other; docs/compare.md those of `compare`.
+//! docs/report.md names every key that the program prints, with its unit, and no other; docs/compare.md those of `compare`,
+//! docs/attack.md those of `attack`, docs/campaigns.md those of `campaign`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -9,6 +10,14 @@ use serde_json::Value;
 const PAGE: &str = include_str!("../../docs/report.md");
 const ELLIPSOID: &str = "safety={shape=\"ellipsoid\", half_axes_m=[0.5, 0.5, 1.0]}";
 const COMPARE_PAGE: &str = include_str!("../../docs/compare.md");
+const ATTACK_PAGE: &str = include_str!("../../docs/attack.md");
+const CAMPAIGN_PAGE: &str = include_str!("../../docs/campaigns.md");
+/// Tables that stand in many places of `campaign.json`, by their keys.
+const KINDS: [&[&str]; 3] = [
+    &["count", "of", "share", "low", "high", "confidence"],
+    &["min", "p05", "median", "p95", "max"],
+    &["only_first", "only_second", "of", "p_value", "first_of_discordant", "difference", "low", "high", "confidence"],
+];
 
 /// The keys of a section of a page, each with what stands beside it: its unit.
 fn documented(page: &'static str, section: &str) -> BTreeMap<&'static str, &'static str> {
@@ -122,6 +131,54 @@ fn every_key_of_the_check_is_on_its_page() {
 fn every_key_of_a_comparison_is_on_its_page() {
     let quick = ["compare", "--laws", "edge-tension", "--runs", "1", "--json", "-", "--set", "time.duration_s=1.5"];
     assert_eq!(plain(&documented(COMPARE_PAGE, "compare --json")), printed(&[&quick]));
+}
+
+#[test]
+fn every_key_of_an_attack_is_on_its_page() {
+    let quick =
+        ["attack", "--vary", "law.alpha=0.9..1.1", "--flights", "1", "--json", "-", "--set", "time.duration_s=1.5"];
+    assert_eq!(plain(&documented(ATTACK_PAGE, "attack --json")), printed(&[&quick]));
+}
+
+/// The same value with a word for each table that stands in many places.
+fn by_kind(value: Value) -> Value {
+    match value {
+        Value::Object(table) => {
+            let has = |keys: &&&[&str]| keys.len() == table.len() && keys.iter().all(|key| table.contains_key(*key));
+            if KINDS.iter().find(has).is_some() {
+                return Value::from("a kind");
+            }
+            table.into_iter().map(|(key, value)| (key, by_kind(value))).collect()
+        }
+        Value::Array(list) => list.into_iter().map(by_kind).collect(),
+        plain => plain,
+    }
+}
+
+#[test]
+fn every_key_of_a_campaign_is_on_its_page() {
+    const PAIR: &str = "formation = { shape = \"points\", points_m = [[0.0, 0.0], [1.3, 0.0]] }\nstart = { positions_m = [[0.0, 0.0], [3.0, \
+                        0.0]] }\nlaw = { kind = \"displacement\", delta_m = 1.0 }\ntime = { duration_s = 12.0, dt_s = 0.02 }\n";
+    const FLIGHTS: &str = "scenario = \"pair.toml\"\nruns = 8\nlaws = [\"displacement\", \"edge-tension\"]\n[vary]\n\
+                           \"start.jitter_m\" = { uniform = [0.0, 0.1] }\n";
+    const RARE: &str = "scenario = \"pair.toml\"\nruns = 2\nmethod = \"splitting\"\n[set]\nlaw = { kind = \"laplacian\" }\nsensing = { \
+                        position_noise_m = 0.3, rate_hz = 10.0 }\n[splitting]\nflights = 10\n";
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut found = BTreeSet::new();
+    for (name, text) in [("pair.toml", PAIR), ("flights.toml", FLIGHTS), ("rare.toml", RARE)] {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    }
+    for name in ["flights.toml", "rare.toml"] {
+        let ran = ran_by(TAUTLINE, folder.path(), &["campaign", "run", name, "--worst", "0", "--json", "--quiet"]);
+        keys(&by_kind(serde_json::from_str(&ran.out).expect(&ran.err)), "", &mut found);
+    }
+    // Null in one campaign, and a table or a list in the other.
+    let named: BTreeSet<_> = found.iter().map(|key| key.trim_end_matches("[]").to_owned()).collect();
+    let is_whole = |key: &String| {
+        !named.iter().any(|other| other.starts_with(&format!("{key}.")) || other.starts_with(&format!("{key}[]")))
+    };
+    let whole: BTreeSet<_> = named.iter().filter(|key| is_whole(key)).cloned().collect();
+    assert_eq!(plain(&documented(CAMPAIGN_PAGE, "campaign.json")), whole);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 mod program;
 
 mod archives;
+mod attack;
 mod audit;
 mod campaign;
 mod check;

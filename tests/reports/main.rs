@@ -3,6 +3,7 @@
 #[path = "../support/browser.rs"]
 mod browser;
 
+mod attacks;
 mod channels;
 mod figures;
 mod margins;

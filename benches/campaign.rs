@@ -1,0 +1,36 @@
+//! Runs of a campaign beside a bare loop of the same flights, on one thread and on two. Their ratio says what the campaign costs.
+
+use std::hint::black_box;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use tautline::campaign::{Campaign, Program, Spec};
+use tautline::compare::Watch;
+use tautline::run::run;
+
+const SPEC: &str = "scenario = \"pentagon\"\nruns = 16\n[vary]\n\"start.jitter_m\" = { uniform = [0.0, 0.3] }\n";
+
+fn campaigns(criterion: &mut Criterion) {
+    let spec = Spec::read("bench", SPEC).expect("a specification");
+    let campaign =
+        Campaign::plan(&spec, "bench", Path::new("."), None, Program::running().expect("read")).expect("a plan");
+    let law = campaign.laws()[0].clone();
+    let scenarios: Vec<_> = (0..16).map(|run| campaign.scenario(run, &law).expect("a scenario")).collect();
+    let mut group = criterion.benchmark_group("sixteen flights of the pentagon");
+    group.sample_size(10);
+    group.bench_function("a bare loop", |bencher| {
+        bencher
+            .iter(|| scenarios.iter().map(|scenario| run(scenario, &mut ()).expect("it flies").run.steps).sum::<u64>());
+    });
+    for threads in [1, 2] {
+        group.bench_function(format!("a campaign on {threads} threads"), |bencher| {
+            let watch = Watch { flown: &|_| (), interrupted: &AtomicBool::new(false) };
+            bencher.iter(|| black_box(campaign.fly(threads, watch).expect("it flies")));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, campaigns);
+criterion_main!(benches);

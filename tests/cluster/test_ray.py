@@ -1,0 +1,152 @@
+"""The driver for Ray on a real cluster of two nodes and more."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import unittest
+from pathlib import Path
+
+from campaigns import ROOT, TAUTLINE, Campaign, ran, short_folder, until
+from ray_node import ENVIRONMENT, Node
+
+DRIVER = ROOT / "python" / "tautline_ray.py"
+
+# The driver as a module that only its own process can import.
+IMPORTED = f"import sys; sys.path.insert(0, {str(DRIVER.parent)!r}); import tautline_ray; sys.exit(tautline_ray.main())"
+
+# In place of the program: shard 1 ends with the code in the file `code`, which each time takes a byte from the file `times`.
+STUB = """\
+#!/bin/sh
+camp=$3
+case $2 in
+missing) [ ! -e "$camp/flown" ] || exit 0; echo 0-3; exit 1 ;;
+shard)
+    if [ "$5" = 1 ] && [ -s "$camp/times" ]; then
+        printf x >> "$camp/begun"
+        left=$(wc -c < "$camp/times")
+        head -c $((left - 1)) /dev/zero > "$camp/times"
+        echo "shard 1 is wrong" >&2
+        exit "$(cat "$camp/code")"
+    fi
+    : > "$camp/flown" ;;
+esac
+"""
+
+
+class RayCluster(unittest.TestCase):
+    """Two nodes of one slot each."""
+
+    folder: Path
+    head: Node
+    second: Node
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        place = short_folder()
+        cls.addClassCleanup(place.cleanup)
+        cls.folder = Path(place.name)
+        cls.head = cls.node("head")
+        cls.head.ready()
+        cls.second = cls.node("second", cls.head).ready()
+
+    @classmethod
+    def node(cls, name: str, head: Node | None = None) -> Node:
+        node = Node(cls.folder, name, head)
+        cls.addClassCleanup(node.end)
+        return node
+
+    def driver(self, camp: Path, *more: str, by: tuple[str, ...] = (str(DRIVER),)) -> list[str]:
+        return [sys.executable, *by, str(camp), "--address", self.head.address, *more]
+
+    def stubbed(
+        self, name: str, code: int, times: int, by: tuple[str, ...] = (str(DRIVER),)
+    ) -> tuple[subprocess.CompletedProcess[str], int]:
+        """Flies four shards of a stub of which one fails so often; gives how often it was begun and failed, too."""
+        camp = self.folder / name
+        camp.mkdir()
+        (camp / "code").write_text(str(code))
+        (camp / "times").write_bytes(bytes(times))
+        program = camp / "tautline"
+        program.write_text(STUB)
+        program.chmod(0o755)
+        flown = ran(*self.driver(camp, "--tautline", str(program), by=by), env=ENVIRONMENT)
+        return flown, len((camp / "begun").read_bytes())
+
+    def test_wrong_input_ends_it_at_once(self) -> None:
+        flown, begun = self.stubbed("wrong", 2, 100)
+        self.assertEqual((flown.returncode, begun), (2, 1), flown.stderr)
+        self.assertIn("shard 1 is wrong", flown.stderr)
+
+    def test_a_failure_is_tried_five_times_more(self) -> None:
+        flown, begun = self.stubbed("healed", 3, 5, by=("-c", IMPORTED))
+        self.assertEqual((flown.returncode, begun), (0, 5), flown.stderr)
+        flown, begun = self.stubbed("ill", 3, 100)
+        self.assertEqual((flown.returncode, begun), (3, 6), flown.stderr)
+        self.assertIn("shard 1 is wrong", flown.stderr)
+
+    def test_another_program_is_refused(self) -> None:
+        folder = self.folder / "another"
+        folder.mkdir()
+        camp = Campaign(folder, runs=2, duration_s=1.0)
+        program = folder / "tautline"
+        program.write_bytes(TAUTLINE.read_bytes() + b"\n")
+        program.chmod(0o755)
+        flown = ran(*self.driver(camp.path, "--tautline", str(program)), env=ENVIRONMENT)
+        self.assertEqual(flown.returncode, 2, flown.stderr)
+        self.assertIn("hash", flown.stderr)
+
+    def test_kill_freeze_and_add_leave_the_same_bytes(self) -> None:
+        camp = Campaign(self.folder, runs=120, duration_s=2.0)
+        hasty = ["--tautline", str(TAUTLINE), "--hedge-after", "4"]
+        log = self.folder / "driver.log"
+
+        def begun() -> subprocess.Popen[bytes]:
+            with log.open("wb") as said:
+                driver = subprocess.Popen(self.driver(camp.path, *hasty), stdout=said, stderr=said, env=ENVIRONMENT, cwd="/")
+            self.addClassCleanup(driver.kill)
+            return driver
+
+        first = begun()
+        until(lambda: camp.flown() >= 5, 90, "the campaign did not begin")
+        first.kill()
+        first.wait()
+        driver, third = begun(), self.node("third", self.head)
+
+        until(lambda: bool(self.second.workers()), 30, "the second node flies nothing")
+        for worker in self.second.workers():
+            os.kill(worker, signal.SIGKILL)
+
+        third.ready()
+        until(lambda: bool(third.flights()), 60, "the third node flies nothing")
+        self.assertLess(camp.flown(), camp.runs)
+        frozen = self.second.freeze()
+        at, began = camp.flown(), time.monotonic()
+        self.assertLess(at, camp.runs - 10, "too late to show anything")
+
+        self.assertEqual(driver.wait(timeout=200), 0, log.read_text())
+        took_s = time.monotonic() - began
+        print(f"node frozen at {at} of {camp.runs} shards; all flown {took_s:.1f} s later", file=sys.stderr)
+        hedged = re.findall(r"(\d+) submitted again$", log.read_text(), re.MULTILINE)
+        self.assertGreaterEqual(int(hedged[-1]), 1, log.read_text())
+        self.assertEqual(camp.missing(), "")
+        whole = camp.alone()
+        self.assertEqual(camp.merged(), whole)
+
+        # What was frozen goes on, finds its shards flown, and says nothing else.
+        for process in frozen:
+            self.assertIn("T", Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0])
+            os.kill(process, signal.SIGCONT)
+        until(lambda: not self.second.flights(), 60, "what was frozen flies for ever")
+        self.assertEqual(list((camp.path / "parts").glob("*.differs.jsonl")), [])
+        self.assertEqual(camp.merged(), whole)
+        again = ran(*self.driver(camp.path, *hasty), env=ENVIRONMENT)
+        self.assertEqual(again.returncode, 0, again.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,100 @@
+//! `tautline attack`: what is found is what `run` flies, and what is wrong is said first.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+/// A law that avoids nothing, for as long as two take to meet.
+const SHORT: [&str; 4] = ["--set", "law.kind=laplacian", "--set", "time.duration_s=3"];
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+#[test]
+fn the_worst_is_flown_again_by_the_command_that_is_printed_and_by_the_recording_that_is_left() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let search = ["attack", "pentagon", "--start", "0.4", "--flights", "24", "--out", "worst", "--json", "-"];
+    let Ran { exit, out, err } = ran(folder.path(), &[&search[..], &SHORT].concat());
+    assert_eq!(exit, Some(1), "{err}");
+    assert!(err.contains("VIOLATION found: ") && err.contains("a search, not a proof"), "{err}");
+    let found: Value = serde_json::from_str(&out).expect("JSON");
+    assert_eq!(found["flights"], 24);
+    let worst = found["progress"].as_array().expect("a list").last().expect("a worst");
+    assert_eq!(worst["flown"]["outcome"], "violated");
+
+    let sets = found["sets"].as_array().expect("a list").iter().map(|set| set.as_str().expect("text"));
+    let sets = sets.flat_map(|set| ["--set", set]);
+    let again: Vec<_> = ["run", "pentagon"].into_iter().chain(SHORT).chain(sets).collect();
+    let flown = ran(folder.path(), &[&again[..], &["--json", "--no-snapshots", "--no-figures"]].concat());
+    let flown: Value = serde_json::from_str(&flown.out).expect("a report");
+    let left = std::fs::read_to_string(folder.path().join("worst/report.json")).expect("a report");
+    let left: Value = serde_json::from_str(&left).expect("JSON");
+    for report in [&flown, &left] {
+        assert_eq!(report["run"]["state_hash"], worst["flown"]["state_hash"]);
+        assert_eq!(report["separation"]["min_m"], worst["flown"]["min_m"]);
+    }
+    for file in ["run.mcap", "report.html"] {
+        assert!(folder.path().join("worst").join(file).is_file(), "{file}");
+    }
+    // The printed command is that one too.
+    let printed = err.lines().find(|line| line.trim().starts_with("tautline run pentagon")).expect("a command");
+    assert!(printed.contains("start={positions_m=[["), "{printed}");
+
+    let Ran { exit, err, .. } = ran(folder.path(), &[&search[..], &SHORT].concat());
+    assert_eq!(exit, Some(2), "a finished run is kept: {err}");
+    assert!(err.contains("worst holds a finished run"), "{err}");
+}
+
+#[test]
+fn a_search_that_finds_nothing_is_exit_0_and_says_that_it_is_no_proof() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let search = ["attack", "pentagon", "--vary", "law.alpha=0.5..2", "--flights", "9", "--set", "time.duration_s=3"];
+    let files = |name: &str, threads: &str| {
+        let [csv, html, json] = ["csv", "html", "json"].map(|kind| format!("{name}.{kind}"));
+        let more = ["--threads", threads, "--csv", &csv, "--html", &html, "--json", &json];
+        let Ran { exit, out, err } = ran(folder.path(), &[&search[..], &more].concat());
+        assert_eq!(exit, Some(0), "{err}");
+        assert!(out.starts_with("no violation found in 9 flights: the worst came to "), "{out}");
+        assert!(out.contains("a search, not a proof"), "{out}");
+        [csv, html, json].map(|file| std::fs::read_to_string(folder.path().join(file)).expect("written"))
+    };
+    let [csv, html, json] = files("one", "1");
+    assert_eq!([&csv, &html, &json], files("two", "2").each_ref());
+    assert!(html.contains("a search, not a proof") && html.contains("tautline attack pentagon --vary"));
+    assert!(csv.starts_with("flight,noise_seed,outcome,min_m,min_at_s,certified_m,law.alpha\n1,"), "{csv}");
+}
+
+#[test]
+fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("there.json"), "").expect("a file");
+    for (arguments, said) in [
+        (&[][..], "nothing is varied"),
+        (&["--vary", "law.alpha"], "is not KEY=LOW..HIGH"),
+        (&["--vary", "law.alpha=2..1"], "not the smaller one"),
+        (&["--vary", "law.alpha=0..inf"], "between 0 and inf"),
+        (&["--vary", "law.alfa=1..2"], "alfa"),
+        (&["--vary", "law..alpha=1..2"], "is not a key"),
+        (&["--vary", "law.kind=1..2"], "law.kind = 1"),
+        (&["--vary", "law.alpha=1..2", "--vary", "law.alpha=2..3"], "law.alpha is varied twice"),
+        (&["--vary", "noise.seed=1..2"], "noise.seed is a seed"),
+        (&["--start", "0"], "the start is to be varied by 0"),
+        (&["--start", "-1"], "the start is to be varied by -1"),
+        (&["--velocity", "nan"], "the velocity at the start is to be varied by NaN"),
+        (&["--start", "1", "--flights", "0"], "0 is not in 1.."),
+        (&["--start", "1", "--flights", "2", "--seeds", "3"], "of 2 flights none is left"),
+        (&["--start", "1", "--seeds", "2"], "nothing in the flight is random"),
+        (&["--start", "1", "--method", "luck"], "invalid value 'luck'"),
+        (&["--start", "1", "--json", "there.json"], "there.json exists"),
+        (&["--start", "1", "--json", "-", "--csv", "-"], "both to go to standard output"),
+        (&["--start", "1", "--set", "law.delta_m=9"], "the keys as they are"),
+    ] {
+        let Ran { exit, err, .. } = ran(folder.path(), &[&["attack", "pentagon"], arguments].concat());
+        assert_eq!(exit, Some(2), "{arguments:?}: {err}");
+        let told = err.split_whitespace().collect::<Vec<_>>().join(" ").replace(" │ ", " ");
+        assert!(told.contains(said), "{arguments:?}: {err}");
+    }
+}

@@ -1,0 +1,55 @@
+//! `docs/attack.md` says what is flown: a seed and a law of it always, the whole tables with `--long`.
+
+#[path = "../support/attacks.rs"]
+mod tables;
+
+use tables::{CASES, Case, SEEDS};
+
+const PAGE: &str = include_str!("../../docs/attack.md");
+/// Seeds of twenty in which CMA-ES has to find less.
+const ENOUGH: u64 = 18;
+
+/// The table that a command makes, as the page has it.
+fn on_page(command: &str) -> &'static str {
+    let [begin, end] =
+        ["begin", "end"].map(|mark| format!("<!-- {mark}: cargo run --release --example {command} -->\n"));
+    PAGE.split_once(&begin).and_then(|(_, rest)| rest.split_once(&end)).expect("two marks").0
+}
+
+/// The numbers of a seed: CMA-ES and random search on each case.
+fn found_m(seed: u64) -> [f64; 2 * CASES.len()] {
+    let line = on_page("attacks").lines().find(|line| line.starts_with(&format!("| {seed} |"))).expect("a line");
+    let cells: Vec<f64> =
+        line.trim_matches('|').split('|').skip(1).map(|cell| cell.trim().parse().expect("m")).collect();
+    cells.try_into().expect("two searches of each case")
+}
+
+fn is_long() -> bool {
+    std::env::var_os("TAUTLINE_LONG").is_some()
+}
+
+#[test]
+fn with_as_many_flights_cma_es_finds_less_than_random_search_and_random_search_does_not() {
+    for (case, Case { name, .. }) in CASES.iter().enumerate() {
+        let count = |less: &dyn Fn(u64) -> bool| (0..SEEDS).filter(|&seed| less(seed)).count() as u64;
+        let better = count(&|seed| found_m(seed)[2 * case] < found_m(seed)[2 * case + 1]);
+        assert!(better >= ENOUGH, "{name}: {better} of {SEEDS}");
+        let of_itself = count(&|seed| found_m(seed)[2 * case + 1] < found_m((seed + 1) % SEEDS)[2 * case + 1]);
+        assert!(of_itself < ENOUGH, "{name}: {of_itself} of {SEEDS}");
+    }
+}
+
+#[test]
+fn the_tables_of_the_page_are_what_is_flown() {
+    if is_long() {
+        for (command, flown) in [("attacks", tables::beside_random()), ("attacks laws", tables::worst_starts())] {
+            let page = on_page(command);
+            assert!(page == flown, "docs/attack.md has\n{page}and flown was\n{flown}");
+        }
+        return;
+    }
+    let case = &CASES[0];
+    let [cma_es, random] = case.cells(0);
+    let line = on_page("attacks").lines().find(|line| line.starts_with("| 0 |")).expect("a line");
+    assert!(line.starts_with(&format!("| 0 | {cma_es} | {random} |")), "{line}: {cma_es} {random}");
+}

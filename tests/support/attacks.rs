@@ -1,0 +1,126 @@
+//! CMA-ES beside uniform random search, and the worst start found for each law, as the tables of docs/attack.md.
+
+use std::sync::atomic::AtomicBool;
+
+use tautline::attack::{Asked, Attack, Method, Plan, Variation};
+use tautline::compare::Watch;
+use tautline::scenario::{Override, Source};
+
+/// A search: the scenario, what is set, what is varied, and for how many flights.
+pub(crate) struct Case {
+    pub(crate) name: &'static str,
+    scenario: &'static str,
+    sets: &'static [&'static str],
+    start_m: f64,
+    apart_m: f64,
+    vary: &'static [&'static str],
+    flights: u64,
+}
+
+/// What CMA-ES has to beat random search on with as many flights.
+pub(crate) const CASES: [Case; 2] = [
+    Case {
+        name: "potential field, acceleration limited",
+        scenario: "pentagon",
+        sets: &["law.kind=potential", "law.max_accel_m_s2=1", "time.duration_s=12", "time.dt_s=0.02"],
+        start_m: 0.5,
+        apart_m: 2.5,
+        vary: &[],
+        flights: 200,
+    },
+    Case {
+        name: "star with loss",
+        scenario: "leader-lossy",
+        sets: &["time.duration_s=12", "time.dt_s=0.02"],
+        start_m: 0.5,
+        apart_m: 2.5,
+        vary: &["network.loss=0..0.3"],
+        flights: 200,
+    },
+];
+
+/// Seeds of the search in a comparison.
+pub(crate) const SEEDS: u64 = 20;
+
+/// The laws whose worst start on the pentagon is looked for.
+const LAWS: [&str; 7] = ["edge-tension", "displacement", "laplacian", "potential", "orca", "cbf-qp", "flocking"];
+const LAW_FLIGHTS: u64 = 300;
+
+impl Case {
+    fn search(&self, law: Option<&str>, method: Method, seed: u64) -> Attack {
+        let law = law.map(|law| format!("law.kind={law}"));
+        let sets = law.as_deref().into_iter().chain(self.sets.iter().copied());
+        let overrides: Vec<_> = sets.map(|set| Override::parse(set).expect("a set")).collect();
+        let vary = self.vary.iter().map(|text| Variation::parse(text).expect("a variation")).collect();
+        let (start_m, apart_m, flights) = (Some(self.start_m), Some(self.apart_m), self.flights);
+        let asked = Asked { vary, start_m, velocity_m_s: None, apart_m, method, flights, seeds: 1, seed };
+        let plan = Plan::new(Source::Builtin(self.scenario.to_owned()), &overrides, asked);
+        let plan = plan.unwrap_or_else(|error| panic!("{}: {error}", self.name));
+        let watch = Watch { flown: &|_| {}, interrupted: &AtomicBool::new(false) };
+        plan.search(2, watch).unwrap_or_else(|error| panic!("{}: {error}", self.name)).expect("not interrupted")
+    }
+
+    /// The smallest separation that CMA-ES finds, and random search \[m\].
+    pub(crate) fn found_m(&self, seed: u64) -> [f64; 2] {
+        [Method::CmaEs, Method::Random].map(|method| {
+            let worst = self.search(None, method, seed);
+            worst.worst().and_then(|worst| worst.flown.min_m).expect("a separation")
+        })
+    }
+
+    /// A seed's cells in the table.
+    pub(crate) fn cells(&self, seed: u64) -> [String; 2] {
+        self.found_m(seed).map(shown)
+    }
+}
+
+/// Both searches on every case, a line a seed, and how often CMA-ES finds the smaller separation.
+pub(crate) fn beside_random() -> String {
+    let names: Vec<_> = CASES.iter().map(|case| format!("{}: CMA-ES [m] | random [m]", case.name)).collect();
+    let mut better = [0; CASES.len()];
+    let line = |seed: u64| {
+        let found = CASES.each_ref().map(|case| case.found_m(seed));
+        for (better, [cma_es, random]) in better.iter_mut().zip(found) {
+            *better += u64::from(cma_es < random);
+        }
+        let cells: Vec<_> = found.iter().flatten().copied().map(shown).collect();
+        format!("| {seed} | {} |\n", cells.join(" | "))
+    };
+    let lines: String = (0..SEEDS).map(line).collect();
+    let [potential, star] = better;
+    format!(
+        "| seed | {} |\n| --- | --- | --- | --- | --- |\n{lines}\
+         | CMA-ES finds less | {potential} of {SEEDS} | | {star} of {SEEDS} | |\n",
+        names.join(" | ")
+    )
+}
+
+/// A separation as the tables have it \[m\], rounded down: what is below delta is shown below it.
+fn shown(found_m: f64) -> String {
+    format!("{:.4}", (1e4 * found_m).floor() / 1e4)
+}
+
+/// The worst start found for each law on the pentagon, a line a law.
+pub(crate) fn worst_starts() -> String {
+    let head = "| law | as it is [m] | worst found [m] | certified for that start [m] | flights that violated |\n\
+                | --- | --- | --- | --- | --- |\n";
+    head.to_owned() + &LAWS.map(worst_start).concat()
+}
+
+/// A law's line.
+pub(crate) fn worst_start(law: &str) -> String {
+    let case = Case {
+        name: "pentagon",
+        scenario: "pentagon",
+        sets: &["time.duration_s=20"],
+        start_m: 0.5,
+        apart_m: 2.5,
+        vary: &[],
+        flights: LAW_FLIGHTS,
+    };
+    let attack = case.search(Some(law), Method::CmaEs, 0);
+    let worst = attack.worst().expect("a flight");
+    let length = |length: Option<f64>| length.map_or_else(|| "-".to_owned(), shown);
+    let [own, found, certified] = [attack.own.min_m, worst.flown.min_m, worst.flown.certified_m].map(length);
+    format!("| `{law}` | {own} | {found} | {certified} | {} of {} |\n", attack.violated, attack.flights)
+}
