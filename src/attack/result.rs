@@ -201,10 +201,13 @@ impl Attack {
         self.progress.last()
     }
 
-    /// Whether a flight violated, or came closer than its certificate.
+    /// Whether a flight violated, or came closer than its certificate, the scenario's own among them; or whether too little was
+    /// flown to its end to say that none did.
     #[must_use]
     pub fn is_bad(&self) -> bool {
-        self.violated > 0 || self.certificates_broken > 0
+        let of_own = self.own.outcome == Outcome::Violated || self.own.breaks_certificate;
+        let known = self.flights.saturating_sub(self.ended_early + self.undecided);
+        of_own || self.violated > 0 || self.certificates_broken > 0 || known == 0
     }
 
     /// `attack --json`.

@@ -31,6 +31,16 @@ impl Attack {
         let flights = counted(self.flights, "flight", "flights");
         let delta = exact(self.delta_m);
         let Some(worst) = self.worst() else { return "no flight was flown: no candidate could be".to_owned() };
+        if self.violated == 0 && self.own.outcome == Outcome::Violated {
+            return format!(
+                "VIOLATION in the scenario as it is; {flights} beside it found none: the worst came to {}",
+                self.closest(worst)
+            );
+        }
+        let unknown = self.ended_early + self.undecided;
+        if self.violated == 0 && unknown >= self.flights {
+            return format!("nothing is known: of {flights} none was flown to its end and judged");
+        }
         if self.violated == 0 {
             return format!(
                 "no violation found in {flights}: the worst came to {} (delta {delta} m)",

@@ -12,6 +12,9 @@ use super::part::{self, Found};
 use super::plan::Campaign;
 use super::row::Row;
 
+/// What a campaign leaves beside its parts, and takes from nobody else.
+const LEFT: [&str; 3] = ["results.parquet", "campaign.json", "campaign.html"];
+
 /// A folder and the campaign in it.
 #[derive(Clone, Debug)]
 pub struct Folder {
@@ -44,11 +47,21 @@ impl Folder {
                     help: "leave --shards out to go on, or give another folder with --out".to_owned(),
                 });
             }
-            return Self::of(path, Campaign::of(there)?);
+            return Ok(Self { path: path.to_owned(), campaign: Campaign::of(there)? });
         }
-        let folder = Self::of(path, campaign)?;
+        if let Some(there) = LEFT.iter().map(|name| path.join(name)).find(|there| there.exists()) {
+            return Err(CampaignError::Foreign {
+                path: there,
+                why: "it is there already, and no campaign's manifest beside it".to_owned(),
+                help: "give another folder with --out, or move it away".to_owned(),
+            });
+        }
+        let folder = Self { path: path.to_owned(), campaign };
+        folder.make()?;
         folder.campaign.manifest().write(&file)?;
-        Ok(folder)
+        // Of two that plan at once the later one wins, and the other is told.
+        let there = Manifest::read(&file, &folder.campaign.manifest().tool)?;
+        if there == *folder.campaign.manifest() { Ok(folder) } else { Self::plan(path, folder.campaign, shards_asked) }
     }
 
     /// The campaign in a folder.
@@ -58,13 +71,14 @@ impl Folder {
     pub fn open(path: &Path, program: &Program) -> Result<Self, CampaignError> {
         let file = if path.is_file() { path.to_owned() } else { path.join("manifest.json") };
         let campaign = Campaign::of(Manifest::read(&file, program)?)?;
-        Self::of(if path.is_file() { path.parent().unwrap_or(Path::new("")) } else { path }, campaign)
+        let folder = if path.is_file() { path.parent().unwrap_or(Path::new("")) } else { path };
+        Ok(Self { path: folder.to_owned(), campaign })
     }
 
-    fn of(path: &Path, campaign: Campaign) -> Result<Self, CampaignError> {
-        let parts = path.join("parts");
-        fs::create_dir_all(&parts).map_err(|error| CampaignError::writing(&parts, error))?;
-        Ok(Self { path: path.to_owned(), campaign })
+    /// Makes room for parts.
+    pub(super) fn make(&self) -> Result<(), CampaignError> {
+        let parts = self.path.join("parts");
+        fs::create_dir_all(&parts).map_err(|error| CampaignError::writing(&parts, error))
     }
 
     /// What is flown.
@@ -88,6 +102,11 @@ impl Folder {
     /// The part of a shard.
     pub(super) fn part(&self, shard: u64) -> PathBuf {
         self.path.join("parts").join(format!("{}.jsonl", stem(shard)))
+    }
+
+    /// A part that says something else than the one that was there.
+    pub(super) fn differs(&self, shard: u64) -> PathBuf {
+        self.path.join("parts").join(format!("{}.differs.jsonl", stem(shard)))
     }
 
     /// Wall-clock times of a shard.
@@ -123,7 +142,8 @@ impl Folder {
     /// [`CampaignError::Alarm`] where it was flown twice with different results, and as [`part::read`].
     pub fn read(&self, shard: u64) -> Result<Found, CampaignError> {
         let kept = self.part(shard);
-        if let Some(other) = self.left(shard, DIFFERS)?.into_iter().next() {
+        let other = self.differs(shard);
+        if other.exists() {
             return Err(CampaignError::Alarm { shard, kept, other });
         }
         part::read(&kept, self.campaign.manifest(), shard, self.campaign.laws().len())
@@ -155,8 +175,6 @@ impl Folder {
     }
 }
 
-/// A part that says something else than the one that was there.
-pub(super) const DIFFERS: &str = "differs.jsonl";
 /// Rows of a process that is under way, or was killed.
 pub(super) const JOURNAL: &str = "journal";
 

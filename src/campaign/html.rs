@@ -40,8 +40,10 @@ pub struct WorstFlight {
 
 /// What the numbers rest on.
 const ASSUMED: [&str; 4] = [
-    "Runs are independent draws of what varies: a share is about that distribution, and about no other.",
-    "A flight violates where the independent judge finds two vehicles closer than delta, between steps too. Flights that ended \
+    "Runs are independent draws of what varies: a share is about that distribution, and about no other. Where only grids vary, \
+     runs are all of their points, and shares have no interval.",
+    "A flight violates where the independent judge finds two vehicles closer than delta, or one nearer to an obstacle than its \
+     clearance, between steps too. Flights that ended \
      early, or of which the judge cannot tell, count at the upper end of an interval.",
     "Shares of a number of runs that was fixed beforehand have the interval of Clopper and Pearson; where flying stopped as soon \
      as enough was known, that of a confidence sequence.",

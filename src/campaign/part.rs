@@ -110,10 +110,13 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
 }
 
 /// Rows as they are flown, of one process: what it flew before it was killed is not flown again.
+///
+/// A line is a hash over the campaign and the row, and the row: one of another campaign, torn or changed, is no row.
 #[derive(Debug)]
 pub(super) struct Journal {
     path: PathBuf,
     file: File,
+    campaign: String,
 }
 
 impl Journal {
@@ -121,9 +124,9 @@ impl Journal {
     ///
     /// # Errors
     /// [`CampaignError::Machine`] where the file cannot be made.
-    pub(super) fn create(path: PathBuf) -> Result<Self, CampaignError> {
+    pub(super) fn create(path: PathBuf, manifest: &Manifest) -> Result<Self, CampaignError> {
         let file = File::create(&path).map_err(|error| CampaignError::writing(&path, error))?;
-        Ok(Self { path, file })
+        Ok(Self { path, file, campaign: manifest.campaign.clone() })
     }
 
     /// Adds a row.
@@ -131,15 +134,26 @@ impl Journal {
     /// # Errors
     /// [`CampaignError::Machine`] where the disk is full; what was written before stays.
     pub(super) fn add(&mut self, row: &Row) -> Result<(), CampaignError> {
-        let line = line(row)?;
-        self.file.write_all(&line).map_err(|error| CampaignError::writing(&self.path, error))
+        let row = line(row)?;
+        let written = [seal_of(&self.campaign, &row).as_bytes(), b" ", &row].concat();
+        self.file.write_all(&written).map_err(|error| CampaignError::writing(&self.path, error))
     }
 
-    /// Rows of a journal that was left behind; a line that was torn is left out.
+    /// Rows of a campaign in a journal that was left behind.
     #[must_use]
-    pub(super) fn rows(path: &Path) -> Vec<Row> {
+    pub(super) fn rows(path: &Path, manifest: &Manifest) -> Vec<Row> {
         let bytes = fs::read(path).unwrap_or_default();
-        let lines = bytes.split_inclusive(|&byte| byte == b'\n').filter(|line| line.ends_with(b"\n"));
-        lines.filter_map(|line| serde_json::from_slice(line).ok()).collect()
+        let row = |written: &[u8]| {
+            let space = written.iter().position(|&byte| byte == b' ')?;
+            let (seal, row) = (&written[..space], &written[space + 1..]);
+            let is_ours = seal == seal_of(&manifest.campaign, row).as_bytes();
+            if is_ours { serde_json::from_slice(row).ok() } else { None }
+        };
+        bytes.split_inclusive(|&byte| byte == b'\n').filter_map(row).collect()
     }
+}
+
+/// Hash over a campaign and the line of a row.
+fn seal_of(campaign: &str, row: &[u8]) -> String {
+    base16(&Sha256::new().chain_update(campaign).chain_update(row).finalize())
 }

@@ -18,6 +18,8 @@ pub const MOST_RUNS: u64 = 1_000_000_000;
 const RUNS_OF_A_SHARD: u64 = 250;
 /// Most values of a list that are tried before anything is flown.
 const MOST_TRIED: usize = 1000;
+/// Runs among which one that can be flown is looked for beforehand.
+const FIRST_TRIED: u64 = 100;
 /// Seeds that are drawn by run where nobody says otherwise.
 const START_SEED: &str = "start.seed";
 const NOISE_SEED: &str = "noise.seed";
@@ -79,7 +81,7 @@ impl Campaign {
             runs: runs(spec)?,
             first: Vec::new(),
             shards: 1,
-            folder: source.folder().to_owned(),
+            folder: std::path::absolute(source.folder()).unwrap_or_else(|_| source.folder().to_owned()),
         };
         manifest.shards = shards.unwrap_or_else(|| manifest.runs.div_ceil(RUNS_OF_A_SHARD));
         if manifest.shards == 0 || manifest.shards > manifest.runs {
@@ -90,7 +92,7 @@ impl Campaign {
         }
         let mut campaign = Self::read(manifest, spec)?;
         campaign.check()?;
-        campaign.manifest.first = campaign.first()?;
+        campaign.manifest.first = campaign.first();
         campaign.manifest = campaign.manifest.sealed();
         Ok(campaign)
     }
@@ -103,7 +105,7 @@ impl Campaign {
     pub fn of(manifest: Manifest) -> Result<Self, CampaignError> {
         let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
         let campaign = Self::read(manifest, &spec)?;
-        let first = campaign.first()?;
+        let first = campaign.first();
         if first != campaign.manifest.first {
             return Err(CampaignError::Foreign {
                 path: campaign.manifest.folder.clone(),
@@ -130,10 +132,11 @@ impl Campaign {
         }
         let sets = spec.sets();
         let mut variations = spec.variations()?;
-        if let Some(key) = sets.keys().find(|&key| variations.contains_key(key)) {
+        refuse_overlaps(&sets, &variations, !spec.laws.is_empty())?;
+        if spec.splitting.is_some() && spec.method != Method::Splitting {
             return Err(CampaignError::plan(
-                format!("{key} stands in [set] and in [vary]"),
-                "a key either has one value or differs from run to run: take it out of one of them",
+                "[splitting] without method = \"splitting\"",
+                "add it, or leave the table out",
             ));
         }
         let written = |(key, value): (&String, &toml::Value)| Override::parse(&format!("{key}={value}"));
@@ -161,7 +164,8 @@ impl Campaign {
         variations.extend(drawn.into_iter().map(|(key, _)| (key.to_owned(), Variation::Seed {})));
         let splitting = (spec.method == Method::Splitting).then(|| spec.splitting.unwrap_or_default().into());
         let file = manifest.folder.join(&manifest.scenario_name);
-        let is_builtin = crate::scenario::builtin::find(&manifest.scenario_name).is_some();
+        let builtin = crate::scenario::builtin::find(&manifest.scenario_name);
+        let is_builtin = builtin.is_some_and(|builtin| builtin.toml == manifest.scenario);
         let argument = if is_builtin { manifest.scenario_name.clone() } else { file.display().to_string() };
         Ok(Self {
             manifest,
@@ -198,21 +202,44 @@ impl Campaign {
                 "let something differ: \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], a random start, or wind",
             ));
         }
+        if self.variations.values().all(|variation| *variation == Variation::Seed {}) && self.splitting.is_none() {
+            let law = &self.laws[0];
+            let hash =
+                |run: u64| self.scenario(run, law).map_or_else(|error| error.to_string(), |run| run.sha256_hex());
+            let runs = self.manifest.runs.min(3);
+            if runs > 1 && (1..runs).all(|run| hash(run) == hash(0)) {
+                return Err(CampaignError::plan(
+                    format!(
+                        "all {} runs are the same flight: nothing depends on the seeds that are drawn",
+                        self.manifest.runs
+                    ),
+                    "let something differ: \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], a random start, or wind",
+                ));
+            }
+        }
         for law in &self.laws {
+            let run = self.first_flyable(law)?;
             for (key, variation) in &self.variations {
-                for value in variation.samples().iter().take(MOST_TRIED) {
-                    let mut drawn = self.drawn(0);
+                let under = |value: &toml::Value| format!("under the law {}, {key} = {value}: ", law.name);
+                let tried = variation.samples().into_iter().take(MOST_TRIED).map(|value| {
+                    let mut drawn = self.drawn(run);
                     drawn.insert(key, value.clone());
-                    let tried = self.read_with(law, &drawn);
-                    let under = || format!("under the law {}, {key} = {value}: ", law.name);
-                    tried.map_err(|error| CampaignError::Scenario { under: under(), error: Box::new(error) })?;
+                    let read = self.read_with(law, &drawn);
+                    read.map_err(|error| CampaignError::Scenario { under: under(&value), error: Box::new(error) })
+                });
+                let (flown, refused): (Vec<_>, Vec<_>) = tried.partition(Result::is_ok);
+                // What is listed is meant; of a range some may be impossible, which is counted as it is flown.
+                if (variation.is_listed() || flown.is_empty())
+                    && let Some(Err(error)) = refused.into_iter().next()
+                {
+                    return Err(error);
                 }
             }
-            let flight = |error| CampaignError::Flight { run: 0, law: law.name.clone(), error: Box::new(error) };
-            let built = self.scenario(0, law).map_err(plain_of(law))?.law();
+            let flight = |error| CampaignError::Flight { run, law: law.name.clone(), error: Box::new(error) };
+            let built = self.scenario(run, law).map_err(plain_of(law))?.law();
             built.map_err(|error| flight(error.into()))?;
             if let Some(settings) = &self.splitting {
-                let ready = splitting::check(&self.scenario(0, law).map_err(plain_of(law))?, settings);
+                let ready = splitting::check(&self.scenario(run, law).map_err(plain_of(law))?, settings);
                 ready.map_err(|error| CampaignError::Splitting {
                     run: 0,
                     law: law.name.clone(),
@@ -223,9 +250,17 @@ impl Campaign {
         Ok(())
     }
 
-    fn first(&self) -> Result<Vec<String>, CampaignError> {
-        let first = self.laws.iter().map(|law| self.scenario(0, law).map_err(plain_of(law)));
-        first.map(|scenario| scenario.map(|scenario| scenario.sha256_hex())).collect()
+    /// The first run that can be flown under a law.
+    fn first_flyable(&self, law: &Law) -> Result<u64, CampaignError> {
+        let runs = 0..self.manifest.runs.min(FIRST_TRIED);
+        let flyable = runs.clone().find(|&run| self.scenario(run, law).is_ok());
+        flyable.map_or_else(|| self.scenario(0, law).map_err(plain_of(law)).map(|_| 0), Ok)
+    }
+
+    /// What run 0 is under each law: the hash of its scenario, or why there is none.
+    fn first(&self) -> Vec<String> {
+        let first = self.laws.iter().map(|law| self.scenario(0, law));
+        first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.sha256_hex())).collect()
     }
 
     /// What it is made from.
@@ -332,6 +367,57 @@ fn plain_of(law: &Law) -> impl Fn(ScenarioError) -> CampaignError {
 
 fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {
     drawn.iter().map(|(key, value)| format!("{key}={value}"))
+}
+
+/// Refuses keys of which one is the other, or a part of it, and a varied law where laws are named.
+fn refuse_overlaps(
+    sets: &BTreeMap<String, toml::Value>,
+    variations: &BTreeMap<String, Variation>,
+    names_laws: bool,
+) -> Result<(), CampaignError> {
+    let is_key = |key: &&String| key.split('.').all(|part| !part.is_empty() && part.chars().all(is_word));
+    if let Some(key) = sets.keys().chain(variations.keys()).find(|key| !is_key(key)) {
+        return Err(CampaignError::plan(
+            format!("`{key}` is no key of a scenario"),
+            "write it as for --set: time.dt_s",
+        ));
+    }
+    let plain = |key: &String| {
+        let axis = |part: &str| match part {
+            "x" => "1".to_owned(),
+            "y" => "2".to_owned(),
+            "z" => "3".to_owned(),
+            other => other.to_owned(),
+        };
+        key.split('.').map(axis).collect::<Vec<_>>()
+    };
+    let all: Vec<_> = sets.keys().chain(variations.keys()).collect();
+    for (k, key) in all.iter().enumerate() {
+        let varies = |number: usize| number >= sets.len();
+        let clash = |&number: &usize| {
+            let (one, other) = (plain(key), plain(all[number]));
+            (varies(k) || varies(number)) && (one.starts_with(&other) || other.starts_with(&one))
+        };
+        if let Some(other) = (0..k).find(clash) {
+            let places = if varies(k) && varies(other) { "both in [vary]" } else { "in [set] and in [vary]" };
+            return Err(CampaignError::plan(
+                format!("{} and {key} stand {places}, and one is the other or a part of it", all[other]),
+                "a key either has one value or differs from run to run: take one of them out",
+            ));
+        }
+    }
+    let is_law = |key: &&String| ["law", "law.kind"].contains(&key.as_str());
+    match variations.keys().find(is_law) {
+        Some(key) if names_laws => Err(CampaignError::plan(
+            format!("{key} stands in [vary], and laws are named beside it"),
+            "name laws to fly each of them from the same starts, or vary the law, and not both",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn is_word(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_' || c == '-'
 }
 
 /// Whether a key of one of these tables is varied, which may bring chance into it.

@@ -61,6 +61,8 @@ pub struct LawSummary {
     pub unknown: u64,
     /// With a violation. Flights of which it is not known count at the upper end of the interval.
     pub violated: Share,
+    /// Flights in which two vehicles came closer than their law's certificate; each is a defect.
+    pub certificates_broken: u64,
     /// Clear to the end.
     pub clear: Share,
     /// With the formation reached and kept.
@@ -156,8 +158,12 @@ impl Gathered {
     #[must_use]
     pub(super) fn new(campaign: &Campaign) -> Self {
         let laws = campaign.laws().len();
-        let intervals =
-            if campaign.stop().is_some() { Intervals::ConfidenceSequence } else { Intervals::ClopperPearson };
+        let is_drawn = campaign.variations().values().any(|variation| variation.grid_len().is_none());
+        let intervals = match (campaign.stop(), is_drawn) {
+            (Some(_), _) => Intervals::ConfidenceSequence,
+            (None, true) => Intervals::ClopperPearson,
+            (None, false) => Intervals::Exact,
+        };
         Self {
             intervals,
             tally: Tally::new(laws, campaign.stop()),
@@ -212,6 +218,7 @@ impl Gathered {
             not_flown: counts.not_flown,
             not_flown_because: numbers.not_flown_because,
             unknown: counts.unknown,
+            certificates_broken: counts.certificates_broken,
             violated: counts.violated(intervals),
             clear: counts.share(Asked::Clear, intervals),
             reached: counts.share(Asked::Reached, intervals),
@@ -303,7 +310,9 @@ impl Summary {
     /// Whether no flight violated, and that is known of each; estimates of rare violations never say so.
     #[must_use]
     pub fn is_clear(&self) -> bool {
-        self.laws.iter().all(|law| law.violated.count == 0 && law.unknown == 0 && law.splitting.is_none())
+        self.laws.iter().all(|law| {
+            law.violated.count == 0 && law.unknown == 0 && law.certificates_broken == 0 && law.splitting.is_none()
+        })
     }
 
     /// Flights that were impossible, by law.

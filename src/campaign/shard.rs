@@ -1,14 +1,15 @@
 //! Flying one shard: every run of it under every law, kept as they are flown.
 
-use std::collections::BTreeSet;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
 use super::error::CampaignError;
-use super::folder::{DIFFERS, Folder, JOURNAL};
+use super::folder::{Folder, JOURNAL};
 use super::part::{self, Found, Journal};
 use super::row::Row;
 use crate::compare::{Watch, in_parallel};
@@ -38,9 +39,9 @@ impl Folder {
     /// flight that does not exist, [`CampaignError::Machine`] where the disk is full; what was flown is kept.
     pub fn fly(&self, shard: u64, threads: usize, watch: Watch<'_>) -> Result<Shard, CampaignError> {
         if let Found::Whole(rows) = self.read(shard)? {
-            self.sweep(shard)?;
             return Ok(Shard::Kept(rows));
         }
+        self.make()?;
         let began = Instant::now();
         let laws = self.campaign().laws().len();
         let places = self.campaign().manifest().range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
@@ -48,7 +49,7 @@ impl Folder {
         let there: BTreeSet<_> = rows.iter().map(Row::place).collect();
         let missing: Vec<_> = places.filter(|place| !there.contains(place)).collect();
         let flown = missing.len();
-        let journal = Mutex::new(Journal::create(self.own(shard, JOURNAL))?);
+        let journal = Mutex::new(Journal::create(self.own(shard, JOURNAL), self.campaign().manifest())?);
         let made = in_parallel(missing.len(), threads, &|number| {
             let (run, law) = missing[number];
             let row = self.campaign().row(run, law, watch)?;
@@ -76,11 +77,23 @@ impl Folder {
     /// Rows that processes left which were killed, each once.
     fn flown_before(&self, shard: u64) -> Result<Vec<Row>, CampaignError> {
         let (range, laws) = (self.campaign().manifest().range(shard), self.campaign().laws().len());
-        let mut rows: Vec<Row> = self.left(shard, JOURNAL)?.iter().flat_map(|path| Journal::rows(path)).collect();
-        rows.retain(|row| range.contains(&row.run) && row.law < laws);
-        rows.sort_by_key(Row::place);
-        rows.dedup_by_key(|row| row.place());
-        Ok(rows)
+        let manifest = self.campaign().manifest();
+        let mut rows: BTreeMap<(u64, usize), (Row, PathBuf)> = BTreeMap::new();
+        for path in self.left(shard, JOURNAL)? {
+            for row in Journal::rows(&path, manifest) {
+                if !range.contains(&row.run) || row.law >= laws {
+                    continue;
+                }
+                match rows.entry(row.place()) {
+                    Entry::Vacant(place) => drop(place.insert((row, path.clone()))),
+                    Entry::Occupied(there) if there.get().0 == row => {}
+                    Entry::Occupied(there) => {
+                        return Err(CampaignError::Alarm { shard, kept: there.get().1.clone(), other: path });
+                    }
+                }
+            }
+        }
+        Ok(rows.into_values().map(|(row, _)| row).collect())
     }
 
     /// Puts a part in its place, whole, unless there is one: then both must say the same.
@@ -94,7 +107,7 @@ impl Folder {
             return Err(failed(error));
         }
         if matches!(self.read(shard), Ok(Found::Broken)) {
-            fs::remove_file(&path).map_err(failed)?;
+            return fs::rename(&own, &path).map_err(failed);
         }
         // A link is made by one process alone; where a file system has none, the last one wins.
         match fs::hard_link(&own, &path) {
@@ -111,7 +124,7 @@ impl Folder {
         if there == bytes {
             return fs::remove_file(own).map_err(|error| CampaignError::writing(own, error));
         }
-        let other = self.own(shard, DIFFERS);
+        let other = self.differs(shard);
         fs::rename(own, &other).map_err(|error| CampaignError::writing(&other, error))?;
         Err(CampaignError::Alarm { shard, kept, other })
     }

@@ -72,7 +72,9 @@ fn columns(campaign: &Campaign) -> Vec<(String, Cells<'_>)> {
     for (place, (key, variation)) in campaign.variations().iter().enumerate() {
         let samples = variation.samples();
         let is_whole = samples.iter().all(toml::Value::is_integer);
-        columns.push((key.clone(), drawn(place, &samples, is_whole)));
+        // Columns of our own have no dots.
+        let name = if key.contains('.') { key.clone() } else { format!("vary.{key}") };
+        columns.push((name, drawn(place, &samples, is_whole)));
     }
     let outcome = |flight: &FlightRow| {
         Some(match flight.outcome {
@@ -96,6 +98,7 @@ fn columns(campaign: &Campaign) -> Vec<(String, Cells<'_>)> {
         ("min_vehicle_a", whole(|flight| flight.min_pair.map(|pair| pair[0] as u64))),
         ("min_vehicle_b", whole(|flight| flight.min_pair.map(|pair| pair[1] as u64))),
         ("certified_m", number(|flight| flight.certified_m)),
+        ("breaks_certificate", flag(|flight| flight.breaks_certificate)),
         ("reached", flag(|flight| flight.reached)),
         ("reached_at_s", number(|flight| flight.reached_at_s)),
         ("peak_control_m_s2", number(|flight| flight.peak_control_m_s2)),

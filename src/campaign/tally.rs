@@ -33,6 +33,8 @@ pub enum Intervals {
     ClopperPearson,
     /// A confidence sequence, which holds whenever one stops.
     ConfidenceSequence,
+    /// None: the runs are all the points of grids, and no sample of anything.
+    Exact,
 }
 
 impl Intervals {
@@ -42,6 +44,11 @@ impl Intervals {
         let at = |count: u64| match self {
             Self::ClopperPearson => Proportion::new(count, of),
             Self::ConfidenceSequence => anytime(count, of),
+            Self::Exact => {
+                let share = if of > 0 { count as f64 / of as f64 } else { 0.0 };
+                let high = if of > 0 { share } else { 1.0 };
+                Proportion { count, of, share: Some(share), low: share, high, confidence: 1.0 }
+            }
         };
         Share {
             count,
@@ -49,7 +56,7 @@ impl Intervals {
             share: (of > 0).then(|| count as f64 / of as f64),
             low: at(count).low,
             high: at(count.saturating_add(unknown).min(of)).high,
-            confidence: crate::statistics::CONFIDENCE,
+            confidence: if self == Self::Exact { 1.0 } else { crate::statistics::CONFIDENCE },
         }
     }
 }
@@ -71,6 +78,8 @@ pub struct Counts {
     pub reached: u64,
     /// Passed.
     pub pass: u64,
+    /// Closer than their law's certificate.
+    pub certificates_broken: u64,
 }
 
 impl Counts {
@@ -85,6 +94,7 @@ impl Counts {
         *counter += 1;
         self.flown += u64::from(row.flight.is_some());
         self.reached += u64::from(row.flight.as_ref().is_some_and(|flight| flight.reached));
+        self.certificates_broken += u64::from(row.flight.as_ref().is_some_and(|flight| flight.breaks_certificate));
         self.pass += u64::from(row.flight.as_ref().is_some_and(|flight| flight.pass));
     }
 

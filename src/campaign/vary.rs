@@ -113,6 +113,12 @@ impl Variation {
         }
     }
 
+    /// Whether its values were listed one by one.
+    #[must_use]
+    pub fn is_listed(&self) -> bool {
+        matches!(self, Self::List(_) | Self::Grid(_))
+    }
+
     /// How many values it flies in turn; none for what is drawn.
     #[must_use]
     pub fn grid_len(&self) -> Option<u64> {

@@ -63,6 +63,15 @@ impl LawSummary {
             return rare(splitting);
         }
         let Share { count, of, low, high, confidence, .. } = self.violated;
+        if confidence == 1.0 && of > 0 {
+            let unknown =
+                if self.unknown > 0 { format!(", of {} it is not known", number(self.unknown)) } else { String::new() };
+            return format!(
+                "{} of {} flights violated{unknown}: all points of the grid, and no sample",
+                number(count),
+                number(of)
+            );
+        }
         let sure = format!("with {:.0} % confidence", 100.0 * confidence);
         if of == 0 {
             return "no flight was flown: nothing is known".to_owned();
@@ -151,6 +160,14 @@ impl Summary {
                 law.not_flown_because.as_deref().unwrap_or("for no reason that was kept")
             )
         });
+        let broken = self.laws.iter().filter(|law| law.certificates_broken > 0).map(|law| {
+            format!(
+                "{}: CERTIFICATE BROKEN in {}: two vehicles came closer than the law promised, by a step too long for it or a defect; \
+                 column breaks_certificate of the table says where",
+                law.name,
+                counted(law.certificates_broken, "flight", "flights")
+            )
+        });
         let unknown = self.laws.iter().filter(|law| law.unknown > 0).map(|law| {
             format!(
                 "{}: {} ended early without a violation, or the judge cannot tell; the upper end of the interval counts {} as \
@@ -162,7 +179,7 @@ impl Summary {
         });
         let advice = self.laws.iter().filter_map(|law| Some((law, law.splitting.as_ref()?)));
         let advice = advice.flat_map(|(law, of)| of.advice.iter().map(move |said| format!("{}: {said}", law.name)));
-        advice.chain(early).chain(sequence).chain(impossible).chain(unknown).collect()
+        advice.chain(early).chain(sequence).chain(impossible).chain(broken).chain(unknown).collect()
     }
 
     /// A table of the laws, and one of each two of them.

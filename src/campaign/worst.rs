@@ -37,7 +37,10 @@ impl WorstList {
     /// Takes a row, if it is among the worst.
     pub(super) fn take(&mut self, row: &Row) {
         let (Some(flight), Some(clearance_m)) = (&row.flight, row.clearance_m()) else { return };
-        let place = self.0.partition_point(|worse| worse.clearance_m <= clearance_m);
+        // One that violated, an obstacle's clearance it may be, is worse than any that did not.
+        let rank = |outcome: Outcome| outcome != Outcome::Violated;
+        let own = (rank(flight.outcome), clearance_m);
+        let place = self.0.partition_point(|worse| (rank(worse.outcome), worse.clearance_m) <= own);
         if place >= WORST {
             return;
         }

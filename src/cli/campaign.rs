@@ -1,7 +1,7 @@
 //! `tautline campaign`: many flights, one answer with an error bar, on one machine or on as many as see one folder.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use clap::{Args, Subcommand};
@@ -332,7 +332,12 @@ fn answer(
     console.say(&format!("{}\n\n{}", summary.headline(), summary.text()));
     let worst = campaign_worst::flown_again(folder, summary, &says.looks, console, interrupted)?;
     let path = folder.file(PAGE);
-    let command = console::command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());
+    if interrupted.load(Ordering::Relaxed) {
+        console.warn("interrupted: no page was written");
+        return Ok(Exit::Bad);
+    }
+    let (spec, out) = (format!("{}.toml", summary.name), shown(folder.path()));
+    let command = console::command_line(["campaign", "run", &spec, "--out", &out].into_iter());
     write_atomically(&path, summary.to_html(&worst.page(&command, &folder.campaign().manifest().spec)).as_bytes())?;
     if let Some(sha256) = sha256 {
         console.say(&format!("{sha256}  {}", folder.file(RESULTS).display()));
@@ -373,6 +378,10 @@ fn fly_again(arguments: &Replay) -> Result<Exit, Failure> {
         let hash = campaign_worst::fly_bad(&folder, law, [arguments.run, bad as u64], &place)?;
         console::data(&format!("state hash {hash}, as in the campaign\nwrote {}\n", place.join(RECORDING).display()))?;
         return Ok(Exit::Bad);
+    }
+    if let Some(out) = arguments.out.as_ref().filter(|out| out.join("report.json").exists()) {
+        let message = format!("{} holds a finished run", out.display());
+        return Err(Failure::input(message, "give another folder with --out"));
     }
     let mut options = RunArguments::for_folder(
         arguments.out.clone().unwrap_or_else(|| campaign_worst::place(&folder, &law.name, arguments.run)),

@@ -9,6 +9,7 @@ use super::console::{self, Console};
 use super::run::{Left, RECORDING, RunArguments, fly_into};
 use super::{Exit, Failure};
 use crate::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
+use crate::compare::Outcome;
 use crate::record::mcap::{Header, McapRecorder};
 use crate::report::page::Picture;
 use crate::splitting::{self, StateAt};
@@ -67,7 +68,8 @@ pub(super) fn flown_again(
     let laws = std::iter::zip(campaign.laws(), &summary.laws);
     let mut worst: Vec<(&Law, &Worst)> =
         laws.flat_map(|(law, of)| of.worst.iter().map(move |worst| (law, worst))).collect();
-    worst.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
+    let rank = |worst: &Worst| worst.outcome != Outcome::Violated;
+    worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
     worst.truncate(looks.worst.into());
     let mut again = Again { flights: Vec::new(), no_pictures: None };
     for (law, worst) in worst {
@@ -177,10 +179,12 @@ fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &Left) -> Wors
     let pair = worst.min_pair.map_or_else(String::new, |[a, b]| format!("vehicles {a} and {b} came to "));
     let at = worst.min_at_s.map_or_else(String::new, |at_s| format!(" at {at_s:.2} s"));
     let reached = if worst.reached { "reached its formation" } else { "did not reach its formation" };
+    let by_obstacle = worst.outcome == Outcome::Violated && worst.clearance_m >= 0.0;
     let said = format!(
-        "Run {} under {}: {pair}{} m{at}, {} m {} delta; it {reached}.",
+        "Run {} under {}: {}{pair}{} m{at}, {} m {} delta; it {reached}.",
         worst.run,
         law.name,
+        if by_obstacle { "a vehicle came nearer to an obstacle than its clearance; " } else { "" },
         metres(worst.min_m),
         metres(worst.clearance_m.abs()),
         if worst.clearance_m < 0.0 { "below" } else { "above" }

@@ -53,7 +53,7 @@ pub struct FlightRow {
     /// What the law's certificate promised \[m\].
     pub certified_m: Option<f64>,
     /// Whether two came closer than that, by more than integration may cost.
-    #[serde(skip)]
+    #[serde(default)]
     pub breaks_certificate: bool,
     /// Ways flown, summed over the vehicles \[m\].
     pub path_length_m: f64,

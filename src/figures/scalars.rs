@@ -43,7 +43,9 @@ pub fn energy(history: &RunHistory, title: &str) -> Figure {
     if let Some(initial) = initial {
         chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
         let excess = largest / initial - 1.0;
-        comparison = if excess > 0.0 {
+        comparison = if initial == 0.0 && largest > 0.0 {
+            format!(" It begins at nothing and rises to {largest:.4} m²/s².")
+        } else if excess > 0.0 {
             format!(" It exceeds E(0), {initial:.4} m²/s², by a share of {excess:.1e}.")
         } else {
             format!(" It never exceeds E(0), {initial:.4} m²/s².")

@@ -173,7 +173,6 @@ audit
       min_m
       min_at_s
   steps
-  refined_steps
   pairs_checked
   closed_form
     min_m
@@ -209,6 +208,7 @@ run
   duration_s
   dt_s
   steps
+  refined_steps
   ended_early
   vehicles
   state_hash

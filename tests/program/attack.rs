@@ -98,3 +98,26 @@ fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
         assert!(told.contains(said), "{arguments:?}: {err}");
     }
 }
+
+#[test]
+fn a_scenario_that_is_violated_as_it_is_is_no_good_news() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ran = ran_by(
+        TAUTLINE,
+        folder.path(),
+        &[
+            "attack",
+            "pentagon-laplacian",
+            "--vary",
+            "time.duration_s=1.1..1.9",
+            "--flights",
+            "3",
+            "--quiet",
+            "--json",
+            "-",
+        ],
+    );
+    assert_eq!(ran.exit, Some(1), "{}{}", ran.out, ran.err);
+    let nothing = ["attack", "pentagon", "--set", "time.duration_s=2", "--start", "1e300", "--flights", "2", "--quiet"];
+    assert_eq!(ran_by(TAUTLINE, folder.path(), &nothing).exit, Some(1), "nothing flown is nothing known");
+}

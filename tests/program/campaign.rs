@@ -138,7 +138,7 @@ fn a_torn_part_is_flown_again_and_a_foreign_one_refused() {
     assert!(refused.err.contains("of campaign"), "{}", refused.err);
     // Two results of one shard.
     fs::write(&part, &bytes).expect("restored");
-    let differs = part.with_file_name("shard-000000001.0123456789abcdef.differs.jsonl");
+    let differs = part.with_file_name("shard-000000001.differs.jsonl");
     fs::write(&differs, &bytes).expect("written");
     let alarm = place.campaign(&["merge", "camp", "--worst", "0"]);
     assert_eq!(alarm.exit, Some(3), "{}", alarm.err);
@@ -266,6 +266,19 @@ fn what_is_wrong_is_said_with_its_key_and_remedy() {
     refused(&vary("law.alpha = { grid = [1.0, 2.0, 3.0] }"), &["10 runs", "multiple of 3"]);
     refused("scenario = \"pentagon\"\nruns = 10\nlaws = [\"edge-tensoin\"]", &["edge-tensoin", "edge-tension"]);
     refused(&format!("{}[stop]\nwidth = 1.5", vary("start.jitter_m = { uniform = [0.0, 0.1] }")), &["stop.width"]);
+    refused(&format!("{SPEC}law.kind = {{ list = [\"orca\", \"potential\"] }}"), &["law.kind", "laws are named"]);
+    refused(
+        &format!("{}[set]\nlaw.alpha = 3.0", vary("law = { list = [{ kind = \"edge-tension\" }] }")),
+        &["a part of it"],
+    );
+    refused(
+        &vary(
+            "\"start.positions_m.2.x\" = { uniform = [0.0, 0.1] }\n\"start.positions_m.2.1\" = { uniform = [0.0, 0.1] }",
+        ),
+        &["both in [vary]"],
+    );
+    refused(&vary("\" start.jitter_m\" = { uniform = [0.0, 0.1] }"), &["no key of a scenario"]);
+    refused(&vary("start.seed = \"run\""), &["all 10 runs are the same flight"]);
     let place = Place::of(SPEC);
     for (arguments, says) in [
         (&["shard", "nowhere", "--shard", "0"][..], "there is no campaign"),
@@ -288,6 +301,73 @@ fn what_is_wrong_is_said_with_its_key_and_remedy() {
         assert_eq!(ran.exit, Some(2), "{arguments:?}: {}", ran.out);
         assert!(ran.err.contains(says), "{arguments:?}: {}", ran.err);
     }
+}
+
+#[test]
+fn a_journal_of_another_campaign_or_with_a_changed_row_is_no_part_of_this_one() {
+    let place = Place::of(SPEC);
+    let whole = place.run("whole", &["--shards", "1"]);
+    let killed = |out: &str| {
+        let mut child = Command::new(TAUTLINE)
+            .args(["campaign", "run", "spec.toml", "--out", out, "--shards", "1", "--worst", "0", "--quiet"])
+            .current_dir(place.0.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        let parts = place.path(out).join("parts");
+        let journal = || {
+            let entries = fs::read_dir(&parts).ok()?.flatten().map(|entry| entry.path());
+            entries.into_iter().find(|path| path.extension().is_some_and(|kind| kind == "journal"))
+        };
+        let has_rows = || journal().is_some_and(|path| fs::read(path).is_ok_and(|bytes| bytes.len() > 4000));
+        while !has_rows() && child.try_wait().expect("it is ours").is_none() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        child.kill().expect("it can be killed");
+        child.wait().expect("it ends");
+        journal().expect("what it flew")
+    };
+    // Rows of this campaign of which one is changed, beside those of another seed.
+    let changed = killed("changed");
+    let text = fs::read_to_string(&changed).expect("rows");
+    fs::write(&changed, text.replacen("\"outcome\":\"clear\"", "\"outcome\":\"violated\"", 1)).expect("written");
+    fs::write(place.path("spec.toml"), SPEC.replace("seed = 5", "seed = 6")).expect("written");
+    let foreign = killed("foreign");
+    fs::copy(&foreign, changed.with_file_name("shard-000000000.foreign.journal")).expect("copied");
+    fs::write(place.path("spec.toml"), SPEC).expect("written");
+    assert_eq!(place.run("changed", &[]), whole);
+}
+
+#[test]
+fn the_command_of_a_file_named_like_a_built_in_scenario_flies_the_file() {
+    let place =
+        Place::of("scenario = \"cases/pentagon\"\nruns = 2\n[vary]\nstart.jitter_m = { uniform = [0.0, 0.1] }\n");
+    fs::create_dir(place.path("cases")).expect("a folder");
+    let pentagon = ran_by(TAUTLINE, place.0.path(), &["list", "--show", "pentagon"]).out;
+    fs::write(place.path("cases/pentagon"), pentagon.replace("duration_s = 120", "duration_s = 2")).expect("written");
+    let ran = place.campaign(&["run", "spec.toml", "--out", "camp", "--worst", "1", "--no-snapshots"]);
+    assert_eq!(ran.exit, Some(0), "{}", ran.err);
+    let page = fs::read_to_string(place.path("camp/campaign.html")).expect("a page");
+    assert!(page.contains("cases/pentagon --set") && !page.contains("tautline run pentagon"), "{page}");
+    // Nobody's results are overwritten.
+    fs::create_dir(place.path("mine")).expect("a folder");
+    fs::write(place.path("mine/results.parquet"), "mine").expect("written");
+    let refused = place.campaign(&["run", "spec.toml", "--out", "mine"]);
+    assert!(refused.exit == Some(2) && refused.err.contains("results.parquet"), "{}", refused.err);
+    assert_eq!(fs::read_to_string(place.path("mine/results.parquet")).expect("kept"), "mine");
+}
+
+#[test]
+fn points_of_a_grid_are_no_sample_and_have_no_interval() {
+    let place = Place::of(
+        "scenario = \"pentagon\"\n[set]\ntime.duration_s = 1.0\n[vary]\nlaw.alpha = { grid = [0.5, 1.0, 2.0] }\n",
+    );
+    let answer = json(&place.run("camp", &[])[1]);
+    let violated = &answer["laws"][0]["violated"];
+    assert_eq!((&answer["intervals"], &violated["high"]), (&Value::from("exact"), &Value::from(0.0)));
+    let said = place.campaign(&["report", "camp", "--worst", "0"]).out;
+    assert!(said.contains("all points of the grid") && !said.contains("95 % confidence"), "{said}");
 }
 
 /// Two vehicles close up to 1.3 m and swing to where errors of measurement decide whether they come below 1 m: of 20,000 flights 43 % do.
