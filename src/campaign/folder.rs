@@ -139,7 +139,8 @@ impl Folder {
     /// Reads the part of a shard.
     ///
     /// # Errors
-    /// [`CampaignError::Alarm`] where it was flown twice with different results, and as [`part::read`].
+    /// [`CampaignError::Alarm`] where it was flown twice with different results, [`CampaignError::Foreign`] for a part of
+    /// another campaign, [`CampaignError::Machine`] where the file cannot be read.
     pub fn read(&self, shard: u64) -> Result<Found, CampaignError> {
         let kept = self.part(shard);
         let other = self.differs(shard);

@@ -16,7 +16,7 @@ pub(super) const SCHEMA_VERSION: u32 = 1;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// [`SCHEMA_VERSION`].
+    /// Version of these keys and of the parts.
     pub schema_version: u32,
     /// SHA-256 over everything below but `shards` and `folder`: two campaigns with the same one fly the same flights.
     pub campaign: String,
