@@ -156,7 +156,8 @@ impl Found {
             Outcome::Clear => {}
         }
         self.certified += u64::from(row.certified_m.is_some());
-        self.certificates_broken += u64::from(row.breaks_certificate);
+        // What was refused beforehand is not the motion of the law, and promised nothing.
+        self.certificates_broken += u64::from(row.breaks_certificate && row.refused.is_empty());
         let candidate = candidate(self.flights);
         if self.progress.last().is_none_or(|worst| candidate.flown.is_worse_than(&worst.flown)) {
             self.progress.push(candidate);

@@ -4,8 +4,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::row::Known;
-use super::tally::{Intervals, Share};
+use super::tally::Intervals;
 use super::vary::Variation;
+use crate::statistics::Proportion;
 
 /// Intervals that the values of a continuous key are put into.
 const INTERVALS: usize = 10;
@@ -40,9 +41,9 @@ pub struct Bin {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BinShares {
     /// With a violation. Flights of which it is not known count at the upper end of the interval.
-    pub violated: Share,
+    pub violated: Proportion,
     /// With the formation reached and kept.
-    pub reached: Share,
+    pub reached: Proportion,
 }
 
 /// The values of a key as they come, with what each flight showed.

@@ -5,7 +5,7 @@ use super::result::{LawSummary, Quantiles, Summary};
 use super::words::{interval, number, p_value, percent};
 use crate::figures::{Figure, Share as Point, histograms, shares};
 use crate::report::page::{self, Badge, Markup, Page, Picture, Render as _, Tone, noted, section};
-use crate::statistics::Estimate;
+use crate::statistics::{Estimate, Proportion};
 use crate::text::metres;
 
 /// What a page shows beside the answer.
@@ -135,7 +135,7 @@ impl Summary {
     fn shares_table(&self) -> Markup {
         let columns = ["Law", "Flights", "Violated", "Clear", "Not known", "Reached", "Passed"];
         let rows = self.laws.iter().map(|law| {
-            let share = |share: &super::tally::Share| noted(&number(share.count), &interval(share));
+            let share = |share: &Proportion| noted(&number(share.count), &interval(share));
             [
                 law.name.render(),
                 number(law.violated.of).render(),
@@ -190,7 +190,7 @@ impl Summary {
         let columns: Vec<_> = headings.iter().map(String::as_str).collect();
         let rows = varied.bins.iter().map(|bin| {
             let shares = bin.laws.iter().flat_map(|of| [of.violated, of.reached]);
-            let cell = |share: super::tally::Share| {
+            let cell = |share: Proportion| {
                 let value = share.share.map_or_else(|| "-".to_owned(), percent);
                 noted(&format!("{value} of {}", number(share.of)), &interval(&share))
             };
@@ -198,7 +198,7 @@ impl Summary {
         });
         let table = page::numbers("Shares with 95 % intervals", &columns, rows);
         let middle = |bin: &super::bins::Bin| Some(f64::midpoint(bin.low?, bin.high?));
-        let series = |pick: &dyn Fn(&super::bins::BinShares) -> super::tally::Share| {
+        let series = |pick: &dyn Fn(&super::bins::BinShares) -> Proportion| {
             let of_law = |law: usize| {
                 let point = |bin: &super::bins::Bin| {
                     let share = pick(bin.laws.get(law)?);

@@ -36,6 +36,6 @@ pub use result::{BadRun, LawSummary, Pair, Quantiles, SCHEMA_VERSION, Summary};
 pub use row::{Known, Row};
 pub use shard::Shard;
 pub use spec::{Asked, Method, Spec, SplittingKeys, Stop};
-pub use tally::{Intervals, Share, Tally};
+pub use tally::{Intervals, Tally};
 pub use vary::{Grid, Variation};
 pub use worst::Worst;

@@ -8,11 +8,11 @@ use super::bins::{KeyColumn, Varied};
 use super::plan::Campaign;
 use super::row::{Known, Row};
 use super::spec::Asked;
-use super::tally::{Intervals, Share, Tally};
+use super::tally::{Intervals, Tally};
 use super::worst::{WORST, Worst, WorstList};
 use crate::figures::Histogram;
 use crate::splitting::{Repetitions, Splitting};
-use crate::statistics::{Estimate, Paired};
+use crate::statistics::{Estimate, Paired, Proportion};
 
 /// Version of the keys of `campaign.json`: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -60,15 +60,15 @@ pub struct LawSummary {
     /// Flights that ended early without a violation, or of which the judge cannot tell.
     pub unknown: u64,
     /// With a violation. Flights of which it is not known count at the upper end of the interval.
-    pub violated: Share,
+    pub violated: Proportion,
     /// Flights in which two vehicles came closer than their law's certificate; each is a defect.
     pub certificates_broken: u64,
     /// Clear to the end.
-    pub clear: Share,
+    pub clear: Proportion,
     /// With the formation reached and kept.
-    pub reached: Share,
+    pub reached: Proportion,
     /// Passed, as `tautline run` says it.
-    pub pass: Share,
+    pub pass: Proportion,
     /// Smallest separation less delta of a flight \[m\].
     pub clearance_m: Quantiles,
     /// When the formation was reached, of the flights that reached it \[s\].

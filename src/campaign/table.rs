@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::plan::Campaign;
 use super::row::Row;
-use crate::compare::{FlightRow, Outcome};
+use crate::compare::FlightRow;
 use crate::splitting::Splitting;
 
 /// Rows of a group, which is built in memory.
@@ -76,18 +76,10 @@ fn columns(campaign: &Campaign) -> Vec<(String, Cells<'_>)> {
         let name = if key.contains('.') { key.clone() } else { format!("vary.{key}") };
         columns.push((name, drawn(place, &samples, is_whole)));
     }
-    let outcome = |flight: &FlightRow| {
-        Some(match flight.outcome {
-            Outcome::Violated => "violated",
-            Outcome::EndedEarly => "ended_early",
-            Outcome::Undecided => "undecided",
-            Outcome::Clear => "clear",
-        })
-    };
-    let word = move |row: &Row| row.flight.as_ref().and_then(outcome).or(Some("not_flown")).map(str::to_owned);
+    let outcome = |row: &Row| row.flight.as_ref().map_or("not_flown", |flight| flight.outcome.name()).to_owned();
     let flag = |of: fn(&FlightRow) -> bool| Cells::Flag(Box::new(move |row: &Row| row.flight.as_ref().map(of)));
     let flight: Vec<(&str, Cells<'_>)> = vec![
-        ("outcome", Cells::Text(Box::new(word))),
+        ("outcome", Cells::Text(Box::new(move |row: &Row| Some(outcome(row))))),
         ("pass", flag(|flight| flight.pass)),
         ("refused", text(|flight| Some(flight.refused.join(" ")).filter(|codes| !codes.is_empty()))),
         ("ended_early", text(|flight| flight.ended_early.clone())),

@@ -7,24 +7,6 @@ use crate::statistics::{Proportion, anytime};
 /// Runs after which it is first asked whether enough has been flown; then after twice as many, and so on.
 const FIRST_LOOK: u64 = 100;
 
-/// A share with the interval that holds the true one. What is not known of some flights widens it: at the lower end they
-/// count as not, at the upper end as well.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Share {
-    /// How many show it.
-    pub count: u64,
-    /// Of how many.
-    pub of: u64,
-    /// One over the other; none of none.
-    pub share: Option<f64>,
-    /// The true share is at least this.
-    pub low: f64,
-    /// And at most this.
-    pub high: f64,
-    /// How often an interval holds the true share.
-    pub confidence: f64,
-}
-
 /// Which intervals are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -38,26 +20,20 @@ pub enum Intervals {
 }
 
 impl Intervals {
-    /// The share of `count`, or `count` and `unknown` more, of so many.
+    /// The share of `count` of so many. What is not known of `unknown` more widens its interval: at the lower end they count as
+    /// not, at the upper end as well.
     #[must_use]
-    pub fn share(self, count: u64, unknown: u64, of: u64) -> Share {
+    pub fn share(self, count: u64, unknown: u64, of: u64) -> Proportion {
         let at = |count: u64| match self {
             Self::ClopperPearson => Proportion::new(count, of),
             Self::ConfidenceSequence => anytime(count, of),
             Self::Exact => {
-                let share = if of > 0 { count as f64 / of as f64 } else { 0.0 };
-                let high = if of > 0 { share } else { 1.0 };
-                Proportion { count, of, share: Some(share), low: share, high, confidence: 1.0 }
+                let share = (of > 0).then(|| count as f64 / of as f64);
+                Proportion { count, of, share, low: share.unwrap_or(0.0), high: share.unwrap_or(1.0), confidence: 1.0 }
             }
         };
-        Share {
-            count,
-            of,
-            share: (of > 0).then(|| count as f64 / of as f64),
-            low: at(count).low,
-            high: at(count.saturating_add(unknown).min(of)).high,
-            confidence: if self == Self::Exact { 1.0 } else { crate::statistics::CONFIDENCE },
-        }
+        let high = at(count.saturating_add(unknown).min(of)).high;
+        Proportion { high, ..at(count) }
     }
 }
 
@@ -100,7 +76,7 @@ impl Counts {
 
     /// The share that shows what is asked.
     #[must_use]
-    pub fn share(&self, asked: Asked, intervals: Intervals) -> Share {
+    pub fn share(&self, asked: Asked, intervals: Intervals) -> Proportion {
         match asked {
             Asked::Clear => intervals.share(self.clear, self.unknown, self.flown),
             Asked::Reached => intervals.share(self.reached, 0, self.flown),
@@ -110,7 +86,7 @@ impl Counts {
 
     /// The share with a violation.
     #[must_use]
-    pub fn violated(&self, intervals: Intervals) -> Share {
+    pub fn violated(&self, intervals: Intervals) -> Proportion {
         intervals.share(self.violated, self.unknown, self.flown)
     }
 }

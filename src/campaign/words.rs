@@ -1,8 +1,9 @@
 //! The answer of a campaign in words: a sentence, what one must know to read it, and tables for the terminal.
 
 use super::result::{LawSummary, Summary};
-use super::tally::{Intervals, Share};
+use super::tally::Intervals;
 use crate::splitting::Repetitions;
+use crate::statistics::Proportion;
 use crate::text::{aligned, at_least, at_most, counted, fixed, metres, seconds, significant};
 
 /// Decimals that show two digits of a share in per cent, at most 8.
@@ -22,7 +23,7 @@ pub(super) fn percent(share: f64) -> String {
 }
 
 /// The interval of a share, rounded outwards.
-pub(super) fn interval(share: &Share) -> String {
+pub(super) fn interval(share: &Proportion) -> String {
     format!("{} to {}", from(share.low), up_to(share.high))
 }
 
@@ -62,7 +63,7 @@ impl LawSummary {
         if let Some(splitting) = &self.splitting {
             return rare(splitting);
         }
-        let Share { count, of, low, high, confidence, .. } = self.violated;
+        let Proportion { count, of, low, high, confidence, .. } = self.violated;
         if confidence == 1.0 && of > 0 {
             let unknown =
                 if self.unknown > 0 { format!(", of {} it is not known", number(self.unknown)) } else { String::new() };

@@ -388,14 +388,14 @@ impl Preflight {
     }
 }
 
-/// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be
-/// shorter still.
 /// Longest step that the links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
 fn links_step_s(law: &dyn Law, scenario: &Scenario) -> Option<f64> {
     let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.velocity_coefficient_per_s())?;
     (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| scenario.time.max_rate_dt / rate_per_s)
 }
 
+/// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be
+/// shorter still.
 fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     let time = &scenario.time;
     let halvings = i32::try_from(time.max_halvings).unwrap_or(i32::MAX);

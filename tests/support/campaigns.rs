@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use tautline::campaign::{Campaign, LawSummary, Program, Share, Spec, Summary};
+use tautline::campaign::{Campaign, LawSummary, Program, Spec, Summary};
 use tautline::compare::Watch;
+use tautline::statistics::Proportion;
 
 /// Random starts of so many vehicles.
 struct Starts {
@@ -88,7 +89,7 @@ fn answer(spec: &str, folder: &Path) -> Summary {
     campaign.fly(threads, watch).expect("it flies").expect("nobody interrupts")
 }
 
-fn percent(share: &Share) -> String {
+fn percent(share: &Proportion) -> String {
     let said = |share: f64| format!("{:.1}", 100.0 * share);
     format!("{} % ({} to {})", said(share.share.unwrap_or(f64::NAN)), said(share.low), said(share.high))
 }
