@@ -9,11 +9,11 @@ use nalgebra::Vector3;
 
 use super::Failure;
 use super::console::{self, Console};
-use super::encounters;
 use super::obstacles;
 use super::outputs;
 use super::own::OwnRecording;
 use super::reading::{self, ReadArguments, one_of};
+use super::replays::{self, Instants};
 use crate::audit::recorded::{Motion, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings};
 use crate::read::{self, Format, ReadOptions};
 use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
@@ -290,7 +290,11 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
-    let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
+    let mut instants = arguments.html.as_ref().map(|_| Instants::default());
+    let Judged { mut outcome, clock, mut notes, curves } =
+        judged(auditor, arguments, &options, console, &mut |items, names| {
+            instants.iter_mut().for_each(|instants| instants.note(items, names, &settings));
+        })?;
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);
     }
@@ -323,9 +327,10 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
 
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
-    if let Some(html) = &arguments.html {
-        let figures = encounters::figures(&arguments.reading, &options, &settings, &outcome)?;
-        write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
+    if let Some((html, instants)) = arguments.html.as_ref().zip(instants) {
+        let (replay, figures) =
+            replays::of_recording(&arguments.reading, &options, &settings, &outcome, &report, instants)?;
+        write_atomically(html, report.to_html(&replay, &figures, &command()).as_bytes())?;
     }
     Ok(report)
 }
@@ -344,6 +349,7 @@ fn judged(
     arguments: &AuditArguments,
     options: &ReadOptions,
     console: Console,
+    note: &mut dyn FnMut(&[Item], &[String]),
 ) -> Result<Judged, Failure> {
     let called = arguments.reading.called();
     let mut recording = arguments.reading.open(options)?;
@@ -361,6 +367,7 @@ fn judged(
         first = false;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
         auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
+        note(&items, recording.vehicles());
         read += items.len() as u64;
         progress.set_position(read);
     }

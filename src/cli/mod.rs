@@ -31,6 +31,7 @@ mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
+mod replays;
 mod run;
 mod scenario;
 mod schema;

@@ -36,6 +36,7 @@ pub use gpu::{AdapterChoice, Renderer};
 pub use picture::{Picture, contact_sheet, data_uri};
 pub use scene::{CameraSpec, Extent, Layers, Scene, Theme, View};
 pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
-pub use timeline::{Frame, Keyframe, Plan, QuadrotorShape, Timeline, TooNear, TracksError};
+pub use crate::plan::Plan;
+pub use timeline::{Frame, Keyframe, QuadrotorShape, Timeline, TooNear, TracksError};
 #[cfg(feature = "window")]
 pub use window::{LiveUpdate, is_in_window_library, show};

@@ -2,6 +2,7 @@
 //!
 //! `separation` and `audit` have the keys of a flight's `report.json`; what a recording adds stands beside them.
 
+mod moments;
 mod report;
 mod words;
 
