@@ -18,18 +18,15 @@ const LIGHT = { paper: 0xeceff3, ink: 0x1b222b, grid: 0xcbd2da, shell: 0x5c7fa3,
 const DARK = { paper: 0x14191f, ink: 0xe6eaef, grid: 0x2e3742, shell: 0x8fb4d9, thing: 0xb8a078, alarm: 0xff2f3c,
   push: 0xff9e2c, rest: 0x6b7580, pull: 0x4fa3ff, vehicles: [0x56a8e0, 0xf07f2e, 0x2fbf94, 0xdb8dbb, 0xcba42b, 0xa5adb6] };
 
-/** @param {string} base64 */
-const bytes = base64 => Uint8Array.from(atob(base64), letter => letter.charCodeAt(0)).buffer;
+const bytes = (/** @type {string} */ base64) => Uint8Array.from(atob(base64), letter => letter.charCodeAt(0)).buffer;
 /** @param {number} colour @param {number} [alpha] */
 const rgba = (colour, alpha = 1) => [(colour >> 16) / 255, (colour >> 8 & 255) / 255, (colour & 255) / 255, alpha];
-/** @param {number} colour */
-const css = colour => "#" + colour.toString(16).padStart(6, "0");
-/** @param {number} x @param {number} low @param {number} high */
-const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+const css = (/** @type {number} */ colour) => "#" + colour.toString(16).padStart(6, "0");
+const clamp = (/** @type {number} */ x, /** @type {number} */ low, /** @type {number} */ high) => Math.min(Math.max(x, low), high);
 /** How many of these are not above a value. @param {ArrayLike<number>} sorted @param {number} value */
 const upTo = (sorted, value) => {
-  let low = 0, high = sorted.length;
-  while (low < high) {
+  let low = 0;
+  for (let high = sorted.length; low < high;) {
     const middle = low + high >> 1;
     if (sorted[middle] <= value) low = middle + 1; else high = middle;
   }
@@ -44,8 +41,7 @@ const make = (tag, attributes, ...inside) => {
   element.append(...inside);
   return element;
 };
-/** @param {Element} element @param {string} words */
-const write = (element, words) => { if (element.textContent !== words) element.textContent = words; };
+const write = (/** @type {Element} */ element, /** @type {string} */ words) => { if (element.textContent !== words) element.textContent = words; };
 
 const pieces = (document.querySelector("script[type='x-shader']")?.textContent ?? "").split("@ ").map(piece => piece.split(/\n([^]*)/));
 /** A shader of the page, after what it begins with. @param {string} name @returns {string} */
@@ -66,7 +62,7 @@ const play = (root, data) => {
   // Four numbers a point and instant, the last 1 where it is there; the time has a column of its own.
   const wide = data.points + 1, path = new Float32Array(times.length * wide * 4);
   {
-    const cells = Float64Array.from(new Int32Array(bytes(data.starts))), steps = new Int16Array(bytes(data.steps));
+    const cells = Array.from(new Int32Array(bytes(data.starts))), steps = new Int16Array(bytes(data.steps));
     for (let row = 0, step = 0, to = 0; row < times.length; row++) {
       for (let k = 0; k < data.points; k++, step += 3, to += 4) {
         const there = steps[step] !== ABSENT;
@@ -88,30 +84,22 @@ const play = (root, data) => {
   const names = /** @type {HTMLCanvasElement} */ (make("canvas", { class: "replay-names", "aria-hidden": "true" }));
   const state = make("p", { class: "replay-state" }), rate = make("p", { class: "replay-rate", title: "pictures a second, and script for each" });
   const said = make("p", { class: "replay-said", role: "status" }), clock = make("output", { class: "replay-clock" }), head = make("i", { class: "replay-head" });
-  /** @param {string} text @param {string} keys @param {() => void} act */
-  const button = (text, keys, act) => {
-    const made = make("button", { type: "button", "aria-keyshortcuts": keys }, text);
-    made.addEventListener("click", act);
-    return made;
-  };
-  const start = button("Play", "Space", () => toggle());
-  start.className = "replay-play";
-  const scrub = make("input", { type: "range", min: String(first), max: String(last), step: "any", "aria-label": "Time" });
-  scrub.addEventListener("input", () => go(Number(scrub.value)));
-  const speeds = make("select", { "aria-label": "Speed" }, ...SPEEDS.map(x => make("option", { value: String(x) }, "× " + x)));
+  const button = (/** @type {string} */ text, /** @type {string} */ keys, /** @type {() => void} */ act) => Object.assign(make("button", { type: "button", "aria-keyshortcuts": keys }, text), { onclick: act });
+  const start = Object.assign(button("Play", "Space", () => toggle()), { className: "replay-play" });
+  const scrub = make("input", { type: "range", min: `${first}`, max: `${last}`, step: "any", "aria-label": "Time" });
+  scrub.oninput = () => go(Number(scrub.value));
+  const speeds = make("select", { "aria-label": "Speed" }, ...SPEEDS.map(x => make("option", { value: `${x}` }, "× " + x)));
   speeds.value = String(SPEEDS.find(x => (last - first) / x <= 30) ?? 64);
-  /** @param {string} kind */
-  const has = kind => moments.some(moment => moment.kind === kind);
+  const has = (/** @type {string} */ kind) => moments.some(moment => moment.kind === kind);
   const jumps = [button("Show all", "F", () => { home(); ask(); })];
   if (has("undecided")) jumps.unshift(button("Next undecided", "U", () => jump("undecided", 1)));
-  if (has("violation")) jumps.unshift(button("Previous", "Shift+V", () => jump("violation", -1)), button("Next violation", "V", () => jump("violation", 1)));
+  if (has("violation")) jumps.unshift(button("Previous violation", "Shift+V", () => jump("violation", -1)), button("Next violation", "V", () => jump("violation", 1)));
   if (has("closest")) jumps.unshift(button("Closest approach", "C", () => jump("closest", 1)));
   /** @type {Object<string, boolean>} */
   const shows = { shells: !!data.shell_m, links: !!data.links, trails: true, slots: data.axes !== null, names: true };
   const layers = Object.keys(shows).filter(name => shows[name]).map(name => {
-    const box = make("input", { type: "checkbox" });
-    box.checked = true;
-    box.addEventListener("change", () => { shows[name] = box.checked; ask(); });
+    const box = make("input", { type: "checkbox", checked: "" });
+    box.onchange = () => { shows[name] = box.checked; ask(); };
     return make("label", {}, box, name);
   });
   const graph = root.querySelector("svg");
@@ -120,41 +108,29 @@ const play = (root, data) => {
   const panel = make("div", { class: "replay-panel", role: "group", "aria-label": "Replay of " + (root.dataset.label ?? "a flight") },
     stage, make("div", { class: "replay-time" }, start, track, clock), said, make("div", { class: "replay-buttons" }, ...jumps, speeds, ...layers));
   root.prepend(panel);
-  graph?.addEventListener("pointerdown", event => {
-    const box = graph.getBoundingClientRect();
-    go(first + (last - first) * (event.clientX - box.left) / box.width);
-  });
+  if (graph) graph.onpointerdown = event => go(first + (last - first) * event.offsetX / graph.clientWidth);
 
   // Time.
   let t = first, playing = false, gone = false, queued = 0, before = 0, frames = 0, passed = 0, spent = 0, saying = /** @type {Moment | null} */ (null);
-  /** @param {Moment | null} moment */
-  const tell = moment => { saying = moment; write(said, moment?.said ?? ""); };
+  const tell = (/** @type {Moment | null} */ moment) => { saying = moment; write(said, moment?.said ?? ""); };
   const ask = () => { if (!queued && !gone) queued = requestAnimationFrame(frame); };
   const toggle = () => {
     playing = !playing;
     if (playing && t >= last) t = first;
-    write(start, playing ? "Pause" : "Play");
-    before = frames = passed = spent = 0;
-    tell(null);
-    ask();
+    write(start, playing ? "Pause" : "Play"); before = frames = passed = spent = 0; tell(null); ask();
   };
-  /** @param {number} to */
-  const go = to => {
+  const go = (/** @type {number} */ to) => {
     if (playing) toggle();
-    t = clamp(to, first, last);
-    tell(null);
-    ask();
+    t = clamp(to, first, last); tell(null); ask();
   };
   /** To the next moment of a kind, or the one before; round and round. @param {string} kind @param {number} way */
   const jump = (kind, way) => {
     const all = moments.filter(moment => moment.kind === kind), at = saying ? all.indexOf(saying) : -1, here = upTo(all.map(moment => moment.at_s), t);
     if (!all.length) return;
     const next = at >= 0 ? at + way : way > 0 ? here : here - 1, moment = all[(next + all.length) % all.length];
-    go(moment.at_s);
-    tell(moment);
+    go(moment.at_s); tell(moment);
   };
-  /** @param {number} now */
-  const frame = now => {
+  const frame = (/** @type {number} */ now) => {
     queued = 0;
     if (gone) return;
     if (playing) {
@@ -175,20 +151,22 @@ const play = (root, data) => {
 
   // The camera: turned around a place.
   let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0];
+  /** From where all of the flight is seen, its longer side across and a level one from above. */
   const home = () => {
-    [yaw, pitch, target] = [-0.9, 0.5, [0, 0, 0]];
-    distance = 0.92 * reach / Math.sin(Math.atan(TANGENT * Math.min(1, canvas.clientWidth / canvas.clientHeight || 1)));
+    [yaw, pitch, target, distance] = [half[0] < half[1] ? -0.35 : -1.22, half[2] < 0.3 * Math.max(half[0], half[1]) ? 0.8 : 0.45, [0, 0, 0], 0];
+    const { right, up, back } = axes(), across = canvas.clientWidth / canvas.clientHeight || 1;
+    for (let k = 0; k < 8; k++) {
+      const [x, y, z] = [right, up, back].map(axis => axis.reduce((sum, part, at) => sum + part * half[at] * (k >> at & 1 ? 1 : -1), 0));
+      distance = Math.max(distance, 1.04 * (Math.max(Math.abs(x) / across, Math.abs(y)) / TANGENT + z));
+    }
   };
   const axes = () => {
     const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)], back = [cp * cy, cp * sy, sp];
     return { right: [-sy, cy, 0], up: [-sp * cy, -sp * sy, cp], back, eye: back.map((x, k) => target[k] + x * distance) };
   };
-  /** @param {number} by @param {number} lift */
-  const turn = (by, lift) => { yaw += by; pitch = clamp(pitch + lift, -1.55, 1.55); ask(); };
-  /** @param {number} by */
-  const zoom = by => { distance = clamp(distance * by, reach * 0.01, reach * 20); ask(); };
-  /** @param {number} dx @param {number} dy */
-  const pan = (dx, dy) => {
+  const turn = (/** @type {number} */ by, /** @type {number} */ lift) => { yaw += by; pitch = clamp(pitch + lift, -1.55, 1.55); ask(); };
+  const zoom = (/** @type {number} */ by) => { distance = clamp(distance * by, reach * 0.01, reach * 20); ask(); };
+  const pan = (/** @type {number} */ dx, /** @type {number} */ dy) => {
     const { right, up } = axes(), metres = 2 * TANGENT * distance / canvas.clientHeight;
     target = target.map((x, k) => x - (right[k] * dx - up[k] * dy) * metres);
     ask();
@@ -199,31 +177,28 @@ const play = (root, data) => {
     const [a, b] = [...fingers.values()];
     return [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, Math.hypot(a[0] - b[0], a[1] - b[1]) || 1];
   };
-  canvas.addEventListener("pointerdown", event => {
+  canvas.onpointerdown = event => {
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     canvas.setPointerCapture(event.pointerId);
-  });
-  canvas.addEventListener("pointermove", event => {
+  };
+  canvas.onpointermove = event => {
     const from = fingers.get(event.pointerId), old = fingers.size === 2 ? grip() : null;
     if (!from) return;
     const [dx, dy] = [event.clientX - from[0], event.clientY - from[1]], by = 5 / canvas.clientHeight;
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     if (old) {
       const now = grip();
-      zoom(old[2] / now[2]);
-      pan(now[0] - old[0], now[1] - old[1]);
+      zoom(old[2] / now[2]); pan(now[0] - old[0], now[1] - old[1]);
     } else if (event.buttons & 2 || event.shiftKey) pan(dx, dy); else turn(-dx * by, dy * by);
-  });
-  for (const end of /** @type {("pointerup" | "pointercancel")[]} */ (["pointerup", "pointercancel"])) canvas.addEventListener(end, event => fingers.delete(event.pointerId));
-  canvas.addEventListener("contextmenu", event => event.preventDefault());
+  };
+  canvas.onpointerup = canvas.onpointercancel = event => fingers.delete(event.pointerId);
+  canvas.oncontextmenu = event => event.preventDefault();
   // A wheel over a picture that nobody has touched scrolls the page.
   canvas.addEventListener("wheel", event => {
     if (!event.ctrlKey && document.activeElement !== canvas) return;
-    event.preventDefault();
-    zoom(Math.exp(clamp(event.deltaY, -100, 100) / 400));
+    event.preventDefault(); zoom(Math.exp(clamp(event.deltaY, -100, 100) / 400));
   }, { passive: false });
-  /** @param {number} by */
-  const faster = by => speeds.selectedIndex = clamp(speeds.selectedIndex + by, 0, SPEEDS.length - 1);
+  const faster = (/** @type {number} */ by) => speeds.selectedIndex = clamp(speeds.selectedIndex + by, 0, SPEEDS.length - 1);
   /** @type {Object<string, (shift: boolean) => void>} */
   const keys = {
     " ": toggle, Home: () => go(first), End: () => go(last), c: () => jump("closest", 1), f: home,
@@ -235,9 +210,7 @@ const play = (root, data) => {
   panel.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
     const on = /** @type {HTMLElement} */ (event.target), key = event.key.length > 1 ? event.key : event.key.toLowerCase();
     if (event.ctrlKey || event.altKey || event.metaKey || on === speeds || key === " " && on !== canvas && on !== scrub || !keys[key]) return;
-    event.preventDefault();
-    keys[key](event.shiftKey);
-    ask();
+    event.preventDefault(); keys[key](event.shiftKey); ask();
   });
 
   // What the graphics card holds.
@@ -246,9 +219,7 @@ const play = (root, data) => {
     const made = gl.createProgram();
     for (const [kind, text] of /** @type {[number, string][]} */ ([[gl.VERTEX_SHADER, shader(vertex)], [gl.FRAGMENT_SHADER, shader(pixel + "_PIXEL")]])) {
       const half = /** @type {WebGLShader} */ (gl.createShader(kind));
-      gl.shaderSource(half, text);
-      gl.compileShader(half);
-      gl.attachShader(made, half);
+      gl.shaderSource(half, text); gl.compileShader(half); gl.attachShader(made, half);
     }
     ["from", "to", "pair", "radius"].forEach((name, k) => gl.bindAttribLocation(made, k, name));
     gl.linkProgram(made);
@@ -256,23 +227,20 @@ const play = (root, data) => {
     /** @type {Object<string, WebGLUniformLocation>} */
     const at = {};
     for (let k = gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS); k-- > 0;) {
-      const name = gl.getActiveUniform(made, k)?.name ?? "";
-      at[name] = /** @type {WebGLUniformLocation} */ (gl.getUniformLocation(made, name));
+      const name = gl.getActiveUniform(made, k)?.name ?? "", place = gl.getUniformLocation(made, name);
+      if (place) at[name] = place;
     }
     return { made, at };
   };
-  /** @param {number} unit @param {number} format @param {number} across @param {number} high @param {number} kind @param {ArrayBufferView} from */
-  const texture = (unit, format, across, high, kind, from) => {
-    gl.activeTexture(gl.TEXTURE0 + unit);
-    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+  const texture = (/** @type {number} */ unit, /** @type {number} */ format, /** @type {number} */ across, /** @type {number} */ high, /** @type {number} */ kind, /** @type {ArrayBufferView} */ from) => {
+    gl.activeTexture(gl.TEXTURE0 + unit); gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     gl.texImage2D(gl.TEXTURE_2D, 0, format, across, high, 0, gl.RGBA, kind, from);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
   };
   /** Numbers behind one attribute or two neighbours, so many for a vertex or (with a divisor) a copy. @param {number[]} at @param {number} size @param {number} divisor @param {Float32Array} numbers @returns {Mesh} */
   const mesh = (at, size, divisor, numbers) => {
     const vao = gl.createVertexArray(), buffer = gl.createBuffer();
-    gl.bindVertexArray(vao);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.bindVertexArray(vao); gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.DYNAMIC_DRAW);
     at.forEach((name, k) => {
       gl.enableVertexAttribArray(name);
@@ -281,10 +249,8 @@ const play = (root, data) => {
     });
     return { vao, buffer, count: numbers.length / size / at.length };
   };
-  /** @param {Mesh} of @param {Float32Array} numbers */
-  const refill = (of, numbers) => {
-    gl.bindBuffer(gl.ARRAY_BUFFER, of.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.DYNAMIC_DRAW);
+  const refill = (/** @type {Mesh} */ of, /** @type {Float32Array} */ numbers) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, of.buffer); gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.DYNAMIC_DRAW);
     of.count = numbers.length / 3;
   };
   const ball = program("BALL"), line = program("LINE", "FLAT"), mark = program("MARK"), solid = program("SOLID", "FLAT");
@@ -334,8 +300,7 @@ const play = (root, data) => {
     const ratio = fit(canvas);
     if (!ratio || gone) return;
     const size = [canvas.width, canvas.height], { right, up, back, eye } = axes(), lens = [TANGENT * size[0] / size[1], TANGENT, distance * 0.02, distance + reach * 12];
-    row = clamp(upTo(times, t) - 1, 0, times.length - 1);
-    next = Math.min(row + 1, times.length - 1);
+    row = clamp(upTo(times, t) - 1, 0, times.length - 1); next = Math.min(row + 1, times.length - 1);
     part = next > row ? clamp((t - times[row]) / (times[next] - times[row]), 0, 1) : 0;
     const wrong = moments.filter(moment => moment.kind === "violation" && moment.from_s <= t && t <= moment.to_s), who = new Set(wrong.flatMap(moment => moment.who));
     if ([...who].join() !== painted) {
@@ -350,8 +315,7 @@ const play = (root, data) => {
     aim();
     gl.viewport(0, 0, size[0], size[1]);
     gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(colours.paper))));
-    gl.enable(gl.DEPTH_TEST);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     /** What the present program is told, by name; whole numbers are told apart by theirs. @type {(values: Object<string, number | number[]>) => void} */
     let set = () => {};
@@ -374,30 +338,24 @@ const play = (root, data) => {
       if (copies > 0) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, copies);
     };
     const near = new Set(wrong.map(moment => moment.thing));
-    /** @param {boolean} opaque */
-    const solids = opaque => things.forEach((thing, k) => {
+    const solids = (/** @type {boolean} */ opaque) => things.forEach((thing, k) => {
       const colour = near.has(k) ? colours.alarm : colours.thing, offset = whereabouts(thing.path);
       if (thing.radius_m !== null && opaque) {
         use(ball, { fixedAt: [...offset, thing.radius_m], fixedPaint: rgba(colour) });
         quads(null, 1);
       } else if (thing.opacity === 1 === opaque) {
         use(solid, { offset, tint: rgba(colour, thing.opacity) });
-        gl.bindVertexArray(thing.solid.vao);
-        gl.drawArrays(gl.TRIANGLES, 0, thing.solid.count);
+        gl.bindVertexArray(thing.solid.vao); gl.drawArrays(gl.TRIANGLES, 0, thing.solid.count);
         use(line, { offset, kind: 0, width: 1.4 * ratio, tint: rgba(colour, Math.min(2 * thing.opacity, 1)) });
         quads(thing.rims);
       }
     });
 
-    gl.depthMask(true);
-    gl.disable(gl.BLEND);
-    gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
+    gl.depthMask(true); gl.disable(gl.BLEND); gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
     use(ball, { least: 2 * ratio });
     quads(bodies);
     solids(true);
-    gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE);
-    gl.enable(gl.BLEND);
-    gl.depthMask(false);
+    gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE); gl.enable(gl.BLEND); gl.depthMask(false);
     use(line, { kind: 0, width: ratio, tint: rgba(colours.grid) });
     quads(ground);
     if (shows.trails) {
@@ -449,12 +407,10 @@ const play = (root, data) => {
         if (!there || -away < lens[2]) continue;
         const px = (1 - across / away / lens[0]) * size[0] / 2, py = (1 + above / away / lens[1]) * size[1] / 2 - Math.max(radius[vehicle] / -away / lens[1] * size[1] / 2, 2 * ratio) - 4 * ratio;
         pen.fillStyle = css(who.has(vehicle) ? colours.alarm : colours.ink);
-        pen.strokeText(data.vehicles[vehicle], px, py);
-        pen.fillText(data.vehicles[vehicle], px, py);
+        pen.strokeText(data.vehicles[vehicle], px, py); pen.fillText(data.vehicles[vehicle], px, py);
       }
     }
-    /** @param {string} kind */
-    const begun = kind => moments.filter(moment => moment.kind === kind && moment.from_s <= t).length;
+    const begun = (/** @type {string} */ kind) => moments.filter(moment => moment.kind === kind && moment.from_s <= t).length;
     const bad = begun("violation"), best = least[upTo(nearS, t) - 1], pair = [0, 1].map(side => data.vehicles[nearWho[2 * best + side]]).filter(name => name);
     const verdict = wrong.length ? "violation" : bad ? `${bad}${data.whole ? "" : " or more"} violation${bad > 1 || !data.whole ? "s" : ""} so far` : data.status === "undecided" || begun("undecided") || !data.whole ? "undecided" : "no violation so far";
     write(state, `${verdict}${best === undefined ? "" : ` · nearest so far ${atLeast(nearM[best])} ${data.unit}${pair.length === 2 ? ", " + pair.join(" and ") : ""}`} · squares of ${data.square_m} m`);
@@ -464,38 +420,29 @@ const play = (root, data) => {
     scrub.setAttribute("aria-valuetext", `${t.toFixed(2)} of ${last.toFixed(2)} seconds`);
     head.style.left = `${100 * (t - first) / (last - first || 1)}%`;
   };
-  canvas.addEventListener("webglcontextlost", () => {
-    if (!gone) write(said, "The graphics were lost: load the page again.");
-    gone = true;
-  });
+  canvas.addEventListener("webglcontextlost", () => { gone = true; write(said, "The graphics were lost: load the page again."); });
   dark.addEventListener("change", themed);
-  const sized = new ResizeObserver(ask);
+  const sized = new ResizeObserver(draw);
   sized.observe(stage);
   home();
   themed();
   return {
-    root,
+    root, draw,
     /** For tests: a camera at a yaw and pitch [rad], so far from a place [m], at a time [s]; drawn at once. @param {{yaw: number, pitch: number, distance: number, target: number[], t: number}} view */
     look(view) { ({ yaw, pitch, distance, target } = view); t = view.t; draw(); return { ...axes(), tangent: TANGENT, place }; },
     end() {
-      gone = true;
-      cancelAnimationFrame(queued);
-      sized.disconnect();
-      dark.removeEventListener("change", themed);
+      gone = true; cancelAnimationFrame(queued); sized.disconnect(); dark.removeEventListener("change", themed);
       if (graph) root.append(graph);
-      panel.remove();
-      gl.getExtension("WEBGL_lose_context")?.loseContext();
+      panel.remove(); gl.getExtension("WEBGL_lose_context")?.loseContext();
     },
   };
 };
 
 /** The replay that draws: a page has few contexts to give. @type {ReturnType<typeof play> | null} */
 let live = null;
-/** @param {HTMLElement} root */
-const open = root => {
+const open = (/** @type {HTMLElement} */ root) => {
   const old = live;
-  live = null;
-  old?.end();
+  live = null; old?.end();
   if (old && old.root !== root) offer(old.root);
   root.querySelector(".replay-start")?.remove();
   try {
@@ -506,10 +453,9 @@ const open = root => {
   }
   root.dataset.state = live ? "ready" : "none";
 };
-/** @param {HTMLElement} root */
-const offer = root => {
+const offer = (/** @type {HTMLElement} */ root) => {
   const start = make("button", { type: "button", class: "replay-start" }, "Replay this flight");
-  start.addEventListener("click", () => { open(root); root.querySelector("canvas")?.focus(); });
+  start.onclick = () => { open(root); root.querySelector("canvas")?.focus(); };
   root.prepend(start);
 };
 for (const root of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".replay"))) if (root.dataset.start) offer(root); else open(root);

@@ -86,7 +86,8 @@ pub(super) fn flown_again(
         let scenario = campaign.scenario(worst.run, law)?;
         let left = fly_into(&options, &scenario, &command(campaign, worst.run, law), interrupted)?;
         check(&left, worst.run, law, &worst.state_hash)?;
-        let replay = replays::of_flight(&scenario, &left.film, &left.report, PAGE_BYTES / usize::from(looks.worst).max(1));
+        let replay =
+            replays::of_flight(&scenario, &left.film, &left.report, PAGE_BYTES / usize::from(looks.worst).max(1));
         again.flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
     }
     Ok(again)

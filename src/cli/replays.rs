@@ -24,7 +24,12 @@ const CURVE_HZ: f64 = 30.0;
 const MOST_GAPS: usize = 200;
 
 /// A flight and what was found on it, in so many bytes.
-pub(super) fn of_flight(scenario: &Scenario, film: &Film, report: &Report, room_bytes: usize) -> Result<Replay, NoReplay> {
+pub(super) fn of_flight(
+    scenario: &Scenario,
+    film: &Film,
+    report: &Report,
+    room_bytes: usize,
+) -> Result<Replay, NoReplay> {
     let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
     let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::judged).collect());
     Replay::new(&stage, film, &report.moments(&names), report.judgement(), room_bytes)
@@ -41,11 +46,8 @@ pub(super) struct Instants {
 impl Instants {
     /// Takes note of items, by clocks that these settings set right. Beyond a million times every second one is dropped.
     pub(super) fn note(&mut self, items: &[Item], names: &[String], settings: &Settings) {
-        let offsets: BTreeMap<usize, f64> = names
-            .iter()
-            .enumerate()
-            .filter_map(|(k, name)| Some((k, settings.vehicles.get(name)?.offset_s)))
-            .collect();
+        let offsets: BTreeMap<usize, f64> =
+            names.iter().enumerate().filter_map(|(k, name)| Some((k, settings.vehicles.get(name)?.offset_s))).collect();
         for item in items {
             let time_s = item.time_s() + offsets.get(&item.vehicle()).copied().unwrap_or(0.0);
             self.items += 1;
@@ -104,9 +106,8 @@ pub(super) fn of_recording(
         Some(ClosestApproach { pair, separation_m, time_s: found.time_s })
     });
     let half = |delta_m: f64| [0.5 * delta_m; 3];
-    let ellipsoid = settings.ellipsoid_m.map(|axes_m| {
-        (axes_m * (0.5 * settings.delta_m.unwrap_or(TOUCHING_ELLIPSOIDS))).into()
-    });
+    let ellipsoid =
+        settings.ellipsoid_m.map(|axes_m| (axes_m * (0.5 * settings.delta_m.unwrap_or(TOUCHING_ELLIPSOIDS))).into());
     let stage = Stage {
         vehicles: outcome.vehicles.clone(),
         radius_m: places.radius_m(),

@@ -10,11 +10,11 @@ use rayon::ThreadPool;
 
 use super::console::{self, Console};
 use super::folder::OutFolder;
-use super::{pictures, replays};
 use super::scenario::{self, ScenarioArguments};
 #[cfg(feature = "viewer")]
 use super::snapshots::Watched;
 use super::{Exit, Failure};
+use super::{pictures, replays};
 use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;

@@ -22,7 +22,12 @@ pub struct Chart {
 }
 
 impl Chart {
-    pub(super) fn of(near: &[ClosestApproach], moments: &[Moment], limit: Option<f64>, [first_s, last_s]: [f64; 2]) -> Self {
+    pub(super) fn of(
+        near: &[ClosestApproach],
+        moments: &[Moment],
+        limit: Option<f64>,
+        [first_s, last_s]: [f64; 2],
+    ) -> Self {
         let x = |time_s: f64| ((time_s - first_s) / (last_s - first_s).max(1e-300)).clamp(0.0, 1.0) * SIZE[0];
         let mut sorted: Vec<f64> = near.iter().map(|near| near.separation_m).collect();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -33,7 +38,8 @@ impl Chart {
         let mut distance = String::new();
         for (k, near) in near.iter().enumerate() {
             // Writing to a string cannot fail.
-            let _ = write!(distance, "{}{:.1} {:.1}", if k == 0 { 'M' } else { 'L' }, x(near.time_s), y(near.separation_m));
+            let _ =
+                write!(distance, "{}{:.1} {:.1}", if k == 0 { 'M' } else { 'L' }, x(near.time_s), y(near.separation_m));
         }
         let bands = moments.iter().filter(|moment| moment.kind != Kind::Closest);
         let closest = moments.iter().find(|moment| moment.kind == Kind::Closest && moment.obstacle.is_none());

@@ -30,7 +30,8 @@ impl Extent {
         if low.x > high.x {
             (low, high) = (Vector3::zeros(), Vector3::zeros());
         }
-        let radii = shown.iter().map(|&vehicle| stage.radius_m.get(vehicle).copied().flatten().unwrap_or(UNKNOWN_RADIUS_M));
+        let radii =
+            shown.iter().map(|&vehicle| stage.radius_m.get(vehicle).copied().flatten().unwrap_or(UNKNOWN_RADIUS_M));
         let around_m = radii.chain(stage.shell_m.into_iter().flatten()).fold(LEAST_M, f64::max);
         (low, high) = (low.add_scalar(-around_m), high.add_scalar(around_m));
         let (size_m, middle) = ((high - low).norm(), 0.5 * (low + high));

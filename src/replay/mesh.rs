@@ -5,8 +5,8 @@ use nalgebra::{Rotation3, Vector3};
 use crate::audit::Shape;
 
 /// Parts of a turn, and of a quarter of one, of a capsule.
-const TURN: u32 = 32;
-const QUARTER: i32 = 6;
+const TURN: u32 = 24;
+const QUARTER: i32 = 4;
 /// Lines across a plane.
 const HATCHES: u32 = 8;
 /// Squares of the ground from the middle of the flight to its end, about.
@@ -100,7 +100,8 @@ pub(super) fn ground(low: Vector3<f64>, high: Vector3<f64>, height_m: f64) -> (f
     while ten * 10.0 <= rough {
         ten *= 10.0;
     }
-    let side_m = [1.0, 2.0, 5.0, 10.0].map(|times| times * ten).into_iter().find(|&side_m| side_m >= rough).unwrap_or(ten);
+    let side_m =
+        [1.0, 2.0, 5.0, 10.0].map(|times| times * ten).into_iter().find(|&side_m| side_m >= rough).unwrap_or(ten);
     let from = (low / side_m).map(f64::floor).map(|cells| cells - 1.0);
     let to = (high / side_m).map(f64::ceil).map(|cells| cells + 1.0);
     let mut lines = Vec::new();

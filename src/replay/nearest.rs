@@ -23,7 +23,8 @@ impl Nearest {
     }
 
     fn halve(&mut self) {
-        let closer = |two: &[ClosestApproach]| two.iter().copied().min_by(|a, b| a.separation_m.total_cmp(&b.separation_m));
+        let closer =
+            |two: &[ClosestApproach]| two.iter().copied().min_by(|a, b| a.separation_m.total_cmp(&b.separation_m));
         self.0 = self.0.chunks(2).filter_map(closer).collect();
     }
 

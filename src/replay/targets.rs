@@ -68,7 +68,10 @@ pub(super) fn of(plan: Option<&Plan>, shown: &[usize], begin_s: f64, room_bytes:
         links: BASE64.encode(links.iter().flat_map(|at| at.to_le_bytes()).collect::<Vec<_>>()),
         tension: plan.has_tension(),
         delta_m: plan.delta_m(),
-        formations: formations.iter().map(|&(from_s, formation)| Target::of(formation, from_s.max(begin_s), shown)).collect(),
+        formations: formations
+            .iter()
+            .map(|&(from_s, formation)| Target::of(formation, from_s.max(begin_s), shown))
+            .collect(),
         axis_m: axis_m.unwrap_or(0.0),
         axes: axis_m.map(|_| shown.len()),
         reference: guides.reference.then(|| guides.count() - 1 + shown.len()),
@@ -81,7 +84,8 @@ impl Target {
     fn of(formation: &Formation, from_s: f64, shown: &[usize]) -> Self {
         let middle = mean_row(&formation.slots_m);
         let slots = shown.iter().filter(|&&k| k < formation.count()).map(|&k| row(&formation.slots_m, k) - middle);
-        let bytes: Vec<_> = slots.flat_map(|slot| <[f64; 3]>::from(slot).map(|x| (x as f32).to_le_bytes())).flatten().collect();
+        let bytes: Vec<_> =
+            slots.flat_map(|slot| <[f64; 3]>::from(slot).map(|x| (x as f32).to_le_bytes())).flatten().collect();
         Self { from_s, slots: BASE64.encode(bytes) }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::flight::{Report, Violation};
 use super::obstacles::ObstacleViolation;
-use crate::replay::{Kind, Judged, Moment, Span};
+use crate::replay::{Judged, Kind, Moment, Span};
 use crate::text::{at_least, exact, metres_below, seconds};
 
 impl Report {

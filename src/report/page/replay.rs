@@ -30,19 +30,16 @@ pub(super) fn script() -> Markup {
     }
 }
 
-/// A source without the lines that are comments, and without indentation.
+/// A source without comments and indentation: lines that begin with `//`, and everything from `/**` to `*/`.
 fn without_comments(source: &str) -> String {
-    let (mut lines, mut within) = (String::new(), false);
-    for line in source.lines().map(str::trim) {
-        let begins = line.starts_with("/**") && (line.ends_with("*/") || !line.contains("*/"));
-        if within || begins {
-            within = !line.contains("*/");
-        } else if !line.is_empty() && !line.starts_with("//") {
-            lines += line;
-            lines.push('\n');
-        }
+    let mut code = String::new();
+    for (k, part) in source.split("/**").enumerate() {
+        let rest =
+            if k == 0 { Some(part) } else { part.split_once("*/").map(|(_, rest)| rest.trim_start_matches(' ')) };
+        code += rest.unwrap_or_default();
     }
-    lines
+    let lines = code.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
+    lines.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// When a replay begins to draw.
@@ -112,4 +109,22 @@ fn note(replay: &Replay) -> String {
     };
     let (vehicles, moments) = (some(replay.vehicles(), "vehicles"), some(replay.moments(), "findings"));
     format!("{motion}{vehicles}{moments}Everything is in this page: nothing is loaded.")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_and_indentation_go_and_code_stays() {
+        let source = "// @ts-check\n  /** @type {A} */\n  const a = (/** @type {B} */ (b)) => \"a // b\";\n\n/** two\n lines */ c();\n";
+        assert_eq!(without_comments(source), "const a = ((b)) => \"a // b\";\nc();\n");
+    }
+
+    #[test]
+    fn script_and_shaders_stay_below_30_kilobytes() {
+        assert!(SCRIPT.len() + SHADERS.len() < 30_000, "{} and {}", SCRIPT.len(), SHADERS.len());
+        assert!(SCRIPT.len() > 10_000 && SHADERS.starts_with("@ COMMON"));
+        assert!(!SCRIPT.contains("</script") && !SHADERS.contains("</script"));
+    }
 }

@@ -4,7 +4,7 @@ use super::report::{OfPair, RecordedReport};
 use super::words::interval;
 use crate::audit::recorded::{Approach, ObjectPair};
 use crate::audit::{Undecided, Violation};
-use crate::replay::{Kind, Judged, Moment, Span};
+use crate::replay::{Judged, Kind, Moment, Span};
 
 impl RecordedReport {
     /// The closest approach, every violation and every time that cannot be decided, the weightiest first, with the judge's
