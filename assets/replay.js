@@ -11,7 +11,7 @@
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
 /** @typedef {{made: WebGLProgram, at: Object<string, WebGLUniformLocation>}} Program */
 
-const ABSENT = -32768, TRAIL_PIECES = 60000, TANGENT = 0.36, NAMED = 64, UNKNOWN_M = 0.1, SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
+const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, NAMED = 64, UNKNOWN_M = 0.1, SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
 const WHOLE = new Set(["path", "paint", "row", "next", "points", "kind", "stride", "newest", "axis", "mark"]);
 const LIGHT = { paper: 0xeceff3, ink: 0x1b222b, grid: 0xcbd2da, shell: 0x5c7fa3, thing: 0x8a6d3b, alarm: 0xd40014,
   push: 0xd96b00, rest: 0xa6aeb7, pull: 0x125fc4, vehicles: [0x0072b2, 0xd55e00, 0x00936c, 0xb85f95, 0x9a7600, 0x7d858e] };
@@ -38,8 +38,7 @@ const atLeast = metres => (Number(metres.toFixed(3)) > metres ? metres - 0.0005 
 const make = (tag, attributes, ...inside) => {
   const element = document.createElement(tag);
   for (const name in attributes) element.setAttribute(name, attributes[name]);
-  element.append(...inside);
-  return element;
+  return element.append(...inside), element;
 };
 const write = (/** @type {Element} */ element, /** @type {string} */ words) => { if (element.textContent !== words) element.textContent = words; };
 
@@ -72,8 +71,7 @@ const play = (root, data) => {
         }
         path[to + 3] = there ? 1 : 0;
       }
-      path[to] = times[row] - first;
-      to += 4;
+      path[to] = times[row] - first; to += 4;
     }
   }
 
@@ -120,8 +118,7 @@ const play = (root, data) => {
     write(start, playing ? "Pause" : "Play"); before = frames = passed = spent = 0; tell(null); ask();
   };
   const go = (/** @type {number} */ to) => {
-    if (playing) toggle();
-    t = clamp(to, first, last); tell(null); ask();
+    if (playing) toggle(); t = clamp(to, first, last); tell(null); ask();
   };
   /** To the next moment of a kind, or the one before; round and round. @param {string} kind @param {number} way */
   const jump = (kind, way) => {
@@ -131,8 +128,7 @@ const play = (root, data) => {
     go(moment.at_s); tell(moment);
   };
   const frame = (/** @type {number} */ now) => {
-    queued = 0;
-    if (gone) return;
+    queued = 0; if (gone) return;
     if (playing) {
       if (before) { passed += now - before; frames++; t += (now - before) / 1000 * Number(speeds.value); }
       before = now;
@@ -143,8 +139,7 @@ const play = (root, data) => {
       }
       if (t >= last) { t = last; toggle(); }
     }
-    const began = performance.now();
-    draw();
+    const began = performance.now(); draw();
     spent += performance.now() - began;
     if (playing) ask();
   };
@@ -187,8 +182,7 @@ const play = (root, data) => {
     const [dx, dy] = [event.clientX - from[0], event.clientY - from[1]], by = 5 / canvas.clientHeight;
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     if (old) {
-      const now = grip();
-      zoom(old[2] / now[2]); pan(now[0] - old[0], now[1] - old[1]);
+      const now = grip(); zoom(old[2] / now[2]); pan(now[0] - old[0], now[1] - old[1]);
     } else if (event.buttons & 2 || event.shiftKey) pan(dx, dy); else turn(-dx * by, dy * by);
   };
   canvas.onpointerup = canvas.onpointercancel = event => fingers.delete(event.pointerId);
@@ -287,9 +281,8 @@ const play = (root, data) => {
   const aim = () => {
     const now = upTo(data.formations.map(of => of.from_s), t);
     if (now === aimed) return;
-    aimed = now;
     const at = new Float32Array(bytes(data.formations[now - 1]?.slots ?? "")), ends = new Uint16Array(bytes(data.links)), joined = [];
-    refill(slots, at);
+    aimed = now; refill(slots, at);
     for (let k = 0; k < ends.length; k += 2) {
       const [a, b] = [3 * ends[k], 3 * ends[k + 1]];
       joined.push(ends[k], ends[k + 1], Math.hypot(at[a] - at[b], at[a + 1] - at[b + 1], at[a + 2] - at[b + 2]) || 0);
@@ -297,8 +290,7 @@ const play = (root, data) => {
     refill(links, Float32Array.from(joined));
   };
   const draw = () => {
-    const ratio = fit(canvas);
-    if (!ratio || gone) return;
+    const ratio = fit(canvas); if (!ratio || gone) return;
     const size = [canvas.width, canvas.height], { right, up, back, eye } = axes(), lens = [TANGENT * size[0] / size[1], TANGENT, distance * 0.02, distance + reach * 12];
     row = clamp(upTo(times, t) - 1, 0, times.length - 1); next = Math.min(row + 1, times.length - 1);
     part = next > row ? clamp((t - times[row]) / (times[next] - times[row]), 0, 1) : 0;
@@ -312,8 +304,7 @@ const play = (root, data) => {
       gl.activeTexture(gl.TEXTURE1);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, count, 1, gl.RGBA, gl.UNSIGNED_BYTE, paint);
     }
-    aim();
-    gl.viewport(0, 0, size[0], size[1]);
+    aim(); gl.viewport(0, 0, size[0], size[1]);
     gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(colours.paper))));
     gl.enable(gl.DEPTH_TEST); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
@@ -321,8 +312,7 @@ const play = (root, data) => {
     let set = () => {};
     /** @param {Program} of @param {Object<string, number | number[]>} values */
     const use = ({ made, at }, values) => {
-      gl.useProgram(made);
-      set = given => {
+      gl.useProgram(made); set = given => {
         for (const name in given) {
           const to = at[name], value = given[name];
           if (!to) continue;
@@ -352,9 +342,7 @@ const play = (root, data) => {
     });
 
     gl.depthMask(true); gl.disable(gl.BLEND); gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
-    use(ball, { least: 2 * ratio });
-    quads(bodies);
-    solids(true);
+    use(ball, { least: 2 * ratio }); quads(bodies); solids(true);
     gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE); gl.enable(gl.BLEND); gl.depthMask(false);
     use(line, { kind: 0, width: ratio, tint: rgba(colours.grid) });
     quads(ground);
@@ -423,9 +411,7 @@ const play = (root, data) => {
   canvas.addEventListener("webglcontextlost", () => { gone = true; write(said, "The graphics were lost: load the page again."); });
   dark.addEventListener("change", themed);
   const sized = new ResizeObserver(draw);
-  sized.observe(stage);
-  home();
-  themed();
+  sized.observe(stage); home(); themed();
   return {
     root, draw,
     /** For tests: a camera at a yaw and pitch [rad], so far from a place [m], at a time [s]; drawn at once. @param {{yaw: number, pitch: number, distance: number, target: number[], t: number}} view */
