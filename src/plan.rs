@@ -6,11 +6,15 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::formation::{Formation, Freedom, RigidMotion, best_rigid_motion};
 use crate::graph::Graph;
-use crate::law::{EdgeTension, EdgeTensionKeys, LawSpec};
+use crate::law::LawSpec;
+#[cfg(feature = "pictures")]
+use crate::law::{EdgeTension, EdgeTensionKeys};
 use crate::record::Event;
 use crate::scenario::Scenario;
 use crate::space::Obstacle;
-use crate::swarm::{Pair, Rows, mean_row, row};
+#[cfg(feature = "pictures")]
+use crate::swarm::{Pair, row};
+use crate::swarm::{Rows, mean_row};
 use crate::target::{Course, Guidance};
 
 /// Formations, graph and how hard an edge pulls.

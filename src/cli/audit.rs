@@ -293,7 +293,9 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     let mut instants = arguments.html.as_ref().map(|_| Instants::default());
     let Judged { mut outcome, clock, mut notes, curves } =
         judged(auditor, arguments, &options, console, &mut |items, names| {
-            instants.iter_mut().for_each(|instants| instants.note(items, names, &settings));
+            if let Some(instants) = &mut instants {
+                instants.note(items, names, &settings);
+            }
         })?;
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);

@@ -128,7 +128,9 @@ impl Replay {
         let shown = shown(film, all, listed, room_bytes);
         let place = |vehicle: usize| shown.binary_search(&vehicle).ok();
         let mut plan = stage.plan.clone();
-        film.events.iter().for_each(|event| plan.iter_mut().for_each(|plan| plan.note(event)));
+        if let Some(plan) = &mut plan {
+            film.events.iter().for_each(|event| plan.note(event));
+        }
         let begin_s = film.times_s.first().copied().unwrap_or(0.0);
         let (targets, guides) = targets::of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
         let near = film.nearest.clone().finish();

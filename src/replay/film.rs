@@ -65,7 +65,9 @@ impl Film {
         self.samples += 1;
         self.times_s.push(time_s);
         self.positions_m.push(positions_m.clone());
-        closest.into_iter().for_each(|closest| self.nearest.take(closest));
+        if let Some(closest) = closest {
+            self.nearest.take(closest);
+        }
         let bytes = positions_m.len() * size_of::<f64>() * self.times_s.len();
         if bytes > self.budget_bytes.unwrap_or(BUDGET_BYTES) && self.times_s.len() > 8 {
             self.thin();

@@ -1,5 +1,6 @@
 //! Replays in a real browser: what they draw, what they say, and what the page forbids.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -207,9 +208,9 @@ fn names_are_text_and_vehicles_that_are_not_there_are_not_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut table = "t,id,x,y,z\n".to_owned();
     for t in 0..=20 {
-        table += &format!("{t},<img src=x onerror=ran=1>,{t},0,0\n");
+        let _ = writeln!(table, "{t},<img src=x onerror=ran=1>,{t},0,0");
         if !(6..=14).contains(&t) {
-            table += &format!("{t},</script><b>b,{t},5,0\n");
+            let _ = writeln!(table, "{t},</script><b>b,{t},5,0");
         }
     }
     fs::write(folder.path().join("names.csv"), table).expect("written");
