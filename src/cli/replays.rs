@@ -8,7 +8,7 @@ use super::reading::ReadArguments;
 use crate::audit::recorded::{Gap, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
 use crate::figures::Figure;
 use crate::read::ReadOptions;
-use crate::replay::{Film, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
+use crate::replay::{Film, MOST_INSTANTS, Nearest, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
 use crate::report::Report;
 use crate::report::recorded::RecordedReport;
 use crate::scenario::Scenario;
@@ -101,10 +101,15 @@ pub(super) fn of_recording(
     let samples = instants.items;
     let mut places = Places::new(settings, outcome, instants.shown(outcome, &spans));
     let figures = encounters::figures(reading, options, settings, outcome, &mut places)?;
-    let near = outcome.smallest.iter().flatten().filter_map(|found| {
-        let (pair, separation_m) = (found.pair.vehicles()?, found.certain_m());
-        Some(ClosestApproach { pair, separation_m, time_s: found.time_s })
-    });
+    let mut near = Nearest::default();
+    for found in &outcome.smallest {
+        match found.and_then(|found| Some((found.pair.vehicles()?, found))) {
+            Some((pair, of)) => {
+                near.take(ClosestApproach { pair, separation_m: of.certain_m(), time_s: of.time_s });
+            }
+            None => near.break_off(),
+        }
+    }
     let half = |delta_m: f64| [0.5 * delta_m; 3];
     let ellipsoid =
         settings.ellipsoid_m.map(|axes_m| (axes_m * (0.5 * settings.delta_m.unwrap_or(TOUCHING_ELLIPSOIDS))).into());
@@ -115,7 +120,6 @@ pub(super) fn of_recording(
         plan: None,
         obstacles: settings.obstacles.clone(),
     };
-    let near = near.collect();
     let (times_s, positions_m) = places.finish();
     let film = Film::of(times_s, positions_m, near, samples).keeping(spans);
     Ok((Replay::new(&stage, &film, &moments, report.judgement(), PAGE_BYTES), figures))

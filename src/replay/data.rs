@@ -154,11 +154,11 @@ impl Replay {
             points: shown.len() + guides.count(),
             starts: String::new(),
             steps: String::new(),
-            near_s: doubles(near.iter().map(|near| near.time_s)),
-            near_m: doubles(near.iter().map(|near| near.separation_m)),
+            near_s: doubles(near.iter().map(|slice| slice.closest.time_s)),
+            near_m: doubles(near.iter().map(|slice| slice.closest.separation_m)),
             near_who: BASE64.encode(
                 near.iter()
-                    .flat_map(|near| [near.pair.first(), near.pair.second()])
+                    .flat_map(|slice| [slice.closest.pair.first(), slice.closest.pair.second()])
                     .flat_map(|vehicle| who(vehicle).to_le_bytes())
                     .collect::<Vec<_>>(),
             ),

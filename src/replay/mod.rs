@@ -29,7 +29,7 @@ pub use error::NoReplay;
 pub use film::Film;
 pub use moment::{Kind, Moment};
 pub use motion::Motion;
-pub use nearest::Nearest;
+pub use nearest::{Nearest, Slice};
 pub use stage::Stage;
 
 /// Room for the replays of a page \[bytes\].
