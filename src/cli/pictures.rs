@@ -1,4 +1,4 @@
-//! What a run leaves for people to look at: figures and a page.
+//! What a run leaves for people to look at: a replay, figures and a page.
 
 use std::fs;
 use std::io;
@@ -6,8 +6,17 @@ use std::path::{Path, PathBuf};
 
 use super::Failure;
 use crate::figures::{self, Criteria, Figure, RunHistory};
+use crate::replay::{Film, NoReplay, Replay, Stage};
 use crate::report::{Report, RunPage, write_atomically};
 use crate::scenario::Scenario;
+use crate::sim;
+
+/// A flight and what was found on it, in so many bytes.
+pub(super) fn replay(scenario: &Scenario, film: &Film, report: &Report, room_bytes: usize) -> Result<Replay, NoReplay> {
+    let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
+    let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::judged).collect());
+    Replay::new(&stage, film, &report.moments(&names), report.judgement(), room_bytes)
+}
 
 /// A run as charts.
 pub(super) fn figures(scenario: &Scenario, history: &RunHistory, report: &Report) -> Vec<Figure> {
