@@ -78,8 +78,8 @@ fn what_does_not_fit_is_thinned_and_every_sample_of_a_violation_stays() {
         assert!(within.clone().count() >= 16 && within.clone().all(|time_s| times.contains(time_s)));
         assert_eq!((times.first(), times.last()), (film.times_s.first(), film.times_s.last()));
     }
-    let none = Replay::new(&stage(5), &film, &[], JUDGED, 2000);
-    assert_eq!(none, Err(NoReplay::NoRoom { room_bytes: 2000 }));
+    let none = Replay::new(&stage(5), &film, &[], JUDGED, 1000);
+    assert_eq!(none, Err(NoReplay::NoRoom { room_bytes: 1000 }));
 }
 
 #[test]

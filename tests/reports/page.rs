@@ -135,7 +135,7 @@ fn figures_that_are_not_wanted_are_not_left_over() {
     let figure = folder.path().join("figures/energy.svg");
     assert!(figure.exists());
     let html = fly(folder.path(), &[&flown[..], &["--no-figures"]].concat());
-    assert!(!figure.exists() && !html.contains("<svg"));
+    assert!(!figure.exists() && !html.contains("<svg xmlns"));
 }
 
 #[test]
