@@ -21,8 +21,9 @@ completes and checks as you type. An unknown key is refused with its line, its c
 `tautline run`, `check`, `margin`, `attack` and `compare` set any key for one run: `--set time.duration_s=20`,
 `--set 'start={shape="grid", spacing_m=2}'`, `--set start.positions_m.4.x=-1`. Lists count from 1.
 
-*Unit* is that of the key's name. *Default* is what stands where the key does not; `needed` says that there is none, and `-` that the
-last column says what happens without it. *Range* says which values are taken.
+*Unit* is that of the key's name. *Default* is what stands where the key does not; `needed` says that the key has to be there, and `-`
+that nothing does, or what the last column says. *Range* says which values are taken; what it does not say is checked all the same, and
+refused with a remedy.
 """
 
 # The order in which a flight is told; what the schema has and this list does not, comes last.
@@ -68,14 +69,11 @@ class Reference:
         table = self.followed(table["items"]) if several else table
         table, both = self.one_of_several(table)
         yield f"{'#' * level} {self.heading(path, several)}\n"
-        yield sentence(use.get("description", "")) + (" A `[[table]]` for each, or a list." if both else "") + "\n"
-        own = sentence(table.get("description", ""))
-        if own and own != sentence(use.get("description", "")):
-            yield own + "\n"
+        used, own = sentence(use.get("description", "")), sentence(table.get("description", ""))
+        yield max(used, own, key=len) + (" A `[[table]]` for each, or a list." if both else "") + "\n"
         values = table.get("additionalProperties")
         if isinstance(values, dict):
             table = self.followed(values)
-            yield sentence(table["description"]) + "\n"
         yield from self.keys(path, table, level)
 
     def keys(self, path: str, table: Schema, level: int) -> Iterator[str]:
@@ -94,14 +92,15 @@ class Reference:
         """The keys that depend on the value of one of them."""
         said = next((name for name in ("formation", "law") if name != path and self.same(name, variants)), None)
         if said:
-            yield f"Beside these, the keys of [`[{said}]`](#{said}), those of its `{self.tag(variants[0])}` and it.\n"
+            tag = self.tag(variants[0])
+            yield f"{'Beside these, ' if table.get('properties') else ''}`{tag}` with the keys of its own, as in [`[{said}]`](#{said}).\n"
             return
         tag = self.tag(variants[0])
         names = [variant["properties"][tag]["const"] for variant in variants]
         yield f"`{tag}` is {alternatives(names)}. The keys below each are its own.\n"
         rows = [COLUMNS]
         for name, variant in zip(names, variants):
-            default = "" if tag in variant.get("required", []) else " (where there is none)"
+            default = "" if tag in variant.get("required", []) else f" This is what stands where no `{tag}` is given."
             rows.append(f"| **`{tag} = \"{name}\"`** | | | | | {cell(variant['description'])}{default} |")
             own = {key: value for key, value in variant["properties"].items() if key != tag}
             rows += [self.row(key, value, key in variant.get("required", [])) for key, value in own.items()]
@@ -120,10 +119,10 @@ class Reference:
 
     def type_of(self, key: Schema) -> str:
         kind = self.followed(key)
-        if self.is_table(key):
-            return "tables" if kind.get("type") == "array" else "table"
-        if "anyOf" in kind:
+        if "anyOf" in kind and not self.variants(kind):
             return alternatives([self.type_of(one) for one in kind["anyOf"]], quoted=False)
+        if self.is_table(key):
+            return "list of tables" if kind.get("type") == "array" else "table"
         if self.words(kind):
             return "word"
         if kind["type"] == "array":

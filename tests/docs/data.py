@@ -36,7 +36,9 @@ def wrong_data(block: Block, folder: Path, programs: Path) -> list[str]:
 
 def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
     keys = tomllib.loads(block.text)
-    path = folder / (block.name or f"block-{block.line}.toml")
+    if block.name == "Cargo.toml":
+        return wrong_features(block, keys)
+    path = folder / Path(block.name or f"block-{block.line}.toml").name
     path.write_text(block.text + "\n", encoding="utf-8")
     file = shlex.quote(path.name)
     if {"start", "formation", "time"} <= keys.keys():
@@ -52,6 +54,13 @@ def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
     ran = run(command, folder, programs)
     wrong = ran.exit_code >= WRONG_INPUT
     return [f"{block.place}: {command}\n{ran.output.strip()}"] if wrong else []
+
+
+def wrong_features(block: Block, keys: dict[str, Any]) -> list[str]:
+    """What is wrong with how a crate of the reader's asks for this one."""
+    ours = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
+    asked = keys["dependencies"][ours["package"]["name"]].get("features", [])
+    return [f"{block.place}: there is no feature {one}" for one in asked if one not in ours["features"]]
 
 
 def settings(table: dict[str, Any], path: str = "") -> list[str]:

@@ -23,9 +23,8 @@ class Walk:
         """Everything that is wrong with the page, in its order."""
         last: tuple[str, Ran | None] = "", None
         for block in self.page.blocks:
-            if block.name:
-                (self.folder / block.name).parent.mkdir(parents=True, exist_ok=True)
-                (self.folder / block.name).write_text(block.text + "\n", encoding="utf-8")
+            if block.name and block.language != "rust":
+                (self.folder / Path(block.name).name).write_text(block.text + "\n", encoding="utf-8")
             if block.language == "sh":
                 last = block.section, self.carry_out(block)
             elif block.language == "text":

@@ -26,6 +26,9 @@ tautline check pentagon-collinear          # exit code 1: a straight line is nev
 scenario = "pentagon"
 runs = 3
 seed = 1
+
+[vary]
+"start.jitter_m" = { uniform = [0.0, 0.1] }
 ```
 
 ```sh
