@@ -57,7 +57,7 @@ class Reference:
         plain = {name: keys[name] for name in names if name not in tables}
         required = self.schema["required"]
         parts = [HEAD, "## The file\n", self.rows(plain, required), ""]
-        parts.append(f"The tables {', '.join(f'[`[{name}]`](#{name})' for name in required)} are needed, and no others.\n")
+        parts.append(f"The tables {listed([f'[`[{name}]`](#{name})' for name in required], 'and')} are needed, and no others.\n")
         for name in tables:
             parts.extend(self.section(name, keys[name], 2))
         return "\n".join(parts)
@@ -141,10 +141,10 @@ class Reference:
         if "maxLength" in kind:
             letters = f", of `{kind['pattern']}`" if "pattern" in kind else ""
             return f"{kind.get('minLength', 0)} to {kind['maxLength']} characters{letters}"
-        low = f"more than {kind['exclusiveMinimum']:g}" if "exclusiveMinimum" in kind else ""
-        low = f"at least {kind['minimum']:g}" if "minimum" in kind else low
+        low = f"> {kind['exclusiveMinimum']:g}" if "exclusiveMinimum" in kind else ""
+        low = f">= {kind['minimum']:g}" if "minimum" in kind else low
         if "maximum" in kind:
-            return f"{kind['minimum']:g} to {kind['maximum']:g}" if "minimum" in kind else f"at most {kind['maximum']:g}"
+            return f"{kind['minimum']:g} to {kind['maximum']:g}" if "minimum" in kind else f"<= {kind['maximum']:g}"
         return low
 
     def heading(self, path: str, several: bool) -> str:
@@ -199,8 +199,11 @@ def plural(said: str) -> str:
 
 
 def alternatives(names: list[str], quoted: bool = True) -> str:
-    names = [f'`"{name}"`' for name in names] if quoted else names
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+    return listed([f'`"{name}"`' for name in names] if quoted else names, "or")
+
+
+def listed(names: list[str], last: str) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}"
 
 
 def toml(value: Any) -> str:
