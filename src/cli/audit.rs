@@ -10,10 +10,12 @@ use nalgebra::Vector3;
 use super::Failure;
 use super::console::{self, Console};
 use super::encounters;
+use super::envelope;
 use super::obstacles;
 use super::outputs;
 use super::own::OwnRecording;
 use super::reading::{self, ReadArguments, one_of};
+use crate::audit::envelope::Limit;
 use crate::audit::recorded::{Motion, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings};
 use crate::read::{self, Format, ReadOptions};
 use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
@@ -56,6 +58,12 @@ pub(super) struct AuditArguments {
     /// TOML file of obstacles: balls, boxes, capsules, half-spaces; at rest or moving.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     obstacles: Option<PathBuf>,
+    /// Limits on each vehicle by itself: speed, horizontal, climb and descent [m/s], accel [m/s^2], height and floor [m].
+    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = envelope::limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
+    limit: Vec<Limit>,
+    /// TOML file of a fence that every vehicle must stay within.
+    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    fence: Option<PathBuf>,
     /// Judge from here on [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     from: Option<f64>,
@@ -186,12 +194,14 @@ impl AuditArguments {
             vehicles,
             only: (!only.is_empty()).then_some(only),
             obstacles: self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)?,
+            envelope: envelope::envelope(&self.limit, self.fence.as_deref())?,
         })
     }
 
     pub(super) fn check_outputs(&self) -> Result<(), Failure> {
         let mut inputs: Vec<_> = self.reading.paths().map(|path| ("the recording", path)).collect();
         inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        inputs.extend(self.fence.as_deref().map(|path| ("the file of the fence", path)));
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--html", &self.html)];
         let outputs: Vec<_> =
             outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
@@ -214,11 +224,10 @@ impl AuditArguments {
         let asked =
             outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
         let asked = asked.count();
-        if asked < 2 && settings.obstacles.is_empty() {
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() {
             let message =
                 format!("{path}: {} to judge, and nothing to keep apart", counted(asked as u64, "vehicle", "vehicles"));
-            let help =
-                "judge two vehicles or more (--ids, --frame, --column id=NAME say which are there), or --obstacles";
+            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME say which are there), or --obstacles, --limit, --fence";
             return Err(Failure::input(message, help));
         }
         if judged == 0 && (self.from.is_some() || self.to.is_some()) {
@@ -236,6 +245,7 @@ impl AuditArguments {
             (self.to.is_some(), "--to"),
             (self.max_gap.is_some(), "--max-gap"),
             (!self.offset.is_empty(), "--offset"),
+            (self.limit.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
         ];
         let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
         let path = self.reading.called();
@@ -382,7 +392,8 @@ impl From<RecordedError> for Failure {
         let help = match &error {
             RecordedError::OutOfRange { .. } | RecordedError::EmptyWindow { .. } => "give another number",
             RecordedError::NoBound { .. } => "give the largest acceleration with --max-accel A or --max-accel NAME=A",
-            RecordedError::NoLimit { .. } => "give --delta, or --radius NAME=R",
+            RecordedError::NoLimit { .. } => "give --delta, or --radius NAME=R; or ask --limit and --fence alone",
+            RecordedError::LimitOfJumps { .. } => "give --motion linear, or bounded with --max-accel",
             RecordedError::UnknownVehicle { .. } => "name vehicles as the recording does",
             RecordedError::NotACurve { .. } => "give --motion linear, hold or bounded",
             RecordedError::NotSamples { .. } => "leave --motion out, or give --motion polynomial",

@@ -18,6 +18,7 @@ mod drawing;
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 mod driver;
 mod encounters;
+mod envelope;
 mod events;
 mod export;
 mod folder;
