@@ -15,6 +15,10 @@ const FENCE_HELP: &str =
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
+    /// In the same place, read by themselves.
+    #[serde(default)]
+    #[expect(dead_code, reason = "they may stand there")]
+    obstacle: Vec<toml::Table>,
     fence: toml::Spanned<FenceTable>,
 }
 

@@ -92,8 +92,9 @@ impl OfLimit {
         format!("{least}{} {}", exact(self.allowed), self.unit())
     }
 
-    /// The finding in a few words, such as `speed at most 3.2 m/s of 5 m/s`.
-    pub(super) fn brief(&self) -> String {
+    /// The finding in a few words, such as `speed at most 3.200 m/s (limit 5.000 m/s)`.
+    #[must_use]
+    pub fn brief(&self) -> String {
         let called = self.called();
         match self.status {
             Status::Clear => {

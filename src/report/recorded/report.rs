@@ -191,6 +191,12 @@ impl RecordedReport {
         }
     }
 
+    /// The verdict on how close any two came alone; none where only single vehicles were asked about.
+    #[must_use]
+    pub fn separation(&self) -> Option<Status> {
+        self.separation_asked.then_some(self.audit.flight.status)
+    }
+
     /// The report as indented JSON with a line end.
     ///
     /// # Errors

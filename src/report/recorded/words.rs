@@ -26,7 +26,9 @@ impl RecordedReport {
         format!("{}: {}", self.verdict(), self.finding())
     }
 
-    fn verdict(&self) -> String {
+    /// The verdict alone, such as `PROVED CLEAR`.
+    #[must_use]
+    pub fn verdict(&self) -> String {
         match self.status {
             Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
             Status::Clear => format!("CLEAR if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
