@@ -14,6 +14,11 @@ from pages import ROOT, Block
 
 WRONG_INPUT = 2
 
+# Files that an audit is given, by their first key, and the option that takes them.
+ASKED_OF_AUDIT = {"obstacle": "--obstacles", "fence": "--fence", "audit": "--config"}
+
+TWO = "t,id,x,y,z\n0,a,100,100,100\n0,b,110,100,100\n1,a,100,100,100\n1,b,110,100,100\n"
+
 
 def wrong_data(block: Block, folder: Path, programs: Path) -> list[str]:
     """What is wrong with a block that is no command."""
@@ -45,9 +50,9 @@ def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
         command = f"tautline check {file}"
     elif "scenario" in keys:
         command = f"tautline campaign plan {file} --out plan-{block.line}"
-    elif keys.keys() == {"obstacle"} and any("path" in one or "name" in one for one in keys["obstacle"]):
-        (folder / "two.csv").write_text("t,id,x,y,z\n0,a,100,100,100\n0,b,110,100,100\n1,a,100,100,100\n1,b,110,100,100\n", encoding="utf-8")
-        command = f"tautline audit two.csv --delta 0.5 --obstacles {file}"
+    elif len(keys) == 1 and keys.keys() <= ASKED_OF_AUDIT.keys():
+        (folder / "two.csv").write_text(TWO, encoding="utf-8")
+        command = f"tautline audit two.csv --delta 0.5 {' '.join(ASKED_OF_AUDIT[key] for key in keys)} {file}"
     else:
         sets = [*AROUND.get(block.page, []), *settings(keys)]
         command = f"tautline check pentagon {' '.join(f'--set {shlex.quote(one)}' for one in sets)}"

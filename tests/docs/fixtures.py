@@ -17,6 +17,7 @@ FLIGHT = "tautline run pentagon --set time.duration_s=10 --out out/short --quiet
 NEEDED_BY = {
     "README.md": ["flight.csv"],
     "docs/audit.md": ["flight.csv"],
+    "docs/ci.md": ["flights"],
     "docs/viewer.md": ["out/pentagon", "flight.csv"],
 }
 
@@ -24,6 +25,13 @@ NEEDED_BY = {
 MADE_BY = {
     "out/pentagon": [PENTAGON],
     "flight.csv": [FLIGHT, "tautline export out/short -o flight.csv"],
+    "flights": [
+        FLIGHT,
+        "mkdir flights",
+        "printf '[audit]\\ndelta_m = 0.5\\n' > flights/tautline.toml",
+        "tautline export out/short -o flights/monday.csv",
+        "cp flights/monday.csv flights/tuesday.csv",
+    ],
 }
 
 
