@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from exceptions import INSTEAD, LONG, NOT_RUN, NOT_RUN_HERE, RUN
-from pages import ROOT, Block
+from pages import ROOT, Block, Page
 
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 TAUTLINE = Path(os.environ.get("TAUTLINE", TARGET / "debug" / "tautline")).resolve()
@@ -68,14 +68,14 @@ def commands(block: Block) -> list[Command]:
 def as_run(command: Command) -> str | None:
     """The command as the tests run it, or `None` where they do not."""
     text = command.text
+    if listed(NOT_RUN_HERE, command) or (listed(LONG, command) and not os.environ.get("TAUTLINE_LONG")):
+        return None
     if text in INSTEAD:
         built = TARGET / INSTEAD[text]
         return shlex.quote(str(built)) if built.exists() else None
     if found := re.fullmatch(r"cargo run --release(?: -- (.*))?", text):
         return f"tautline {found[1] or ''}".strip()
-    if listed(NOT_RUN_HERE, command) or (listed(LONG, command) and not os.environ.get("TAUTLINE_LONG")):
-        return None
-    return None if command.program in NOT_RUN else text
+    return text if command.program in RUN | {"tautline"} else None
 
 
 def listed(table: dict[tuple[str, str], str], command: Command) -> bool:
@@ -113,6 +113,12 @@ def unread(command: Command) -> list[str]:
     if command.program == "cargo":
         found += missing_targets(command)
     return found + [f"{command.place}: {one}" for arguments in spoken(command.text) for one in unknown_arguments(arguments)]
+
+
+def unread_within(page: Page) -> list[str]:
+    """What is wrong with the commands that a page names within its lines."""
+    named = [one for one in page.spoken if re.match(r"(tautline|cargo) [a-z]", one.target)]
+    return [wrong for one in named for wrong in unread(Command(one.target, one.place, page.name, 0))]
 
 
 def missing_targets(command: Command) -> list[str]:

@@ -14,6 +14,7 @@ NOT_RUN = {
     "git": "looks at the reader's changes",
     "pip": "tests/setup.sh installs what the tests need",
     "python": "runs the driver of a cluster; tests/cluster runs it",
+    "python3": "runs these tests",
     "ray": "starts a cluster; tests/cluster starts one",
     "sbatch": "submits to Slurm; tests/cluster does",
     "sh": "sets up and runs all tests, or changes the sources",
@@ -22,6 +23,7 @@ NOT_RUN = {
 
 # (page, beginning of the command): why it is not run.
 NOT_RUN_HERE = {
+    ("CONTRIBUTING.md", "cargo run --release -- schema"): "writes docs/scenario.md; test_book.py compares the two",
     ("docs/clusters.md", "cp target/release/tautline"): "into a folder that a cluster shares; tests/cluster flies from one",
     ("docs/clusters.md", "/shared/tautline"): "the same",
     ("docs/scale.md", "tautline run"): "ten thousand and a hundred thousand vehicles: minutes, and 0.4 GB of memory",

@@ -39,8 +39,8 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Link:
-    """Where a link leads, as it is written."""
+class Said:
+    """Where a link leads, as it is written, or a word of code within a line."""
 
     target: str
     place: str
@@ -53,7 +53,9 @@ class Page:
         self.path = path
         self.name = path.relative_to(root).as_posix()
         self.blocks: list[Block] = []
-        self.links: list[Link] = []
+        self.links: list[Said] = []
+        self.spoken: list[Said] = []
+        """Code within a line, and where."""
         self.headings: list[str] = []
         self._read(path.read_text(encoding="utf-8").splitlines())
 
@@ -74,8 +76,9 @@ class Page:
                 if heading := HEADING.match(line):
                     section = heading[1]
                     self.headings.append(section)
+                self.spoken += [Said(found[0].strip("`"), f"{self.name}:{number}") for found in CODE.finditer(line)]
                 bare = CODE.sub("", re.sub(r"\[`[^`]*`\]", "[code]", line))
-                self.links += [Link(target, f"{self.name}:{number}") for target in LINK.findall(bare)]
+                self.links += [Said(target, f"{self.name}:{number}") for target in LINK.findall(bare)]
         if fence:
             raise ValueError(f"{self.name}:{begin}: this block of code has no end")
 

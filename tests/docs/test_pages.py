@@ -5,7 +5,7 @@ from __future__ import annotations
 import unittest
 from pathlib import Path
 
-from commands import Command, Ran, as_run, commands, missing_lines, run, unread, wrong
+from commands import Command, Ran, as_run, commands, missing_lines, run, unread, unread_within, wrong
 from data import wrong_data
 from exceptions import OTHER_OUTPUT
 from fixtures import Fixtures
@@ -34,7 +34,7 @@ class Walk:
                 last = "", None
             else:
                 self.wrong += wrong_data(block, self.folder, self.programs)
-        return self.wrong
+        return self.wrong + unread_within(self.page)
 
     def carry_out(self, block: Block) -> Ran | None:
         """What came of the last command of a block, where it was run."""

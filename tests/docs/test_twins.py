@@ -19,7 +19,7 @@ tautline check pentagon --set law.alpha=2
 tautline check pentagon-collinear          # exit code 1: a straight line is never left
 ```
 
-[another heading](#a-page), [a file](README.md)
+[another heading](#a-page), [a file](README.md), `tautline audit --delta 1`
 
 ```toml
 # spec.toml
@@ -52,6 +52,7 @@ FAULTS = {
     "an option that is not there": ("--set law.alpha=2", "--sett law.alpha=2", "unexpected argument"),
     "a command that is not there": ("tautline list", "tautline lists", "unrecognized subcommand"),
     "a key that is not there": ("law.alpha=2", "law.alhpa=2", "unknown"),
+    "an option that is not there, within a line": ("audit --delta", "audit --dleta", "has no option --dleta"),
     "an exit code that is not said": ("# exit code 1: a", "# a", "the page says exit code 0, it was 1"),
     "an exit code that is not so": ("tautline list\n", "tautline list  # exit code 1\n", "the page says exit code 1, it was 0"),
     "output of other days": ("six vehicles from a line", "seven vehicles from a line", "seven vehicles from a line"),
