@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tempfile
 import tomllib
 import unittest
 from pathlib import Path
@@ -22,28 +23,55 @@ sys.path.insert(0, str(DOCS))
 import scenario_reference  # noqa: E402
 
 
-def items(page: str) -> list[tuple[str, ...]]:
-    return ITEM.findall((DOCS / page).read_text(encoding="utf-8"))
+def items(docs: Path, page: str) -> list[tuple[str, ...]]:
+    """Title, file and what stands behind them, of each page that a page lists."""
+    return ITEM.findall((docs / page).read_text(encoding="utf-8"))
+
+
+def faults(docs: Path) -> list[str]:
+    """What is wrong with the order of the pages and with where they link to."""
+    contents, index = items(docs, "SUMMARY.md"), items(docs, "README.md")
+    there = {path.name for path in docs.glob("*.md")} - {"SUMMARY.md", "README.md"}
+    named = [file for _, file, _ in contents]
+    wrong = [f"SUMMARY.md does not name {file}" for file in sorted(there - set(named))]
+    wrong += [f"{file} of SUMMARY.md is not there" for file in sorted(set(named) - there)]
+    wrong += [f"SUMMARY.md names {file} twice" for file in sorted(set(named)) if named.count(file) > 1]
+    if [one[:2] for one in contents] != [one[:2] for one in index]:
+        wrong.append("SUMMARY.md and README.md name other pages, or in another order")
+    wrong += [f"README.md does not say what {file} answers" for _, file, answer in index if len(answer) < 10]
+    links = [link for path in sorted(docs.glob("*.md")) for link in Page(path, docs).links]
+    outside = [link for link in links if re.match(r"\.\.|/", link.target)]
+    return wrong + [f"{link.place}: {link.target} is dead where the book is read" for link in outside]
 
 
 class Book(unittest.TestCase):
     """The order of the pages."""
 
-    def test_the_contents_name_every_page_once(self) -> None:
-        named = ["README.md", *(file for _, file, _ in items("SUMMARY.md"))]
-        self.assertEqual(sorted(named), sorted(path.name for path in DOCS.glob("*.md") if path.name != "SUMMARY.md"))
+    def test_contents_and_index_name_every_page_and_links_stay_in_the_book(self) -> None:
+        self.assertEqual(faults(DOCS), [])
 
-    def test_the_index_says_of_every_page_what_it_answers(self) -> None:
-        index, contents = items("README.md"), items("SUMMARY.md")
-        self.assertEqual([(title, file) for title, file, _ in index], [(title, file) for title, file, _ in contents])
-        for title, _, answer in index:
-            self.assertGreater(len(answer), 10, f"{title}: what does it answer?")
-
-    def test_links_of_the_book_stay_in_the_book(self) -> None:
-        """A link out of docs/ is dead where the book is read."""
-        for path in DOCS.glob("*.md"):
-            for link in Page(path).links:
-                self.assertNotRegex(link.target, r"^(\.\.|/)", link.place)
+    def test_what_is_wrong_with_a_book_is_found(self) -> None:
+        right = {
+            "SUMMARY.md": "- [A](a.md)\n- [B](b.md)\n",
+            "README.md": "- [A](a.md): what is that?\n- [B](b.md): and what is this?\n",
+            "a.md": "# A\n\n[b](b.md)\n",
+            "b.md": "# B\n",
+        }
+        changes = {
+            "": ("SUMMARY.md", right["SUMMARY.md"]),
+            "does not name c.md": ("c.md", "# C\n"),
+            "c.md of SUMMARY.md is not there": ("SUMMARY.md", "- [A](a.md)\n- [B](b.md)\n- [C](c.md)\n"),
+            "names a.md twice": ("SUMMARY.md", "- [A](a.md)\n- [B](b.md)\n- [A](a.md)\n"),
+            "in another order": ("SUMMARY.md", "- [B](b.md)\n- [A](a.md)\n"),
+            "does not say what b.md answers": ("README.md", "- [A](a.md): what is that?\n- [B](b.md)\n"),
+            "a.md:3: ../x.md is dead": ("a.md", "# A\n\n[x](../x.md)\n"),
+        }
+        for said, (file, text) in changes.items():
+            with self.subTest(said), tempfile.TemporaryDirectory() as place:
+                for name, words in (right | {file: text}).items():
+                    (Path(place) / name).write_text(words, encoding="utf-8")
+                found = faults(Path(place))
+                self.assertTrue(any(said in one for one in found) if said else not found, found)
 
     def test_mdbook_finds_the_pages(self) -> None:
         book = tomllib.loads((DOCS / "book.toml").read_text(encoding="utf-8"))

@@ -6,7 +6,6 @@ import tempfile
 import unittest
 from pathlib import Path
 
-import test_pages
 from fixtures import Fixtures
 from pages import Page, dead_links
 from test_pages import Walk
@@ -119,10 +118,6 @@ class Twins(unittest.TestCase):
     def test_a_block_without_an_end_is_found(self) -> None:
         with self.assertRaisesRegex(ValueError, "has no end"):
             self.page("# A page\n\n```sh\ntautline list\n")
-
-
-def setUpModule() -> None:
-    test_pages.setUpModule()
 
 
 if __name__ == "__main__":
