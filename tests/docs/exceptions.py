@@ -4,7 +4,7 @@ another exception adds a line here."""
 from __future__ import annotations
 
 # Programs beside tautline that a page may call and that are run.
-RUN = {"cat", "cp", "mkdir"}
+RUN = {"cat", "cp"}
 
 # Programs that are not run. What they say to tautline is parsed all the same.
 NOT_RUN = {
@@ -27,7 +27,6 @@ NOT_RUN_HERE = {
     ("docs/clusters.md", "cp target/release/tautline"): "into a folder that a cluster shares; tests/cluster flies from one",
     ("docs/clusters.md", "/shared/tautline"): "the same",
     ("docs/scale.md", "tautline run"): "ten thousand and a hundred thousand vehicles: minutes, and 0.4 GB of memory",
-    ("docs/viewer.md", "tautline view"): "needs a screen and a hand; tests/window has both",
 }
 
 # (page, beginning of the command): what takes more than some 20 s in a debug build. Run with TAUTLINE_LONG, else parsed.

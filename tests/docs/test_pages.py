@@ -5,9 +5,9 @@ from __future__ import annotations
 import unittest
 from pathlib import Path
 
+import exceptions
 from commands import Command, Ran, as_run, commands, missing_lines, run, unread, unread_within, wrong
 from data import wrong_data
-from exceptions import OTHER_OUTPUT
 from fixtures import Fixtures
 from pages import Block, Page, dead_links, pages
 
@@ -57,7 +57,7 @@ class Walk:
 
     @staticmethod
     def is_other_output(block: Block) -> bool:
-        return any(page == block.page and block.text.startswith(begin) for page, begin in OTHER_OUTPUT)
+        return any(page == block.page and block.text.startswith(begin) for page, begin in exceptions.OTHER_OUTPUT)
 
 
 fixtures: Fixtures
@@ -79,6 +79,23 @@ class Pages(unittest.TestCase):
     def links_lead_somewhere(self, page: Page) -> None:
         found = dead_links(page)
         self.assertFalse(found, "\n".join(["", *found]))
+
+
+class Exceptions(unittest.TestCase):
+    """No exception outlives what it was made for."""
+
+    def test_each_is_of_a_page_as_it_is(self) -> None:
+        blocks = [block for page in pages() for block in page.blocks]
+        called = [command for block in blocks if block.language == "sh" for command in commands(block)]
+        shown = [block for block in blocks if block.language == "text"]
+        for page, begin in [*exceptions.NOT_RUN_HERE, *exceptions.LONG]:
+            self.assertTrue(any(one.page == page and one.text.startswith(begin) for one in called), (page, begin))
+        for page, begin in exceptions.OTHER_OUTPUT:
+            self.assertTrue(any(one.page == page and one.text.startswith(begin) for one in shown), (page, begin))
+        for command in exceptions.INSTEAD:
+            self.assertTrue(any(one.text == command for one in called), command)
+        for program in [*exceptions.NOT_RUN, *exceptions.RUN]:
+            self.assertTrue(any(one.program == program for one in called), program)
 
 
 def test_of(page: Page, what: str):
