@@ -24,7 +24,9 @@ impl RecordedReport {
         format!("{}: {}", self.verdict(), self.finding())
     }
 
-    fn verdict(&self) -> String {
+    /// The verdict alone: `PROVED CLEAR`, `CLEAR if ...`, `VIOLATION` or `UNDECIDED`.
+    #[must_use]
+    pub fn verdict(&self) -> String {
         match self.status {
             Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
             Status::Clear => format!("CLEAR if {}", self.motion),
