@@ -25,8 +25,8 @@ pub(crate) struct Observation {
     reference_acceleration_m_s2: (f64, f64, f64),
     /// (K, 2) pairs i < j of vehicles that are near each other; none unless the law has a sensing range.
     near: Py<PyArray2<i64>>,
-    /// Whether everybody knows the true state of everybody; what follows is None then.
-    exact: bool,
+    /// Whether all know of each other what each knows of itself, `positions` and `velocities`; what follows is None then.
+    shared: bool,
     /// (N, N, 3) positions [m]: row j of page i is what vehicle i last heard of vehicle j.
     heard_positions: Option<Py<PyArray3<f64>>>,
     /// (N, N, 3) velocities [m/s], in the same way.
@@ -47,9 +47,9 @@ impl Observation {
         let (v, a) = (target.reference.velocity_m_s, target.reference.acceleration_m_s2);
         let pairs = at.near.iter().flat_map(|&(i, j)| [i64::try_from(i), i64::try_from(j)]);
         let near = PyArray1::from_vec(py, pairs.map(|index| index.unwrap_or(i64::MAX)).collect());
-        let exact = matches!(at.others, Others::Shared);
-        let heard = (!exact).then(|| Pictures::of(py, at, |i, j| at.heard(i, j))).transpose()?;
-        let seen = (!exact && sees).then(|| Pictures::of(py, at, |i, j| at.seen(i, j))).transpose()?;
+        let shared = matches!(at.others, Others::Shared);
+        let heard = (!shared).then(|| Pictures::of(py, at, |i, j| at.heard(i, j))).transpose()?;
+        let seen = (!shared && sees).then(|| Pictures::of(py, at, |i, j| at.seen(i, j))).transpose()?;
         let (heard_positions, heard_velocities, heard_ages_s) = Pictures::apart(heard);
         let (seen_positions, seen_velocities, _) = Pictures::apart(seen);
         Ok(Self {
@@ -61,7 +61,7 @@ impl Observation {
             reference_velocity_m_s: (v.x, v.y, v.z),
             reference_acceleration_m_s2: (a.x, a.y, a.z),
             near: near.reshape([at.near.len(), 2])?.unbind(),
-            exact,
+            shared,
             heard_positions,
             heard_velocities,
             heard_ages_s,

@@ -207,7 +207,8 @@ def audit(
         return of_files(words + reading(**read_as), t, obstacles, velocities is not None or names is not None)
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
-    return of_arrays(words, t, positions, velocities, names)
+    inputs = [] if obstacles is None else [obstacles]
+    return with_files(inputs, lambda: of_arrays(words, t, positions, velocities, names))
 
 
 def of_files(words: list[str], t: object, obstacles: PathLike | None, has_more: bool) -> Audit:

@@ -36,8 +36,8 @@ class Observation:
     def near(self) -> NDArray[np.int64]:
         """(K, 2) pairs i < j of vehicles, from 0, that are near each other; none unless the law has a sensing range."""
     @property
-    def exact(self) -> bool:
-        """Whether everybody knows the true state of everybody; what follows is None then."""
+    def shared(self) -> bool:
+        """Whether all know of each other what each knows of itself, ``positions`` and ``velocities``; what follows is None then."""
     @property
     def heard_positions(self) -> NDArray[np.float64] | None:
         """(N, N, 3) positions [m]: ``[i, j]`` is what vehicle i last heard of vehicle j."""

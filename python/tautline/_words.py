@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -84,7 +85,9 @@ def with_files(files: Iterable[PathLike], do: Callable[[], T]) -> T:
         missing = next((file for file in files if not Path(file).exists()), None)
         if missing is None:
             raise
-        raise FileNotFoundError(2, str(error), os.fspath(missing)) from None
+        absent = FileNotFoundError(str(error))
+        absent.errno, absent.filename = errno.ENOENT, os.fspath(missing)
+        raise absent from None
 
 
 def reading(

@@ -110,7 +110,8 @@ fn parsed(words: &[String]) -> Result<Command, Refusal> {
     let arguments = Arguments::try_parse_from(std::iter::once("tautline").chain(words.iter().map(String::as_str)));
     let refused = |usage: clap::Error| {
         let text = usage.render().to_string();
-        let message = text.split("\n\nUsage").next().unwrap_or(&text);
+        // What is wrong, without how the program is used and where to read on.
+        let message = text.split("\n\nUsage").next().unwrap_or(&text).split("\n\nFor more").next().unwrap_or(&text);
         Refusal { is_machine: false, message: message.trim_start_matches("error: ").trim_end().to_owned() }
     };
     let none = Refusal { is_machine: false, message: "there is no command".to_owned() };
