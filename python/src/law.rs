@@ -46,7 +46,7 @@ impl PythonLaw {
     /// The law of an object that has a method `control`, and may have `name`, `sensing_range_m` and `reaches`.
     pub(crate) fn new(object: &Bound<'_, PyAny>, scenario: &Scenario) -> PyResult<Self> {
         let py = object.py();
-        let control = object.getattr_opt(intern!(py, "control"))?.filter(|control| control.is_callable());
+        let control = object.getattr_opt(intern!(py, "control"))?.filter(PyAnyMethods::is_callable);
         let Some(control) = control else {
             let kind = object.get_type().qualname()?;
             return Err(wrong_type(format!(

@@ -3,6 +3,8 @@
 //!
 //! Nothing here judges, flies or reads: `tautline` does, and this crate translates.
 
+#![expect(clippy::needless_pass_by_value, reason = "Python gives what it hands over")]
+
 mod arrays;
 mod audit;
 mod errors;

@@ -29,6 +29,9 @@ pub(crate) struct Simulation {
 /// Someone closer than delta: the pair, from 1, from when to when \[s\], and how close \[m\].
 type Violation = ((usize, usize), f64, f64, f64);
 
+/// The closest two: the pair, from 1, how far apart \[m\], and when \[s\].
+type Closest = ((usize, usize), f64, f64);
+
 impl Simulation {
     /// Does something with the simulation, unless somebody else does.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut sim::Simulation) -> T + Send) -> PyResult<T> {
@@ -158,7 +161,7 @@ impl Simulation {
 
     /// The closest pair so far, from 1, how far apart, and when.
     #[getter]
-    fn closest(&self, py: Python<'_>) -> PyResult<Option<((usize, usize), f64, f64)>> {
+    fn closest(&self, py: Python<'_>) -> PyResult<Option<Closest>> {
         let closest = self.with(py, |simulation| simulation.closest())?;
         Ok(closest.map(|closest| (numbers(closest.pair), closest.separation_m, closest.time_s)))
     }

@@ -5,7 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Parser as _;
 
-use super::audit::{Recorded, judge as judge_file, judge_recorded};
+use super::audit::{Recorded, judge_recorded};
+use super::audits::one;
 use super::caller::by_program;
 use super::console::Console;
 use super::diagnostic::{Exit, Failure};
@@ -82,11 +83,11 @@ pub fn judge(
     if arguments.reading.recordings().len() > 1 {
         return Err(refused("several recordings are given, and one is judged (judge each by itself, or join them)"));
     }
-    arguments.check_outputs()?;
     let console = Console { data_on_stdout: true, quiet: true };
     let work = || match held {
-        None => judge_file(&arguments, console),
+        None => Ok(one(arguments, console)?.report),
         Some(held) => {
+            arguments.check_outputs()?;
             let recorded = Recorded { own: None, own_limit_m: None, command: held.command.to_owned(), open: held.open };
             judge_recorded(&arguments, recorded, console)
         }
@@ -120,6 +121,6 @@ fn parsed(words: &[String]) -> Result<Command, Refusal> {
 
 impl From<Failure> for Refusal {
     fn from(failure: Failure) -> Self {
-        Self { is_machine: failure.is_machine(), message: failure.in_full() }
+        Self { is_machine: failure.exit() == Exit::MachineFailed, message: failure.in_full() }
     }
 }

@@ -93,11 +93,6 @@ impl Failure {
         Self { exit, said: Box::new(MietteDiagnostic::new(harmless(&message.into()))), source: None }
     }
 
-    /// Whether the machine failed and not the input.
-    pub(super) fn is_machine(&self) -> bool {
-        self.exit == Exit::MachineFailed
-    }
-
     /// Where in a text it is wrong, what is, and what helps, on one line.
     pub(super) fn in_full(&self) -> String {
         let place = || {
@@ -106,6 +101,11 @@ impl Failure {
             Some(format!("{}, line {}: ", text.name(), 1 + before.matches('\n').count()))
         };
         place().unwrap_or_default() + &self.in_words()
+    }
+
+    /// How the program ends by it.
+    pub(super) fn exit(&self) -> Exit {
+        self.exit
     }
 
     /// What is wrong and what helps, on one line.
