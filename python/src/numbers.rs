@@ -19,7 +19,9 @@ pub(crate) fn borrowed<'py, D: Dimension>(
     axes: &str,
 ) -> PyResult<PyReadonlyArray<'py, f64, D>> {
     if given.hasattr("mask")? {
-        return Err(wrong_type(format!("{what}: a masked array says nothing of what it hides; give it as .filled(numpy.nan)")));
+        return Err(wrong_type(format!(
+            "{what}: a masked array says nothing of what it hides; give it as .filled(numpy.nan)"
+        )));
     }
     let Ok(array) = given.cast::<PyUntypedArray>() else {
         let kind = given.get_type().qualname()?;

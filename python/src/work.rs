@@ -75,7 +75,7 @@ impl Signals {
     /// Whether none has been raised.
     pub(crate) fn are_silent(&mut self) -> bool {
         if self.looked.elapsed() >= SIGNALS_EVERY {
-            self.raised = Python::attach(Python::check_signals).err();
+            self.raised = Python::attach(|py| py.check_signals().err());
             self.looked = Instant::now();
         }
         self.raised.is_none()
