@@ -101,6 +101,11 @@ class Audit:
         return Findings(self._report["obstacles"]["closest"])
 
     @property
+    def limits(self) -> Findings:
+        """What vehicles did by themselves, where ``limit`` or ``fence`` asked: each limit with its verdict, as in the JSON."""
+        return Findings(self._report["limits"])
+
+    @property
     def vehicles(self) -> list[str]:
         """Names of the vehicles."""
         return list(self._report["vehicles"])
@@ -165,6 +170,9 @@ def audit(
     radius: float | Mapping[str, float] | None = None,
     ellipsoid: Sequence[float] | None = None,
     obstacles: PathLike | None = None,
+    limit: Mapping[str, float] | None = None,
+    fence: PathLike | None = None,
+    config: PathLike | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
     above: float | None = None,
@@ -187,7 +195,9 @@ def audit(
     ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep
     max(delta, r1 + r2). ``ellipsoid`` (3,) [m] are half axes of what must stay empty, with delta scaled by them. ``motion`` says what
     happens between samples: ``linear``, ``hold``, ``polynomial``, ``bounded`` (with ``max_accel`` [m/s^2]). ``obstacles`` is a TOML
-    file. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
+    file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2], ``height`` [m]; ``fence`` is a TOML file of
+    what each must stay within. Of a file, ``config`` is a ``tautline.toml`` that fills what is not asked here; the one beside the
+    recording unless given. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
     judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap.
 
     Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
@@ -198,26 +208,28 @@ def audit(
     words += options(motion=motion, expect_vehicles=expect_vehicles)
     words += of_each("--max-accel", max_accel, "max_accel") + of_each("--radius", radius, "radius")
     words += [] if ellipsoid is None else [f"--ellipsoid={numbers(ellipsoid, 'ellipsoid')}"]
-    words += [] if obstacles is None else [f"--obstacles={path(obstacles, 'obstacles')}"]
+    files = {"obstacles": obstacles, "fence": fence, "config": config}
+    given = [path(file, what) for what, file in files.items() if file is not None]
+    words += [f"--{what}={path(file, what)}" for what, file in files.items() if file is not None]
+    words += [f"--limit={what}={number(most, 'limit')}" for what, most in (limit or {}).items()]
     for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap)):
         words += [] if value is None else [f"--{option}={number(value, option)}"]
     words += [f"--ids={quoted(name)}" for name in ids or ()]
     words += [f"--offset={name}={number(seconds, 'offset')}" for name, seconds in (offset or {}).items()]
     if positions is None:
-        return of_files(words + reading(**read_as), t, obstacles, velocities is not None or names is not None)
+        return of_files(words + reading(**read_as), t, given, velocities is not None or names is not None)
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
-    inputs = [] if obstacles is None else [obstacles]
-    return with_files(inputs, lambda: of_arrays(words, t, positions, velocities, names))
+    return with_files(given, lambda: of_arrays(words, t, positions, velocities, names))
 
 
-def of_files(words: list[str], t: object, obstacles: PathLike | None, has_more: bool) -> Audit:
+def of_files(words: list[str], t: object, beside: list[str], has_more: bool) -> Audit:
     if isinstance(t, np.ndarray):
         raise TypeError("positions: an array (T, N, 3) is needed beside the times, or a path in their place")
     if has_more:
         raise TypeError("velocities and names belong to arrays, and a recording is given")
     files = paths(t, "t")
-    inputs = files + ([] if obstacles is None else [os.fspath(obstacles)])
+    inputs = files + beside
 
     def judged(*more: str) -> Judged:
         ask = [*words, *more, "--", *files]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
 
 from ._native import Error
 
@@ -16,12 +17,9 @@ PathLike = str | os.PathLike[str]
 
 def number(value: object, what: str) -> str:
     """A number in digits that read back to the same bits."""
-    if isinstance(value, bool):
-        raise TypeError(f"{what}: a number is needed, not a bool")
-    try:
-        return repr(float(value))  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise TypeError(f"{what}: a number is needed, not {type(value).__name__}") from None
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise TypeError(f"{what}: a number is needed, not {type(value).__name__}")
+    return repr(float(value))
 
 
 def numbers(value: Iterable[object], what: str) -> str:
@@ -63,9 +61,7 @@ def path(value: object, what: str) -> str:
     """A path as text that is never taken for an option."""
     if not isinstance(value, (str, os.PathLike)):
         raise TypeError(f"{what}: a path is needed, not {type(value).__name__}")
-    text: str | bytes = os.fspath(value)
-    if isinstance(text, bytes):
-        raise TypeError(f"{what}: a path of text is needed, not of bytes")
+    text = os.fspath(value)
     return f".{os.sep}{text}" if text.startswith("-") else text
 
 
@@ -82,12 +78,9 @@ def with_files(files: Iterable[PathLike], do: Callable[[], T]) -> T:
     try:
         return do()
     except Error as error:
-        missing = next((file for file in files if not Path(file).exists()), None)
-        if missing is None:
+        if all(Path(file).exists() for file in files):
             raise
-        absent = FileNotFoundError(str(error))
-        absent.errno, absent.filename = errno.ENOENT, os.fspath(missing)
-        raise absent from None
+        raise FileNotFoundError(str(error)) from None
 
 
 def reading(
