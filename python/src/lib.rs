@@ -28,13 +28,13 @@ mod _native {
     #[pymodule_export]
     use super::errors::Error;
     #[pymodule_export]
-    use super::flight::fly;
+    use super::flight::{Flown, fly};
     #[pymodule_export]
     use super::observation::Observation;
     #[pymodule_export]
     use super::program::{call, main};
     #[pymodule_export]
-    use super::read::read;
+    use super::read::{Columns, read};
     #[pymodule_export]
     use super::scenario::Scenario;
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! A flight that the caller steps.
 
 use std::sync::{Mutex, TryLockError};
+use std::time::{Duration, Instant};
 
 use numpy::PyArray2;
 use numpy::PyUntypedArrayMethods as _;
@@ -15,8 +16,8 @@ use crate::numbers::{borrowed, shown, table, to_rows};
 use crate::scenario::Scenario;
 use crate::work::here;
 
-/// Steps that are flown between two looks at Ctrl-C.
-const STEPS_AT_ONCE: u64 = 256;
+/// Steps are flown for so long between two looks at Ctrl-C.
+const AT_ONCE: Duration = Duration::from_millis(50);
 
 /// A flight under way.
 #[pyclass(frozen, module = "tautline._native")]
@@ -101,11 +102,11 @@ impl Simulation {
         }
         let mut left = steps;
         while left > 0 {
-            let now = left.min(STEPS_AT_ONCE);
-            let flown = self.with(py, |simulation| -> Result<bool, SimError> {
-                for _ in 0..now {
+            let flown = self.with(py, |simulation| -> Result<u64, SimError> {
+                let (began, mut flown) = (Instant::now(), 0);
+                while flown < left && began.elapsed() < AT_ONCE {
                     if simulation.ending().is_some() {
-                        return Ok(false);
+                        return Ok(left);
                     }
                     match commands {
                         Some(commands) => simulation.step_with(commands)?,
@@ -114,14 +115,12 @@ impl Simulation {
                     // What is recorded elsewhere is for nobody here.
                     simulation.events().for_each(drop);
                     simulation.sample();
+                    flown += 1;
                 }
-                Ok(true)
+                Ok(flown)
             })?;
             self.raise(py)?;
-            if !flown.map_err(SimError::raised)? {
-                break;
-            }
-            left -= now;
+            left -= flown.map_err(SimError::raised)?;
             py.check_signals()?;
         }
         Ok(())

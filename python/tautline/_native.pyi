@@ -4,6 +4,21 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Columns",
+    "Error",
+    "Flown",
+    "Observation",
+    "Scenario",
+    "Simulation",
+    "audit",
+    "audit_in_rust",
+    "call",
+    "fly",
+    "main",
+    "read",
+]
+
 class Error(ValueError):
     """The input is wrong: the message names the place, the value and the remedy, as the command line does."""
 

@@ -1,6 +1,7 @@
 """Types: the package passes mypy, its stub is what the native module is, and everything public says what it is."""
 
 import inspect
+import os
 import subprocess
 import sys
 import unittest
@@ -24,8 +25,10 @@ class Types(unittest.TestCase):
         wrong = "import tautline as tl\ntl.audit('a.csv', delta='1.5')\n"
         right = "import tautline as tl\nx: float | None = tl.audit('a.csv', delta=1.5).separation_m\n"
         for code, text in ((1, wrong), (0, right)):
-            ran = subprocess.run([sys.executable, "-m", "mypy", "-c", text], cwd=ROOT / "python", capture_output=True, text=True, check=False, timeout=600)
-            self.assertEqual(ran.returncode, code, ran.stdout)
+            words = [sys.executable, "-m", "mypy", "--strict", "-c", text]
+            environment = {**os.environ, "MYPYPATH": str(ROOT / "python")}
+            ran = subprocess.run(words, cwd=ROOT / "tests", env=environment, capture_output=True, text=True, check=False, timeout=600)
+            self.assertEqual(ran.returncode, code, ran.stdout + ran.stderr)
 
     def test_everything_public_says_what_it_is(self) -> None:
         for name in tl.__all__:
