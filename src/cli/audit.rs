@@ -57,6 +57,7 @@ pub(super) fn judge_recorded(
     let own_delta_m = own_delta_m.filter(|_| is_silent && own_ellipsoid_m.is_none());
     settings.delta_m = settings.delta_m.or(own_delta_m);
     settings.ellipsoid_m = settings.ellipsoid_m.or(own_ellipsoid_m);
+    settings.is_own_limit = is_silent && arguments.obstacles.is_none();
     settings.is_told_scaled = own.as_ref().is_some_and(|own| own.ellipsoid_m.is_some());
     let own_obstacles = own
         .as_ref()

@@ -44,6 +44,7 @@ mod schema;
 #[cfg(feature = "viewer")]
 mod snapshots;
 mod summary;
+mod text_file;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;

@@ -9,7 +9,7 @@ const MOST_CORNERS: usize = 4096;
 /// Part of a distance outside that it is told to.
 const RESOLUTION: f64 = 1e-9;
 /// Parts of a line outside that are looked at.
-const MOST_PARTS: usize = 1000;
+const MOST_PARTS: usize = 100;
 
 /// A polygon in the plane of x and y, convex or not, and perhaps a range of heights, that every vehicle must stay within.
 #[derive(Clone, Debug, PartialEq)]

@@ -24,7 +24,7 @@ impl RecordedReport {
     /// The verdict in one line.
     #[must_use]
     pub fn headline(&self) -> String {
-        format!("{}: {}", self.verdict(), self.finding())
+        one_line(&format!("{}: {}", self.verdict(), self.finding()))
     }
 
     /// The verdict alone, such as `PROVED CLEAR`.
@@ -97,7 +97,7 @@ impl RecordedReport {
         let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
         if let Some(OfPair { who: [first, second], finding }) = closest {
             let rate =
-                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
+                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
             let (low, high, at) = (at_least(finding.lower_m, 6), at_most(finding.upper_m, 6), seconds(finding.to_s));
             return if finding.upper_m.is_finite() {
                 format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
@@ -143,7 +143,7 @@ impl RecordedReport {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let mut line = |words: String| {
-            let _ = writeln!(text, "{words}");
+            let _ = writeln!(text, "{}", one_line(&words));
         };
         let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
         line(format!(
@@ -232,6 +232,11 @@ impl RecordedReport {
     }
 }
 
+/// Words with foreign names in them, on one line whatever the names hold.
+fn one_line(words: &str) -> String {
+    words.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
 /// The first of some lines, and how many more there are.
 fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
     let rest = lines.len().saturating_sub(most);
@@ -255,7 +260,7 @@ impl OfPair<Violation<ObjectPair>> {
 impl OfPair<Undecided<ObjectPair>> {
     pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
-        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
+        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
         let apart = if finding.upper_m.is_finite() {
             interval(finding.lower_m, finding.upper_m)
         } else {
