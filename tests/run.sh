@@ -22,4 +22,8 @@ if [ $# = 0 ]; then
     for tests in tests/cluster tests/ci tests/docs; do
         target/cluster/bin/python -m unittest discover --verbose --start-directory "$tests"
     done
+
+    # The Python package, as its users build it but for the optimisation.
+    VIRTUAL_ENV="$PWD/target/python" target/python/bin/maturin develop --manifest-path python/Cargo.toml
+    target/python/bin/python -m unittest discover --verbose --start-directory tests/python
 fi

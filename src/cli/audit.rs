@@ -1,13 +1,17 @@
 //! `tautline audit`: judge a recording, whoever made it.
 
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 use super::Failure;
 use super::audit_arguments::AuditArguments;
+use super::caller;
 use super::console::{self, Console};
 use super::encounters;
+use super::own::OwnRecording;
+use super::reading::Open;
 use crate::audit::recorded::{Outcome, RecordedError, TrackAuditor};
-use crate::read::{self, ReadOptions};
+use crate::read;
 use crate::report::recorded::{Clock, RecordedReport, Source};
 use crate::report::write_atomically;
 use crate::track::Item;
@@ -17,12 +21,38 @@ const OPENING: usize = 65_536;
 
 /// Judges one recording and says so, with a page where one is asked for.
 pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<RecordedReport, Failure> {
-    let mut settings = arguments.settings()?;
     let options = arguments.reading.options(arguments.format)?;
-    let own = arguments.reading.own(arguments.format, options.scale);
+    let recorded = Recorded {
+        own: arguments.reading.own(arguments.format, options.scale),
+        own_limit_m: read::own_limit_m(&arguments.reading.recording, &options),
+        command: console::command_line(caller::words().iter().map(String::as_str)),
+        open: &|| arguments.reading.open(&options),
+    };
+    judge_recorded(arguments, recorded, console)
+}
+
+/// What is judged.
+pub(super) struct Recorded<'a> {
+    /// What it says of itself, where it is ours.
+    pub(super) own: Option<OwnRecording>,
+    /// How close vehicles may come, where it says that itself \[m\].
+    pub(super) own_limit_m: Option<f64>,
+    /// The command that judges it again, for a person.
+    pub(super) command: String,
+    /// Opens it, each time from its beginning.
+    pub(super) open: &'a Open<'a>,
+}
+
+/// As [`judge`], of what is opened by the caller.
+pub(super) fn judge_recorded(
+    arguments: &AuditArguments,
+    recorded: Recorded<'_>,
+    console: Console,
+) -> Result<RecordedReport, Failure> {
+    let mut settings = arguments.settings()?;
+    let Recorded { own, own_limit_m, command, open } = recorded;
     let is_silent = arguments.delta.is_none() && arguments.radius.is_empty() && arguments.ellipsoid.is_none();
-    let own_delta_m =
-        own.as_ref().map(|own| own.delta_m).or_else(|| read::own_limit_m(&arguments.reading.recording, &options));
+    let own_delta_m = own.as_ref().map(|own| own.delta_m).or(own_limit_m);
     let own_ellipsoid_m = own.as_ref().and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
     let own_delta_m = own_delta_m.filter(|_| is_silent && own_ellipsoid_m.is_none());
     settings.delta_m = settings.delta_m.or(own_delta_m);
@@ -40,7 +70,7 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
-    let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
+    let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, open, console)?;
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);
     }
@@ -75,8 +105,8 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
     if let Some(html) = &arguments.html {
-        let figures = encounters::figures(&arguments.reading, &options, &settings, &outcome)?;
-        write_atomically(html, report.to_html(&figures, &command()).as_bytes())?;
+        let figures = encounters::figures(open, &settings, &outcome)?;
+        write_atomically(html, report.to_html(&figures, &command).as_bytes())?;
     }
     Ok(report)
 }
@@ -93,15 +123,19 @@ struct Judged {
 fn judged(
     mut auditor: TrackAuditor,
     arguments: &AuditArguments,
-    options: &ReadOptions,
+    open: &Open<'_>,
     console: Console,
 ) -> Result<Judged, Failure> {
     let called = arguments.reading.called();
-    let mut recording = arguments.reading.open(options)?;
+    let mut recording = open()?;
+    let interrupted = caller::interruption();
     let progress = console.counter(called.clone());
     let mut items = Vec::new();
     let (mut more, mut first, mut read, mut curves) = (true, true, 0, true);
     while more {
+        if interrupted.as_ref().is_some_and(|interrupted| interrupted.load(Ordering::Relaxed)) {
+            return Err(Failure::machine("interrupted"));
+        }
         items.clear();
         while more && (items.is_empty() || (first && items.len() < OPENING)) {
             more = recording.read(&mut items)?;
@@ -120,12 +154,6 @@ fn judged(
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
     let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
     Ok(Judged { outcome, clock, notes: recording.notes().to_vec(), curves })
-}
-
-/// The command as it was given, for a shell.
-fn command() -> String {
-    let words: Vec<String> = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
-    console::command_line(words.iter().map(String::as_str))
 }
 
 impl From<RecordedError> for Failure {

@@ -15,7 +15,7 @@ use super::own::OwnRecording;
 use super::reading::{self, ReadArguments, one_of};
 use crate::audit::envelope::Limit;
 use crate::audit::recorded::{Motion, Outcome, Settings, VehicleSettings};
-use crate::read::Format;
+use crate::read::{Format, Recording};
 use crate::report::recorded::{Basis, Between};
 use crate::text::counted;
 
@@ -175,6 +175,11 @@ fn axes(text: &str) -> Result<Vector3<f64>, String> {
 }
 
 impl AuditArguments {
+    /// Opens the recording.
+    pub(super) fn open(&self) -> Result<Recording, Failure> {
+        Ok(self.reading.open(&self.reading.options(self.format)?)?)
+    }
+
     pub(super) fn settings(&self) -> Result<Settings, Failure> {
         let mut vehicles: BTreeMap<String, VehicleSettings> = BTreeMap::new();
         let (mut radius_m, mut max_accel_m_s2) = (None, None);

@@ -52,7 +52,7 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
 }
 
 /// Judges one recording as it and the file of settings beside it ask.
-fn one(arguments: AuditArguments, console: Console) -> Result<Judgement, Failure> {
+pub(super) fn one(arguments: AuditArguments, console: Console) -> Result<Judgement, Failure> {
     let arguments = audit_config::configured(arguments)?;
     arguments.check_outputs()?;
     let report = judge(&arguments, console)?;

@@ -1,26 +1,20 @@
 //! Those who came closest in a recording, as figures.
 
 use super::Failure;
-use super::reading::ReadArguments;
+use super::reading::Open;
 use crate::audit::recorded::{Approach, Outcome, PairSeries, RecordedError, Settings};
 use crate::figures::{self, Encounter, Figure};
-use crate::read::ReadOptions;
 use crate::report::recorded::interval;
 
 /// Pairs, and approaches to obstacles, that are drawn.
 const DRAWN: usize = 3;
 
 /// Reads the recording again for those who came closest.
-pub(super) fn figures(
-    reading: &ReadArguments,
-    options: &ReadOptions,
-    settings: &Settings,
-    outcome: &Outcome,
-) -> Result<Vec<Figure>, Failure> {
+pub(super) fn figures(open: &Open<'_>, settings: &Settings, outcome: &Outcome) -> Result<Vec<Figure>, Failure> {
     let follow = |approach: &Approach| Ok((PairSeries::new(settings, outcome, approach.pair)?, *approach));
     let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();
     let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
-    let mut recording = reading.open(options)?;
+    let mut recording = open()?;
     let (mut items, mut more) = (Vec::new(), !(pairs.is_empty() && obstacles.is_empty()));
     while more {
         items.clear();

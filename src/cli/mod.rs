@@ -8,6 +8,8 @@ mod audit;
 mod audit_arguments;
 mod audit_config;
 mod audits;
+mod call;
+mod caller;
 mod campaign;
 mod campaign_worst;
 mod check;
@@ -47,9 +49,16 @@ mod view;
 #[cfg(feature = "viewer")]
 mod worst;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::Once;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+
+pub use call::{Answer, Held, Refusal, call, judge, open};
+pub use pictures::flight_page;
+
+pub use crate::figures::RunHistory;
 
 use crate::read;
 use diagnostic::{Exit, Failure};
@@ -104,28 +113,38 @@ enum Command {
 
 /// Keeps the panic hook from speaking of what becomes an error anyway.
 fn quiet_guarded_panics() {
-    let speak = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        #[cfg(feature = "viewer")]
-        if crate::render::is_in_window_library() {
-            std::process::exit(view::lose_display() as i32);
-        }
-        if !read::is_guarded() {
-            speak(panic);
-        }
-    }));
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let speak = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            #[cfg(feature = "viewer")]
+            if crate::render::is_in_window_library() {
+                std::process::exit(view::lose_display() as i32);
+            }
+            if !read::is_guarded() {
+                speak(panic);
+            }
+        }));
+    });
 }
 
 /// Runs the program with the arguments of the process.
 #[must_use]
 pub fn main() -> ExitCode {
+    entry(&std::env::args_os().collect::<Vec<_>>()).into()
+}
+
+/// Runs the program with these arguments, the first of which is its own name, and gives its exit code.
+#[must_use]
+pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
-    let arguments = match Arguments::try_parse() {
+    caller::by_person(arguments.iter().skip(1).map(|word| word.to_string_lossy().into_owned()).collect());
+    let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
             // A closed pipe is the reader's choice.
             let _ = usage.print();
-            return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good }.into();
+            return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good } as u8;
         }
     };
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::parse_from(["run"])));
@@ -138,7 +157,12 @@ pub fn main() -> ExitCode {
     } {
         driver::silence();
     }
-    let done = match command {
+    obey(command).unwrap_or_else(Failure::show) as u8
+}
+
+/// Does what a command asks for.
+fn obey(command: Command) -> Result<Exit, Failure> {
+    match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Audit(arguments) => audits::audits(&arguments),
         Command::Check(arguments) => check::check(&arguments),
@@ -155,8 +179,7 @@ pub fn main() -> ExitCode {
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments, &mut Arguments::command()),
-    };
-    done.unwrap_or_else(Failure::show).into()
+    }
 }
 
 #[cfg(test)]

@@ -149,9 +149,14 @@ impl Preflight {
     /// # Errors
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
-        let law = scenario.law()?;
+        Ok(Self::under(scenario, scenario.law()?.as_ref()))
+    }
+
+    /// As [`Preflight::of`], under another law than the scenario's.
+    #[must_use]
+    pub fn under(scenario: &Scenario, law: &dyn Law) -> Self {
         let start = scenario.observation(&scenario.start);
-        let certificate = scenario.certificate(law.as_ref());
+        let certificate = scenario.certificate(law);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
         let drift = scenario.drift(law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()));
@@ -195,8 +200,8 @@ impl Preflight {
                     scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
                 },
             ),
-            dt_links_s: links_step_s(law.as_ref(), scenario),
-            margins: margins::margins(law.as_ref(), scenario),
+            dt_links_s: links_step_s(law, scenario),
+            margins: margins::margins(law, scenario),
             samples: scenario.time.samples(),
             recording_bytes: scenario.time.samples() * TimeSpec::BYTES_PER_VEHICLE * scenario.count() as u64,
             start_dimension: motion_dimension(&scenario.start),
@@ -211,7 +216,7 @@ impl Preflight {
             barrier_m: law.barrier_m(),
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
-        let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
+        let undamped = found.relative_velocity_unstable(law, scenario);
         if scenario.wind.is_still()
             && certificate.void == [Void::GraphNotComplete]
             && found.velocity_margin_per_s.is_some()
@@ -223,7 +228,7 @@ impl Preflight {
         let warnings = [
             (Code::RelativeVelocityUnstable, undamped),
             (trap, found.start_too_flat()),
-            (Code::StepTooLong, step_too_long(law.as_ref(), scenario)),
+            (Code::StepTooLong, step_too_long(law, scenario)),
             (Code::DriftUnresolved, found.drift_unresolved(scenario)),
             (Code::BeyondMargin, margins::beyond(&found.margins, scenario)),
             (Code::NoCertificate, found.no_certificate()),
@@ -233,7 +238,7 @@ impl Preflight {
         ];
         let said = |(code, message): (Code, Option<String>)| Some(Warning { code, message: message? });
         found.warnings = warnings.into_iter().filter_map(said).collect();
-        Ok(found)
+        found
     }
 
     /// Stable names of the warnings that refuse the flight ([`Code::refuses`]).

@@ -155,6 +155,11 @@ impl Judge {
         Some(if is_violated { least_m.min(-f64::MIN_POSITIVE) } else { least_m.max(0.0) })
     }
 
+    /// The closest that two vehicles came so far.
+    pub(super) fn least_separation(&self) -> Option<ClosestApproach> {
+        self.auditor.closest()
+    }
+
     /// Who came closest to which obstacle so far.
     pub(super) fn closest_to_obstacles(&self) -> impl Iterator<Item = Event> + '_ {
         let closest = self.clearance.iter().flat_map(ClearanceAuditor::closest);

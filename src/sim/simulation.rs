@@ -14,7 +14,7 @@ use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Peaks, Sample};
 use crate::scenario::Scenario;
-use crate::swarm::{Rows, Swarm, first_row_not_finite};
+use crate::swarm::{ClosestApproach, Rows, Swarm, first_row_not_finite};
 
 /// A flight under way: law, link, supervisor, vehicles and judge, with everything that any of them remembers.
 ///
@@ -241,6 +241,19 @@ impl Simulation {
     #[must_use]
     pub fn least_clearance_m(&self) -> Option<f64> {
         self.judge.least_clearance_m()
+    }
+
+    /// The closest that two vehicles came so far, between steps included \[m\]; in scaled lengths where what must stay empty
+    /// around a vehicle is an ellipsoid ([`crate::space::Metric`]). None of fewer than two vehicles.
+    #[must_use]
+    pub fn closest(&self) -> Option<ClosestApproach> {
+        self.judge.least_separation()
+    }
+
+    /// The smallest distance of two vehicles over the last step \[m\], in the same lengths; at the start, of the start.
+    #[must_use]
+    pub fn separation_m(&self) -> f64 {
+        self.judge.nearest_m
     }
 
     /// Takes what happened since this was asked last, in its order.

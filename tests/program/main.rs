@@ -6,6 +6,7 @@ mod program;
 mod archives;
 mod attack;
 mod audit;
+mod calls;
 mod campaign;
 mod check;
 mod compare;

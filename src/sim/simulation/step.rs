@@ -144,6 +144,7 @@ impl Simulation {
             self.motion.apply(&self.control, &mut self.state);
         }
         let Self { judge, controller, state, control, time_s, events, .. } = self;
+        let may_move = !controller.law.stays_in_its_thread();
         let (state, time_s): (&Swarm, f64) = (state, *time_s);
         let mut audit = || {
             let began = Instant::now();
@@ -158,7 +159,7 @@ impl Simulation {
             let began = Instant::now();
             (controller.act(time_s, state, is_asked.then_some(control)), began.elapsed())
         };
-        let side_by_side = state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
+        let side_by_side = may_move && state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
         let ((judged, audit_time), (commanded, law_time)) =
             if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
         self.performance.audit += audit_time;
