@@ -37,6 +37,7 @@ mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
+mod replays;
 mod run;
 mod scenario;
 mod schema;

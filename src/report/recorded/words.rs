@@ -8,7 +8,8 @@ use super::report::RecordedReport;
 use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
-use crate::report::page::{self, Badge, Markup, Page, Tone, section};
+use crate::replay::{NoReplay, Replay};
+use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};
 use crate::text::{at_least, at_most, counted, exact, fixed, metres_below, seconds};
 
 /// Violations that are listed in words, and on the page.
@@ -174,10 +175,14 @@ impl RecordedReport {
         text
     }
 
-    /// The report as a self-contained HTML page.
+    /// The report as a self-contained HTML page, with the replay of the recording or why there is none.
     #[must_use]
-    pub fn to_html(&self, figures: &[Figure], command: &str) -> String {
-        let mut sections = Vec::new();
+    pub fn to_html(&self, replay: &Result<Replay, NoReplay>, figures: &[Figure], command: &str) -> String {
+        let replay = match replay {
+            Ok(replay) => page::replay(&self.source.recording, replay, Start::AtOnce),
+            Err(why) => page::no_replay(&why.to_string()),
+        };
+        let mut sections = vec![section("Replay", &[replay])];
         if !self.closest.is_empty() {
             sections.push(section("Closest pairs", &[closest_table(&self.closest)]));
         }
@@ -223,7 +228,7 @@ impl RecordedReport {
             warnings: Vec::new(),
             sections,
         }
-        .render()
+        .render_with_replays()
     }
 }
 
@@ -235,7 +240,7 @@ fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
 }
 
 impl OfPair<Violation<ObjectPair>> {
-    fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
         let min = metres_below(finding.min_m, finding.limit_m);
         format!(
@@ -248,7 +253,7 @@ impl OfPair<Violation<ObjectPair>> {
 }
 
 impl OfPair<Undecided<ObjectPair>> {
-    fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
         let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
         let apart = if finding.upper_m.is_finite() {
