@@ -61,6 +61,7 @@ pub use call::{Answer, Held, Refusal, call, judge, open};
 pub use pictures::flight_page;
 
 pub use crate::figures::RunHistory;
+pub use crate::replay::Film;
 
 use crate::read;
 use diagnostic::{Exit, Failure};
