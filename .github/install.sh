@@ -27,20 +27,19 @@ for file in "$name.tar.gz" "$name.tar.gz.sha256"; do
         exit 3
     }
 done
-(
-    cd "$work"
-    if command -v sha256sum >/dev/null; then
-        sha256sum --check --quiet "$name.tar.gz.sha256"
-    else
-        shasum -a 256 --check "$name.tar.gz.sha256" >/dev/null
-    fi
-) || {
+# Of the archive itself, whatever file the checksum is said to be of.
+if command -v sha256sum >/dev/null; then found=$(sha256sum <"$work/$name.tar.gz"); else found=$(shasum -a 256 <"$work/$name.tar.gz"); fi
+if [ "${found%% *}" != "$(cut -d ' ' -f 1 "$work/$name.tar.gz.sha256")" ]; then
     echo "$name.tar.gz is not what its checksum says: it is not installed" >&2
     exit 3
-}
+fi
 tar -xzf "$work/$name.tar.gz" -C "$work"
 mkdir -p "$folder"
-for program in tautline tautline.exe; do
-    if [ -f "$work/$name/$program" ]; then mv -f "$work/$name/$program" "$folder/"; fi
-done
+program=tautline
+case "$system" in *windows*) program=tautline.exe ;; esac
+if [ ! -f "$work/$name/$program" ]; then
+    echo "$name.tar.gz has no $program: nothing is installed" >&2
+    exit 3
+fi
+mv -f "$work/$name/$program" "$folder/"
 echo "$folder"

@@ -59,6 +59,8 @@ pub mod link;
 pub mod margin;
 pub mod metrics;
 pub mod observation;
+#[cfg(any(feature = "pictures", feature = "reports"))]
+pub mod plan;
 pub mod plant;
 pub mod preflight;
 #[cfg(feature = "recordings")]
@@ -66,6 +68,8 @@ pub mod read;
 pub mod record;
 #[cfg(feature = "pictures")]
 pub mod render;
+#[cfg(feature = "reports")]
+pub mod replay;
 #[cfg(feature = "reports")]
 pub mod report;
 #[cfg(feature = "reports")]

@@ -16,10 +16,10 @@ sh tests/setup.sh
 cargo test --release --no-default-features --test bits
 cargo test "$@"
 
-# Campaigns on a cluster, and what others' continuous integration is given, with the program that was just built; arguments ask
-# for some of cargo's tests alone.
+# Campaigns on a cluster, what others' continuous integration is given, and every command of the docs, with the program that was
+# just built; arguments ask for some of cargo's tests alone.
 if [ $# = 0 ]; then
-    for tests in tests/cluster tests/ci; do
+    for tests in tests/cluster tests/ci tests/docs; do
         target/cluster/bin/python -m unittest discover --verbose --start-directory "$tests"
     done
 

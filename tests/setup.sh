@@ -18,6 +18,17 @@ if ! command -v chromium >/dev/null 2>&1; then
     $sudo apt-get install -y --no-install-recommends chromium fonts-dejavu-core
 fi
 
+# The compiler that checks the types of the script of replays.
+if ! target/typescript/node_modules/.bin/tsc --version >/dev/null 2>&1; then
+    if ! command -v npm >/dev/null 2>&1; then
+        sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+        $sudo apt-get update
+        $sudo apt-get install -y --no-install-recommends nodejs npm
+    fi
+    mkdir -p target/typescript
+    npm install --silent --no-audit --no-fund --prefix target/typescript 'typescript@5'
+fi
+
 # A driver in software where no graphics driver is installed: tests/viewer fails without one.
 if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)

@@ -4,7 +4,8 @@ use super::bins::Varied;
 use super::result::{LawSummary, Quantiles, Summary};
 use super::words::{interval, number, p_value, percent};
 use crate::figures::{Figure, Share as Point, histograms, shares};
-use crate::report::page::{self, Badge, Markup, Page, Picture, Render as _, Tone, noted, section};
+use crate::replay::{NoReplay, Replay};
+use crate::report::page::{self, Badge, Markup, Page, Picture, Render as _, Start, Tone, noted, section};
 use crate::statistics::{Estimate, Proportion};
 use crate::text::metres;
 
@@ -36,6 +37,8 @@ pub struct WorstFlight {
     pub recording: Option<String>,
     /// It at its worst moment.
     pub picture: Option<Picture>,
+    /// The flight itself, or why it cannot be replayed.
+    pub replay: Option<Result<Replay, NoReplay>>,
 }
 
 /// What the numbers rest on.
@@ -94,7 +97,7 @@ impl Summary {
             warnings: Vec::new(),
             sections,
         }
-        .render()
+        .render_with_replays()
     }
 
     /// The page of estimates of rare violations.
@@ -129,7 +132,7 @@ impl Summary {
                 section("Repeat it", &[page::command(page.command), page::command(page.spec)]),
             ],
         }
-        .render()
+        .render_with_replays()
     }
 
     fn shares_table(&self) -> Markup {
@@ -254,6 +257,10 @@ fn worst(page: &CampaignPage<'_>) -> Vec<Markup> {
         let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
         let said: Vec<_> = std::iter::once(flight.said.clone()).chain(recording).collect();
         blocks.push(page::list(&said));
+        blocks.extend(flight.replay.as_ref().map(|replay| match replay {
+            Ok(replay) => page::replay(&flight.said, replay, Start::OnDemand),
+            Err(why) => page::no_replay(&why.to_string()),
+        }));
         blocks.push(page::command(&flight.command));
     }
     blocks

@@ -7,9 +7,9 @@ use super::Failure;
 use super::audit_arguments::AuditArguments;
 use super::caller;
 use super::console::{self, Console};
-use super::encounters;
 use super::own::OwnRecording;
 use super::reading::Open;
+use super::replays::{self, Instants};
 use crate::audit::recorded::{Outcome, RecordedError, TrackAuditor};
 use crate::read;
 use crate::report::recorded::{Clock, RecordedReport, Source};
@@ -57,6 +57,7 @@ pub(super) fn judge_recorded(
     let own_delta_m = own_delta_m.filter(|_| is_silent && own_ellipsoid_m.is_none());
     settings.delta_m = settings.delta_m.or(own_delta_m);
     settings.ellipsoid_m = settings.ellipsoid_m.or(own_ellipsoid_m);
+    settings.is_own_limit = is_silent && arguments.obstacles.is_none();
     settings.is_told_scaled = own.as_ref().is_some_and(|own| own.ellipsoid_m.is_some());
     let own_obstacles = own
         .as_ref()
@@ -70,7 +71,13 @@ pub(super) fn judge_recorded(
     own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
-    let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, open, console)?;
+    let mut instants = arguments.html.as_ref().map(|_| Instants::default());
+    let Judged { mut outcome, clock, mut notes, curves } =
+        judged(auditor, arguments, open, console, &mut |items, names| {
+            if let Some(instants) = &mut instants {
+                instants.note(items, names, &settings);
+            }
+        })?;
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);
     }
@@ -104,9 +111,9 @@ pub(super) fn judge_recorded(
 
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
-    if let Some(html) = &arguments.html {
-        let figures = encounters::figures(open, &settings, &outcome)?;
-        write_atomically(html, report.to_html(&figures, &command).as_bytes())?;
+    if let Some((html, instants)) = arguments.html.as_ref().zip(instants) {
+        let (replay, figures) = replays::of_recording(open, &settings, &outcome, &report, instants)?;
+        write_atomically(html, report.to_html(&replay, &figures, &command).as_bytes())?;
     }
     Ok(report)
 }
@@ -125,6 +132,7 @@ fn judged(
     arguments: &AuditArguments,
     open: &Open<'_>,
     console: Console,
+    note: &mut dyn FnMut(&[Item], &[String]),
 ) -> Result<Judged, Failure> {
     let called = arguments.reading.called();
     let mut recording = open()?;
@@ -146,6 +154,7 @@ fn judged(
         first = false;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
         auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
+        note(&items, recording.vehicles());
         read += items.len() as u64;
         progress.set_position(read);
     }

@@ -217,6 +217,7 @@ impl AuditArguments {
             vehicles,
             only: (!only.is_empty()).then_some(only),
             obstacles: self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)?,
+            is_own_limit: false,
             envelope: envelope::envelope(&self.limit, self.fence.as_deref())?,
         })
     }

@@ -1,13 +1,14 @@
 //! `tautline.toml`: what is asked of the recordings beside it, where the command line does not say otherwise.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::Failure;
 use super::audit_arguments::AuditArguments;
+use super::text_file;
 use crate::audit::envelope::{Limit, Quantity};
 use crate::audit::recorded::Motion;
 
@@ -61,39 +62,32 @@ impl From<MotionName> for Motion {
 }
 
 /// The arguments for one recording, with what its `tautline.toml` asks where they are silent.
-pub(super) fn configured(arguments: AuditArguments) -> Result<AuditArguments, Failure> {
-    let found = match &arguments.config {
-        Some(path) => Some(path.clone()),
-        None if arguments.no_config => None,
-        None => nearest(&arguments.reading.recording),
-    };
-    match found {
-        Some(path) => read(&path)?.fill(arguments, &path),
+pub(super) fn configured(mut arguments: AuditArguments) -> Result<AuditArguments, Failure> {
+    if arguments.config.is_none() && !arguments.no_config {
+        arguments.config = nearest(&arguments.reading.recording);
+        let is_none = arguments.config.as_ref().filter(|path| !path.is_file());
+        if let Some(path) = is_none {
+            return Err(Failure::input(format!("{} is no file", path.display()), HELP));
+        }
+    }
+    match arguments.config.clone() {
+        Some(path) => parse(&text_file::read(&path, MOST_BYTES, HELP)?, &path)?.fill(arguments, &path),
         None => Ok(arguments),
     }
 }
 
 /// The nearest file of that name in the recording's folder and in those above it, up to the working folder; of a recording
-/// that is elsewhere, in its own folder alone.
+/// that is elsewhere, in its own folder alone. Links are followed, so that every name of a recording finds the same one.
 fn nearest(recording: &Path) -> Option<PathBuf> {
-    let here = std::env::current_dir().unwrap_or_default();
-    let shown = recording.strip_prefix(&here).unwrap_or(recording);
-    let folder = if shown.is_dir() { shown } else { shown.parent()? };
-    let is_below = shown.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    let levels = if is_below { usize::MAX } else { 1 };
-    folder.ancestors().take(levels).map(|folder| folder.join(NAME)).find(|file| file.is_file())
-}
-
-fn read(path: &Path) -> Result<AuditTable, Failure> {
-    let cannot = |error: std::io::Error| Failure::input(format!("cannot read {}: {error}", path.display()), HELP);
-    let size = std::fs::metadata(path).map_err(cannot)?.len();
-    if size > MOST_BYTES {
-        return Err(Failure::input(
-            format!("{} has {size} bytes, at most {MOST_BYTES} are read", path.display()),
-            HELP,
-        ));
-    }
-    parse(&std::fs::read_to_string(path).map_err(cannot)?, path)
+    let beside = if recording.is_dir() { recording } else { recording.parent()? };
+    let beside = if beside.as_os_str().is_empty() { Path::new(".") } else { beside };
+    let folder = beside.canonicalize().ok()?;
+    let here = std::env::current_dir().and_then(|here| here.canonicalize()).ok();
+    let above = here.filter(|here| folder.starts_with(here));
+    let levels = above.as_ref().map_or(1, |here| folder.components().count() - here.components().count() + 1);
+    let found =
+        folder.ancestors().take(levels).map(|folder| folder.join(NAME)).find(|file| file.symlink_metadata().is_ok())?;
+    Some(above.and_then(|here| found.strip_prefix(here).map(Path::to_owned).ok()).unwrap_or(found))
 }
 
 fn parse(text: &str, path: &Path) -> Result<AuditTable, Failure> {
@@ -113,6 +107,24 @@ impl AuditTable {
         let asks_otherwise = arguments.delta.is_some() || !arguments.radius.is_empty() || arguments.ellipsoid.is_some();
         if self.ellipsoid_m.is_some() && self.radius_m.is_some() {
             return Err(wrong("ellipsoid_m and radius_m are both given".to_owned()));
+        }
+        let numbers = [
+            ("delta_m", self.delta_m),
+            ("radius_m", self.radius_m),
+            ("max_accel_m_s2", self.max_accel_m_s2),
+            ("above_m", self.above_m),
+            ("max_gap_s", self.max_gap_s),
+        ];
+        if let Some((key, _)) = numbers.into_iter().find(|(_, value)| value.is_some_and(|value| !value.is_finite())) {
+            return Err(wrong(format!("{key} must be a finite number")));
+        }
+        if self.max_accel_m_s2.is_some()
+            && arguments.motion.is_none()
+            && !matches!(self.motion, Some(MotionName::Bounded))
+        {
+            return Err(wrong(
+                "max_accel_m_s2 says nothing of a motion that is known exactly: add motion = \"bounded\"".to_owned(),
+            ));
         }
         // Limits of distance are one question: a part of it from the command line and a part from here would be a third.
         if !asks_otherwise {
@@ -185,6 +197,8 @@ mod tests {
             ("[audit]\ndelta = 1.5", "show/tautline.toml, line 2: unknown field `delta`"),
             ("[audit]\nmotion = \"spline\"", "line 2: unknown variant `spline`"),
             ("[audit.limits]\nspeed = 5.0", "`speed` is no limit: the limits are speed_m_s,"),
+            ("[audit]\nmax_accel_m_s2 = 2.0", "add motion = \"bounded\""),
+            ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),
         ] {
             let message = filled(&[], text).unwrap_err();

@@ -23,14 +23,21 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
         return Err(Failure::input("--html is a page on one recording, and several are given", help));
     }
     arguments.check_outputs()?;
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let asked: Vec<_> = recordings
+        .into_iter()
+        .map(|reading| (reading.called(), audit_config::configured(AuditArguments { reading, ..arguments.clone() })))
+        .collect();
+    // Nothing is written where something would be written over what is read, of whichever recording.
+    asked.iter().filter_map(|(_, asked)| asked.as_ref().ok()).try_for_each(AuditArguments::check_outputs)?;
+    // A log in which a system looks for its own lines has none of ours, which hold foreign names.
+    let quiet = arguments.quiet || arguments.annotations.is_some();
+    let console = Console { data_on_stdout: arguments.json, quiet };
     let (mut judged, mut failures) = (Vec::new(), Vec::new());
-    for reading in recordings {
-        let name = reading.called();
+    for (name, asked) in asked {
         if !is_one {
             console.say(&format!("{name}:"));
         }
-        match one(AuditArguments { reading, ..arguments.clone() }, console) {
+        match asked.and_then(|asked| judgement(&asked, console)) {
             Ok(judgement) => judged.push(judgement),
             Err(failure) => {
                 if !is_one {
@@ -46,6 +53,8 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
     answer(arguments, &judged, &failures, is_one)?;
     let worst = judged.iter().map(Judgement::exit).max_by_key(|exit| *exit as u8).unwrap_or(Exit::Good);
     match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| failure.exit() as u8) {
+        // It was said in a line that means nothing else to the system.
+        Some(failure) if arguments.annotations.is_some() => Ok(failure.exit()),
         Some(failure) => Err(failure),
         None => Ok(worst),
     }
@@ -55,33 +64,37 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
 pub(super) fn one(arguments: AuditArguments, console: Console) -> Result<Judgement, Failure> {
     let arguments = audit_config::configured(arguments)?;
     arguments.check_outputs()?;
-    let report = judge(&arguments, console)?;
-    Ok(Judgement { report, allows_undecided: arguments.allow_undecided })
+    judgement(&arguments, console)
+}
+
+fn judgement(arguments: &AuditArguments, console: Console) -> Result<Judgement, Failure> {
+    let (allows_undecided, asked_by) = (arguments.allow_undecided, arguments.asked_by.clone());
+    Ok(Judgement { report: judge(arguments, console)?, allows_undecided, asked_by })
 }
 
 /// What is for programs: of one recording by itself, of several as a list, with those that could not be judged and why.
 fn answer(arguments: &AuditArguments, judged: &[Judgement], failures: &Failures, is_one: bool) -> Result<(), Failure> {
-    if let Some(Annotations::Github) = arguments.annotations {
-        let lines = summary::github(judged, failures);
-        if arguments.json { console::beside(&lines) } else { console::data(&lines)? }
-    }
-    if let Some(file) = &arguments.summary {
-        write_atomically(file, summary::markdown(judged, failures).as_bytes())?;
-    }
-    if is_one && !failures.is_empty() {
-        return Ok(());
-    }
     if arguments.json {
         match judged {
+            [] if is_one => {}
             [of] if is_one => console::json(&of.report)?,
             judged => console::json(&Answers::of(judged, failures))?,
         }
+    }
+    if let Some(Annotations::Github) = arguments.annotations {
+        let lines = summary::github(judged, failures);
+        if arguments.json { console::beside(&lines) } else { console::data(&lines)? }
     }
     if let Some(file) = &arguments.events {
         write_atomically(file, &events::csv(judged, !is_one)?)?;
     }
     if let Some(file) = &arguments.junit {
         write_atomically(file, events::junit(judged, failures)?.as_bytes())?;
+    }
+    if let Some(file) = &arguments.summary {
+        // Pages of jobs are written by one step after another.
+        let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
+        write_atomically(file, &[before, summary::markdown(judged, failures).into_bytes()].concat())?;
     }
     Ok(())
 }

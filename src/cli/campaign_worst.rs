@@ -6,11 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use super::console::{self, Console};
+use super::replays;
 use super::run::{Left, RECORDING, RunArguments, fly_into};
 use super::{Exit, Failure};
 use crate::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
 use crate::compare::Outcome;
 use crate::record::mcap::{Header, McapRecorder};
+use crate::replay::PAGE_BYTES;
 use crate::report::page::Picture;
 use crate::splitting::{self, StateAt};
 use crate::text::metres;
@@ -81,10 +83,12 @@ pub(super) fn flown_again(
         let options = RunArguments::for_folder(path);
         #[cfg(feature = "viewer")]
         let options = options.without_pictures(looks.no_snapshots);
-        let left =
-            fly_into(&options, &campaign.scenario(worst.run, law)?, &command(campaign, worst.run, law), interrupted)?;
+        let scenario = campaign.scenario(worst.run, law)?;
+        let left = fly_into(&options, &scenario, &command(campaign, worst.run, law), interrupted)?;
         check(&left, worst.run, law, &worst.state_hash)?;
-        again.flights.push(looked_at(campaign, law, worst, &left));
+        let replay =
+            replays::of_flight(&scenario, &left.film, &left.report, PAGE_BYTES / usize::from(looks.worst).max(1));
+        again.flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
     }
     Ok(again)
 }
@@ -119,6 +123,7 @@ fn bad_again(folder: &Folder, summary: &Summary, looks: &Looks, interrupted: &At
             command: console::command_line(command.into_iter()),
             recording: Some(format!("worst/{}-run-{}-bad-{}/{RECORDING}", law.name, bad.run, bad.bad)),
             picture: None,
+            replay: None,
         });
     }
     Ok(again)
@@ -195,6 +200,7 @@ fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &Left) -> Wors
         recording: Some(format!("worst/{}-run-{}/{RECORDING}", law.name, worst.run)),
         command: command(campaign, worst.run, law),
         picture: closest(left, &said),
+        replay: None,
         said,
     }
 }

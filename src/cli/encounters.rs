@@ -2,23 +2,29 @@
 
 use super::Failure;
 use super::reading::Open;
-use crate::audit::recorded::{Approach, Outcome, PairSeries, RecordedError, Settings};
+use crate::audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
 use crate::figures::{self, Encounter, Figure};
 use crate::report::recorded::interval;
 
 /// Pairs, and approaches to obstacles, that are drawn.
 const DRAWN: usize = 3;
 
-/// Reads the recording again for those who came closest.
-pub(super) fn figures(open: &Open<'_>, settings: &Settings, outcome: &Outcome) -> Result<Vec<Figure>, Failure> {
+/// Reads the recording again for those who came closest, and for the places of all.
+pub(super) fn figures(
+    open: &Open<'_>,
+    settings: &Settings,
+    outcome: &Outcome,
+    places: &mut Places,
+) -> Result<Vec<Figure>, Failure> {
     let follow = |approach: &Approach| Ok((PairSeries::new(settings, outcome, approach.pair)?, *approach));
     let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();
     let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
     let mut recording = open()?;
-    let (mut items, mut more) = (Vec::new(), !(pairs.is_empty() && obstacles.is_empty()));
+    let (mut items, mut more) = (Vec::new(), true);
     while more {
         items.clear();
         more = recording.read(&mut items)?;
+        places.push(&items)?;
         for (series, _) in pairs.iter_mut().chain(&mut obstacles) {
             series.push(&items)?;
         }

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::Failure;
+use super::text_file;
 use crate::audit::envelope::{Envelope, Fence, Limit, Quantity};
 
 /// Largest file that is read \[bytes\].
@@ -56,15 +57,7 @@ pub(super) fn envelope(limits: &[Limit], fence: Option<&Path>) -> Result<Envelop
 }
 
 fn read(path: &Path) -> Result<Fence, Failure> {
-    let cannot = |error: std::io::Error| {
-        Failure::input(format!("cannot read {}: {error}", path.display()), "give a TOML file of a fence")
-    };
-    let size = std::fs::metadata(path).map_err(cannot)?.len();
-    if size > MOST_BYTES {
-        let message = format!("{} has {size} bytes, more than the file of a fence may have", path.display());
-        return Err(Failure::input(message, format!("give at most {MOST_BYTES} bytes")));
-    }
-    parse(&std::fs::read_to_string(path).map_err(cannot)?, path)
+    parse(&text_file::read(path, MOST_BYTES, FENCE_HELP)?, path)
 }
 
 fn parse(text: &str, path: &Path) -> Result<Fence, Failure> {

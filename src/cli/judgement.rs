@@ -9,6 +9,8 @@ pub(super) struct Judgement {
     pub(super) report: RecordedReport,
     /// Whether it is good that it cannot be told.
     pub(super) allows_undecided: bool,
+    /// What was asked by a file of settings.
+    pub(super) asked_by: Option<String>,
 }
 
 impl Judgement {

@@ -37,12 +37,14 @@ mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
+mod replays;
 mod run;
 mod scenario;
 mod schema;
 #[cfg(feature = "viewer")]
 mod snapshots;
 mod summary;
+mod text_file;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;

@@ -11,15 +11,16 @@ use rayon::ThreadPool;
 use super::caller;
 use super::console::{self, Console};
 use super::folder::OutFolder;
-use super::pictures;
 use super::scenario::{self, ScenarioArguments};
 #[cfg(feature = "viewer")]
 use super::snapshots::Watched;
 use super::{Exit, Failure};
+use super::{pictures, replays};
 use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
 use crate::record::mcap::{Header, McapRecorder};
+use crate::replay::{Film, PAGE_BYTES};
 use crate::report::page::Picture;
 use crate::report::{INTERRUPTED, Report, RunPage};
 use crate::run::{run_while, verify};
@@ -117,6 +118,8 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 /// What a run left beside its files.
 pub(super) struct Left {
     pub(super) report: Report,
+    /// Its motion.
+    pub(super) film: Film,
     /// Its pictures, in the order of their names.
     #[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "nothing is drawn"))]
     pub(super) pictures: Vec<Picture>,
@@ -150,7 +153,8 @@ pub(super) fn fly_into(
     let mut watched = Watched::new(scenario, !arguments.no_snapshots, &arguments.adapter);
     #[cfg(not(feature = "viewer"))]
     let mut watched = ();
-    let mut watchers = (&mut history, &mut watched);
+    let mut film = Film::new();
+    let mut watchers = (&mut history, (&mut film, &mut watched));
     let mut report = threads.install(|| fly(scenario, &preflight, &folder, console, interrupted, &mut watchers))?;
     if arguments.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
         report.verification = Some(threads.install(|| verify(scenario, &report))?);
@@ -160,7 +164,9 @@ pub(super) fn fly_into(
     #[cfg(not(feature = "viewer"))]
     let snapshots = Vec::new();
     let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(scenario, &history, &report) };
-    let page = RunPage { scenario, warnings: &warnings, figures: &figures, pictures: &snapshots, command };
+    let replay = replays::of_flight(scenario, &film, &report, PAGE_BYTES);
+    let page =
+        RunPage { scenario, warnings: &warnings, replay: &replay, figures: &figures, pictures: &snapshots, command };
     let page = pictures::write(folder.path(), &report, &page)?;
     report.write(&folder.report())?;
 
@@ -180,7 +186,7 @@ pub(super) fn fly_into(
     if arguments.json {
         console::json(&report)?;
     }
-    Ok(Left { report, pictures: snapshots })
+    Ok(Left { report, film, pictures: snapshots })
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.

@@ -29,7 +29,8 @@ pub(super) fn markdown(judged: &[Judgement], failures: &[(String, Failure)]) -> 
         let _ = writeln!(text, "| {} | \u{274c} not judged: {} | | | |", plain(recording), plain(&failure.in_words()));
     }
     for Judgement { report, .. } in judged {
-        let (headline, found) = (report.headline(), report.text());
+        let notes = report.source.notes.iter().map(|note| format!("note: {note}\n"));
+        let (headline, found) = (report.headline(), report.text() + &notes.collect::<String>());
         let fence = "`".repeat(longest_run(&headline).max(longest_run(&found)).max(2) + 1);
         let open = if report.status == Status::Clear { "" } else { " open" };
         let _ = write!(
@@ -48,13 +49,14 @@ pub(super) fn github(judged: &[Judgement], failures: &[(String, Failure)]) -> St
         // Writing to a string cannot fail.
         let _ = writeln!(text, "::{level} file={},title={}::{}", property(recording), property(title), data(message));
     };
-    for Judgement { report, allows_undecided } in judged {
+    for Judgement { report, allows_undecided, asked_by } in judged {
         let level = match report.status {
             Status::Clear => "notice",
             Status::Undecided if *allows_undecided => "warning",
             Status::Undecided | Status::Violation => "error",
         };
-        line(level, &report.source.recording, &report.verdict(), &report.headline());
+        let asked = asked_by.iter().map(|asked| format!("; {asked}"));
+        line(level, &report.source.recording, &report.verdict(), &(report.headline() + &asked.collect::<String>()));
     }
     for (recording, failure) in failures {
         line("error", recording, "not judged", &failure.in_words());
@@ -90,7 +92,7 @@ fn plain(text: &str) -> String {
             '&' => plain.push_str("&amp;"),
             '<' => plain.push_str("&lt;"),
             '>' => plain.push_str("&gt;"),
-            '\r' | '\n' => plain.push(' '),
+            c if c.is_control() => plain.push(' '),
             '|' | '`' | '*' | '_' | '[' | ']' | '\\' | '~' | '#' | '!' | '$' | '@' => {
                 plain.push('\\');
                 plain.push(c);
@@ -105,8 +107,10 @@ fn longest_run(text: &str) -> usize {
     text.split(|c| c != '`').map(str::len).max().unwrap_or(0)
 }
 
+/// Foreign text in a line for the runner: neither an end of the line nor a mark of its older lines, which count anywhere.
 fn data(text: &str) -> String {
-    text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A")
+    let text = text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A").replace("##[", "# #[");
+    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
 fn property(text: &str) -> String {
@@ -121,6 +125,7 @@ mod tests {
     fn foreign_text_means_nothing() {
         assert_eq!(plain("a|b<script>`x`\n[l](u)"), "a\\|b&lt;script&gt;\\`x\\` \\[l\\](u)");
         assert_eq!(property("a,b:c%\n::error::"), "a%2Cb%3Ac%25%0A%3A%3Aerror%3A%3A");
+        assert_eq!(data("\u{1b}[31m##[error]x"), "\u{fffd}[31m# #[error]x");
         assert_eq!((longest_run("a```b``"), longest_run("")), (3, 0));
         let failures = [("x\n::error::y.csv".to_owned(), Failure::input("no\nsuch file", "look"))];
         assert_eq!(github(&[], &failures).lines().count(), 1);

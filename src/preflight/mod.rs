@@ -197,7 +197,7 @@ impl Preflight {
             dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.velocity_coefficient_per_s()).map(
                 |rate_per_s| {
                     let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
-                    scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
+                    honest_rate_dt(scenario) / rate_per_s.hypot(beside.sqrt())
                 },
             ),
             dt_links_s: links_step_s(law, scenario),
@@ -393,10 +393,16 @@ impl Preflight {
     }
 }
 
+/// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
+/// energy.
+fn honest_rate_dt(scenario: &Scenario) -> f64 {
+    scenario.time.max_rate_dt.min(TimeSpec::DEFAULT_MAX_RATE_DT)
+}
+
 /// Longest step that the links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
 fn links_step_s(law: &dyn Law, scenario: &Scenario) -> Option<f64> {
     let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.velocity_coefficient_per_s())?;
-    (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| scenario.time.max_rate_dt / rate_per_s)
+    (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| honest_rate_dt(scenario) / rate_per_s)
 }
 
 /// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be

@@ -13,8 +13,9 @@ use nalgebra::UnitQuaternion;
 
 use super::foxglove_parts::{ball, colour, pose, quadrotor, turned};
 use super::scene::{Colour, Theme};
-use super::timeline::{Plan, QuadrotorShape, attitudes_of};
+use super::timeline::{QuadrotorShape, attitudes_of};
 use crate::graph::Graph;
+use crate::plan::Plan;
 use crate::record::mcap::{ExtraTopic, Topic};
 use crate::record::{Event, Sample};
 use crate::scenario::Scenario;

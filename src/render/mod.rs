@@ -28,6 +28,7 @@ mod timeline;
 #[cfg(feature = "window")]
 mod window;
 
+pub use crate::plan::Plan;
 pub use error::{FARTHEST_M, RenderError};
 #[cfg(feature = "film")]
 pub use film::{Film, FilmFormat};
@@ -36,6 +37,6 @@ pub use gpu::{AdapterChoice, Renderer};
 pub use picture::{Picture, contact_sheet, data_uri};
 pub use scene::{CameraSpec, Extent, Layers, Scene, Theme, View};
 pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
-pub use timeline::{Frame, Keyframe, Plan, QuadrotorShape, Timeline, TooNear, TracksError};
+pub use timeline::{Frame, Keyframe, QuadrotorShape, Timeline, TooNear, TracksError};
 #[cfg(feature = "window")]
 pub use window::{LiveUpdate, is_in_window_library, show};

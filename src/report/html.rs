@@ -4,11 +4,12 @@ use maud::{Markup, html};
 
 use super::findings::Performance;
 use super::flight::{Report, Violation};
-use super::page::{self, Badge, Page, Picture, noted, section};
+use super::page::{self, Badge, Page, Picture, Start, noted, section};
 use super::vehicles::plant;
 use crate::audit::Status;
 use crate::figures::Figure;
 use crate::formation::Freedom;
+use crate::replay::{NoReplay, Replay};
 use crate::scenario::Scenario;
 use crate::swarm::Bounce;
 use crate::text::{at_least, seconds, significant};
@@ -26,6 +27,8 @@ pub struct RunPage<'a> {
     pub scenario: &'a Scenario,
     /// What was known to be doubtful before the first step.
     pub warnings: &'a [(String, String)],
+    /// The flight itself, or why it cannot be replayed.
+    pub replay: &'a Result<Replay, NoReplay>,
     /// The run as charts.
     pub figures: &'a [Figure],
     /// The run as it looked.
@@ -40,12 +43,17 @@ impl Report {
     /// Two runs of one scenario give the same bytes but for the table of performance.
     #[must_use]
     pub fn to_html(&self, page: &RunPage<'_>) -> String {
-        self.page(page).render()
+        self.page(page).render_with_replays()
     }
 
     fn page(&self, page: &RunPage<'_>) -> Page {
         let tables = [self.separation_table(), self.formation_table(), self.control_table(), self.run_table()];
-        let mut sections = vec![section("Numbers", &[html! { div.tables { @for table in tables { (table) } } }])];
+        let replay = match page.replay {
+            Ok(replay) => page::replay(&self.scenario.name, replay, Start::AtOnce),
+            Err(why) => page::no_replay(&why.to_string()),
+        };
+        let mut sections = vec![section("Replay", &[replay])];
+        sections.push(section("Numbers", &[html! { div.tables { @for table in tables { (table) } } }]));
         if !self.legs.is_empty() {
             sections.push(section("Legs", &[super::legs::table(&self.legs)]));
         }

@@ -14,6 +14,7 @@ mod flight;
 mod html;
 mod hulls;
 mod legs;
+mod moments;
 mod network;
 mod obstacles;
 pub mod page;

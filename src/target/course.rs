@@ -48,6 +48,17 @@ impl Course {
         begun.map_or(0, |&(_, leg)| leg).min(self.count().saturating_sub(1))
     }
 
+    /// The formations one after the other, each from when on \[s\] it is under way as vehicles are assigned to it; the first
+    /// from the start.
+    #[must_use]
+    pub fn formations(&self) -> Vec<(f64, &Formation)> {
+        let mut times_s: Vec<f64> = self.assigned.iter().map(|&(from_s, _)| from_s).collect();
+        times_s.extend(self.begun.iter().map(|&(from_s, _)| from_s));
+        times_s.sort_unstable_by(f64::total_cmp);
+        times_s.dedup();
+        times_s.into_iter().filter_map(|from_s| Some((from_s, self.formation_at(from_s)?))).collect()
+    }
+
     /// The slots of the leg that is under way at a time \[s\], as vehicles are assigned to them then; none where there is no
     /// leg.
     #[must_use]

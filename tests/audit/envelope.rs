@@ -193,9 +193,90 @@ fn the_window_counts_and_nothing_outside_of_it() {
         ..asked(limits(&[(Quantity::Speed, 4.0), (Quantity::Acceleration, 4.0)]))
     };
     let of = |from_s, to_s| judged(&items, window(from_s, to_s)).1.iter().map(|found| found.status).collect::<Vec<_>>();
-    assert_eq!(of(0.0, 0.95), [Status::Clear, Status::Clear]);
+    assert_eq!(of(0.0, 0.85), [Status::Clear, Status::Clear]);
+    // The parabola through the samples at 0.9, 1.0 and 1.1 s.
+    assert_eq!(of(0.0, 0.95), [Status::Clear, Status::Violation]);
     assert_eq!(of(0.0, 1.05), [Status::Violation, Status::Violation]);
     assert_eq!(of(1.25, 2.0), [Status::Violation, Status::Clear]);
+}
+
+#[test]
+fn what_a_bounded_motion_needed_somewhere_is_not_said_of_a_part() {
+    let items: Vec<_> = [(0.0, 0.0), (2.0, 0.0), (4.0, 8.0), (6.0, 16.0)]
+        .map(|(t, x)| sample(t, Vector3::new(x, 0.0, 1.0), None))
+        .into();
+    let settings = |from_s, to_s| Settings {
+        motion: Some(Motion::Bounded),
+        max_accel_m_s2: Some(10.0),
+        from_s,
+        to_s,
+        ..asked(limits(&[(Quantity::Acceleration, 1.0)]))
+    };
+    assert_eq!(judged(&items, settings(None, None)).0, Status::Violation);
+    assert_eq!(judged(&items, settings(Some(1.9), Some(2.1))).0, Status::Undecided);
+}
+
+#[test]
+fn an_eased_flight_along_a_wall_has_all_of_its_room() {
+    // Up at (4, 4), from rest to rest.
+    let rise = |from_s: f64| Piece {
+        vehicle: 0,
+        from_s,
+        to_s: from_s + 10.0,
+        coefficients: vec![
+            Vector3::new(4.0, 4.0, 0.0),
+            Vector3::zeros(),
+            Vector3::new(0.0, 0.0, 0.9),
+            Vector3::new(0.0, 0.0, -0.06),
+        ],
+    };
+    let corners = [[-10.0, -10.0], [10.0, -10.0], [10.0, 10.0], [-10.0, 10.0]];
+    let fence = Fence::new(&corners, None, 1.0).expect("a fence");
+    let envelope = Envelope { limits: Vec::new(), fence: Some(fence) };
+    let (status, found) = judged(&[Item::Piece(rise(0.0))], asked(envelope));
+    let room = found[0].extreme.expect("room");
+    assert!(status == Status::Clear && (room.lower - 6.0).abs() < 0.01 && (room.upper - 6.0).abs() < 1e-9, "{room:?}");
+}
+
+#[test]
+fn digits_of_places_are_no_speed_and_their_corners_no_acceleration() {
+    // 3 m/s at 5400 km from the origin, 100 times a second.
+    let items: Vec<_> = (0..100)
+        .map(|k| f64::from(k) / 100.0)
+        .map(|t| sample(t, Vector3::new(5e5, 5.4e6 + 3.0 * t, 0.0), None))
+        .collect();
+    assert_eq!(judged(&items, asked(limits(&[(Quantity::Speed, 3.0)]))).0, Status::Clear);
+    assert_eq!(judged(&items, asked(limits(&[(Quantity::Speed, 2.999_999)]))).0, Status::Violation);
+    let piece = |from_s: f64, x: f64, speed: f64| {
+        Item::Piece(Piece {
+            vehicle: 0,
+            from_s,
+            to_s: from_s + 1.0,
+            coefficients: vec![Vector3::new(x, 0.0, 0.0), Vector3::new(speed, 0.0, 0.0)],
+        })
+    };
+    let corner = |by: f64| {
+        judged(&[piece(0.0, 0.0, 1.0), piece(1.0, 1.0, 1.0 + by)], asked(limits(&[(Quantity::Acceleration, 9.0)]))).0
+    };
+    assert_eq!([5e-4, 3e-3, 1e-2].map(corner), [Status::Clear, Status::Undecided, Status::Violation]);
+}
+
+#[test]
+fn a_vehicle_alone_is_asked_about_itself_whatever_radius_it_has() {
+    let with_radius = |vehicle: usize, radius_m| {
+        let place = move |t: f64| Vector3::new(t, 9.0 * if vehicle == 0 { 0.0 } else { 1.0 }, 0.0);
+        [0.0, 1.0, 2.0]
+            .map(|t| Item::Sample(Sample { vehicle, time_s: t, position_m: place(t), velocity_m_s: None, radius_m }))
+    };
+    let slow = || asked(limits(&[(Quantity::Speed, 5.0)]));
+    assert_eq!(judged(&with_radius(0, Some(0.3)), slow()).0, Status::Clear);
+    let both = |radius_m| {
+        let mut items = [with_radius(0, Some(0.3)), with_radius(1, radius_m)].concat();
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        audit(&["a", "b"].map(str::to_owned), &items, slow()).expect("a verdict")
+    };
+    assert_eq!(both(Some(0.3)).separation, Some(Status::Clear));
+    assert_eq!((both(None).separation, both(None).status), (None, Status::Clear));
 }
 
 #[test]

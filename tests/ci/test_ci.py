@@ -22,6 +22,9 @@ PROGRAM = pathlib.Path(os.environ.get("TAUTLINE", ROOT / "target/debug/tautline"
 VERSION = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE).group(1)
 TARGET = {"x86_64": "x86_64-unknown-linux-gnu", "aarch64": "aarch64-unknown-linux-gnu"}[os.uname().machine]
 
+_packed = tempfile.TemporaryDirectory()
+PACKED = pathlib.Path(_packed.name)
+
 CLEAR = "t,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,1,0\n1,b,3,1,0\n"
 CROSSING = "t,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,3,0,0\n1,b,0,0,0\n"
 
@@ -41,8 +44,11 @@ class InFolder(unittest.TestCase):
         file.write_text(text)
 
     def pack(self):
-        done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, "dist", folder=self.folder)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        """An archive of the program in the test's own folder, packed once for all."""
+        if not list(PACKED.glob("*.tar.gz")):
+            done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, PACKED, folder=self.folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        shutil.copytree(PACKED, self.folder / "dist")
         return self.folder / "dist" / f"tautline-{VERSION}-{TARGET}.tar.gz"
 
     def install(self):
@@ -65,6 +71,23 @@ class Archives(InFolder):
         self.assertEqual(done.returncode, 3)
         self.assertIn("not what its checksum says", done.stderr)
         self.assertFalse((self.folder / "bin").exists())
+
+    def test_a_checksum_of_another_file_is_none_of_the_archive(self):
+        archive = self.pack()
+        nothing = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855  /dev/null\n"
+        archive.with_name(archive.name + ".sha256").write_text(nothing)
+        self.assertEqual(self.install().returncode, 3)
+        self.assertFalse((self.folder / "bin").exists())
+
+    def test_an_archive_without_the_program_installs_nothing(self):
+        archive = self.pack()
+        (self.folder / archive.name.removesuffix(".tar.gz")).mkdir()
+        run("tar", "-czf", archive, archive.name.removesuffix(".tar.gz"), folder=self.folder)
+        sha = run("sha256sum", archive.name, folder=archive.parent).stdout
+        archive.with_name(archive.name + ".sha256").write_text(sha)
+        done = self.install()
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("has no tautline", done.stderr)
 
     def test_an_archive_that_is_not_there_is_named(self):
         (self.folder / "dist").mkdir()
@@ -146,7 +169,12 @@ class Action(InFolder):
     def test_no_recording_is_no_success(self):
         code, said = self.act(recordings="flights/*.csv", releases=self.releases())
         self.assertEqual(code, 2)
-        self.assertIn("no recording matches", said)
+        self.assertIn("there is no recording flights/*.csv", said)
+        self.write("a.csv", CLEAR)
+        code, said = self.act(recordings="a.csv shows/*.skyc", arguments="--delta 1.5", releases=self.releases())
+        self.assertEqual(code, 2, "what nobody looked at is not clear")
+        code, said = self.act(recordings=" ", releases=self.releases())
+        self.assertEqual(code, 2)
 
 
 class Hook(InFolder):
@@ -160,7 +188,8 @@ class Hook(InFolder):
         files = [name for name in ("a.csv", "b.csv", "notes.md") if re.search(hook["files"], name)]
         program, *words = hook["entry"].split()
         self.assertEqual(program, "tautline")
-        done = run(PROGRAM, *words, "--delta", "1.5", *files, folder=self.folder)
+        self.assertEqual(hook["args"][-1], "--")
+        done = run(PROGRAM, *words, "--delta", "1.5", *hook["args"], *files, folder=self.folder)
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("1 recording clear, 1 violation, 0 undecided", done.stdout)
 
@@ -198,6 +227,49 @@ class Answers(InFolder):
         self.assertEqual([of.get("status") for of in json.loads(done.stdout)], ["clear", "violation", None])
         self.assertEqual(done.stderr.count("::error file="), 2)
         self.assertIn("not judged", (self.folder / "s.md").read_text())
+
+    def test_nothing_that_is_read_is_written_over(self):
+        self.write("a.csv", CLEAR)
+        self.write("b.csv", CLEAR)
+        self.write("fence.toml", "[fence]\npolygon_m = [[-9, -9], [9, -9], [9, 9], [-9, 9]]\n")
+        settings = '[audit]\ndelta_m = 1.5\nfence = "fence.toml"\n'
+        self.write("tautline.toml", settings)
+        for recordings in (["a.csv"], ["a.csv", "b.csv"]):
+            for option in ("--summary", "--junit", "--events"):
+                for kept in ("fence.toml", "tautline.toml"):
+                    before = (self.folder / kept).read_text()
+                    done = self.audit(*recordings, option, kept)
+                    self.assertEqual(done.returncode, 2, (option, kept))
+                    self.assertIn("would overwrite", done.stderr)
+                    self.assertEqual((self.folder / kept).read_text(), before)
+
+    def test_names_mean_nothing_to_the_system_that_reads_the_log(self):
+        hostile = ["::stop-commands::x", "y ##[error]z", "a\n::error title=pwn::pwned"]
+        rows = [f'{t},"{name}",{3 * k},{t},0' for t in (0, 1) for k, name in enumerate(hostile)]
+        self.write("a.csv", "t,id,x,y,z\n" + "\n".join(rows) + "\n")
+        self.write("::stop-commands::b.csv", "t,id,x,y\nnonsense\n")
+        done = self.audit("a.csv", "::stop-commands::b.csv", "--delta", "5", "--annotations", "github")
+        lines = [line.strip() for line in (done.stdout + done.stderr).splitlines()]
+        self.assertNotIn("##[", done.stdout + done.stderr)
+        self.assertEqual([line.split(" ")[0] for line in lines if line.startswith("::")], ["::error", "::error"])
+        self.assertTrue(all("title=pwn" not in line.split("::")[1] for line in lines if line.startswith("::")))
+
+    def test_a_summary_is_added_to_the_page_of_a_job(self):
+        self.write("a.csv", CLEAR)
+        self.write("s.md", "# Mine\n")
+        self.assertEqual(self.audit("a.csv", "--delta", "1.5", "--summary", "s.md").returncode, 0)
+        self.assertRegex((self.folder / "s.md").read_text(), r"^# Mine\n## tautline audit\n")
+
+    def test_every_name_of_a_recording_finds_the_same_settings(self):
+        self.write("real/flights/a.csv", CLEAR)
+        self.write("real/tautline.toml", "[audit]\ndelta_m = 9.0\n")
+        (self.folder / "link").symlink_to("real")
+        for name in ("flights/a.csv", "flights/../flights/a.csv", self.folder / "link/flights/a.csv", "./flights/a.csv"):
+            done = run(PROGRAM, "audit", name, "--limit", "speed=9", folder=self.folder / "link")
+            self.assertEqual(done.returncode, 1, name)
+        (self.folder / "real/tautline.toml").unlink()
+        (self.folder / "real/tautline.toml").mkdir()
+        self.assertEqual(run(PROGRAM, "audit", "flights/a.csv", "--delta", "1", folder=self.folder / "real").returncode, 2)
 
     def test_the_nearest_settings_count_and_say_so(self):
         self.write("flights/deep/a.csv", CLEAR)

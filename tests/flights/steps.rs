@@ -112,6 +112,37 @@ fn a_flight_that_is_clear_and_home_does_not_pass_on_steps_too_long_for_the_law()
 }
 
 #[test]
+fn a_step_is_short_enough_where_it_leads_to_and_not_only_where_it_began() {
+    // Fast contacts that one step lands deep in: the law looks slow before, and the barrier is far.
+    for (name, keys) in [
+        ("swap", &["law.alpha=5000", "time.dt_s=0.1", "time.record_hz=4", "time.duration_s=5"][..]),
+        (
+            "pentagon",
+            &[
+                "law.kind=displacement",
+                "law.alpha=1e6",
+                "time.record_hz=4",
+                "time.duration_s=10",
+                "plant.precision=double",
+            ],
+        ),
+        (
+            "pentagon",
+            &["law.alpha=400", "time.dt_s=0.045", "time.record_hz=4", "time.max_rate_dt=1e9", "time.duration_s=30"],
+        ),
+    ] {
+        let report = run::run(&builtin(name, keys), &mut ()).expect("a report");
+        assert!(!report.breaks_certificate(), "{name} {keys:?}: {}", report.headline());
+        let rises = report.energy.max_over_leg_start.is_some_and(|ratio| ratio > 1.01);
+        assert!(
+            !rises || (report.run.overlong_steps > 0 && !report.verdict.pass),
+            "{name} {keys:?}: {}",
+            report.headline()
+        );
+    }
+}
+
+#[test]
 fn vehicles_that_hold_a_command_for_a_period_of_its_own_ask_for_no_shorter_steps() {
     let keys = ["law.alpha=100", "time.dt_s=0.01", "time.max_halvings=0", "time.control_hz=100"];
     let (flight, _) = fly(&builtin("pentagon", &keys));

@@ -2,6 +2,8 @@
 
 #[path = "../support/browser.rs"]
 mod browser;
+#[path = "../support/replays.rs"]
+mod replays_in_browser;
 
 mod attacks;
 mod channels;
@@ -9,5 +11,6 @@ mod figures;
 mod margins;
 mod opened;
 mod page;
+mod replays;
 mod scale;
 mod validation;

@@ -28,7 +28,11 @@ fn a_report_fits_every_screen_in_light_and_dark_and_loads_nothing() {
     check(folder.path(), &page, "pentagon", "CLEAR", 6);
 
     let picture = folder.path().join("report.png");
-    let flags = [format!("--screenshot={}", picture.display()), "--window-size=1280,2000".to_owned()];
+    let flags = [
+        format!("--screenshot={}", picture.display()),
+        "--window-size=1280,2000".to_owned(),
+        "--disable-gpu".to_owned(),
+    ];
     open(folder.path(), &page, &flags);
     let bytes = fs::read(&picture).expect("a picture");
     assert!(bytes.starts_with(b"\x89PNG") && bytes.len() > 50_000, "{} bytes", bytes.len());

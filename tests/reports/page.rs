@@ -40,6 +40,18 @@ fn without_namespaces(html: &str) -> String {
     html.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "").replace("href=\"data:,\"", "")
 }
 
+/// A page without its script elements, and their attributes.
+fn without_scripts(html: &str) -> (String, Vec<String>) {
+    let mut parts = html.split("<script");
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    let mut attributes = Vec::new();
+    for part in parts {
+        attributes.push(part.split('>').next().unwrap_or_default().to_owned());
+        plain += part.split_once("</script>").expect("it ends").1;
+    }
+    (plain, attributes)
+}
+
 #[test]
 fn every_text_of_a_page_is_escaped() {
     let html = hostile_page().render();
@@ -104,7 +116,12 @@ fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_n
         assert!(html.contains(part) || html.contains(&part_quoted), "{part}");
     }
     assert_eq!(html.matches("src=\"data:image/png;base64,").count(), 3, "start, closest approach and end");
-    let plain = without_namespaces(&html).replace("src=\"data:image/png;base64,", "");
+    let (plain, scripts) = without_scripts(&without_namespaces(&html).replace("src=\"data:image/png;base64,", ""));
+    assert_eq!(
+        scripts,
+        [" type=\"application/json\"", " type=\"x-shader\"", ""],
+        "data, shaders and the one that runs"
+    );
     for reference in ["http", "href", "src=", "url(", "@import", "<script"] {
         assert!(!plain.contains(reference), "{reference}");
     }

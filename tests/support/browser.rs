@@ -66,7 +66,7 @@ fn browser() -> String {
 pub(crate) fn open(folder: &Path, page: &Path, flags: &[String]) -> Output {
     let mut command = Command::new(browser());
     command
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars"])
+        .args(["--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--hide-scrollbars"])
         .args([
             "--disable-background-networking",
             "--disable-component-update",
@@ -118,7 +118,7 @@ pub(crate) fn probe(folder: &Path, page: &Path, width_px: u32, dark: bool) -> (s
         page.display()
     );
     fs::write(&wrapper, html).expect("written");
-    let mut flags = vec!["--dump-dom".to_owned(), "--window-size=1400,900".to_owned()];
+    let mut flags = vec!["--dump-dom".to_owned(), "--disable-gpu".to_owned(), "--window-size=1400,900".to_owned()];
     flags.extend(scheme(dark));
     let output = open(folder, &wrapper, &flags);
     let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));

@@ -6,6 +6,10 @@ use crate::audit::sweep::MAX_LENGTH_M;
 
 /// Corners of a fence: every edge is compared with every other.
 const MOST_CORNERS: usize = 4096;
+/// Part of a distance outside that it is told to.
+const RESOLUTION: f64 = 1e-9;
+/// Parts of a line outside that are looked at.
+const MOST_PARTS: usize = 100;
 
 /// A polygon in the plane of x and y, convex or not, and perhaps a range of heights, that every vehicle must stay within.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,14 +148,33 @@ impl Fence {
         if wall_m > 0.0 && self.holds(from) {
             return wall_m;
         }
-        // It is outside, at least for a part: how far, at the ends and between any two crossings.
+        // It is outside, at least for a part.
         let mut crossings: Vec<f64> = self.edges().filter_map(|edge| crossing([from, to], edge)).collect();
         crossings.extend([0.0, 1.0]);
         crossings.sort_unstable_by(f64::total_cmp);
-        let between = crossings.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
-        let places = crossings.iter().copied().chain(between).map(|u| from.lerp(&to, u));
-        let outside = |place: Vector2<f64>| if self.holds(place) { 0.0 } else { self.wall_m(place) };
-        0.0 - places.map(outside).fold(0.0, f64::max)
+        let parts = crossings.windows(2).map(|pair| [pair[0], pair[1]]);
+        let is_outside = |&[start, end]: &[f64; 2]| !self.holds(from.lerp(&to, 0.5 * (start + end)));
+        let farthest =
+            parts.filter(is_outside).map(|[start, end]| self.farthest_m(from.lerp(&to, start), from.lerp(&to, end)));
+        0.0 - farthest.fold(0.0, f64::max)
+    }
+
+    /// How far a line that is outside gets from the fence \[m\]. The distance from one edge is a convex function of the place, so
+    /// that over a part of the line it is largest at an end: parts are halved until the least of these is reached.
+    fn farthest_m(&self, from: Vector2<f64>, to: Vector2<f64>) -> f64 {
+        let mut farthest_m = self.wall_m(from).max(self.wall_m(to));
+        let (mut open, mut looked_at) = (vec![[from, to]], 0);
+        while let Some([from, to]) = open.pop() {
+            let most_m =
+                self.edges().map(|edge| from_edge(from, edge).max(from_edge(to, edge))).fold(f64::INFINITY, f64::min);
+            looked_at += 1;
+            if most_m > farthest_m * (1.0 + RESOLUTION) && looked_at < MOST_PARTS {
+                let middle = from.lerp(&to, 0.5);
+                farthest_m = farthest_m.max(self.wall_m(middle));
+                open.extend([[from, middle], [middle, to]]);
+            }
+        }
+        farthest_m
     }
 
     fn wall_m(&self, place: Vector2<f64>) -> f64 {
@@ -233,6 +256,16 @@ mod tests {
         assert_eq!(room([2.0, 2.0, 10.0], [2.0, 2.0, 21.0]), -1.0);
         assert_eq!(room([0.0, 1.0, 10.0], [0.0, 9.0, 10.0]), 0.0);
         assert_eq!(room([-3.0, 2.0, 10.0], [13.0, 2.0, 10.0]), -3.0);
+        // Along a wall, and past it: farthest where neither end nor middle is.
+        assert_eq!(room([12.0, 1.0, 10.0], [12.0, 4.0, 10.0]), -2.0);
+        let past = room([10.0, 5.5, 10.0], [5.5, 10.0, 10.0]);
+        assert!((past + 2.75).abs() < 1e-8, "{past}");
+        let (low, high) = (Vector3::new(9.0, 5.5, 10.0), Vector3::new(6.0, 9.5, 10.0));
+        let seen =
+            (0..=3000).map(|k| low.lerp(&high, f64::from(k) / 3000.0)).map(|place| l_shape().room_m(place, place));
+        let seen = seen.fold(0.0, f64::min);
+        let told = l_shape().room_m(low, high);
+        assert!(told <= seen + 1e-12 && seen - told < 1e-3, "{told} {seen}");
     }
 
     #[test]

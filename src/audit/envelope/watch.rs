@@ -2,18 +2,21 @@
 
 use nalgebra::Vector3;
 
-use super::extremum::{Enclosure, WIDTH, derivative, largest, largest_of};
+use super::extremum::{Enclosure, Goal, WIDTH, derivative, largest, largest_of};
 use super::fence::Fence;
 use super::limit::{Envelope, Limit, Quantity};
 use super::outcome::{EnvelopeOutcome, Exceeding, LimitOutcome};
 use crate::audit::outcome::Status;
-use crate::audit::polynomial::{rescale, stray, value};
+use crate::audit::polynomial::{rescale, stray_across, value};
 use crate::audit::sweep::Interval;
 use crate::track::{Item, Piece, Sample};
 
 /// Pieces of a curve that meet within this \[m\], and whose velocities do within this \[m/s\], are one smooth curve: their
-/// coefficients are written with so many digits.
+/// coefficients are written with so many digits. Places that are off by so much change the velocity at the end of a piece of
+/// degree n and length h by twice n / h times as much: whether there is a corner then is not known.
 const SMOOTH: f64 = 1e-3;
+/// Part of the room that is left to a fence to which a curve's least room is told.
+const COARSE: f64 = 1e-3;
 /// What is taken of accelerations between samples where nothing bounds them.
 const BY_THREE_SAMPLES: &str = "accelerations are those of the parabolas through three samples in a row";
 
@@ -41,8 +44,8 @@ pub(in crate::audit) struct Watch {
 #[derive(Clone, Copy, Debug, Default)]
 struct Last {
     sample: Option<Sample>,
-    /// Velocity at the end of its last piece \[m/s\].
-    curve_end_m_s: Option<Vector3<f64>>,
+    /// Velocity at the end of its last piece \[m/s\], and how far that is off where places are by [`SMOOTH`].
+    curve_end: Option<(Vector3<f64>, f64)>,
     /// Mean velocity over its last interval \[m/s\], and how long that was \[s\].
     interval: Option<(Vector3<f64>, f64)>,
 }
@@ -92,13 +95,14 @@ impl Watch {
         let over = Interval { from_s: before.time_s, to_s: seen.time_s };
         let h = over.to_s - over.from_s;
         let mean = (seen.position_m - before.position_m) / h;
-        self.each(seen.vehicle, |limit, fence, window| match limit.quantity.derivative() {
-            0 => place_between(limit, fence, window, (&before, &seen), bounded_by_m_s2.unwrap_or(0.0)),
-            1 => speed_between(limit, window, (&before, &seen), mean, bounded_by_m_s2.unwrap_or(0.0)),
+        let bound_m_s2 = bounded_by_m_s2.unwrap_or(0.0);
+        self.each(seen.vehicle, |limit, fence, window, known| match limit.quantity.derivative() {
+            0 => place_between(limit, fence, window, (&before, &seen), (bound_m_s2, known)),
+            1 => speed_between(limit, window, (&before, &seen), mean, bound_m_s2),
             _ => None,
         });
         self.corner(&before, &seen, (last.interval, mean), bounded_by_m_s2);
-        Last { sample: Some(seen), interval: Some((mean, h)), curve_end_m_s: None }
+        Last { sample: Some(seen), interval: Some((mean, h)), curve_end: None }
     }
 
     /// Accelerations around a sample, from the mean velocities on both sides and its own velocity.
@@ -110,22 +114,26 @@ impl Watch {
         bounded_by_m_s2: Option<f64>,
     ) {
         let h = seen.time_s - before.time_s;
+        let shortest_s = last.map_or(h, |(_, h_before)| h.min(h_before));
+        let rounding = 4.0 * rounding_m(before, seen) / (h * shortest_s);
         let needs = [
             last.map(|(mean_before, h_before)| 2.0 * (mean - mean_before).norm() / (h_before + h)),
             before.velocity_m_s.map(|start| 2.0 * (mean - start).norm() / h),
             seen.velocity_m_s.map(|end| 2.0 * (end - mean).norm() / h),
             before.velocity_m_s.zip(seen.velocity_m_s).map(|(start, end)| (end - start).norm() / h),
         ];
-        let needed = needs.into_iter().flatten().reduce(f64::max);
+        let needed = needs.into_iter().flatten().reduce(f64::max).map(|needed| (needed - rounding).max(0.0));
         let from_s = before.time_s - last.map_or(0.0, |(_, h_before)| h_before);
-        self.each(seen.vehicle, |limit, _, window| {
-            let in_window = window.from_s <= before.time_s && before.time_s <= window.to_s;
-            let lower = needed.filter(|_| limit.quantity == Quantity::Acceleration && in_window)?;
+        self.each(seen.vehicle, |limit, _, window, _| {
+            let needed = needed.filter(|_| limit.quantity == Quantity::Acceleration)?;
+            // Of a bounded motion it is known that it needed as much somewhere between the samples, and not where.
+            let is_whole = window.from_s <= from_s && seen.time_s <= window.to_s;
+            let lower = if is_whole || bounded_by_m_s2.is_none() { needed } else { f64::NEG_INFINITY };
             let upper = bounded_by_m_s2.map_or(lower, |most| most.max(lower));
             let over = Interval { from_s: from_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
             let at =
                 if over.to_s > over.from_s { (before.time_s - over.from_s) / (over.to_s - over.from_s) } else { 0.0 };
-            Some((over, Enclosure { lower, upper, at }))
+            (over.from_s < over.to_s).then_some((over, Enclosure { lower, upper, at }))
         });
         if bounded_by_m_s2.is_none() {
             let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
@@ -136,7 +144,7 @@ impl Watch {
     /// A vehicle of which nothing is known before.
     fn instant(&mut self, seen: &Sample) {
         let over = Interval { from_s: seen.time_s, to_s: seen.time_s };
-        self.each(seen.vehicle, |limit, fence, window| {
+        self.each(seen.vehicle, |limit, fence, window, _| {
             let is_asked = window.from_s <= seen.time_s && seen.time_s <= window.to_s;
             let exact = match (limit.quantity, limit.quantity.derivative()) {
                 (Quantity::Fence, _) => -fence?.room_m(seen.position_m, seen.position_m),
@@ -155,7 +163,8 @@ impl Watch {
         rescale(&mut whole, 0.0, length_s);
         let (start, start_m_s) = (whole[0], derivative(&whole, length_s)[0]);
         let (end, end_m_s) = (value(&whole, 1.0), value(&derivative(&whole, length_s), 1.0));
-        self.join(&last, vehicle, (over.from_s, start, start_m_s));
+        let off_m_s = 2.0 * SMOOTH * (piece.coefficients.len() - 1) as f64 / length_s;
+        self.join(&last, vehicle, (over.from_s, start), (start_m_s, off_m_s));
         let clip = Interval { from_s: over.from_s.max(self.window.from_s), to_s: over.to_s.min(self.window.to_s) };
         if clip.from_s < clip.to_s {
             let mut part = piece.coefficients.clone();
@@ -164,33 +173,47 @@ impl Watch {
             let first = derivative(&part, clipped_s);
             let second = derivative(&first, clipped_s);
             for of in &mut self.of {
-                let known = of.extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.lower);
-                let to = (known, WIDTH * of.limit.allowance());
+                let goal = Goal {
+                    known: of.known(),
+                    bound: of.limit.bound(),
+                    width: WIDTH * of.limit.allowance(),
+                    coarse: 0.0,
+                };
                 let found = match (of.limit.quantity, of.limit.quantity.derivative()) {
-                    (Quantity::Fence, _) => self.fence.as_ref().map(|fence| outside(fence, &part, to)),
-                    (quantity, order) => Some(largest_of(quantity, [&part, &first, &second][order], to)),
+                    (Quantity::Fence, _) => {
+                        self.fence.as_ref().map(|fence| outside(fence, &part, Goal { coarse: COARSE, ..goal }))
+                    }
+                    (quantity, order) => Some(largest_of(quantity, [&part, &first, &second][order], goal)),
                 };
                 of.note(vehicle, found.map(|found| (clip, found)));
             }
         }
         let sample = Sample { vehicle, time_s: over.to_s, position_m: end, velocity_m_s: None, radius_m: None };
-        Last { sample: Some(sample), curve_end_m_s: Some(end_m_s), interval: None }
+        Last { sample: Some(sample), curve_end: Some((end_m_s, off_m_s)), interval: None }
     }
 
     /// Where a piece does not go on where the one before it ended, no speed is known; where it goes on at another velocity, it
     /// has no acceleration that a vehicle could have.
-    fn join(&mut self, last: &Last, vehicle: usize, (from_s, start, start_m_s): (f64, Vector3<f64>, Vector3<f64>)) {
-        let Some((before, end_m_s)) = last.sample.zip(last.curve_end_m_s) else { return };
+    fn join(
+        &mut self,
+        last: &Last,
+        vehicle: usize,
+        (from_s, start): (f64, Vector3<f64>),
+        (start_m_s, off_m_s): (Vector3<f64>, f64),
+    ) {
+        let Some((before, (end_m_s, off_before_m_s))) = last.sample.zip(last.curve_end) else { return };
         let apart_s = from_s - before.time_s;
         let jumps = (start - before.position_m).norm() > SMOOTH;
-        let bends = (start_m_s - end_m_s).norm() > SMOOTH;
+        let by_m_s = (start_m_s - end_m_s).norm();
+        let (may_bend, bends) = (by_m_s > SMOOTH, by_m_s > SMOOTH + off_m_s + off_before_m_s);
         let over = Interval { from_s: before.time_s.min(from_s), to_s: from_s };
-        self.each(vehicle, |limit, fence, window| {
+        self.each(vehicle, |limit, fence, window, _| {
             let in_window = window.from_s <= from_s && from_s <= window.to_s;
             let lower = match limit.quantity.derivative() {
                 0 if limit.quantity == Quantity::Fence => -fence?.room_m(before.position_m, start),
                 0 => limit.quantity.of(before.position_m).max(limit.quantity.of(start)),
-                2 if bends => (start_m_s - end_m_s).norm() / apart_s.max(0.0),
+                2 if bends => by_m_s / apart_s.max(0.0),
+                2 if may_bend => f64::NEG_INFINITY,
                 _ if jumps => f64::NEG_INFINITY,
                 _ => return None,
             };
@@ -199,11 +222,12 @@ impl Watch {
         });
     }
 
-    /// Asks for what was found of each limit, and notes it.
-    fn each(&mut self, vehicle: usize, mut find: impl FnMut(Limit, Option<&Fence>, Interval) -> Option<Found>) {
+    /// Asks for what was found of each limit, given the worst value that is known of it, and notes it.
+    fn each(&mut self, vehicle: usize, mut find: impl FnMut(Limit, Option<&Fence>, Interval, f64) -> Option<Found>) {
         let Self { fence, window, of, .. } = self;
         for of in of {
-            of.note(vehicle, find(of.limit, fence.as_ref(), *window));
+            let known = of.known();
+            of.note(vehicle, find(of.limit, fence.as_ref(), *window, known));
         }
     }
 
@@ -220,23 +244,30 @@ fn place_between(
     fence: Option<&Fence>,
     window: Interval,
     (before, seen): (&Sample, &Sample),
-    bound_m_s2: f64,
+    (bound_m_s2, known): (f64, f64),
 ) -> Option<Found> {
     let whole_s = seen.time_s - before.time_s;
     let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
     let place = |time_s: f64| before.position_m.lerp(&seen.position_m, (time_s - before.time_s) / whole_s);
     let from = if over.from_s > before.time_s { place(over.from_s) } else { before.position_m };
     let to = if over.to_s < seen.time_s { place(over.to_s) } else { seen.position_m };
-    let at = |here: Vector3<f64>| match limit.quantity {
-        Quantity::Fence => fence.map(|fence| -fence.room_m(here, here)),
-        quantity => Some(quantity.of(here)),
-    };
-    let (first, second) = (at(from)?, at(to)?);
-    let drawn = match limit.quantity {
-        Quantity::Fence => -fence?.room_m(from, to),
-        _ => first.max(second),
-    };
     let stray_m = bound_m_s2 * whole_s * whole_s / 8.0;
+    let (first, second, drawn) = match fence.filter(|_| limit.quantity == Quantity::Fence) {
+        None => {
+            let ends = [from, to].map(|here| limit.quantity.of(here));
+            (ends[0], ends[1], ends[0].max(ends[1]))
+        }
+        Some(fence) => {
+            let drawn = -fence.room_m(from, to);
+            // Where it is no worse than what is known, nobody asks at which end.
+            let [first, second] = if stray_m == 0.0 && drawn <= known.min(limit.bound()) {
+                [drawn; 2]
+            } else {
+                [from, to].map(|here| -fence.room_m(here, here))
+            };
+            (first, second, drawn)
+        }
+    };
     let is_seen = |time_s: f64| time_s == before.time_s || time_s == seen.time_s;
     let ends = [(over.from_s, first), (over.to_s, second)].into_iter().filter(|&(time_s, _)| is_seen(time_s));
     let lower = if stray_m == 0.0 { drawn } else { ends.map(|(_, value)| value).fold(f64::NEG_INFINITY, f64::max) };
@@ -259,7 +290,9 @@ fn speed_between(
     };
     let (start, end) = (recorded(before), recorded(seen));
     let added = bound_m_s2 * (seen.time_s - before.time_s);
-    let drawn = limit.quantity.of(mean);
+    // What the digits of its places leave open is no speed.
+    let drawn = limit.quantity.of(mean) - 2.0 * rounding_m(before, seen) / (seen.time_s - before.time_s);
+    let drawn = if over.from_s < over.to_s { drawn } else { f64::NEG_INFINITY };
     let is_whole = over.from_s == before.time_s && over.to_s == seen.time_s;
     let of_mean = if is_whole || bound_m_s2 == 0.0 { drawn } else { f64::NEG_INFINITY };
     let seen_most = start.into_iter().chain(end).fold(f64::NEG_INFINITY, f64::max);
@@ -267,14 +300,20 @@ fn speed_between(
     let by_ends = start.zip(end).map_or(f64::INFINITY, |(start, end)| 0.5 * (start + end + added));
     let upper = if bound_m_s2 == 0.0 { lower } else { lower.max((drawn + 0.5 * added).min(by_ends)) };
     let at = if end == Some(lower) { 1.0 } else { 0.0 };
-    (over.from_s < over.to_s).then_some((over, Enclosure { lower, upper, at }))
+    let is_told = over.from_s < over.to_s || (over.from_s == over.to_s && seen_most.is_finite());
+    is_told.then_some((over, Enclosure { lower, upper, at }))
+}
+
+/// How far places of two samples may be off by their digits \[m\].
+fn rounding_m(before: &Sample, seen: &Sample) -> f64 {
+    f64::EPSILON * before.position_m.amax().max(seen.position_m.amax())
 }
 
 /// How far outside of a fence a curve gets.
-fn outside(fence: &Fence, part: &[Vector3<f64>], to: (f64, f64)) -> Enclosure {
-    largest(part, to, |part, _| {
+fn outside(fence: &Fence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
+    largest(part, goal, |part, _| {
         let (from, to) = (part[0], value(part, 1.0));
-        [-fence.room_m(from, from), -fence.room_m(to, to), stray(part) - fence.room_m(from, to)]
+        [-fence.room_m(from, from), -fence.room_m(to, to), stray_across(part) - fence.room_m(from, to)]
     })
 }
 
@@ -282,6 +321,11 @@ impl Followed {
     fn new(limit: Limit) -> Self {
         let (violations, undecided) = (Times::default(), Times::default());
         Self { limit, extreme: None, violations, undecided, told: Vec::new(), assumes: None }
+    }
+
+    /// The worst value that is known.
+    fn known(&self) -> f64 {
+        self.extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.lower)
     }
 
     fn note(&mut self, vehicle: usize, found: Option<Found>) {

@@ -211,6 +211,15 @@ impl TrackAuditor {
         self.settings.asks_for_separation() || self.vehicles.iter().any(|vehicle| vehicle.radius_m.is_some())
     }
 
+    /// Whether the verdict is on pairs too: always where the question is about them. Limits that a recording brings of its own
+    /// count beside a question about single vehicles where there are two, and each of them has one.
+    fn is_separation_asked(&self) -> bool {
+        let is_own = self.settings.is_own_limit || !self.settings.asks_for_separation();
+        let mut judged = self.vehicles.iter().filter(|vehicle| vehicle.is_judged());
+        let are_two = judged.clone().count() > 1 && judged.all(|vehicle| vehicle.has_limit(&self.settings));
+        if is_own && !self.settings.envelope.is_empty() { are_two && self.asks_for_separation() } else { true }
+    }
+
     /// Notes a gap as far as it lies in the window that is asked for.
     fn note(&mut self, gap: Gap) {
         let window = self.settings.window();
@@ -235,11 +244,9 @@ impl TrackAuditor {
         let span_s = there().map(|there| (there.from_s, there.to_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let contradiction =
             self.vehicles.iter().filter_map(|v| v.contradiction).max_by(|a, b| a.needs_m_s2.total_cmp(&b.needs_m_s2));
-        let separates = self.asks_for_separation();
-        if let Some(vehicle) =
-            self.vehicles.iter().find(|of| separates && of.is_judged() && !of.has_limit(&self.settings))
-        {
-            return Err(RecordedError::NoLimit { vehicle: vehicle.name.clone() });
+        let separates = self.is_separation_asked();
+        if !separates {
+            self.results = Results::default();
         }
         let envelope = self.envelope.take().map(|envelope| {
             let judged: Vec<_> = self.vehicles.iter().map(Vehicle::is_judged).collect();

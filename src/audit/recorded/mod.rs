@@ -44,6 +44,7 @@
 mod auditor;
 mod error;
 mod outcome;
+mod places;
 mod rates;
 mod series;
 mod settings;
@@ -57,5 +58,6 @@ pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use error::RecordedError;
 pub use outcome::{Contradiction, Gap, Outcome, Presence, Told, ToldViolation};
+pub use places::Places;
 pub use series::{PairSample, PairSeries};
 pub use settings::{Motion, Settings, VehicleSettings};

@@ -7,7 +7,7 @@ use super::draw_list::{Annotation, pixels};
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
 use crate::audit::Violation;
-use crate::render::timeline::Plan;
+use crate::plan::Plan;
 use crate::swarm::Pair;
 use crate::text::at_least;
 

@@ -6,7 +6,7 @@ use super::builder::SceneBuilder;
 use super::camera::Lens;
 use super::colour::Theme;
 use super::draw_list::{Ball, Line, Scene, single};
-use crate::render::timeline::Plan;
+use crate::plan::Plan;
 use crate::swarm::Pair;
 
 /// Most edges that are drawn: more hide what they join.

@@ -370,7 +370,7 @@ fn goals_are_those_of_the_leg_under_way_where_the_reference_is() {
         known_by: crate::graph::Pinning::Leader(2),
         feed_forward: true,
     });
-    let mut plan = crate::render::timeline::Plan::of(&scenario);
+    let mut plan = crate::plan::Plan::of(&scenario);
     plan.note(&crate::record::Event::LegBegan { leg: 1, time_s: 1.0 });
     let slot = |time_s: f64, k: usize| plan.slots_at(time_s, &Rows::zeros(4)).expect("slots")[k];
     let first_m = row(&scenario.legs[0].formation.slots_m, 1);

@@ -5,7 +5,6 @@ mod frame;
 mod history;
 mod judge;
 mod obstacles;
-mod plan;
 mod tracks;
 
 pub use airframe::QuadrotorShape;
@@ -14,7 +13,6 @@ pub use frame::{Frame, Keyframe};
 pub(super) use history::PICTURED;
 pub use history::Timeline;
 pub use obstacles::TooNear;
-pub use plan::Plan;
 pub use tracks::TracksError;
 
 #[cfg(test)]

@@ -9,9 +9,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::player::Player;
 use super::plot::plot;
 use super::state::WindowState;
+use crate::plan::Plan;
 use crate::render::gpu::paint;
 use crate::render::scene::{Extent, Projected, Scene, metres};
-use crate::render::timeline::{Frame, Plan};
+use crate::render::timeline::Frame;
 use crate::swarm::{Pair, row};
 
 /// Degrees that the camera turns for a point that the mouse is dragged.

@@ -1,16 +1,19 @@
 //! Self-contained HTML pages.
 //!
 //! A [`Page`] is a verdict and sections. Every text is escaped. A page refers to nothing outside itself and forbids the
-//! browser to load anything; it follows the reader's choice of light or dark and fits a phone. The same parts give the
+//! browser to load anything; where flights are replayed, one script of ours may run, and no other. It follows the reader's choice of light or dark and fits a phone. The same parts give the
 //! same bytes.
+
+mod replay;
 
 use maud::{DOCTYPE, PreEscaped, html};
 pub use maud::{Markup, Render};
+pub use replay::{Start, no_replay, replay};
 
 use crate::figures::Figure;
 
 const STYLE: &str = include_str!("style.css");
-/// Nothing may be loaded and nothing may run.
+/// Nothing may be loaded; what may run is named by its hash, where anything may.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
 
@@ -83,9 +86,20 @@ impl Render for Badge {
 }
 
 impl Page {
-    /// The page as HTML.
+    /// The page as HTML, in which nothing runs.
     #[must_use]
     pub fn render(&self) -> String {
+        self.whole(false)
+    }
+
+    /// The page as HTML with the one script that draws the [`replay`]s of its sections.
+    #[must_use]
+    pub fn render_with_replays(&self) -> String {
+        self.whole(true)
+    }
+
+    fn whole(&self, replays: bool) -> String {
+        let policy = if replays { format!("{POLICY}; {}", replay::script_source()) } else { POLICY.to_owned() };
         let page = html! {
             (DOCTYPE)
             html lang="en" {
@@ -93,11 +107,11 @@ impl Page {
                     meta charset="utf-8";
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     meta name="color-scheme" content="light dark";
-                    meta http-equiv="Content-Security-Policy" content=(POLICY);
+                    meta http-equiv="Content-Security-Policy" content=(policy);
                     title { (self.title) " - " (self.badge.word) }
                     // An empty icon, or browsers ask for one.
                     link rel="icon" href="data:,";
-                    style { (PreEscaped(STYLE)) }
+                    style { (PreEscaped(STYLE)) @if replays { (PreEscaped(replay::STYLE)) } }
                 }
                 body {
                     header {
@@ -118,6 +132,7 @@ impl Page {
                         @for section in &self.sections { (section) }
                     }
                     footer { p { "Made by " (env!("CARGO_PKG_NAME")) " " (env!("CARGO_PKG_VERSION")) "." } }
+                    @if replays { (replay::script()) }
                 }
             }
         };

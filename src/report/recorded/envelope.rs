@@ -71,7 +71,7 @@ impl OfLimit {
         let (lower, upper) = (of.lower, of.upper);
         let number = match (lower.is_finite(), upper.is_finite()) {
             (false, false) if lower > 0.0 => return "without bound where its curve has a corner".to_owned(),
-            (false, false) => "not known".to_owned(),
+            (false, false) => return "not known".to_owned(),
             (true, false) => format!("at least {}", at_least(lower, 3)),
             (false, true) => format!("at most {}", at_most(upper, 3)),
             (true, true) if upper - lower <= 1e-6 * upper.abs().max(1.0) => self.told_apart(upper),
@@ -82,7 +82,8 @@ impl OfLimit {
 
     /// A value with at least three decimals, and as many as tell it from the limit.
     fn told_apart(&self, value: f64) -> String {
-        let is_told = |&decimals: &usize| fixed(value, decimals) != fixed(self.allowed, decimals);
+        let size = |number: f64, decimals: usize| fixed(number, decimals).trim_start_matches('-').to_owned();
+        let is_told = |&decimals: &usize| size(value, decimals) != size(self.allowed, decimals);
         let decimals = if value == self.allowed { 3 } else { (3..=17).find(is_told).unwrap_or(3) };
         fixed(value, decimals)
     }
@@ -100,12 +101,12 @@ impl OfLimit {
             Status::Clear => {
                 let least = self.limit.quantity.is_least();
                 let most = self.extreme.as_ref().map_or(String::new(), |of| {
-                    // What rounding leaves beyond the limit is none.
-                    let bound = if least {
-                        at_least(of.finding.lower.max(self.allowed), 3)
-                    } else {
-                        at_most(of.finding.upper.min(self.allowed), 3)
-                    };
+                    let bound = if least { at_least(of.finding.lower, 3) } else { at_most(of.finding.upper, 3) };
+                    // What rounding, or three decimals, leave beyond the limit is none.
+                    let is_beyond = bound
+                        .parse()
+                        .is_ok_and(|shown: f64| if least { shown < self.allowed } else { shown > self.allowed });
+                    let bound = if is_beyond { exact(self.allowed) } else { bound };
                     format!(" {} {bound} {}", if least { "at least" } else { "at most" }, self.unit())
                 });
                 format!("{called}{most} (limit {})", self.asked())

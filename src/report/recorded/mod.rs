@@ -3,6 +3,7 @@
 //! `separation` and `audit` have the keys of a flight's `report.json`; what a recording adds stands beside them.
 
 mod envelope;
+mod moments;
 mod named;
 mod report;
 mod words;

@@ -8,7 +8,8 @@ use super::report::RecordedReport;
 use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
-use crate::report::page::{self, Badge, Markup, Page, Tone, section};
+use crate::replay::{NoReplay, Replay};
+use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};
 use crate::text::{at_least, at_most, counted, exact, fixed, metres_below, seconds};
 
 /// Violations that are listed in words, and on the page.
@@ -23,7 +24,7 @@ impl RecordedReport {
     /// The verdict in one line.
     #[must_use]
     pub fn headline(&self) -> String {
-        format!("{}: {}", self.verdict(), self.finding())
+        one_line(&format!("{}: {}", self.verdict(), self.finding()))
     }
 
     /// The verdict alone, such as `PROVED CLEAR`.
@@ -96,7 +97,7 @@ impl RecordedReport {
         let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
         if let Some(OfPair { who: [first, second], finding }) = closest {
             let rate =
-                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
+                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
             let (low, high, at) = (at_least(finding.lower_m, 6), at_most(finding.upper_m, 6), seconds(finding.to_s));
             return if finding.upper_m.is_finite() {
                 format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
@@ -142,7 +143,7 @@ impl RecordedReport {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let mut line = |words: String| {
-            let _ = writeln!(text, "{words}");
+            let _ = writeln!(text, "{}", one_line(&words));
         };
         let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
         line(format!(
@@ -174,10 +175,14 @@ impl RecordedReport {
         text
     }
 
-    /// The report as a self-contained HTML page.
+    /// The report as a self-contained HTML page, with the replay of the recording or why there is none.
     #[must_use]
-    pub fn to_html(&self, figures: &[Figure], command: &str) -> String {
-        let mut sections = Vec::new();
+    pub fn to_html(&self, replay: &Result<Replay, NoReplay>, figures: &[Figure], command: &str) -> String {
+        let replay = match replay {
+            Ok(replay) => page::replay(&self.source.recording, replay, Start::AtOnce),
+            Err(why) => page::no_replay(&why.to_string()),
+        };
+        let mut sections = vec![section("Replay", &[replay])];
         if !self.closest.is_empty() {
             sections.push(section("Closest pairs", &[closest_table(&self.closest)]));
         }
@@ -223,8 +228,13 @@ impl RecordedReport {
             warnings: Vec::new(),
             sections,
         }
-        .render()
+        .render_with_replays()
     }
+}
+
+/// Words with foreign names in them, on one line whatever the names hold.
+fn one_line(words: &str) -> String {
+    words.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
 /// The first of some lines, and how many more there are.
@@ -235,7 +245,7 @@ fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
 }
 
 impl OfPair<Violation<ObjectPair>> {
-    fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
         let min = metres_below(finding.min_m, finding.limit_m);
         format!(
@@ -248,9 +258,9 @@ impl OfPair<Violation<ObjectPair>> {
 }
 
 impl OfPair<Undecided<ObjectPair>> {
-    fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
-        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
+        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
         let apart = if finding.upper_m.is_finite() {
             interval(finding.lower_m, finding.upper_m)
         } else {

@@ -2,15 +2,19 @@
 
 use std::sync::LazyLock;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
-use crate::formation::{Formation, Freedom, best_rigid_motion};
+use crate::formation::{Formation, Freedom, RigidMotion, best_rigid_motion};
 use crate::graph::Graph;
-use crate::law::{EdgeTension, EdgeTensionKeys, LawSpec};
+use crate::law::LawSpec;
+#[cfg(feature = "pictures")]
+use crate::law::{EdgeTension, EdgeTensionKeys};
 use crate::record::Event;
 use crate::scenario::Scenario;
 use crate::space::Obstacle;
-use crate::swarm::{Pair, Rows, mean_row, row};
+#[cfg(feature = "pictures")]
+use crate::swarm::{Pair, row};
+use crate::swarm::{Rows, mean_row};
 use crate::target::{Course, Guidance};
 
 /// Formations, graph and how hard an edge pulls.
@@ -29,7 +33,7 @@ pub struct Plan {
 
 impl Plan {
     /// Formations, graph and law of a scenario.
-    pub(in crate::render) fn of(scenario: &Scenario) -> Self {
+    pub(crate) fn of(scenario: &Scenario) -> Self {
         Self {
             course: Course::new(&scenario.legs),
             guidance: scenario.reference.clone(),
@@ -42,7 +46,7 @@ impl Plan {
     }
 
     /// Takes note of what happened.
-    pub(in crate::render) fn note(&mut self, event: &Event) {
+    pub(crate) fn note(&mut self, event: &Event) {
         match event {
             &Event::LegBegan { leg, time_s } => self.course.begin(leg, time_s),
             Event::Assigned { slots, time_s } => self.course.assign(slots, *time_s),
@@ -75,23 +79,46 @@ impl Plan {
         self.guidance.as_ref()?.known_by.leader()
     }
 
-    /// Where the slots are at a time \[s\], moved as the law leaves them free to be so that they fit best \[m\]; none
-    /// where positions are not known.
-    pub(in crate::render) fn slots_at(&self, time_s: f64, positions_m: &Rows) -> Option<Vec<Vector3<f64>>> {
+    /// What lays the slots of a time \[s\] over the vehicles as well as the law leaves them free to be moved; none where
+    /// positions are not known.
+    pub(crate) fn laid_at(&self, time_s: f64, positions_m: &Rows) -> Option<RigidMotion> {
         let formation = self.formation_at(time_s);
-        let (slots_m, count) = (&formation.slots_m, formation.count());
-        let moved = |by_m: Vector3<f64>| (0..count).map(|k| row(slots_m, k) + by_m).collect();
+        let moved = |translation_m| RigidMotion { rotation: Matrix3::identity(), translation_m };
         match self.freedom {
             Freedom::Fixed => self.reference_at(time_s).map(moved),
-            Freedom::Translation if positions_m.nrows() == count => Some(mean_row(positions_m) - mean_row(slots_m))
-                .filter(|by_m| by_m.iter().all(|x| x.is_finite()))
-                .map(moved),
-            Freedom::Translation => None,
-            Freedom::RigidMotion => {
-                let motion = best_rigid_motion(positions_m, formation)?;
-                Some((0..count).map(|k| motion.apply(row(slots_m, k))).collect())
+            Freedom::Translation if positions_m.nrows() == formation.count() => {
+                Some(mean_row(positions_m) - mean_row(&formation.slots_m))
+                    .filter(|by_m| by_m.iter().all(|x| x.is_finite()))
+                    .map(moved)
             }
+            Freedom::Translation => None,
+            Freedom::RigidMotion => best_rigid_motion(positions_m, formation),
         }
+    }
+
+    /// Where the slots are at a time \[s\], laid over the vehicles \[m\]; none where positions are not known.
+    #[cfg(feature = "pictures")]
+    pub(crate) fn slots_at(&self, time_s: f64, positions_m: &Rows) -> Option<Vec<Vector3<f64>>> {
+        let (laid, slots_m) = (self.laid_at(time_s, positions_m)?, &self.formation_at(time_s).slots_m);
+        Some((0..slots_m.nrows()).map(|k| laid.apply(row(slots_m, k))).collect())
+    }
+
+    /// From when on each of the formations is under way \[s\], in order of time; the first from the start.
+    #[cfg(feature = "reports")]
+    pub(crate) fn formations(&self) -> Vec<(f64, &Formation)> {
+        self.course.formations()
+    }
+
+    /// Safety distance \[m\].
+    #[cfg(feature = "reports")]
+    pub(crate) fn delta_m(&self) -> f64 {
+        self.delta_m
+    }
+
+    /// Whether edges have a tension, and are no springs.
+    #[cfg(feature = "reports")]
+    pub(crate) fn has_tension(&self) -> bool {
+        matches!(self.law, LawSpec::EdgeTension(_))
     }
 
     /// How hard the edge between two vehicles pulls (above 0) or pushes (below 0) at a distance \[m\] and a time \[s\], from
@@ -99,8 +126,9 @@ impl Plan {
     ///
     /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
     /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: its elongation over the desired distance.
+    #[cfg(feature = "pictures")]
     #[expect(clippy::cast_possible_truncation, reason = "the share of a colour")]
-    pub(in crate::render) fn tension(&self, pair: Pair, distance_m: f64, time_s: f64) -> f32 {
+    pub(crate) fn tension(&self, pair: Pair, distance_m: f64, time_s: f64) -> f32 {
         let tension = match self.edge_tension(pair, time_s) {
             Some((alpha, edge)) => edge.derivative(distance_m) * edge.k_m() / alpha,
             None => self.elongation(pair, distance_m, time_s),
@@ -111,18 +139,20 @@ impl Plan {
     /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
     /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
     #[cfg(feature = "window")]
-    pub(in crate::render) fn pull_m_s2(&self, pair: Pair, distance_m: f64, time_s: f64) -> Option<f64> {
+    pub(crate) fn pull_m_s2(&self, pair: Pair, distance_m: f64, time_s: f64) -> Option<f64> {
         let vehicles = self.graph.count() as f64;
         self.edge_tension(pair, time_s).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
     }
 
     /// How much longer a distance \[m\] is than the desired one, over that one.
-    pub(in crate::render) fn elongation(&self, pair: Pair, distance_m: f64, time_s: f64) -> f64 {
+    #[cfg(feature = "pictures")]
+    pub(crate) fn elongation(&self, pair: Pair, distance_m: f64, time_s: f64) -> f64 {
         let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
         (distance_m - rest_m) / rest_m
     }
 
     /// Alpha \[m^2/s^2\] and the tension of an edge, where the law has one.
+    #[cfg(feature = "pictures")]
     fn edge_tension(&self, pair: Pair, time_s: f64) -> Option<(f64, EdgeTension)> {
         let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = self.law else { return None };
         let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());

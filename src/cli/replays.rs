@@ -1,0 +1,124 @@
+//! Replays of what was flown and of what was judged.
+
+use std::collections::BTreeMap;
+
+use super::Failure;
+use super::encounters;
+use super::reading::Open;
+use crate::audit::recorded::{Gap, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
+use crate::figures::Figure;
+use crate::replay::{Film, MOST_INSTANTS, Nearest, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
+use crate::report::Report;
+use crate::report::recorded::RecordedReport;
+use crate::scenario::Scenario;
+use crate::sim;
+use crate::swarm::ClosestApproach;
+use crate::track::Item;
+
+/// Most times of a recording that are kept while it is judged.
+const MOST_TIMES: usize = 1 << 20;
+/// Instants a second at which known curves are drawn \[Hz\].
+const CURVE_HZ: f64 = 30.0;
+/// Most gaps whose ends are shown to the instant.
+const MOST_GAPS: usize = 200;
+
+/// A flight and what was found on it, in so many bytes.
+pub(super) fn of_flight(
+    scenario: &Scenario,
+    film: &Film,
+    report: &Report,
+    room_bytes: usize,
+) -> Result<Replay, NoReplay> {
+    let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
+    let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::judged).collect());
+    Replay::new(&stage, film, &report.moments(&names), report.judgement(), room_bytes)
+}
+
+/// When a recording says something, as it is read.
+#[derive(Default)]
+pub(super) struct Instants {
+    times_s: Vec<f64>,
+    items: usize,
+    has_curves: bool,
+}
+
+impl Instants {
+    /// Takes note of items, by clocks that these settings set right. Beyond a million times every second one is dropped.
+    pub(super) fn note(&mut self, items: &[Item], names: &[String], settings: &Settings) {
+        let offsets: BTreeMap<usize, f64> =
+            names.iter().enumerate().filter_map(|(k, name)| Some((k, settings.vehicles.get(name)?.offset_s))).collect();
+        for item in items {
+            let time_s = item.time_s() + offsets.get(&item.vehicle()).copied().unwrap_or(0.0);
+            self.items += 1;
+            self.has_curves |= matches!(item, Item::Piece(_));
+            if self.times_s.last() != Some(&time_s) {
+                self.times_s.push(time_s);
+            }
+            if self.times_s.len() > MOST_TIMES {
+                let mut k = 0_usize;
+                self.times_s.retain(|_| {
+                    k += 1;
+                    k % 2 == 1
+                });
+            }
+        }
+    }
+
+    /// The times that are shown of a recording with this outcome.
+    fn shown(self, outcome: &Outcome, spans: &[Span]) -> Vec<f64> {
+        let Some((from_s, to_s)) = outcome.span_s else { return Vec::new() };
+        let mut times_s = self.times_s;
+        if self.has_curves {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+            let steps = ((to_s - from_s) * CURVE_HZ).ceil().clamp(1.0, MOST_INSTANTS as f64) as usize;
+            times_s.extend((0..=steps).map(|k| from_s + (to_s - from_s) * (k as f64 / steps as f64)));
+        }
+        times_s.extend(spans.iter().flat_map(|span| [span.from_s, span.at_s, span.to_s]));
+        times_s.extend([from_s, to_s]);
+        times_s.retain(|time_s| (from_s..=to_s).contains(time_s));
+        times_s.sort_unstable_by(f64::total_cmp);
+        times_s.dedup();
+        chosen(&times_s, spans, MOST_INSTANTS).into_iter().map(|k| times_s[k]).collect()
+    }
+}
+
+/// Reads a recording again for its replay, or why there is none, and for the figures of those who came closest.
+pub(super) fn of_recording(
+    open: &Open<'_>,
+    settings: &Settings,
+    outcome: &Outcome,
+    report: &RecordedReport,
+    instants: Instants,
+) -> Result<(Result<Replay, NoReplay>, Vec<Figure>), Failure> {
+    let moments = report.moments();
+    let gaps = outcome.gaps.iter().take(MOST_GAPS).map(|gap: &Gap| {
+        let at_s = f64::midpoint(gap.from_s, gap.to_s);
+        Span { from_s: gap.from_s, to_s: gap.to_s, at_s }
+    });
+    let spans: Vec<_> = moments.iter().map(|moment| moment.span).chain(gaps).collect();
+    let samples = instants.items;
+    let mut places = Places::new(settings, outcome, instants.shown(outcome, &spans));
+    let figures = encounters::figures(open, settings, outcome, &mut places)?;
+    let mut near = Nearest::default();
+    for found in &outcome.smallest {
+        match found.and_then(|found| Some((found.pair.vehicles()?, found))) {
+            Some((pair, of)) => {
+                near.take(ClosestApproach { pair, separation_m: of.certain_m(), time_s: of.time_s });
+            }
+            None => near.break_off(),
+        }
+    }
+    let half = |delta_m: f64| [0.5 * delta_m; 3];
+    let ellipsoid =
+        settings.ellipsoid_m.map(|axes_m| (axes_m * (0.5 * settings.delta_m.unwrap_or(TOUCHING_ELLIPSOIDS))).into());
+    let stage = Stage {
+        vehicles: outcome.vehicles.clone(),
+        radius_m: places.radius_m(),
+        shell_m: ellipsoid.or(settings.delta_m.map(half)),
+        plan: None,
+        obstacles: settings.obstacles.clone(),
+    };
+    let (times_s, positions_m) = places.finish();
+    let film = Film::of(times_s, positions_m, near, samples).keeping(spans);
+    Ok((Replay::new(&stage, &film, &moments, report.judgement(), PAGE_BYTES), figures))
+}

@@ -1,0 +1,94 @@
+//! Which instants of a flight are kept.
+
+use std::collections::BTreeSet;
+
+/// Most instants of a replay: a texture of every graphics card has so many rows.
+pub const MOST_INSTANTS: usize = 2000;
+/// Instants that are kept on either side of what happened.
+const BESIDE: usize = 2;
+/// Part of all instants that spans may take.
+const SHARE: f64 = 0.75;
+
+/// A time in which something happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// When it was at its worst \[s\].
+    pub at_s: f64,
+}
+
+/// Indices of at most `most` (at least 2) instants, given in order of time \[s\], in ascending order.
+///
+/// Kept are the first and the last; two on either side of the worst time of each span; all within spans and two on either
+/// side, one span after the other as long as they take no more than three quarters; and every k-th of all.
+#[must_use]
+pub fn chosen(times_s: &[f64], spans: &[Span], most: usize) -> Vec<usize> {
+    let (count, most) = (times_s.len(), most.max(2));
+    if count <= most {
+        return (0..count).collect();
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+    let room = (SHARE * most as f64) as usize;
+    let mut kept = BTreeSet::from([0, count - 1]);
+    let around = |from_s: f64, to_s: f64| {
+        let first = times_s.partition_point(|&time_s| time_s < from_s).saturating_sub(BESIDE);
+        let end = times_s.partition_point(|&time_s| time_s <= to_s) + BESIDE;
+        first..end.min(count)
+    };
+    let worst = spans.iter().map(|span| around(span.at_s, span.at_s));
+    let whole = spans.iter().map(|span| around(span.from_s, span.to_s));
+    for instants in worst.chain(whole) {
+        let more = instants.clone().filter(|k| !kept.contains(k)).count();
+        if kept.len() + more <= room {
+            kept.extend(instants);
+        }
+    }
+    // The smallest stride that leaves no more than there is room for.
+    let free = most - kept.len();
+    let stride = count.div_ceil(free.max(1)).max(1);
+    kept.extend((0..count).step_by(stride));
+    kept.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn span(from_s: f64, to_s: f64) -> Span {
+        Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) }
+    }
+
+    proptest! {
+        #[test]
+        fn no_more_than_asked_are_kept_in_order_with_the_first_and_the_last(
+            count in 0..5000_usize,
+            most in 2..800_usize,
+            spans in prop::collection::vec((0.0..5000.0_f64, 0.0..200.0_f64), 0..40),
+        ) {
+            let times: Vec<f64> = (0..count).map(|k| k as f64).collect();
+            let spans: Vec<_> = spans.into_iter().map(|(from_s, length_s)| span(from_s, from_s + length_s)).collect();
+            let kept = chosen(&times, &spans, most);
+            prop_assert!(kept.len() <= most && kept.len() <= count && kept.is_sorted_by(|a, b| a < b));
+            prop_assert!(count == 0 || (kept.first() == Some(&0) && kept.last() == Some(&(count - 1))));
+            // Evenly, too: a quarter of the room is for that.
+            let widest = kept.windows(2).map(|two| two[1] - two[0]).max().unwrap_or(1);
+            prop_assert!(widest <= 1 + count.div_ceil((most / 4).max(1)));
+        }
+    }
+
+    #[test]
+    fn every_instant_of_a_span_is_kept_and_two_beside_it() {
+        let times: Vec<f64> = (0..100_000).map(f64::from).collect();
+        let kept = chosen(&times, &[span(5000.5, 5100.5), span(70_000.0, 70_000.0)], 500);
+        assert!((4999..=5102).chain(69_998..=70_002).all(|k| kept.contains(&k)), "{kept:?}");
+        assert!(kept.len() > 250, "the rest of the room is used: {}", kept.len());
+        // One that does not fit is kept where it is worst.
+        let kept = chosen(&times, &[span(5000.0, 9000.0)], 500);
+        assert!((6998..=7002).all(|k| kept.contains(&k)) && kept.len() <= 500);
+    }
+}

@@ -1,0 +1,126 @@
+//! Motion as it is taken, in bounded memory.
+
+use super::choice::{Span, chosen};
+use super::nearest::Nearest;
+use crate::audit::recorded::ObjectPair;
+use crate::record::{Event, RecordError, Sample, Sink};
+use crate::swarm::{ClosestApproach, Rows};
+
+/// Memory for positions \[bytes\]; beyond, every second instant is dropped.
+const BUDGET_BYTES: usize = 64 << 20;
+/// Most times in which something happened that instants are kept for while a flight is taken.
+const MOST_SPANS: usize = 1000;
+
+/// Positions at instants, and how near any two were, by the judge.
+///
+/// It is a [`Sink`] and can watch a flight. What goes beyond 64 MiB is thinned; instants around violations and around the
+/// closest approach stay.
+#[derive(Clone, Debug, Default)]
+pub struct Film {
+    /// In order of time \[s\].
+    pub(super) times_s: Vec<f64>,
+    /// N x 3 each \[m\]; NaN for a vehicle that is not there.
+    pub(super) positions_m: Vec<Rows>,
+    pub(super) nearest: Nearest,
+    /// What changes the target, and legs and slots with it.
+    pub(super) events: Vec<Event>,
+    /// Samples taken.
+    pub(super) samples: usize,
+    /// Times whose instants stay, beside those of moments.
+    pub(super) spans: Vec<Span>,
+    violations: Vec<(ObjectPair, Span)>,
+    budget_bytes: Option<usize>,
+}
+
+impl Film {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Of instants that are known, `samples` in the recording: N x 3 positions \[m\] at each time \[s\], NaN for a vehicle that
+    /// is not there.
+    #[must_use]
+    pub fn of(times_s: Vec<f64>, positions_m: Vec<Rows>, nearest: Nearest, samples: usize) -> Self {
+        Self { times_s, positions_m, nearest, samples, ..Self::default() }
+    }
+
+    /// The same, with times whose instants are not to be thinned out.
+    #[must_use]
+    pub fn keeping(self, spans: Vec<Span>) -> Self {
+        Self { spans, ..self }
+    }
+
+    #[cfg(test)]
+    pub(super) fn within(self, budget_bytes: usize) -> Self {
+        Self { budget_bytes: Some(budget_bytes), ..self }
+    }
+
+    /// Takes the next instant: a time \[s\] later than the one before it, and N x 3 positions \[m\].
+    pub fn take(&mut self, time_s: f64, positions_m: &Rows, closest: Option<ClosestApproach>) {
+        if self.positions_m.first().is_some_and(|first| first.nrows() != positions_m.nrows()) {
+            return;
+        }
+        self.samples += 1;
+        self.times_s.push(time_s);
+        self.positions_m.push(positions_m.clone());
+        if let Some(closest) = closest {
+            self.nearest.take(closest);
+        }
+        let bytes = positions_m.len() * size_of::<f64>() * self.times_s.len();
+        if bytes > self.budget_bytes.unwrap_or(BUDGET_BYTES) && self.times_s.len() > 8 {
+            self.thin();
+        }
+    }
+
+    fn thin(&mut self) {
+        let closest = self.nearest.closest().map(|closest| closest.time_s);
+        let closest = closest.map(|at_s| Span { from_s: at_s, to_s: at_s, at_s });
+        let spans: Vec<_> = closest.into_iter().chain(self.violations.iter().map(|(_, span)| *span)).collect();
+        let kept = chosen(&self.times_s, &spans, self.times_s.len() / 2);
+        let mut all: Vec<_> = std::mem::take(&mut self.positions_m).into_iter().map(Some).collect();
+        self.positions_m = kept.iter().filter_map(|&k| all[k].take()).collect();
+        self.times_s = kept.iter().map(|&k| self.times_s[k]).collect();
+    }
+
+    fn begin(&mut self, whose: ObjectPair, time_s: f64) {
+        if self.violations.len() < MOST_SPANS {
+            self.violations.push((whose, Span { from_s: time_s, to_s: f64::INFINITY, at_s: time_s }));
+        }
+    }
+
+    fn end(&mut self, whose: ObjectPair, time_s: f64) {
+        if let Some((_, span)) = self.violations.iter_mut().rev().find(|(other, _)| *other == whose) {
+            span.to_s = time_s;
+        }
+    }
+}
+
+impl Sink for Film {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.take(sample.time_s, &sample.swarm.positions_m, sample.separation);
+        Ok(())
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        let of_obstacle = |vehicle, obstacle| ObjectPair::Obstacle { vehicle, obstacle };
+        match *event {
+            Event::LegBegan { .. } | Event::Assigned { .. } => self.events.push(event.clone()),
+            Event::ViolationBegan { pair, time_s } => self.begin(ObjectPair::Vehicles(pair), time_s),
+            Event::ViolationEnded { pair, time_s, .. } => self.end(ObjectPair::Vehicles(pair), time_s),
+            Event::ObstacleViolationBegan { vehicle, obstacle, time_s } => {
+                self.begin(of_obstacle(vehicle, obstacle), time_s);
+            }
+            Event::ObstacleViolationEnded { vehicle, obstacle, time_s, .. } => {
+                self.end(of_obstacle(vehicle, obstacle), time_s);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,215 @@
+//! Positions as 16-bit steps on a grid.
+
+use nalgebra::Vector3;
+
+/// Stands for a point that is not there, in the place of its step along x.
+const ABSENT: i16 = i16::MIN;
+/// Largest step.
+const LARGEST: f64 = 32_766.0;
+/// Cells of the grid between the middle and the farthest point, at most: a start is a whole number of 32 bits.
+const MOST_CELLS: f64 = 1_073_741_824.0;
+/// Smallest cell \[m\].
+const SMALLEST_M: f64 = 1e-9;
+/// Cells up to the largest coordinate, at most: every place on the grid is a double, exactly.
+const MOST_WHOLE: f64 = 2_251_799_813_685_248.0;
+
+/// The motion of points, on a grid whose cells are the smallest power of two in which no step is too long for 16 bits.
+///
+/// A point is rounded to the nearest place of the grid, and steps lead from place to place: rounding does not add up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    points: usize,
+    instants: usize,
+    /// Cells from zero to the middle, along each axis.
+    middle: [f64; 3],
+    cell_m: f64,
+    /// Cells from the middle to where each point is first seen; 0 where it never is.
+    starts: Vec<[i32; 3]>,
+    /// Steps of every point at every instant, one instant after the other; the first is none.
+    steps: Vec<[i16; 3]>,
+}
+
+impl Motion {
+    /// Packs points at instants: the same number of points at each, none where one is not there. A point with a coordinate that is
+    /// no finite number is not there.
+    ///
+    /// Coordinates of more than 1e9 m make cells of more than 1e-6 m.
+    #[must_use]
+    pub fn new(instants: &[Vec<Option<Vector3<f64>>>]) -> Self {
+        let points = instants.first().map_or(0, Vec::len);
+        let there = |k: usize, point: usize| instants[k].get(point).copied().flatten().filter(is_finite);
+        let all = || (0..instants.len()).flat_map(|k| (0..points).filter_map(move |point| there(k, point)));
+        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        for at in all() {
+            (low, high) = (low.inf(&at), high.sup(&at));
+        }
+        if low.x > high.x {
+            (low, high) = (Vector3::zeros(), Vector3::zeros());
+        }
+        let mut longest_m = 0.0_f64;
+        for point in 0..points {
+            let mut last: Option<Vector3<f64>> = None;
+            for at in (0..instants.len()).filter_map(|k| there(k, point)) {
+                longest_m = longest_m.max(last.map_or(0.0, |last| (at - last).amax()));
+                last = Some(at);
+            }
+        }
+        let reach_m = (0.5 * (high - low)).amax();
+        let farthest_m = low.amax().max(high.amax());
+        // A step between two places of the grid is at most a cell longer than the way.
+        let cell_m = power_of_two(
+            (longest_m / (LARGEST - 1.0))
+                .max(reach_m / (MOST_CELLS - 2.0))
+                .max(farthest_m / MOST_WHOLE)
+                .max(SMALLEST_M),
+        );
+        let middle = (0.5 * low + 0.5 * high).map(|x| (x / cell_m).round());
+        let place = |at: Vector3<f64>| at.map(|x| (x / cell_m).round()) - middle;
+        let mut starts = vec![[0; 3]; points];
+        let mut last: Vec<Option<Vector3<f64>>> = vec![None; points];
+        let mut steps = Vec::with_capacity(points * instants.len());
+        for k in 0..instants.len() {
+            for point in 0..points {
+                let Some(at) = there(k, point).map(place) else {
+                    steps.push([ABSENT, 0, 0]);
+                    continue;
+                };
+                let from = *last[point].get_or_insert_with(|| {
+                    starts[point] = whole(at);
+                    at
+                });
+                let step = at - from;
+                steps.push([step.x, step.y, step.z].map(short));
+                last[point] = Some(at);
+            }
+        }
+        Self { points, instants: instants.len(), middle: middle.into(), cell_m, starts, steps }
+    }
+
+    /// Most that a coordinate is rounded by \[m\]: half of a cell.
+    #[must_use]
+    pub fn rounding_m(&self) -> f64 {
+        0.5 * self.cell_m
+    }
+
+    /// Edge of a cell \[m\].
+    #[must_use]
+    pub fn cell_m(&self) -> f64 {
+        self.cell_m
+    }
+
+    /// The middle of all points \[m\], from which places are counted.
+    #[must_use]
+    pub fn middle_m(&self) -> [f64; 3] {
+        self.middle.map(|cells| cells * self.cell_m)
+    }
+
+    /// Starts in cells from the middle: 32-bit whole numbers, least byte first, x, y, z of one point after the other.
+    #[must_use]
+    pub fn start_bytes(&self) -> Vec<u8> {
+        self.starts.iter().flatten().flat_map(|cells| cells.to_le_bytes()).collect()
+    }
+
+    /// Steps in cells from where the point was last seen: 16-bit whole numbers, least byte first, x, y, z of one point after the
+    /// other, one instant after the other. A step of -32768 along x stands for a point that is not there.
+    #[must_use]
+    pub fn step_bytes(&self) -> Vec<u8> {
+        self.steps.iter().flatten().flat_map(|cells| cells.to_le_bytes()).collect()
+    }
+
+    /// The points at every instant, as they are drawn \[m\].
+    #[must_use]
+    pub fn unpacked(&self) -> Vec<Vec<Option<Vector3<f64>>>> {
+        let mut cells: Vec<_> = self.starts.iter().map(|start| Vector3::from(start.map(f64::from))).collect();
+        let middle = Vector3::from(self.middle);
+        let of_instant = |k: usize| &self.steps[k * self.points..(k + 1) * self.points];
+        let mut unpacked = Vec::new();
+        for k in 0..self.instants {
+            let at = std::iter::zip(&mut cells, of_instant(k)).map(|(at, step)| {
+                *at += if step[0] == ABSENT { Vector3::zeros() } else { Vector3::from(step.map(f64::from)) };
+                (step[0] != ABSENT).then(|| (*at + middle) * self.cell_m)
+            });
+            unpacked.push(at.collect());
+        }
+        unpacked
+    }
+}
+
+/// The smallest power of two that is not less than a normal positive number.
+fn power_of_two(least: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff << 52;
+    let below = f64::from_bits(least.to_bits() & EXPONENT);
+    if below < least { 2.0 * below } else { below }
+}
+
+fn is_finite(at: &Vector3<f64>) -> bool {
+    at.iter().all(|x| x.is_finite())
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "cells are chosen so that it fits")]
+fn whole(at: Vector3<f64>) -> [i32; 3] {
+    [at.x, at.y, at.z].map(|x| x as i32)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "cells are chosen so that it fits")]
+fn short(step: f64) -> i16 {
+    debug_assert!(step.abs() <= LARGEST, "a step of {step} cells");
+    step as i16
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn coordinate() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            8 => -50.0..50.0_f64,
+            2 => -1e-6..1e-6_f64,
+            2 => 4e6..4.000_01e6_f64,
+            1 => -1e9..1e9_f64,
+            1 => Just(f64::NAN),
+            1 => Just(f64::INFINITY),
+        ]
+    }
+
+    fn point() -> impl Strategy<Value = Option<Vector3<f64>>> {
+        let at = [coordinate(), coordinate(), coordinate()].prop_map(|at| Some(Vector3::from(at)));
+        prop_oneof![6 => at, 1 => Just(None)]
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_unpacked_is_within_half_a_cell_and_who_is_not_there_stays_away(
+            instants in (1..5_usize).prop_flat_map(|points| {
+                prop::collection::vec(prop::collection::vec(point(), points), 1..30)
+            }),
+        ) {
+            let motion = Motion::new(&instants);
+            let unpacked = motion.unpacked();
+            prop_assert_eq!(unpacked.len(), instants.len());
+            for (is, was) in std::iter::zip(unpacked.iter().flatten(), instants.iter().flatten()) {
+                let was = was.filter(is_finite);
+                prop_assert_eq!(is.is_some(), was.is_some());
+                if let (Some(is), Some(was)) = (is, was) {
+                    prop_assert!((is - was).amax() <= motion.rounding_m(), "{} and {}", is, was);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cells_are_as_small_as_steps_allow_and_half_as_large_ones_would_not_do() {
+        let at = |x: f64| vec![Some(Vector3::new(x, 0.0, 0.0))];
+        let instants: Vec<_> = (0..1000).map(|k| at(0.1 * f64::from(k))).collect();
+        let motion = Motion::new(&instants);
+        assert!((0.1 / LARGEST..0.2 / LARGEST * 1.01).contains(&motion.cell_m()), "{}", motion.cell_m());
+        let largest = motion.steps.iter().map(|step| i32::from(step[0])).max().expect("a step");
+        assert!(2 * largest > 32_767, "twice as many cells would not fit: {largest}");
+        // One that never moves is where it is.
+        let still = Motion::new(&vec![at(3.25); 5]);
+        assert_eq!(still.unpacked()[4][0], Some(Vector3::new(3.25, 0.0, 0.0)));
+        assert_eq!(Motion::new(&[]).unpacked().len(), 0);
+    }
+}

@@ -1,0 +1,36 @@
+//! What a replay shows beside motion.
+
+use crate::audit::Obstacle;
+use crate::plan::Plan;
+use crate::scenario::Scenario;
+
+/// Who flies, what must stay empty around them, what they are after and what is in the way.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// Names of the vehicles.
+    pub vehicles: Vec<String>,
+    /// Radius of each vehicle \[m\]; none where it is not known.
+    pub radius_m: Vec<Option<f64>>,
+    /// Half axes of the shell around each vehicle \[m\], half of what two centres must keep; none where there is no such
+    /// distance.
+    pub shell_m: Option<[f64; 3]>,
+    /// Formations and graph, where they are known.
+    pub plan: Option<Plan>,
+    /// What is in the way.
+    pub obstacles: Vec<Obstacle>,
+}
+
+impl Stage {
+    /// That of a scenario, with its obstacles as they are judged. What is told in the course of the flight is for
+    /// [`Film`](super::Film) to note.
+    #[must_use]
+    pub fn of(scenario: &Scenario, obstacles: Vec<Obstacle>) -> Self {
+        Self {
+            vehicles: (1..=scenario.count()).map(|number| number.to_string()).collect(),
+            radius_m: scenario.hull_radius_m.iter().copied().map(Some).collect(),
+            shell_m: Some(scenario.half_axes_m().unwrap_or([0.5 * scenario.delta_m; 3])),
+            plan: Some(Plan::of(scenario)),
+            obstacles,
+        }
+    }
+}

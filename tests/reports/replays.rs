@@ -1,0 +1,231 @@
+//! Replays in a real browser: what they draw, what they say, and what the page forbids.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::replays_in_browser::steer;
+
+const DESKTOP: (u32, bool) = (1000, false);
+
+/// Runs the program in a folder and gives a file that it leaves there.
+fn left(folder: &Path, arguments: &[&str], file: &str) -> PathBuf {
+    let program = Command::new(env!("CARGO_BIN_EXE_tautline")).args(arguments).current_dir(folder).output();
+    let program = program.expect("the program runs");
+    assert!(program.status.code() <= Some(1), "{}", String::from_utf8_lossy(&program.stderr));
+    folder.join(file)
+}
+
+fn flown(folder: &Path, arguments: &[&str]) -> PathBuf {
+    left(folder, &[&["run", "--quiet", "--out", "run"], arguments].concat(), "run/report.html")
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+#[test]
+fn the_script_keeps_its_types() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let check = |file: &Path| {
+        let compiler = root.join("target/typescript/node_modules/.bin/tsc");
+        let output = Command::new(&compiler)
+            .args(["--noEmit", "--strict", "--checkJs", "--allowJs", "--target", "es2023"])
+            .args(["--lib", "es2023,dom,dom.iterable"])
+            .arg(file)
+            .output()
+            .unwrap_or_else(|error| {
+                panic!("cannot start {}: {error}; `sh tests/setup.sh` installs it", compiler.display())
+            });
+        (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let script = root.join("assets/replay.js");
+    let (is_right, said) = check(&script);
+    assert!(is_right, "{said}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let wrong = folder.path().join("wrong.js");
+    let source = fs::read_to_string(&script).expect("a script");
+    fs::write(&wrong, source.replacen("const first = times[0]", "const first = `${times[0]}`", 1)).expect("written");
+    assert!(!check(&wrong).0, "a text for a number is seen");
+}
+
+#[test]
+fn a_replay_draws_and_jumps_to_what_the_judge_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = flown(folder.path(), &["pentagon-laplacian", "--set", "time.duration_s=10"]);
+    let report = fs::read_to_string(folder.path().join("run/report.json")).expect("a report");
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    let (found, said) = steer(
+        folder.path(),
+        &page,
+        DESKTOP,
+        "const words = name => doc.querySelector('.replay-' + name).textContent;
+         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+         [pen.canvas.width, pen.canvas.height] = [view.width, view.height];
+         const colours = () => {
+           root.player.draw(); pen.drawImage(view, 0, 0);
+           const all = pen.getImageData(0, 0, view.width, view.height).data, seen = new Set();
+           for (let k = 0; k < all.length; k += 4) seen.add(all[k] << 16 | all[k + 1] << 8 | all[k + 2]);
+           return [...seen];
+         };
+         const start = { state: words('state'), clock: words('clock'), colours: colours().length };
+         key('c'); const closest = { said: words('said'), state: words('state'), clock: words('clock') };
+         const reds = colours().filter(colour => (colour >> 16) > 180 && (colour >> 8 & 255) < 60).length;
+         key('Home'); key('v'); const violation = { said: words('said') };
+         key('End'); const end = { state: words('state'), clock: words('clock'), said: words('said') };
+         key('Home'); key('ArrowRight'); key('ArrowRight'); const steps = words('clock');
+         return { start, closest, reds, violation, end, steps, state: root.dataset.state,
+           loaded: win.performance.getEntriesByType('resource').length };",
+    );
+    assert!(said.is_empty(), "{said:?}");
+    assert_eq!((text(&found["state"]), &found["loaded"]), ("ready", &Value::from(0)), "{found}");
+    assert!(text(&found["start"]["state"]).starts_with("no violation so far"), "{found}");
+    assert!(found["start"]["colours"].as_u64() > Some(100), "{found}");
+    let (min_m, at_s) = (report["separation"]["min_m"].as_f64(), report["separation"]["min_at_s"].as_f64());
+    let (min_m, at) = (min_m.expect("a distance"), format!("{:.2} s", at_s.expect("a time")));
+    let least = format!("{:.6}", (min_m * 1e6).floor() / 1e6);
+    let said = text(&found["closest"]["said"]);
+    assert!(said.contains(&least) && said.ends_with(&format!("vehicles 4-5 at {at}")), "{said}: {least}");
+    assert_eq!(found["closest"]["clock"], at.as_str());
+    assert!(text(&found["closest"]["state"]).starts_with("violation · nearest so far 1.532 m, 4 and 5"), "{found}");
+    assert!(found["reds"].as_u64() > Some(20), "who is too near is red: {found}");
+    assert!(text(&found["violation"]["said"]).starts_with("Violation: vehicles 4-5 came to 1.533 m (δ 2.000) at"));
+    assert!(text(&found["end"]["state"]).starts_with("1 violation so far"), "{found}");
+    assert_eq!((text(&found["end"]["clock"]), text(&found["end"]["said"])), ("10.00 s", ""));
+    assert_eq!(found["steps"], "0.03 s", "two samples of 60 a second");
+}
+
+/// The outline of a ball at a corner of the picture is an ellipse: every pixel that is not on its edge is judged by the ray
+/// through it.
+#[test]
+fn a_ball_is_right_to_the_pixel_wherever_it_is_seen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Two that are never there together: one ball of 0.5 m is drawn, and nothing between two.
+    let table = "t,id,x,y,z\n0,a,0,0,0\n1,a,0,0,0\n5,b,4,0,0\n6,b,4,0,0\n";
+    fs::write(folder.path().join("two.csv"), table).expect("written");
+    let page =
+        left(folder.path(), &["audit", "two.csv", "--radius", "0.5", "--quiet", "--html", "two.html"], "two.html");
+    let script = "for (const box of doc.querySelectorAll('input[type=checkbox]')) { box.checked = false; box.dispatchEvent(new win.Event('change')); }
+         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+         [pen.canvas.width, pen.canvas.height] = [view.width, view.height];
+         const shots = [];
+         for (const [yaw, pitch, distance, target] of [[0, 0, 5, [0, 0, 0]], [0.4, 0.3, 6, [1, 1.5, 0.9]], [2, 0.5, 4, [-0.5, 0.7, 0.8]]]) {
+           const camera = root.player.look({ yaw, pitch, distance, target, t: 0.5 });
+           pen.drawImage(view, 0, 0);
+           const all = pen.getImageData(0, 0, view.width, view.height).data, corner = all.slice(0, 3);
+           let wrong = 0, inside = 0, edge = 0;
+           for (let y = 0; y < view.height; y++) for (let x = 0; x < view.width; x++) {
+             // Four rays half a pixel around the middle, and a margin for the edge's shading.
+             const hits = new Set();
+             for (const [dx, dy] of [[0.5, 0.5], [-0.4, -0.4], [1.4, -0.4], [-0.4, 1.4], [1.4, 1.4]]) {
+               const u = ((x + dx) / view.width * 2 - 1) * camera.tangent * view.width / view.height, v = (1 - (y + dy) / view.height * 2) * camera.tangent;
+               const ray = [0, 1, 2].map(k => camera.right[k] * u + camera.up[k] * v - camera.back[k]);
+               hits.add([0].some(ball => {
+                 const at = camera.place(ball), to = [0, 1, 2].map(k => at[k] - camera.eye[k]);
+                 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2], along = dot(to, ray) / dot(ray, ray);
+                 return along > 0 && dot(to, to) - along * along * dot(ray, ray) < RADIUS * RADIUS;
+               }));
+             }
+             if (hits.size > 1) { edge++; continue; }
+             const k = 4 * (y * view.width + x), drawn = [0, 1, 2].some(c => Math.abs(all[k + c] - corner[c]) > 40);
+             if (hits.has(true)) inside++;
+             if (drawn !== hits.has(true)) wrong++;
+           }
+           shots.push({ wrong, inside, edge });
+         }
+         return shots;";
+    let (found, _) = steer(folder.path(), &page, (800, false), &script.replace("RADIUS", "0.5"));
+    for shot in found.as_array().expect("pictures") {
+        assert!(shot["inside"].as_u64() > Some(2000) && shot["edge"].as_u64() < Some(1500), "{found}");
+        assert_eq!(shot["wrong"], 0, "{found}");
+    }
+    let (twin, _) = steer(folder.path(), &page, (800, false), &script.replace("RADIUS", "0.53"));
+    assert!(twin[0]["wrong"].as_u64() > Some(50), "a ball of another size is seen: {twin}");
+}
+
+#[test]
+fn it_fits_a_phone_in_light_and_dark_and_within_a_sandbox() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=3"]);
+    for dark in [false, true] {
+        let (found, said) = steer(
+            folder.path(),
+            &page,
+            (360, dark),
+            "const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+             root.player.draw(); pen.drawImage(view, 0, 0);
+             const sticking = [...doc.querySelectorAll('.replay *')].filter(e => e.getBoundingClientRect().right > win.innerWidth + 8.5).length;
+             return { wide: doc.documentElement.scrollWidth, sticking, paper: pen.getImageData(3, 60, 1, 1).data[0],
+               named: [...doc.querySelectorAll('.replay button, .replay select, .replay input, .replay-view')].every(e =>
+                 e.textContent.trim() || e.getAttribute('aria-label') || e.closest('label')) };",
+        );
+        assert!(said.is_empty(), "{said:?}");
+        assert_eq!((&found["wide"], &found["sticking"]), (&Value::from(360), &Value::from(0)), "{found}");
+        assert_eq!(found["paper"].as_u64() < Some(60), dark, "{found}");
+        assert_eq!(found["named"], true, "everything has a name");
+    }
+    // Neither the origin of the page nor its frame is needed: the script says that it is ready by what it shows.
+    let html = fs::read_to_string(&page).expect("a page");
+    let outer = folder.path().join("outer.html");
+    let inner = html.replace('&', "&amp;").replace('"', "&quot;");
+    fs::write(
+        &outer,
+        format!(
+            "<!doctype html><iframe sandbox=\"allow-scripts\" srcdoc=\"{inner}\"></iframe><div class=replay></div>"
+        ),
+    )
+    .expect("written");
+    let (_, said) = steer(folder.path(), &outer, DESKTOP, "return {};");
+    assert!(said.is_empty(), "{said:?}");
+}
+
+#[test]
+fn no_other_script_runs_and_without_webgl_the_page_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=1"]);
+    let html = fs::read_to_string(&page).expect("a page");
+    assert_eq!(html.matches("script-src 'sha256-").count() + html.matches("script-src &#39;sha256-").count(), 1);
+    let state = "return { state: root.dataset.state ?? 'none yet', none: doc.querySelector('.replay-none')?.textContent ?? '', ran: win.ran ?? false };";
+    let (found, said) = steer(folder.path(), &page, DESKTOP, state);
+    assert!(said.is_empty() && found["state"] == "ready" && found["ran"] == false, "{found} {said:?}");
+    fs::write(&page, html.replace("<footer>", "<script>window.ran = true;</script><footer>")).expect("written");
+    let (found, said) = steer(folder.path(), &page, DESKTOP, state);
+    assert!(
+        found["ran"] == false && said.iter().any(|line| line.contains("Content Security Policy")),
+        "{found} {said:?}"
+    );
+    // One letter of the script changed, and it does not run.
+    fs::write(&page, html.replace("const ABSENT", "const  ABSENT")).expect("written");
+    let (found, _) = steer(folder.path(), &page, DESKTOP, state);
+    assert_eq!(found["state"], "none yet");
+}
+
+#[test]
+fn names_are_text_and_vehicles_that_are_not_there_are_not_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut table = "t,id,x,y,z\n".to_owned();
+    for t in 0..=20 {
+        let _ = writeln!(table, "{t},<img src=x onerror=ran=1>,{t},0,0");
+        if !(6..=14).contains(&t) {
+            let _ = writeln!(table, "{t},</script><b>b,{t},5,0");
+        }
+    }
+    fs::write(folder.path().join("names.csv"), table).expect("written");
+    let page =
+        left(folder.path(), &["audit", "names.csv", "--delta", "1", "--quiet", "--html", "names.html"], "names.html");
+    let (found, said) = steer(
+        folder.path(),
+        &page,
+        DESKTOP,
+        "const there = t => { const { place } = root.player.look({ yaw: 0, pitch: 0.5, distance: 30, target: [0, 0, 0], t }); return [0, 1].map(k => place(k)[3]); };
+         return { there: [2, 5.5, 10, 16].map(there), state: doc.querySelector('.replay-state').textContent,
+           images: doc.querySelectorAll('img, b').length, ran: win.ran ?? 0 };",
+    );
+    assert!(said.is_empty(), "{said:?}");
+    assert_eq!(found["there"], serde_json::json!([[1, 1], [1, 0], [1, 0], [1, 1]]), "{found}");
+    assert_eq!((&found["images"], &found["ran"]), (&Value::from(0), &Value::from(0)));
+    assert!(text(&found["state"]).starts_with("undecided · nearest so far 5.000 m, <img src=x"), "{found}");
+}
