@@ -104,7 +104,7 @@ pub(crate) fn audit<'py>(
 }
 
 /// How long the library takes in Rust \[s\] to judge the same positions, at first as items that it made before, then with the
-/// time to make them: what `bench.py` compares `audit` with.
+/// time to make them: what `bench/ratios.py` compares `audit` with.
 #[pyfunction]
 pub(crate) fn audit_in_rust(
     times: &Bound<'_, PyAny>,

@@ -1,7 +1,7 @@
 //! Those who came closest in a recording, as figures.
 
 use super::Failure;
-use super::reading::Open;
+use super::open::Open;
 use crate::audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
 use crate::figures::{self, Encounter, Figure};
 use crate::report::recorded::interval;

@@ -9,10 +9,6 @@ use super::Failure;
 use super::own::OwnRecording;
 use super::run::RECORDING;
 use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
-use crate::track::Tracks;
-
-/// Opens what is judged, each time from its beginning.
-pub(super) type Open<'a> = dyn Fn() -> Result<Box<dyn Tracks<Error = ReadError> + 'a>, ReadError> + 'a;
 
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]

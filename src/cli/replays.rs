@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Failure;
 use super::encounters;
-use super::reading::Open;
+use super::open::Open;
 use crate::audit::recorded::{Gap, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
 use crate::figures::Figure;
 use crate::replay::{Film, MOST_INSTANTS, Nearest, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};

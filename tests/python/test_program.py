@@ -113,7 +113,7 @@ class Functions(Case):
 
     def test_scenarios_are_listed_and_built(self) -> None:
         self.assertIn("pentagon", tl.scenarios())
-        s = tl.Scenario("pentagon", set={"start.positions_m.2.x": 6.2, "law.kind": "displacement", "graph": {"kind": "star"}})
+        s = tl.Scenario("pentagon", set={"start.positions_m.2.x": 9.2, "law.kind": "displacement", "graph": {"kind": "star"}})
         self.assertEqual((s.law, len(s), s.links.shape), ("displacement", 5, (4, 2)))
         self.assertEqual(tl.Scenario.from_toml(s.to_toml()).sha256, s.sha256)
         file = self.folder / "s.toml"

@@ -1,4 +1,4 @@
-"""What the package costs beside the library: ``python python/bench.py``. Build it for release first (``pip install ./python``).
+"""What the package costs beside the library: ``python python/bench/ratios.py``. Build it for release first (``pip install ./python``).
 
 Prints ratios of times that are taken in turn in one process, the best of several each.
 """
