@@ -245,8 +245,9 @@ impl AuditArguments {
         Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")))
     }
 
-    /// What is taken to happen between samples of a recording of curves alone, or that may be ours.
-    fn between(&self, curves: bool, own: Option<&OwnRecording>) -> Between {
+    /// What is taken to happen between samples of a recording of curves alone, or that may be ours; nothing is proved where
+    /// the samples themselves are assumed.
+    fn between(&self, curves: bool, own: Option<&OwnRecording>, assumed: Option<&str>) -> Between {
         let most = |accel: &[Named]| {
             let listed = accel.iter().map(|(name, a)| match name {
                 Some(name) => format!("{a:?} m/s^2 for {name}"),
@@ -261,7 +262,10 @@ impl AuditArguments {
             _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
             _ => ("straight between samples".to_owned(), Basis::Assumed),
         };
-        Between { motion, basis }
+        match assumed {
+            Some(assumed) => Between { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
+            None => Between { motion, basis },
+        }
     }
 }
 
@@ -290,12 +294,12 @@ pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<Reco
     own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
-    let Judged { mut outcome, clock, mut notes, curves } = judged(auditor, arguments, &options, console)?;
+    let Judged { mut outcome, clock, mut notes, assumed, curves } = judged(auditor, arguments, &options, console)?;
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);
     }
     arguments.check_count(&outcome, &settings)?;
-    let between = arguments.between(curves, own.as_ref());
+    let between = arguments.between(curves, own.as_ref(), assumed.as_deref());
     let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
@@ -335,6 +339,8 @@ struct Judged {
     outcome: Outcome,
     clock: Clock,
     notes: Vec<String>,
+    /// What was assumed to know its samples.
+    assumed: Option<String>,
     /// Whether it has curves and no samples.
     curves: bool,
 }
@@ -368,7 +374,8 @@ fn judged(
     let clock = recording.clock();
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
     let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
-    Ok(Judged { outcome, clock, notes: recording.notes().to_vec(), curves })
+    let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
+    Ok(Judged { outcome, clock, notes, assumed, curves })
 }
 
 /// The command as it was given, for a shell.

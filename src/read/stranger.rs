@@ -1,7 +1,5 @@
 //! Files that are known and not read: what they are, and the way in.
 
-use std::path::Path;
-
 use super::error::Fault;
 
 /// Beginnings of files, what they are, and what helps.
@@ -30,7 +28,7 @@ const STRANGERS: [(&[u8], &str, &str); 14] = [
     (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
-const BAG: &str = "convert it with `ros2 bag convert` to MCAP, and give the .mcap file";
+pub(super) const BAG: &str = "convert it with `ros2 bag convert` to MCAP, and give the .mcap file";
 const DATAFLASH: &str =
     "write the messages of position with `mavlogdump.py --format csv`, a file for each vehicle in metres";
 const UNPACK: &str = "unpack it, and give the folder";
@@ -63,22 +61,4 @@ pub(super) fn of_text(text: &[u8]) -> Option<Fault> {
         _ => return None,
     };
     Some(Fault::content(format!("it is {what}, which is not read"), remedy))
-}
-
-/// The same of a folder.
-pub(super) fn of_folder(path: &Path) -> Option<Fault> {
-    if !path.join("metadata.yaml").is_file() {
-        return None;
-    }
-    let files = std::fs::read_dir(path).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut bags: Vec<_> =
-        files.filter(|file| file.extension().is_some_and(|end| end == "mcap" || end == "db3")).collect();
-    bags.sort();
-    let bag = bags.first()?;
-    let remedy = if bag.extension().is_some_and(|end| end == "mcap") {
-        format!("give {}, which lies in it", bag.file_name()?.to_string_lossy())
-    } else {
-        BAG.to_owned()
-    };
-    Some(Fault::content("it is the folder of a ROS 2 bag, which is not read", remedy))
 }
