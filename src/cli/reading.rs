@@ -38,7 +38,7 @@ pub(super) struct ReadArguments {
     /// Metres per unit of length of the recording.
     #[arg(long, value_name = "METRES", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
-    /// Name of a column: t, id, x, y, z, vx, vy, vz or radius. In NPZ, t and x name the arrays.
+    /// Name of a column: t, id, x, y, z, vx, vy, vz, radius, or lat, lon, alt. In NPZ, t and x name the arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
     columns: Vec<(String, String)>,
     /// Where the curve of a vehicle starts [m], for polynomials that are relative to it; may be given several times.
@@ -212,6 +212,9 @@ pub(super) fn format() -> impl TypedValueParser<Value = Format> {
         Format::Mcap => "MCAP: our own, Foxglove or ROS 2 messages",
         Format::Crazyflie => "A folder of Crazyflie polynomials",
         Format::Skybrush => "A Skybrush show",
+        Format::Vviz => "A VVIZ show of Verge Aero or Finale 3D",
+        Format::Motive => "A take of OptiTrack Motive as CSV",
+        Format::Vicon => "An export of Vicon Nexus or Tracker as CSV",
     };
     one_of(Format::ALL.map(|format| (PossibleValue::new(format.name()).help(help(format)), format)).into())
 }

@@ -49,12 +49,17 @@ impl Local {
         Ok(self.axes * (centred(place)? - self.centre_m))
     }
 
+    /// The origin, as the user would say it.
+    pub(super) fn origin(&self) -> String {
+        let [latitude, longitude, height] = self.origin.into();
+        format!("{latitude:?},{longitude:?},{height:?}")
+    }
+
     /// What a person should know.
     pub(super) fn note(&self) -> String {
-        let [latitude, longitude, height] = self.origin.into();
+        let origin = self.origin();
         format!(
-            "places on the Earth are in metres east, north and up of {latitude:?},{longitude:?},{height:?} on WGS 84 \
-             (--origin {latitude:?},{longitude:?},{height:?} says so)"
+            "places on the Earth are in metres east, north and up of {origin} on WGS 84 (--origin {origin} says so)"
         )
     }
 }

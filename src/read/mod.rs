@@ -14,6 +14,7 @@
 
 mod archive;
 mod bag;
+mod capture;
 mod clock;
 mod crazyflie;
 mod csv;
@@ -27,6 +28,7 @@ mod heading;
 mod join;
 mod layout;
 pub(crate) mod mcap;
+mod motive;
 mod names;
 mod npy;
 mod npz;
@@ -40,6 +42,8 @@ mod source;
 mod stranger;
 mod table;
 mod units;
+mod vicon;
+mod vviz;
 
 #[cfg(feature = "parquet")]
 pub use self::parquet::is_guarded;
@@ -200,5 +204,8 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
             Err(Fault::content(problem, "build it with the feature of the format's name").into())
         }
         Format::Skybrush => skybrush::open(source, options),
+        Format::Vviz => vviz::open(source, options),
+        Format::Motive => motive::open(source, options),
+        Format::Vicon => vicon::open(source, options),
     }
 }

@@ -56,11 +56,12 @@ impl Dimensions {
 
 /// Names of columns, where they are not the usual ones: one for each of [`ColumnNames::ROLES`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ColumnNames([Option<String>; 9]);
+pub struct ColumnNames([Option<String>; 12]);
 
 impl ColumnNames {
-    /// Roles that a column can have: time, vehicle, position \[m\], velocity \[m/s\] and radius \[m\] of the vehicle.
-    pub const ROLES: [&str; 9] = ["t", "id", "x", "y", "z", "vx", "vy", "vz", "radius"];
+    /// Roles that a column can have: time, vehicle, position \[m\], velocity \[m/s\] and radius \[m\] of the vehicle, or its
+    /// latitude and longitude \[degrees\] and height \[m\].
+    pub const ROLES: [&str; 12] = ["t", "id", "x", "y", "z", "vx", "vy", "vz", "radius", "lat", "lon", "alt"];
 
     /// Gives the column of a role a name; `false` where there is no such role.
     pub fn set(&mut self, role: &str, name: &str) -> bool {
@@ -162,6 +163,7 @@ impl ReadOptions {
             ),
             (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
             (self.axis_order.is_some() && !is_npz, "--axis-order", "has no arrays"),
+            (self.origin.is_some() && !is_mcap && (!is_table || is_npz), "--origin", "has no latitudes and longitudes"),
             (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
             (!self.topics.is_empty() && !is_mcap, "--topic", "has no topics"),
             (self.allow_unfinished && !is_mcap, "--allow-unfinished", "cannot be read before it is closed"),

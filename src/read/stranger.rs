@@ -3,7 +3,7 @@
 use super::error::Fault;
 
 /// Beginnings of files, what they are, and what helps.
-const STRANGERS: [(&[u8], &str, &str); 14] = [
+const STRANGERS: [(&[u8], &str, &str); 13] = [
     (b"#ROSBAG V", "a ROS 1 bag", "convert it with `rosbags-convert` to a ROS 2 bag in MCAP, and give its .mcap file"),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
     (
@@ -11,7 +11,6 @@ const STRANGERS: [(&[u8], &str, &str); 14] = [
         "a ULog of PX4",
         "write its vehicle_local_position with `ulog2csv`, and give a file for each vehicle",
     ),
-    (b"Format Version,", "a take of OptiTrack Motive", "write the positions of its rigid bodies as a table t,id,x,y,z"),
     (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
     (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),

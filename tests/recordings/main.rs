@@ -5,8 +5,10 @@ mod recording;
 
 mod any_bytes;
 mod beside;
+mod capture;
 mod columns;
 mod containers;
+mod earth;
 mod exports;
 mod formats;
 mod messages;
