@@ -32,7 +32,7 @@ const DATAFLASH: &str =
     "write the messages of position with `mavlogdump.py --format csv`, a file for each vehicle in metres";
 const UNPACK: &str = "unpack it, and give the folder";
 pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z";
-const EARTH: &str = "convert degrees to metres in a plane first, and give a table t,id,x,y,z";
+const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
 
 /// What a file is and what helps, where it is known and not read.
 pub(super) fn of_bytes(head: &[u8]) -> Option<Fault> {
