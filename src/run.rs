@@ -82,7 +82,8 @@ pub fn verify(scenario: &Scenario, report: &Report) -> Result<Verification, SimE
 /// Whether the energy is proved never to grow: relative velocities are damped, and nothing voids the proof but that it
 /// certifies no distance.
 fn energy_falls(preflight: &Preflight, certificate: &Certificate) -> bool {
-    let holds = |void: &Void| matches!(void, Void::NoBarrier | Void::GraphNotComplete | Void::Unresolved);
+    let holds =
+        |void: &Void| matches!(void, Void::NoBarrier | Void::GraphNotComplete | Void::StepsTooLong | Void::Unresolved);
     preflight.velocity_margin_per_s.is_some_and(|margin_per_s| margin_per_s >= 0.0)
         && certificate.void.iter().all(holds)
 }
@@ -149,6 +150,7 @@ fn report(
             dt_s: scenario.time.dt_s,
             steps: flight.steps,
             refined_steps: flight.refined_steps,
+            overlong_steps: flight.overlong_steps,
             ended_early,
             vehicles: scenario.count(),
             state_hash,

@@ -16,7 +16,10 @@ sh tests/setup.sh
 cargo test --release --no-default-features --test bits
 cargo test "$@"
 
-# Campaigns on a cluster, with the program that was just built; arguments ask for some of cargo's tests alone.
+# Campaigns on a cluster, and what others' continuous integration is given, with the program that was just built; arguments ask
+# for some of cargo's tests alone.
 if [ $# = 0 ]; then
-    target/cluster/bin/python -m unittest discover --verbose --start-directory tests/cluster
+    for tests in tests/cluster tests/ci; do
+        target/cluster/bin/python -m unittest discover --verbose --start-directory "$tests"
+    done
 fi

@@ -33,8 +33,8 @@ if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; th
         libxkbcommon-x11-0
 fi
 
-# Ray, in a virtual environment of its own, for tests/cluster.
-if ! target/cluster/bin/python -c 'import ray' 2>/dev/null; then
+# Ray for tests/cluster, and what reads the hook and the action for tests/ci, in a virtual environment of their own.
+if ! target/cluster/bin/python -c 'import ray, pre_commit, yaml' 2>/dev/null; then
     if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
         sudo=$([ "$(id -u)" = 0 ] || echo sudo)
         $sudo apt-get update
@@ -43,7 +43,7 @@ if ! target/cluster/bin/python -c 'import ray' 2>/dev/null; then
     rm -rf target/cluster
     mkdir -p target
     python3 -m venv target/cluster
-    if ! target/cluster/bin/pip install --quiet --disable-pip-version-check 'ray>=2.40,<3'; then
+    if ! target/cluster/bin/pip install --quiet --disable-pip-version-check 'ray>=2.40,<3' pre-commit pyyaml; then
         echo "tests/cluster needs Ray, which cannot be installed for $(python3 --version) here" >&2
         exit 1
     fi

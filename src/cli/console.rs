@@ -75,6 +75,11 @@ pub(super) fn data(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// Writes lines that are not for a person beside data on standard output: to standard error. What nobody reads is dropped.
+pub(super) fn beside(text: &str) {
+    let _ = io::stderr().lock().write_all(text.as_bytes());
+}
+
 /// Writes an answer to standard output, as indented JSON.
 pub(super) fn json(answer: &impl Serialize) -> Result<(), Failure> {
     match serde_json::to_string_pretty(answer) {

@@ -93,6 +93,11 @@ impl Failure {
         Self { exit, said: Box::new(MietteDiagnostic::new(harmless(&message.into()))), source: None }
     }
 
+    /// How the program ends by it.
+    pub(super) fn exit(&self) -> Exit {
+        self.exit
+    }
+
     /// What is wrong and what helps, on one line.
     pub(super) fn in_words(&self) -> String {
         let message = &self.said.message;

@@ -5,6 +5,8 @@
 
 mod attack;
 mod audit;
+mod audit_arguments;
+mod audit_config;
 mod audits;
 mod campaign;
 mod campaign_worst;
@@ -18,9 +20,11 @@ mod drawing;
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 mod driver;
 mod encounters;
+mod envelope;
 mod events;
 mod export;
 mod folder;
+mod judgement;
 mod list;
 mod margin;
 mod obstacles;
@@ -36,6 +40,7 @@ mod scenario;
 mod schema;
 #[cfg(feature = "viewer")]
 mod snapshots;
+mod summary;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;
@@ -68,7 +73,7 @@ enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),
     /// Judge a recording of any origin: clear, a violation, or undecided at its sampling.
-    Audit(audit::AuditArguments),
+    Audit(audit_arguments::AuditArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),
     /// Reproduce the paper and judge every claim, ours and the paper's.

@@ -15,6 +15,10 @@ const MOST_BYTES: u64 = 64 << 20;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
+    /// Of the same place, read by itself.
+    #[serde(default)]
+    #[expect(dead_code, reason = "it may stand there")]
+    fence: Option<toml::Table>,
     #[serde(default)]
     obstacle: Vec<toml::Spanned<ObstacleTable>>,
 }

@@ -16,6 +16,7 @@ mod exports;
 mod imperfections;
 mod interruption;
 mod keys;
+mod limits;
 mod margin;
 mod obstacles;
 mod reads;

@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::report::{OfPair, OfVehicle, RecordedReport};
+use super::envelope::OfLimit;
+use super::named::{OfPair, OfVehicle};
+use super::report::RecordedReport;
 use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
@@ -24,17 +26,26 @@ impl RecordedReport {
         format!("{}: {}", self.verdict(), self.finding())
     }
 
-    fn verdict(&self) -> String {
+    /// The verdict alone, such as `PROVED CLEAR`.
+    #[must_use]
+    pub fn verdict(&self) -> String {
         match self.status {
             Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
-            Status::Clear => format!("CLEAR if {}", self.motion),
+            Status::Clear => format!("CLEAR if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
             Status::Violation => "VIOLATION".to_owned(),
             Status::Undecided => "UNDECIDED".to_owned(),
         }
     }
 
-    /// The headline behind the verdict.
+    /// The headline behind the verdict: of pairs, and of the limits that decide it.
     fn finding(&self) -> String {
+        let decides = |limit: &&OfLimit| limit.status == self.status;
+        let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
+        let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
+        of_pairs.then(|| self.finding_of_pairs()).into_iter().chain(limits).collect::<Vec<_>>().join("; ")
+    }
+
+    fn finding_of_pairs(&self) -> String {
         let unit = self.unit();
         let delta = self.separation.delta_m.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
         match self.status {
@@ -116,9 +127,11 @@ impl RecordedReport {
 
     /// What was found of each kind, a sentence each.
     fn lists(&self) -> [(&'static str, Vec<String>); 3] {
+        let beyond = self.limits.iter().flat_map(OfLimit::violations_in_words);
+        let undecided = self.limits.iter().flat_map(OfLimit::undecided_in_words);
         [
-            ("Violations", self.violations.iter().map(OfPair::<Violation<_>>::words).collect()),
-            ("Undecided", self.undecided.iter().map(OfPair::<Undecided<_>>::words).collect()),
+            ("Violations", self.violations.iter().map(OfPair::<Violation<_>>::words).chain(beyond).collect()),
+            ("Undecided", self.undecided.iter().map(OfPair::<Undecided<_>>::words).chain(undecided).collect()),
             ("Gaps", self.gaps.iter().map(OfVehicle::words).collect()),
         ]
     }
@@ -148,6 +161,10 @@ impl RecordedReport {
                 line(format!("  {apart}  at {at} s  {first} and {second}"));
             }
         }
+        if !self.limits.is_empty() {
+            line("limits on each vehicle".to_owned());
+            self.limits.iter().for_each(|limit| line(format!("  {}", limit.brief())));
+        }
         for (heading, lines) in self.lists() {
             if !lines.is_empty() {
                 line(format!("{}: {}", heading.to_lowercase(), lines.len()));
@@ -163,6 +180,14 @@ impl RecordedReport {
         let mut sections = Vec::new();
         if !self.closest.is_empty() {
             sections.push(section("Closest pairs", &[closest_table(&self.closest)]));
+        }
+        if !self.limits.is_empty() {
+            let columns = ["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
+            let rows = self.limits.iter().map(OfLimit::row);
+            sections.push(section(
+                "Each vehicle by itself",
+                &[page::numbers("Limits, and who came nearest", &columns, rows)],
+            ));
         }
         if !figures.is_empty() {
             sections.push(section("Figures", &[page::figures(figures)]));

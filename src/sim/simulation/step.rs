@@ -6,6 +6,7 @@ use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M};
 use super::Simulation;
 use crate::feedback::Feedback as _;
+use crate::law::Void;
 use crate::record::Event;
 use crate::scenario::MAX_HALVINGS;
 use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
@@ -14,12 +15,21 @@ use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
 const SIDE_BY_SIDE_FROM: usize = 512;
 
+/// Into how many parts a step had to be cut, and whether that was enough.
+struct Fineness {
+    /// The fewest parts that were flown at once.
+    shortest: u64,
+    /// A part that cannot be halved was still too long for the law.
+    is_overlong: bool,
+}
+
 impl Simulation {
     /// Flies one step, in halves where it is refused.
     pub(super) fn advance(&mut self, step: u64) -> Result<(), Ending> {
         let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
-        let mut shortest = whole;
-        let flown = self.fly_parts(step, whole, &mut shortest);
+        let mut parts = Fineness { shortest: whole, is_overlong: false };
+        let flown = self.fly_parts(step, whole, &mut parts);
+        let Fineness { shortest, is_overlong } = parts;
         if shortest < whole && shortest != self.shortest {
             let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
             let dt_s = length_s * (shortest as f64 / whole as f64);
@@ -27,6 +37,10 @@ impl Simulation {
         }
         self.shortest = shortest;
         self.refined_steps += u64::from(shortest < whole);
+        if is_overlong && self.overlong_steps == 0 {
+            self.certificate = self.certificate.clone().void_where(true, Void::StepsTooLong);
+        }
+        self.overlong_steps += u64::from(is_overlong);
         flown
     }
 
@@ -43,9 +57,14 @@ impl Simulation {
             .map_or(f64::INFINITY, |rate_per_s| self.scenario.time.max_rate_dt / rate_per_s)
     }
 
-    /// Flies the `whole` parts of a step, as many at once as are honest and not refused; the fewest at once are
-    /// `shortest`.
-    fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<(), Ending> {
+    /// Whether every part that the law asks for changes the motion: where a command is held for a period of its own, or
+    /// comes from outside, the vehicles move as they are commanded however long a part is.
+    fn follows_the_law(&self) -> bool {
+        !self.overruled && self.scenario.time.control_hz.is_none()
+    }
+
+    /// Flies the `whole` parts of a step, as many at once as are honest and not refused.
+    fn fly_parts(&mut self, step: u64, whole: u64, fineness: &mut Fineness) -> Result<(), Ending> {
         let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
         let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
         let (mut flown, mut part) = (0, whole);
@@ -53,20 +72,22 @@ impl Simulation {
             let longest_s = self.longest_step_s();
             while part > 1 && seconds(part) > longest_s {
                 part /= 2;
-                *shortest = part.min(*shortest);
+                fineness.shortest = part.min(fineness.shortest);
             }
             self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();
-            if part > 1 && (bend_m > MAX_BEND_M || self.is_refused()) {
+            let is_refused = self.is_refused();
+            if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
                 self.motion.restore(&self.state);
                 self.controller.link.forget_after(self.time_s);
                 part /= 2;
-                *shortest = part.min(*shortest);
+                fineness.shortest = part.min(fineness.shortest);
                 continue;
             }
             if bend_m > MAX_BEND_M {
                 return Err(Breakdown::Bent { step, bend_m }.into());
             }
+            fineness.is_overlong |= (is_refused || seconds(part) > longest_s) && self.follows_the_law();
             flown += part;
             let from_s = self.time_s;
             if flown == whole {
