@@ -1,5 +1,6 @@
 //! ROS 2 bags: a folder with `metadata.yaml` and files in MCAP, which follow each other and may be packed by zstd.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
@@ -112,7 +113,7 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
     if bag.relative_file_paths.is_empty() {
         return Err(Fault::content("the bag lists no file", REINDEX));
     }
-    let mut files = Vec::new();
+    let (mut files, mut known) = (Vec::new(), BTreeSet::new());
     for listed in &bag.relative_file_paths {
         let path = Path::new(listed);
         let odd = |part| !matches!(part, Component::Normal(_) | Component::CurDir);
@@ -123,7 +124,7 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
             return Err(Fault::content(problem, REINDEX));
         };
         let file = folder.join(name);
-        if files.contains(&file) {
+        if !known.insert(file.clone()) {
             return Err(Fault::content(format!("the bag lists {} twice", quoted(listed)), REINDEX));
         }
         files.push(file);
@@ -133,12 +134,12 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
 
 /// Refuses files in the folder that the bag does not list: they may be parts of it.
 fn refuse_others(folder: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
-    let mut others = Vec::new();
+    let (listed, mut others): (BTreeSet<_>, Vec<_>) = (files.iter().collect(), Vec::new());
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let is_part = [".mcap", ".mcap.zstd", ".db3"].iter().any(|end| name.ends_with(end));
-        if is_part && !name.starts_with('.') && !files.contains(&path) {
+        if is_part && !name.starts_with('.') && !listed.contains(&path) {
             others.push(name);
         }
     }

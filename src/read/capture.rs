@@ -1,5 +1,6 @@
 //! What the tables of motion capture share: rows below a head of several lines, a vehicle in several markers.
 
+use std::collections::BTreeMap;
 use std::str;
 
 use nalgebra::Vector3;
@@ -36,12 +37,14 @@ pub(super) struct Capture {
 /// Groups the columns of markers by what is before the colon of their names: these are on one vehicle.
 pub(super) fn by_subject(markers: Vec<(String, [usize; 3])>) -> Vec<(String, Vec<[usize; 3]>)> {
     let mut vehicles: Vec<(String, Vec<[usize; 3]>)> = Vec::new();
+    let mut known = BTreeMap::new();
     for (name, columns) in markers {
-        let subject = name.split(':').next().unwrap_or_default();
-        match vehicles.iter_mut().find(|(known, _)| known == subject) {
-            Some((_, of)) => of.push(columns),
-            None => vehicles.push((subject.to_owned(), vec![columns])),
+        let subject = name.split(':').next().unwrap_or_default().to_owned();
+        let at = *known.entry(subject.clone()).or_insert(vehicles.len());
+        if at == vehicles.len() {
+            vehicles.push((subject, Vec::new()));
         }
+        vehicles[at].1.push(columns);
     }
     vehicles
 }

@@ -3,6 +3,8 @@
 //! The first line says the unit of length. Five lines or so name the columns: type, name, ID, perhaps the parent, what is
 //! measured (`Position`) and its axis. Axes are those of Motive: y up.
 
+use std::collections::BTreeSet;
+
 use super::capture::{self, Capture, When, by_subject, note_of_markers};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
@@ -76,28 +78,24 @@ impl Head {
         let time = self.axes.iter().position(|name| name.starts_with("Time"));
         let time = time.ok_or_else(|| Fault::content("there is no column of time", EXPORT))?;
         let bodies = self.positions("Rigid Body");
-        let (mut notes, vehicles) = (
-            vec!["axes of Motive, y up, are turned: x, -z, y".to_owned()],
-            if bodies.is_empty() {
-                by_subject(self.positions("Marker"))
-            } else {
-                bodies.into_iter().map(|(name, columns)| (name, vec![columns])).collect()
-            },
-        );
+        let vehicles = if bodies.is_empty() {
+            by_subject(self.positions("Marker"))
+        } else {
+            bodies.into_iter().map(|(name, columns)| (name, vec![columns])).collect()
+        };
         if vehicles.is_empty() {
             return Err(Fault::content("it has neither the position of a rigid body nor of a labelled marker", EXPORT));
         }
-        for (k, (name, _)) in vehicles.iter().enumerate() {
-            if vehicles[..k].iter().any(|(known, _)| known == name) {
-                let problem = format!("two rigid bodies are called {}", quoted(name));
-                return Err(Fault::content(problem, "give each a name of its own, and export the take again"));
-            }
+        let mut known = BTreeSet::new();
+        if let Some((name, _)) = vehicles.iter().find(|(name, _)| !known.insert(name.as_str())) {
+            let problem = format!("two rigid bodies are called {}", quoted(name));
+            return Err(Fault::content(problem, "give each a name of its own, and export the take again"));
         }
+        let mut notes = vec!["axes of Motive, y up, are turned: x, -z, y".to_owned()];
         notes.extend(note_of_markers(&vehicles));
-        let read =
-            |name: &&String| vehicles.iter().any(|(known, _)| known == name.split(':').next().unwrap_or_default());
-        let mut others: Vec<_> = self.names.iter().skip(2).filter(|name| !name.is_empty() && !read(name)).collect();
-        others.dedup();
+        let is_read = |name: &str| known.contains(name.split(':').next().unwrap_or_default());
+        let others = self.names.iter().skip(2).filter(|name| !name.is_empty() && !is_read(name));
+        let others: BTreeSet<_> = others.collect();
         if !others.is_empty() {
             notes.push(format!("not read, being neither rigid bodies nor labelled markers: {} names", others.len()));
         }

@@ -46,7 +46,8 @@ impl Source {
         Self { entry: Some(name), ..Self::file(archive) }
     }
 
-    /// As a file of its own, whose bytes can be read in any order: an entry or a packed file is unpacked, until the last copy of this is gone.
+    /// As a file of its own, whose bytes can be read in any order: an entry or a packed file is unpacked, until the last copy
+    /// of this is gone.
     pub(super) fn seekable(self) -> Result<Self, ReadError> {
         if self.entry.is_none() && !self.gzip && !self.zstd {
             return Ok(self);

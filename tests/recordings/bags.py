@@ -71,8 +71,7 @@ def transforms(*parts):
 def write(folder, messages, packed=False):
     """Writes messages (time in ns, topic, message) as one bag."""
     writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
-    if packed:
-        writer.set_compression(CompressionMode.FILE, CompressionFormat.ZSTD)
+    writer.set_compression(CompressionMode.FILE if packed else CompressionMode.STORAGE, CompressionFormat.ZSTD)
     with writer:
         connections = {}
         for ns, topic, message in messages:
@@ -131,6 +130,14 @@ def robot(ns):
         yield ns, "/tf", transforms(transform(ns, "map", "odom", 0, ns / 1e9, 0, math.pi / 2))
 
 
+def robots(ns, carried):
+    """Two robots side by side, 2 m apart, on odometry that drifts; `carried` says whether the drift is told now."""
+    for k, y in ((1, 0), (2, 2)):
+        yield ns, "/tf", transforms(transform(ns, f"r{k}/odom", f"r{k}/base_link", ns / 1e9, 0, 0))
+        if carried:
+            yield ns, "/tf", transforms(transform(ns, "map", f"r{k}/odom", 0, y + ns / 1e10, 0))
+
+
 def main(out):
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
@@ -145,6 +152,8 @@ def main(out):
         shutil.rmtree(half)
     static = transforms(transform(0, "base_link", "camera", 0.1, 0, 0.2))
     write(out / "robot", [(0, "/tf_static", static)] + [entry for ns in times for entry in robot(ns)])
+    for name, every in (("robots", 500_000_000), ("robots_exact", 100_000_000)):
+        write(out / name, [entry for ns in times for entry in robots(ns, ns % every == 0)])
     covariance = "geometry_msgs/msg/PoseWithCovarianceStamped"
     poses = [
         (ns, f"/r{k}/pose", make(covariance, header=header(ns, "map"), pose=covariant(k, ns / 1e9, 0)))

@@ -316,6 +316,14 @@ fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
 }
 
 #[test]
+fn transforms_on_topics_of_any_name_speak_of_one_tree() {
+    let kind = "geometry_msgs/msg/TransformStamped";
+    let at = |topic, child: &'static str| (topic, kind, "cdr", 1, cdr(&(header(1), child, ([1.0; 3], NO_TURN)), true));
+    let found = whole("vicon.mcap", &mcap_of(&[at("/vicon/cf1/cf1", "cf1"), at("/vicon/cf2/cf2", "vicon/cf2/cf2")]));
+    assert_eq!(found.vehicles, ["cf1", "vicon/cf2/cf2"]);
+}
+
+#[test]
 fn bodies_of_robots_in_namespaces_are_called_by_both() {
     let robot = |topic, x| {
         [
@@ -325,6 +333,8 @@ fn bodies_of_robots_in_namespaces_are_called_by_both() {
         ]
     };
     let messages = [robot("/r1/tf", 1.0), robot("/r2/tf", 2.0)].concat();
+    let (said, _) = refused(&messages, &ReadOptions::default());
+    assert!(said.contains("`/r1` and `/r2` give positions in a frame `odom`"), "{said}");
     let found = read(&mcap_of(&messages), &in_frame("map"));
     assert_eq!(found.samples(), [(1e-9, "/r1/base_link", [1.0, 1.0, 0.0]), (1e-9, "/r2/base_link", [2.0, 1.0, 0.0])]);
     assert_eq!(found.assumed, None);

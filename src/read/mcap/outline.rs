@@ -9,8 +9,11 @@ use super::messages::{EARTH, Seen, What, Who};
 use super::rigid::Placed;
 use super::schemas::reader_of_topic;
 use super::splits::Splits;
-use super::tree::{Body, Tree, is_carrier};
+use super::tree::{Body, Tree};
 use crate::record::mcap::topic::{Message, Part};
+
+/// Most parts of a topic that may be namespaces of transforms.
+const DEEPEST: usize = 16;
 
 /// A topic with positions.
 #[derive(Debug, Default)]
@@ -47,8 +50,13 @@ pub(super) fn is_static(topic: &str) -> bool {
 }
 
 /// The namespace of a topic, without its last part: `/cf1` of `/cf1/pose`.
-pub(super) fn namespace(topic: &str) -> &str {
+fn namespace(topic: &str) -> &str {
     topic.rsplit_once('/').map_or("", |(before, _)| before)
+}
+
+/// The namespace that a topic of transforms speaks of: `/r1` of `/r1/tf`, and the common one of a topic called otherwise.
+pub(super) fn space(topic: &str) -> &str {
+    if matches!(topic.rsplit('/').next(), Some("tf" | "tf_static")) { namespace(topic) } else { "" }
 }
 
 /// What is read of a message, and where the message is.
@@ -87,7 +95,7 @@ impl Outline {
             if still.is_none() && !self.transforms.contains(topic) {
                 self.transforms.insert(topic.clone());
             }
-            return self.trees.entry(namespace(topic).to_owned()).or_default().learn(child, &seen.frame, still);
+            return self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, still);
         }
         if seen.frame == EARTH && self.first_fix.is_none() {
             self.first_fix = Some(seen.position);
@@ -113,10 +121,9 @@ impl Outline {
 
     /// The frames that a topic speaks of, and their namespace: the nearest one that is around the topic.
     pub(super) fn tree_of(&self, topic: &str) -> Option<(&str, &Tree)> {
-        let around =
-            |space: &str| topic.strip_prefix(space).is_some_and(|rest| rest.starts_with('/') || space.is_empty());
-        let nearest = self.trees.iter().filter(|(space, _)| around(space)).max_by_key(|(space, _)| space.len());
-        nearest.map(|(space, tree)| (space.as_str(), tree))
+        let around = topic.rmatch_indices('/').map(|(at, _)| &topic[..at]).take(DEEPEST).chain([""]);
+        let mut nearest = around.filter_map(|space| self.trees.get_key_value(space));
+        nearest.next().map(|(space, tree)| (space.as_str(), tree))
     }
 
     /// Names of all topics with positions, those of transforms last.
@@ -125,84 +132,102 @@ impl Outline {
     }
 
     /// Whether some of these topics tell of the frames of a namespace.
-    pub(super) fn is_told_by(&self, space: &str, topics: &[String]) -> bool {
-        self.transforms.iter().any(|topic| namespace(topic) == space && topics.contains(topic))
+    pub(super) fn is_told_by(&self, wanted: &str, topics: &[String]) -> bool {
+        self.transforms.iter().any(|topic| space(topic) == wanted && topics.contains(topic))
     }
 
     /// Refuses topics that tell of one vehicle twice, of those that are read.
     pub(super) fn refuse_twice(&self, reads: impl Fn(&str) -> bool) -> Result<(), Fault> {
-        let read: Vec<_> = self.topics.iter().filter(|(topic, _)| reads(topic)).collect();
-        for (k, (first, one)) in read.iter().enumerate() {
-            for (second, other) in &read[k + 1..] {
-                if let Some(who) = told_twice((first, one), (second, other)) {
-                    let problem = format!("topics {} and {} both tell of {who}", quoted(first), quoted(second));
-                    let remedy = "say which is read with --topic NAME, once for each topic that is";
-                    return Err(Fault::content(problem, remedy));
+        let read = || self.topics.iter().filter(|(topic, _)| reads(topic));
+        let twice = |first: &str, second: &str, who: &str| {
+            let problem = format!("topics {} and {} both tell of {who}", quoted(first), quoted(second));
+            Fault::content(problem, "say which is read with --topic NAME, once for each topic that is")
+        };
+        let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
+        for (topic, told) in read() {
+            for name in &told.names {
+                if let Some(first) = named.insert(name.as_str(), topic) {
+                    return Err(twice(first, topic, &quoted(name)));
                 }
             }
         }
-        Ok(())
-    }
-
-    /// Refuses positions of several robots in frames of the same name that each robot has of its own, as a rule.
-    pub(super) fn refuse_own_frames(&self, reads: impl Fn(&str) -> bool) -> Result<(), Fault> {
-        let mut known: BTreeMap<&str, &str> = BTreeMap::new();
-        for (topic, told) in self.topics.iter().filter(|(topic, told)| told.is_vehicle && reads(topic)) {
-            for frame in told.frames.iter().filter(|frame| is_own(frame)) {
-                let Some(first) = known.insert(frame, topic) else { continue };
-                let problem = format!(
-                    "topics {} and {} give positions in a frame {}, of which each robot has one of its own as a rule",
-                    quoted(first),
-                    quoted(topic),
-                    quoted(frame)
-                );
-                let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
-                return Err(Fault::content(problem, remedy));
+        for (topic, told) in read().filter(|(_, told)| told.is_vehicle) {
+            if let Some((name, first)) = topic.rsplit('/').take(2).find_map(|part| named.get_key_value(part)) {
+                return Err(twice(first, topic, &quoted(name)));
+            }
+            let (first, schema) = *robots.entry(namespace(topic)).or_insert((topic, &told.schema));
+            if *schema != told.schema {
+                let robot = namespace(topic);
+                return Err(twice(
+                    first,
+                    topic,
+                    &if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) },
+                ));
             }
         }
         Ok(())
     }
 
-    /// Whether topics of poses tell of a vehicle of the transforms in a namespace.
-    pub(super) fn is_covered(&self, space: &str, body: &Body) -> bool {
-        let last = |path: &str| path.rsplit('/').next().unwrap_or_default().to_owned();
-        let robot = body.frame.rsplit_once('/').map(|(robot, _)| last(robot));
-        let mut called: Vec<String> = robot.into_iter().chain([body.frame.clone(), last(space)]).collect();
-        called.retain(|name| !name.is_empty());
-        let is_same = |tree: &Tree, child: &str| {
-            let above = |low: &str, high: &str| tree.way_up(low).is_ok_and(|way| way.contains(&high));
-            above(child, &body.frame) || above(&body.frame, child)
-        };
-        self.topics.iter().any(|(topic, told)| {
-            let names_it = called.iter().any(|name| told.names.contains(name));
-            let in_its_name = told.is_vehicle && called.contains(&last(namespace(topic)));
-            let odometry = told
-                .child
-                .as_ref()
-                .is_some_and(|child| self.tree_of(topic).is_some_and(|(of, tree)| of == space && is_same(tree, child)));
-            names_it || in_its_name || odometry
-        })
+    /// Topics that are vehicles, of those that are read, with each frame that they are given in.
+    pub(super) fn given_in(&self, reads: impl Fn(&str) -> bool) -> impl Iterator<Item = (&str, &str)> {
+        let vehicles = self.topics.iter().filter(move |(topic, told)| told.is_vehicle && reads(topic));
+        vehicles.flat_map(|(topic, told)| told.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
     }
-}
 
-/// Whether each robot has a frame of this name of its own.
-fn is_own(frame: &str) -> bool {
-    let frame = frame.to_lowercase();
-    is_carrier(&frame) && frame.split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom")
-}
-
-/// Whom two topics both tell of.
-fn told_twice((first, one): (&str, &Told), (second, other): (&str, &Told)) -> Option<String> {
-    if let Some(name) = one.names.intersection(&other.names).next() {
-        return Some(quoted(name));
-    }
-    for ((topic, alone), many) in [((first, one), other), ((second, other), one)] {
-        let parts = topic.rsplit('/').take(2);
-        if let Some(name) = parts.filter(|_| alone.is_vehicle).find(|part| many.names.contains(*part)) {
-            return Some(quoted(name));
+    /// What topics of poses tell of the vehicles of transforms.
+    pub(super) fn cover(&self) -> Cover<'_> {
+        let mut cover = Cover::default();
+        for (topic, told) in &self.topics {
+            cover.names.extend(told.names.iter().map(String::as_str));
+            cover.names.extend(Some(last(namespace(topic))).filter(|name| told.is_vehicle && !name.is_empty()));
+            let Some((child, (space, tree))) = told.child.as_deref().zip(self.tree_of(topic)) else { continue };
+            cover.children.insert((space, child));
+            cover.carriers.extend(tree.way_up(child).into_iter().flatten().map(|frame| (space, frame)));
         }
+        cover
     }
-    let both = one.is_vehicle && other.is_vehicle && one.schema != other.schema;
-    let (space, same) = (namespace(first), namespace(first) == namespace(second));
-    (both && same).then(|| if space.is_empty() { "the same robot".to_owned() } else { quoted(space) })
+}
+
+/// The last part of a name.
+fn last(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or_default()
+}
+
+/// Whom topics of poses tell of.
+#[derive(Default)]
+pub(super) struct Cover<'a> {
+    /// Names in messages and of the namespaces of topics.
+    names: BTreeSet<&'a str>,
+    /// Frames of odometry by their namespace, and those with all that carries them.
+    children: BTreeSet<(&'a str, &'a str)>,
+    carriers: BTreeSet<(&'a str, &'a str)>,
+}
+
+impl Cover<'_> {
+    /// Whether a vehicle of the transforms in a namespace is among them.
+    pub(super) fn holds(&self, space: &str, tree: &Tree, body: &Body) -> bool {
+        let robot = body.frame.rsplit_once('/').map_or("", |(robot, _)| last(robot));
+        let is_named = [robot, &body.frame, last(space)].iter().any(|name| self.names.contains(name));
+        let way = tree.way_up(&body.frame);
+        is_named
+            || self.carriers.contains(&(space, &body.frame))
+            || way.is_ok_and(|way| way.iter().any(|frame| self.children.contains(&(space, frame))))
+    }
+}
+
+/// Refuses positions of several robots, by whom they are told, in frames of the same name that each robot has of its own, as
+/// a rule.
+pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
+    let is_own = |frame: &str| frame.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom");
+    let mut known: BTreeMap<&str, &str> = BTreeMap::new();
+    for (teller, frame) in given.filter(|(_, frame)| is_own(frame)) {
+        let Some(first) = known.insert(frame, teller).filter(|first| *first != teller) else { continue };
+        let (first, teller, shown) = (quoted(first), quoted(teller), quoted(frame));
+        let problem = format!(
+            "{first} and {teller} give positions in a frame {shown}, of which each robot has one of its own as a rule"
+        );
+        let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
+        return Err(Fault::content(problem, remedy));
+    }
+    Ok(())
 }

@@ -8,7 +8,7 @@ use super::super::earth::Local;
 use super::super::error::{Fault, ReadError, quoted};
 use super::super::options::ReadOptions;
 use super::messages::{EARTH, What, Who};
-use super::outline::{Outline, is_static, namespace, place, seen_in};
+use super::outline::{Outline, is_static, place, refuse_own_frames, seen_in, space};
 use super::rigid::{Known, Placed};
 use super::splits::Splits;
 use super::tree::{Body, Chain};
@@ -50,6 +50,13 @@ impl Plan {
         }
         plan.check()?;
         plan.find_bodies()?;
+        if plan.wanted.is_none() {
+            let bodies = plan
+                .bodies
+                .iter()
+                .flat_map(|(space, of)| of.values().flatten().map(|body| (space.as_str(), body.carrier.as_str())));
+            refuse_own_frames(plan.outline.given_in(|topic| plan.reads(topic)).chain(bodies))?;
+        }
         let needed = plan.find_chains()?;
         plan.gather(&needed, splits)?;
         Ok(plan)
@@ -62,8 +69,7 @@ impl Plan {
                 format!("it has no topic {} with positions; those that it has are {}", quoted(name), known.join(", "));
             return Err(Fault::content(problem, "name one of these with --topic"));
         }
-        self.outline.refuse_twice(|topic| self.reads(topic))?;
-        if self.wanted.is_none() { self.outline.refuse_own_frames(|topic| self.reads(topic)) } else { Ok(()) }
+        self.outline.refuse_twice(|topic| self.reads(topic))
     }
 
     /// Whether the poses of a topic are read.
@@ -74,7 +80,7 @@ impl Plan {
     /// Finds the vehicles of the transforms, unless topics of poses tell of them.
     fn find_bodies(&mut self) -> Result<(), Fault> {
         let beside_poses = self.topics.is_empty() && !self.outline.topics.is_empty();
-        let (mut covered, mut uncovered) = (Vec::new(), Vec::new());
+        let (cover, mut covered, mut uncovered) = (self.outline.cover(), Vec::new(), Vec::new());
         for (space, tree) in &self.outline.trees {
             if !self.topics.is_empty() && !self.outline.is_told_by(space, &self.topics) {
                 continue;
@@ -82,14 +88,14 @@ impl Plan {
             let bodies = tree.bodies()?;
             if beside_poses {
                 for body in bodies {
-                    let of = if self.outline.is_covered(space, &body) { &mut covered } else { &mut uncovered };
+                    let of = if cover.holds(space, tree, &body) { &mut covered } else { &mut uncovered };
                     of.push(body.frame);
                 }
                 continue;
             }
-            let others =
-                tree.frames().filter(|frame| tree.moves(frame) && bodies.iter().all(|body| body.frame != *frame));
-            self.notes.extend(note_of(&bodies, &others.collect::<Vec<_>>()));
+            let vehicles: BTreeSet<_> = bodies.iter().map(|body| body.frame.as_str()).collect();
+            let others: Vec<_> = tree.frames().filter(|frame| tree.moves(frame) && !vehicles.contains(frame)).collect();
+            self.notes.extend(note_of(&bodies, &others));
             let of = self.bodies.entry(space.clone()).or_default();
             for body in bodies {
                 of.entry(body.driver.clone()).or_default().push(body);
@@ -151,7 +157,7 @@ impl Plan {
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
             let topic = &message.of.topic;
-            let space = namespace(topic);
+            let space = space(topic);
             for seen in seen_in(&message, &mut number)? {
                 let (What::Transform(turn), Who::Named(child)) = (seen.what, seen.who) else { continue };
                 if is_static(topic) || !needed.get(space).is_some_and(|frames| frames.contains(&child)) {

@@ -7,7 +7,7 @@ use super::super::error::{Fault, ReadError, UNSEEN, quoted};
 use super::super::names::Names;
 use super::super::order::Row;
 use super::messages::{EARTH, Seen, What, Who};
-use super::outline::{is_static, namespace, place, seen_in};
+use super::outline::{is_static, place, seen_in, space};
 use super::plan::Plan;
 use super::rigid::{Known, Placed};
 use crate::record::mcap::topic::Message;
@@ -99,7 +99,7 @@ impl Poses {
         time_ns: i64,
         rows: &mut Vec<Row>,
     ) -> Result<(), Fault> {
-        let space = namespace(topic);
+        let space = space(topic);
         let Who::Named(driver) = &seen.who else { return Ok(()) };
         let Some(bodies) = self.plan.bodies_of(space, driver).cloned() else { return Ok(()) };
         check_finite(&seen.position)?;
@@ -119,7 +119,7 @@ impl Poses {
             };
             let Some(position) = position else { continue };
             let several = self.plan.outline.trees.len() > 1;
-            let name = if several { format!("{space}/{}", body.frame) } else { body.frame };
+            let name = if several && !space.is_empty() { format!("{space}/{}", body.frame) } else { body.frame };
             self.push(&name, time_ns, position, rows);
         }
         Ok(())

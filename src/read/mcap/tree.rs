@@ -225,7 +225,7 @@ fn is_body(frame: &str) -> bool {
 }
 
 /// Whether a frame carries robots and is none.
-pub(super) fn is_carrier(frame: &str) -> bool {
+fn is_carrier(frame: &str) -> bool {
     let frame = frame.to_lowercase();
     frame.split(|c: char| !c.is_alphanumeric()).any(|word| CARRIERS.contains(&word))
 }
