@@ -26,7 +26,7 @@ pub(super) struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-#[cfg_attr(not(feature = "viewer"), expect(clippy::large_enum_variant, reason = "there is one of it"))]
+#[expect(clippy::large_enum_variant, reason = "there is one of it")]
 pub(super) enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),
