@@ -114,7 +114,7 @@ fn frames() -> Vec<u8> {
     const TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
     const TF: &str = "tf2_msgs/msg/TFMessage";
     let transform = |nanosec: u32, parent, child| {
-        cdr(&(vec![(((1, nanosec), parent), child, ([1.0, 2.0, 3.0], TURN))],), nanosec % 2 == 0)
+        cdr(&(vec![(((1, nanosec), parent), child, ([1.0, 2.0, 3.0], TURN))],), nanosec.is_multiple_of(2))
     };
     let named = (((1, 5), "map"), vec![("cf1", ([1.0, 2.0, 3.0], TURN)), ("cf2", ([1.0, 2.0, 3.0], TURN))]);
     let odometry = (((1, 5), "odom"), "base_link", ([1.0, 2.0, 3.0], TURN));

@@ -157,7 +157,8 @@ fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
     };
     let foreign = |folder: &Path| fs::write(folder.join("split_1.mcap.zstd"), "no bag").expect("written");
     let other = |folder: &Path| drop(fs::copy(folder.join("split_1.mcap.zstd"), folder.join("split_2.mcap")));
-    let cases: [(Box<dyn FnOnce(&Path)>, &str, &str); 11] = [
+    type Spoil = Box<dyn FnOnce(&Path)>;
+    let cases: [(Spoil, &str, &str); 11] = [
         (
             Box::new(remove("split_1.mcap.zstd")),
             "split_1.mcap.zstd: the bag lists this file, and it is not there",
