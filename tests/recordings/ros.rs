@@ -9,6 +9,9 @@ use tempfile::TempDir;
 use crate::messages::{Message, NO_TURN, SEC, cdr, header, mcap_of, read_bytes, whole};
 use crate::recording::Whole;
 
+/// What is done to a folder that was whole.
+type Spoil = Box<dyn FnOnce(&Path)>;
+
 /// The quaternion of a quarter turn to the left.
 const QUARTER: [f64; 4] = [0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2];
 
@@ -157,7 +160,6 @@ fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
     };
     let foreign = |folder: &Path| fs::write(folder.join("split_1.mcap.zstd"), "no bag").expect("written");
     let other = |folder: &Path| drop(fs::copy(folder.join("split_1.mcap.zstd"), folder.join("split_2.mcap")));
-    type Spoil = Box<dyn FnOnce(&Path)>;
     let cases: [(Spoil, &str, &str); 11] = [
         (
             Box::new(remove("split_1.mcap.zstd")),
