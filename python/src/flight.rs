@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray3};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use tautline::cli::{RunHistory, flight_page};
+use tautline::cli::FlightWatch;
 use tautline::preflight::Preflight;
 use tautline::record::mcap::{Header, McapRecorder};
 use tautline::record::{Event, RecordError, Sample, Sink};
@@ -91,28 +91,28 @@ impl Flown {
 #[derive(Default)]
 struct Beside {
     recording: Option<McapRecorder>,
-    history: Option<RunHistory>,
+    watch: Option<FlightWatch>,
 }
 
 impl Sink for Beside {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.recording.as_mut().map_or(Ok(()), |recording| recording.sample(sample))?;
-        self.history.as_mut().map_or(Ok(()), |history| history.sample(sample))
+        self.watch.as_mut().map_or(Ok(()), |watch| watch.sample(sample))
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         self.recording.as_mut().map_or(Ok(()), |recording| recording.event(event))?;
-        self.history.as_mut().map_or(Ok(()), |history| history.event(event))
+        self.watch.as_mut().map_or(Ok(()), |watch| watch.event(event))
     }
 
     fn step(&mut self, step: &tautline::record::Step<'_>) {
-        if let Some(history) = &mut self.history {
-            history.step(step);
+        if let Some(watch) = &mut self.watch {
+            watch.step(step);
         }
     }
 
     fn looks_at_steps(&self) -> bool {
-        self.history.as_ref().is_some_and(Sink::looks_at_steps)
+        self.watch.as_ref().is_some_and(Sink::looks_at_steps)
     }
 }
 
@@ -146,15 +146,15 @@ pub(crate) fn fly(
             let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
             McapRecorder::create(path, &header)
         });
-        let history = html.is_some().then(|| RunHistory::new().scaled_by(scenario.metric()));
-        let mut sinks = (samples, Beside { recording: recording.transpose()?, history });
+        let watch = html.is_some().then(|| FlightWatch::new(scenario));
+        let mut sinks = (samples, Beside { recording: recording.transpose()?, watch });
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
-        let (samples, Beside { recording, history }) = sinks;
+        let (samples, Beside { recording, watch }) = sinks;
         let closed = recording.map_or(Ok(()), McapRecorder::finish);
         let (report, ending) = flown?;
         closed?;
-        let page = history.map(|history| flight_page(scenario, &preflight, &history, &report, command));
+        let page = watch.map(|watch| watch.page(scenario, &preflight, &report, command));
         Ok((report, ending, samples, page))
     })?;
     if let Some(raised) = signals.raised.or_else(|| raising.as_ref()?.take()) {

@@ -26,6 +26,7 @@ mod encounters;
 mod envelope;
 mod events;
 mod export;
+mod flight_page;
 mod folder;
 mod judgement;
 mod list;
@@ -59,9 +60,7 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 pub use call::{Answer, Held, Refusal, call, judge, open};
-pub use pictures::flight_page;
-
-pub use crate::figures::RunHistory;
+pub use flight_page::FlightWatch;
 
 use command::{Arguments, Command, obey, quiet_guarded_panics};
 use diagnostic::{Exit, Failure};

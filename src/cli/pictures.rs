@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use super::Failure;
 use crate::figures::{self, Criteria, Figure, RunHistory};
-use crate::preflight::Preflight;
 use crate::report::{Report, RunPage, write_atomically};
 use crate::scenario::Scenario;
 
@@ -21,21 +20,6 @@ pub(super) fn figures(scenario: &Scenario, history: &RunHistory, report: &Report
         most_thrust_n: scenario.airframe.quadrotor().map(|quadrotor| quadrotor.model.max_thrust_n),
     };
     figures::of_run(history, &criteria)
-}
-
-/// The page on a flight that a program has flown itself, which `command` flies again; without pictures.
-#[must_use]
-pub fn flight_page(
-    scenario: &Scenario,
-    preflight: &Preflight,
-    history: &RunHistory,
-    report: &Report,
-    command: &str,
-) -> String {
-    let warnings: Vec<_> =
-        preflight.warnings.iter().map(|warning| (warning.code.name().to_owned(), warning.message.clone())).collect();
-    let figures = figures(scenario, history, report);
-    report.to_html(&RunPage { scenario, warnings: &warnings, figures: &figures, pictures: &[], command })
 }
 
 /// Writes `figures/*.svg` and `report.html` into a run's folder and gives the path of the page. Figures of an earlier run
