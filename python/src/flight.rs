@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray3};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use tautline::cli::FlightWatch;
+use tautline::cli::{Film, RunHistory, flight_page};
 use tautline::preflight::Preflight;
 use tautline::record::mcap::{Header, McapRecorder};
 use tautline::record::{Event, RecordError, Sample, Sink};
@@ -91,28 +91,28 @@ impl Flown {
 #[derive(Default)]
 struct Beside {
     recording: Option<McapRecorder>,
-    watch: Option<FlightWatch>,
+    page: Option<(RunHistory, Film)>,
 }
 
 impl Sink for Beside {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.recording.as_mut().map_or(Ok(()), |recording| recording.sample(sample))?;
-        self.watch.as_mut().map_or(Ok(()), |watch| watch.sample(sample))
+        self.page.as_mut().map_or(Ok(()), |page| page.sample(sample))
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         self.recording.as_mut().map_or(Ok(()), |recording| recording.event(event))?;
-        self.watch.as_mut().map_or(Ok(()), |watch| watch.event(event))
+        self.page.as_mut().map_or(Ok(()), |page| page.event(event))
     }
 
     fn step(&mut self, step: &tautline::record::Step<'_>) {
-        if let Some(watch) = &mut self.watch {
-            watch.step(step);
+        if let Some(page) = &mut self.page {
+            page.step(step);
         }
     }
 
     fn looks_at_steps(&self) -> bool {
-        self.watch.as_ref().is_some_and(Sink::looks_at_steps)
+        self.page.as_ref().is_some_and(Sink::looks_at_steps)
     }
 }
 
@@ -146,15 +146,15 @@ pub(crate) fn fly(
             let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
             McapRecorder::create(path, &header)
         });
-        let watch = html.is_some().then(|| FlightWatch::new(scenario));
-        let mut sinks = (samples, Beside { recording: recording.transpose()?, watch });
+        let page = html.is_some().then(|| (RunHistory::new().scaled_by(scenario.metric()), Film::new()));
+        let mut sinks = (samples, Beside { recording: recording.transpose()?, page });
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
-        let (samples, Beside { recording, watch }) = sinks;
+        let (samples, Beside { recording, page }) = sinks;
         let closed = recording.map_or(Ok(()), McapRecorder::finish);
         let (report, ending) = flown?;
         closed?;
-        let page = watch.map(|watch| watch.page(scenario, &preflight, &report, command));
+        let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));
         Ok((report, ending, samples, page))
     })?;
     if let Some(raised) = signals.raised.or_else(|| raising.as_ref()?.take()) {

@@ -72,7 +72,7 @@ pub(super) fn judge_recorded(
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
     let mut instants = arguments.html.as_ref().map(|_| Instants::default());
-    let Judged { mut outcome, clock, mut notes, curves } =
+    let Judged { mut outcome, clock, mut notes, assumed, curves } =
         judged(auditor, arguments, open, console, &mut |items, names| {
             if let Some(instants) = &mut instants {
                 instants.note(items, names, &settings);
@@ -82,7 +82,7 @@ pub(super) fn judge_recorded(
         own.bind(&mut outcome, &settings);
     }
     arguments.check_count(&outcome, &settings)?;
-    let between = arguments.between(curves, own.as_ref());
+    let between = arguments.between(curves, own.as_ref(), assumed.as_deref());
     let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
@@ -123,6 +123,8 @@ struct Judged {
     outcome: Outcome,
     clock: Clock,
     notes: Vec<String>,
+    /// What was assumed to know its samples.
+    assumed: Option<String>,
     /// Whether it has curves and no samples.
     curves: bool,
 }
@@ -162,7 +164,8 @@ fn judged(
     let clock = recording.clock();
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
     let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
-    Ok(Judged { outcome, clock, notes: recording.notes().to_vec(), curves })
+    let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
+    Ok(Judged { outcome, clock, notes, assumed, curves })
 }
 
 impl From<RecordedError> for Failure {

@@ -285,8 +285,9 @@ impl AuditArguments {
         Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")))
     }
 
-    /// What is taken to happen between samples of a recording of curves alone, or that may be ours.
-    pub(super) fn between(&self, curves: bool, own: Option<&OwnRecording>) -> Between {
+    /// What is taken to happen between samples of a recording of curves alone, or that may be ours; nothing is proved where
+    /// the samples themselves are assumed.
+    pub(super) fn between(&self, curves: bool, own: Option<&OwnRecording>, assumed: Option<&str>) -> Between {
         let most = |accel: &[Named]| {
             let listed = accel.iter().map(|(name, a)| match name {
                 Some(name) => format!("{a:?} m/s^2 for {name}"),
@@ -301,6 +302,9 @@ impl AuditArguments {
             _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
             _ => ("straight between samples".to_owned(), Basis::Assumed),
         };
-        Between { motion, basis }
+        match assumed {
+            Some(assumed) => Between { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
+            None => Between { motion, basis },
+        }
     }
 }

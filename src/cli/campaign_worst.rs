@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 
 use super::console::{self, Console};
-use super::replays;
+use super::pictures;
 use super::run::{Left, RECORDING, RunArguments, fly_into};
 use super::{Exit, Failure};
 use crate::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
@@ -87,7 +87,7 @@ pub(super) fn flown_again(
         let left = fly_into(&options, &scenario, &command(campaign, worst.run, law), interrupted)?;
         check(&left, worst.run, law, &worst.state_hash)?;
         let replay =
-            replays::of_flight(&scenario, &left.film, &left.report, PAGE_BYTES / usize::from(looks.worst).max(1));
+            pictures::replay(&scenario, &left.film, &left.report, PAGE_BYTES / usize::from(looks.worst).max(1));
         again.flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
     }
     Ok(again)

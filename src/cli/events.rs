@@ -88,7 +88,7 @@ pub(super) fn junit(judged: &[Judgement], failures: &[(String, Failure)]) -> Res
 }
 
 /// A case for the verdict and one for each thing found.
-fn suite(Judgement { report, allows_undecided }: &Judgement) -> TestSuite {
+fn suite(Judgement { report, allows_undecided, .. }: &Judgement) -> TestSuite {
     let failed = |message: &str| {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
         status.set_message(message);

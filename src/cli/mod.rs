@@ -26,7 +26,6 @@ mod encounters;
 mod envelope;
 mod events;
 mod export;
-mod flight_page;
 mod folder;
 mod judgement;
 mod list;
@@ -60,7 +59,10 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 pub use call::{Answer, Held, Refusal, call, judge, open};
-pub use flight_page::FlightWatch;
+pub use pictures::flight_page;
+
+pub use crate::figures::RunHistory;
+pub use crate::replay::Film;
 
 use command::{Arguments, Command, obey, quiet_guarded_panics};
 use diagnostic::{Exit, Failure};

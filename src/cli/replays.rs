@@ -1,4 +1,4 @@
-//! Replays of what was flown and of what was judged.
+//! Replays of recordings that were judged.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,7 @@ use super::open::Open;
 use crate::audit::recorded::{Gap, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
 use crate::figures::Figure;
 use crate::replay::{Film, MOST_INSTANTS, Nearest, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
-use crate::report::Report;
 use crate::report::recorded::RecordedReport;
-use crate::scenario::Scenario;
-use crate::sim;
 use crate::swarm::ClosestApproach;
 use crate::track::Item;
 
@@ -21,18 +18,6 @@ const MOST_TIMES: usize = 1 << 20;
 const CURVE_HZ: f64 = 30.0;
 /// Most gaps whose ends are shown to the instant.
 const MOST_GAPS: usize = 200;
-
-/// A flight and what was found on it, in so many bytes.
-pub(super) fn of_flight(
-    scenario: &Scenario,
-    film: &Film,
-    report: &Report,
-    room_bytes: usize,
-) -> Result<Replay, NoReplay> {
-    let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
-    let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::judged).collect());
-    Replay::new(&stage, film, &report.moments(&names), report.judgement(), room_bytes)
-}
 
 /// When a recording says something, as it is read.
 #[derive(Default)]

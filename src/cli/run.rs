@@ -11,11 +11,11 @@ use rayon::ThreadPool;
 use super::caller;
 use super::console::{self, Console};
 use super::folder::OutFolder;
+use super::pictures;
 use super::scenario::{self, ScenarioArguments};
 #[cfg(feature = "viewer")]
 use super::snapshots::Watched;
 use super::{Exit, Failure};
-use super::{pictures, replays};
 use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
@@ -164,7 +164,7 @@ pub(super) fn fly_into(
     #[cfg(not(feature = "viewer"))]
     let snapshots = Vec::new();
     let figures = if arguments.no_figures { Vec::new() } else { pictures::figures(scenario, &history, &report) };
-    let replay = replays::of_flight(scenario, &film, &report, PAGE_BYTES);
+    let replay = pictures::replay(scenario, &film, &report, PAGE_BYTES);
     let page =
         RunPage { scenario, warnings: &warnings, replay: &replay, figures: &figures, pictures: &snapshots, command };
     let page = pictures::write(folder.path(), &report, &page)?;

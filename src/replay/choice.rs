@@ -31,26 +31,32 @@ pub fn chosen(times_s: &[f64], spans: &[Span], most: usize) -> Vec<usize> {
         return (0..count).collect();
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
-    let room = (SHARE * most as f64) as usize;
-    let mut kept = BTreeSet::from([0, count - 1]);
-    let around = |from_s: f64, to_s: f64| {
+    let mut kept = around(times_s, spans, (SHARE * most as f64) as usize);
+    // The smallest stride that leaves no more than there is room for.
+    let free = most - kept.len();
+    let stride = count.div_ceil(free.max(1)).max(1);
+    kept.extend((0..count).step_by(stride));
+    kept.into_iter().collect()
+}
+
+/// Indices of the first and the last instant and of those in which something happened, as long as they are no more than `room`.
+pub(super) fn around(times_s: &[f64], spans: &[Span], room: usize) -> BTreeSet<usize> {
+    let count = times_s.len();
+    let mut kept: BTreeSet<_> = count.checked_sub(1).into_iter().flat_map(|last| [0, last]).collect();
+    let beside = |from_s: f64, to_s: f64| {
         let first = times_s.partition_point(|&time_s| time_s < from_s).saturating_sub(BESIDE);
         let end = times_s.partition_point(|&time_s| time_s <= to_s) + BESIDE;
         first..end.min(count)
     };
-    let worst = spans.iter().map(|span| around(span.at_s, span.at_s));
-    let whole = spans.iter().map(|span| around(span.from_s, span.to_s));
+    let worst = spans.iter().map(|span| beside(span.at_s, span.at_s));
+    let whole = spans.iter().map(|span| beside(span.from_s, span.to_s));
     for instants in worst.chain(whole) {
         let more = instants.clone().filter(|k| !kept.contains(k)).count();
         if kept.len() + more <= room {
             kept.extend(instants);
         }
     }
-    // The smallest stride that leaves no more than there is room for.
-    let free = most - kept.len();
-    let stride = count.div_ceil(free.max(1)).max(1);
-    kept.extend((0..count).step_by(stride));
-    kept.into_iter().collect()
+    kept
 }
 
 #[cfg(test)]

@@ -133,7 +133,7 @@ impl Replay {
         }
         let begin_s = film.times_s.first().copied().unwrap_or(0.0);
         let (targets, guides) = targets::of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
-        let near = film.nearest.clone().finish();
+        let near = film.nearest.clone().finish(room_bytes / 5 / base64_bytes(SLICE_BYTES));
         let extent = Extent::of(stage, film, &shown);
         let level_m = stage.obstacles.iter().find_map(ground_m).unwrap_or(extent.low_m.z);
         let (square_m, lines) = mesh::ground(extent.low_m, extent.high_m, level_m);
@@ -177,7 +177,9 @@ impl Replay {
             return Err(no_room);
         }
         let spans: Vec<_> = listed.iter().map(|moment| moment.span).chain(film.spans.iter().copied()).collect();
-        let kept = chosen(&film.times_s, &spans, most.min(MOST_INSTANTS));
+        let even = film.even();
+        let times_s: Vec<_> = even.iter().map(|&k| film.times_s[k]).collect();
+        let kept: Vec<_> = chosen(&times_s, &spans, most.min(MOST_INSTANTS)).into_iter().map(|k| even[k]).collect();
         let instants: Vec<Vec<_>> = kept
             .iter()
             .map(|&k| {
@@ -245,6 +247,8 @@ impl Replay {
 
 /// What the numbers of the grid take, which are not known before it is chosen \[bytes\].
 const NUMBERS: usize = 200;
+/// What a closest approach takes \[bytes\].
+const SLICE_BYTES: usize = 20;
 
 impl Moment {
     fn data(&self, place: &impl Fn(usize) -> Option<usize>) -> MomentData<'_> {

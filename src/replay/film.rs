@@ -1,6 +1,6 @@
 //! Motion as it is taken, in bounded memory.
 
-use super::choice::{Span, chosen};
+use super::choice::{Span, around};
 use super::nearest::Nearest;
 use crate::audit::recorded::ObjectPair;
 use crate::record::{Event, RecordError, Sample, Sink};
@@ -10,6 +10,8 @@ use crate::swarm::{ClosestApproach, Rows};
 const BUDGET_BYTES: usize = 64 << 20;
 /// Most times in which something happened that instants are kept for while a flight is taken.
 const MOST_SPANS: usize = 1000;
+/// Fewest instants that are thinned.
+const FEWEST: usize = 8;
 
 /// Positions at instants, and how near any two were, by the judge.
 ///
@@ -26,6 +28,9 @@ pub struct Film {
     pub(super) events: Vec<Event>,
     /// Samples taken.
     pub(super) samples: usize,
+    /// The number of each instant that is kept, from 0, and one in how many stays whatever happened.
+    numbers: Vec<usize>,
+    every: usize,
     /// Times whose instants stay, beside those of moments.
     pub(super) spans: Vec<Span>,
     violations: Vec<(ObjectPair, Span)>,
@@ -43,7 +48,8 @@ impl Film {
     /// is not there.
     #[must_use]
     pub fn of(times_s: Vec<f64>, positions_m: Vec<Rows>, nearest: Nearest, samples: usize) -> Self {
-        Self { times_s, positions_m, nearest, samples, ..Self::default() }
+        let numbers = (0..times_s.len()).collect();
+        Self { times_s, positions_m, nearest, samples, numbers, ..Self::default() }
     }
 
     /// The same, with times whose instants are not to be thinned out.
@@ -62,6 +68,7 @@ impl Film {
         if self.positions_m.first().is_some_and(|first| first.nrows() != positions_m.nrows()) {
             return;
         }
+        self.numbers.push(self.samples);
         self.samples += 1;
         self.times_s.push(time_s);
         self.positions_m.push(positions_m.clone());
@@ -69,19 +76,36 @@ impl Film {
             self.nearest.take(closest);
         }
         let bytes = positions_m.len() * size_of::<f64>() * self.times_s.len();
-        if bytes > self.budget_bytes.unwrap_or(BUDGET_BYTES) && self.times_s.len() > 8 {
+        if bytes > self.budget_bytes.unwrap_or(BUDGET_BYTES) && self.times_s.len() > FEWEST {
             self.thin();
         }
     }
 
+    /// Drops half of the instants at least.
     fn thin(&mut self) {
-        let closest = self.nearest.closest().map(|closest| closest.time_s);
-        let closest = closest.map(|at_s| Span { from_s: at_s, to_s: at_s, at_s });
-        let spans: Vec<_> = closest.into_iter().chain(self.violations.iter().map(|(_, span)| *span)).collect();
-        let kept = chosen(&self.times_s, &spans, self.times_s.len() / 2);
+        let most = self.times_s.len() / 2;
+        let mut kept = self.even();
+        while kept.len() > most {
+            self.every = 2 * self.every.max(1);
+            kept = self.even();
+        }
         let mut all: Vec<_> = std::mem::take(&mut self.positions_m).into_iter().map(Some).collect();
         self.positions_m = kept.iter().filter_map(|&k| all[k].take()).collect();
         self.times_s = kept.iter().map(|&k| self.times_s[k]).collect();
+        self.numbers = kept.iter().map(|&k| self.numbers[k]).collect();
+    }
+
+    /// Indices of the instants that are as dense at the end as at the beginning: one in so many, the first and the last, and those
+    /// around what happened, which take a quarter of the room at most.
+    pub(super) fn even(&self) -> Vec<usize> {
+        let closest = self.nearest.closest().map(|closest| closest.time_s);
+        let closest = closest.map(|at_s| Span { from_s: at_s, to_s: at_s, at_s });
+        let spans = closest.into_iter().chain(self.violations.iter().map(|(_, span)| *span));
+        let spans: Vec<_> = spans.chain(self.spans.iter().copied()).collect();
+        let mut kept = around(&self.times_s, &spans, self.times_s.len() / 4);
+        let one_in = self.every.max(1);
+        kept.extend((0..self.numbers.len()).filter(|&k| self.numbers[k].is_multiple_of(one_in)));
+        kept.into_iter().collect()
     }
 
     fn begin(&mut self, whose: ObjectPair, time_s: f64) {

@@ -11,6 +11,9 @@ const MOST: usize = 1000;
 pub struct Nearest {
     slices: Vec<Slice>,
     gap: bool,
+    /// One slice stands for two to the power of this many that were taken, and how many the last one stands for.
+    halved: u32,
+    filled: u64,
 }
 
 /// The closest approach of a slice of time.
@@ -28,9 +31,20 @@ impl Nearest {
         if !(next.time_s.is_finite() && next.separation_m.is_finite()) {
             return;
         }
-        self.slices.push(Slice { closest: next, after_gap: std::mem::take(&mut self.gap) });
-        if self.slices.len() > 2 * MOST {
-            self.halve();
+        let slice = Slice { closest: next, after_gap: std::mem::take(&mut self.gap) };
+        match self.slices.last_mut() {
+            Some(last) if self.filled < 1 << self.halved => {
+                *last = last.and(slice);
+                self.filled += 1;
+            }
+            _ => {
+                if self.slices.len() == 2 * MOST {
+                    self.halve();
+                    self.halved += 1;
+                }
+                self.slices.push(slice);
+                self.filled = 1;
+            }
         }
     }
 
@@ -40,17 +54,13 @@ impl Nearest {
     }
 
     fn halve(&mut self) {
-        let closer = |two: &[Slice]| {
-            let closest = two.iter().min_by(|a, b| a.closest.separation_m.total_cmp(&b.closest.separation_m))?.closest;
-            Some(Slice { closest, after_gap: two.iter().any(|slice| slice.after_gap) })
-        };
-        self.slices = self.slices.chunks(2).filter_map(closer).collect();
+        self.slices = self.slices.chunks(2).filter_map(|two| two.iter().copied().reduce(Slice::and)).collect();
     }
 
-    /// At most a thousand, in the order in which they were taken.
+    /// At most so many, and at most a thousand, in the order in which they were taken.
     #[must_use]
-    pub fn finish(mut self) -> Vec<Slice> {
-        while self.slices.len() > MOST {
+    pub fn finish(mut self, most: usize) -> Vec<Slice> {
+        while self.slices.len() > most.clamp(1, MOST) {
             self.halve();
         }
         self.slices
@@ -61,6 +71,14 @@ impl Nearest {
     pub fn closest(&self) -> Option<ClosestApproach> {
         let all = self.slices.iter().map(|slice| slice.closest);
         all.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m))
+    }
+}
+
+impl Slice {
+    /// The closer of two neighbours, which stands for both.
+    fn and(self, next: Self) -> Self {
+        let closest = if next.closest.separation_m < self.closest.separation_m { next.closest } else { self.closest };
+        Self { closest, after_gap: self.after_gap || next.after_gap }
     }
 }
 
@@ -92,9 +110,11 @@ mod tests {
             nearest.take(at(k));
         }
         assert_eq!(nearest.closest(), Some(at(12_345)));
-        let kept = nearest.finish();
+        let kept = nearest.finish(MOST);
         assert!(kept.len() <= MOST && kept.iter().any(|slice| slice.closest == at(12_345)));
         assert!(kept.is_sorted_by(|a, b| a.closest.time_s < b.closest.time_s));
+        let widest_s = kept.windows(2).map(|two| two[1].closest.time_s - two[0].closest.time_s).fold(0.0, f64::max);
+        assert!(kept.len() > MOST / 3 && widest_s < 300.0, "evenly: {} and {widest_s}", kept.len());
         let gaps: Vec<_> = kept.iter().filter(|slice| slice.after_gap).map(|slice| slice.closest.time_s).collect();
         assert!(gaps.len() == 1 && (29_900.0..30_100.0).contains(&gaps[0]), "{gaps:?}");
         let odd = ClosestApproach { separation_m: f64::NAN, ..at(0) };

@@ -156,6 +156,9 @@ fn memory_is_bounded_while_a_flight_is_taken_and_its_violations_stay() {
         film.sample(&OwnedSample::from(&sample).as_sample()).expect("taken");
     }
     assert!(film.times_s.len() * 48 <= 200_000 && film.samples == 50_000, "{}", film.times_s.len());
+    let even = film.even();
+    let widest_s = even.windows(2).map(|two| film.times_s[two[1]] - film.times_s[two[0]]).fold(0.0, f64::max);
+    assert!(even.len() > 1000 && widest_s < 500.0 / 1000.0, "as dense everywhere: {} and {widest_s} s", even.len());
     for k in 19_998..=20_052_u32 {
         assert!(film.times_s.contains(&(f64::from(k) / 100.0)), "{k}");
     }

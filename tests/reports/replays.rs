@@ -7,7 +7,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::replays_in_browser::steer;
+use crate::replays_in_browser::{steer, steer_with};
 
 const DESKTOP: (u32, bool) = (1000, false);
 
@@ -180,6 +180,10 @@ fn it_fits_a_phone_in_light_and_dark_and_within_a_sandbox() {
     .expect("written");
     let (_, said) = steer(folder.path(), &outer, DESKTOP, "return {};");
     assert!(said.is_empty(), "{said:?}");
+    let without = fs::read_to_string(&outer).expect("a page").replace("allow-scripts", "allow-forms");
+    fs::write(&outer, without).expect("written");
+    let (_, said) = steer(folder.path(), &outer, DESKTOP, "return {};");
+    assert!(said.iter().any(|line| line.contains("Blocked script execution")), "what does not run is seen: {said:?}");
 }
 
 #[test]
@@ -197,6 +201,10 @@ fn no_other_script_runs_and_without_webgl_the_page_says_so() {
         found["ran"] == false && said.iter().any(|line| line.contains("Content Security Policy")),
         "{found} {said:?}"
     );
+    fs::write(&page, &html).expect("written");
+    let (found, said) = steer_with(folder.path(), &page, DESKTOP, &["--disable-gpu"], state);
+    assert!(found["state"] == "none" && said.is_empty(), "{found} {said:?}");
+    assert!(text(&found["none"]).contains("does not draw WebGL 2: there is no replay"), "{found}");
     // One letter of the script changed, and it does not run.
     fs::write(&page, html.replace("const ABSENT", "const  ABSENT")).expect("written");
     let (found, _) = steer(folder.path(), &page, DESKTOP, state);

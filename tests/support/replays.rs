@@ -8,10 +8,17 @@ use crate::browser::open;
 /// Puts a page into a frame so wide, runs a script there once it is loaded, and gives what the script returns and what the
 /// browser's console said. The script knows the page's `win` and `doc`, its first replay `root`, the `player` in it, and
 /// `key(name)`, which presses a key and draws at once.
-pub(crate) fn steer(
+pub(crate) fn steer(folder: &Path, page: &Path, look: (u32, bool), script: &str) -> (serde_json::Value, Vec<String>) {
+    // The graphics card in software.
+    steer_with(folder, page, look, &["--use-angle=swiftshader", "--enable-unsafe-swiftshader"], script)
+}
+
+/// The same in a browser that is started so.
+pub(crate) fn steer_with(
     folder: &Path,
     page: &Path,
     (width_px, dark): (u32, bool),
+    started: &[&str],
     script: &str,
 ) -> (serde_json::Value, Vec<String>) {
     let wrapper = folder.join("steered.html");
@@ -34,8 +41,7 @@ pub(crate) fn steer(
     );
     fs::write(&wrapper, html).expect("written");
     let mut flags = vec!["--dump-dom".to_owned(), "--window-size=1400,900".to_owned()];
-    // The graphics card in software.
-    flags.extend(["--use-angle=swiftshader".to_owned(), "--enable-unsafe-swiftshader".to_owned()]);
+    flags.extend(started.iter().map(|&flag| flag.to_owned()));
     flags.extend(dark.then(|| "--blink-settings=preferredColorScheme=0".to_owned()));
     let output = open(folder, &wrapper, &flags);
     let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));

@@ -55,7 +55,7 @@ pub(super) fn largest(
     let basis = BernsteinBasis::of_degree(c.len().saturating_sub(1));
     let rounding = 4.0 * c.len() as f64 * f64::EPSILON * c.iter().map(Vector3::norm).sum::<f64>();
     let mut found = Enclosure { lower: f64::NEG_INFINITY, upper: f64::NEG_INFINITY, at: 0.0 };
-    let mut look = |start: f64, length: f64, found: &mut Enclosure| {
+    let look = |start: f64, length: f64, found: &mut Enclosure| {
         let mut part = c.to_vec();
         rescale(&mut part, start, length);
         let [at_start, at_end, most] = ask(&part, &basis);
