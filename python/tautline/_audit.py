@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,7 +172,7 @@ def audit(
     obstacles: PathLike | None = None,
     limit: Mapping[str, float] | None = None,
     fence: PathLike | None = None,
-    config: PathLike | None = None,
+    config: PathLike | Literal[False] | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
     above: float | None = None,
@@ -190,14 +190,14 @@ def audit(
 
     ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
     it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``scale``, ``dimensions``, ``column``, ``start``, ``axis_order``,
-    ``frame``, ``allow_unfinished``.
+    ``frame``, ``topic``, ``origin``, ``allow_unfinished``.
 
     ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep
     max(delta, r1 + r2). ``ellipsoid`` (3,) [m] are half axes of what must stay empty, with delta scaled by them. ``motion`` says what
     happens between samples: ``linear``, ``hold``, ``polynomial``, ``bounded`` (with ``max_accel`` [m/s^2]). ``obstacles`` is a TOML
     file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2], ``height`` [m]; ``fence`` is a TOML file of
     what each must stay within. Of a file, ``config`` is a ``tautline.toml`` that fills what is not asked here; the one beside the
-    recording unless given. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
+    recording unless given, and none where it is False. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
     judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap.
 
     Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
@@ -208,7 +208,8 @@ def audit(
     words += options(motion=motion, expect_vehicles=expect_vehicles)
     words += of_each("--max-accel", max_accel, "max_accel") + of_each("--radius", radius, "radius")
     words += [] if ellipsoid is None else [f"--ellipsoid={numbers(ellipsoid, 'ellipsoid')}"]
-    files = {"obstacles": obstacles, "fence": fence, "config": config}
+    words += ["--no-config"] if config is False else []
+    files = {"obstacles": obstacles, "fence": fence, "config": None if config is False else config}
     given = [path(file, what) for what, file in files.items() if file is not None]
     words += [f"--{what}={path(file, what)}" for what, file in files.items() if file is not None]
     words += [f"--limit={what}={number(most, 'limit')}" for what, most in (limit or {}).items()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -95,6 +95,8 @@ def reading(
     start: Mapping[str, Iterable[float]] | None = None,
     axis_order: str | None = None,
     frame: str | None = None,
+    topic: str | Sequence[str] | None = None,
+    origin: Iterable[float] | None = None,
     join: bool = False,
     allow_unfinished: bool = False,
 ) -> list[str]:
@@ -108,8 +110,10 @@ def reading(
         dimensions=dimensions,
         axis_order=axis_order,
         frame=frame,
+        topic=list(topic) if isinstance(topic, (list, tuple)) else topic,
         join=join,
         allow_unfinished=allow_unfinished,
     )
+    words += [] if origin is None else [f"--origin={numbers(origin, 'origin')}"]
     words += [f"--column={role}={name}" for role, name in (column or {}).items()]
     return words + [f"--start={name}={numbers(place, 'start')}" for name, place in (start or {}).items()]

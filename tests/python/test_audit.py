@@ -127,6 +127,7 @@ class Files(Case):
         (self.folder / "tautline.toml").write_text("[audit]\ndelta_m = 1.5\n")
         self.assertEqual(tl.audit(self.folder / "p.npz").verdict, "VIOLATION")
         self.assertTrue(tl.audit(self.folder / "p.npz", delta=0.1).is_clear)
+        self.refuses(tl.Error, "there is no delta", lambda: tl.audit(self.folder / "p.npz", config=False))
 
     def test_files_of_a_vehicle_each_are_joined(self) -> None:
         for name, x in (("a", 0.0), ("b", 1.0)):

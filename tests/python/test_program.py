@@ -1,7 +1,9 @@
 """The command line inside the package, and its commands as functions."""
 
+import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 import unittest
@@ -10,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import tautline as tl
 from shared import Case, passing, short
+from tautline import _words
 
 SPEC = """\
 scenario = "pentagon"
@@ -50,6 +53,14 @@ class Command(Case):
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertIn("CLEAR if straight between samples", ran.stdout)
         self.assertIn("tautline audit p.npz --delta 0.4", (self.folder / "a.html").read_text())
+
+    def test_every_question_of_the_command_line_can_be_asked_in_python(self) -> None:
+        asked = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
+        self.assertIn("max-gap", asked)
+        answers = {"json", "quiet", "junit", "events", "html", "summary", "annotations", "allow-undecided", "no-config", "help"}
+        taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_words.reading).parameters}
+        taken |= {"from", "to"} if {"from_s", "to_s"} <= taken else set()
+        self.assertEqual({name for name in asked - answers if name.replace("-", "_") not in taken}, set())
 
     def test_nothing_is_printed_by_functions(self) -> None:
         text = "import tautline as tl\ntl.compare('pentagon', ['laplacian'], runs=1, set={'time.duration_s': 2})\ntl.fly('pentagon', set={'time.duration_s': 2})"
