@@ -43,7 +43,8 @@ struct Agent {
     home_x: f64,
     home_y: f64,
     home_z: f64,
-    agent_traversal: Vec<Step>,
+    #[serde(rename = "agentTraversal")]
+    steps: Vec<Step>,
 }
 
 /// How far a drone moves from one sample to the next, and in how much time \[s\].
@@ -116,7 +117,7 @@ fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<I
         let sample = Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None };
         if finite { Ok(Item::Sample(sample)) } else { Err(Fault::out_of_range()) }
     };
-    for (number, step) in agent.agent_traversal.iter().enumerate() {
+    for (number, step) in agent.steps.iter().enumerate() {
         let fail = |fault| (Some(number), fault);
         if number > 0 || step.dt.is_some() {
             if number == 0 {

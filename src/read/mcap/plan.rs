@@ -11,7 +11,7 @@ use super::messages::{EARTH, What, Who};
 use super::outline::{Outline, is_static, place, refuse_own_frames, seen_in, space};
 use super::rigid::{Known, Placed};
 use super::splits::Splits;
-use super::tree::{Body, Chain};
+use super::tree::{Body, Chain, Tree};
 use crate::record::mcap::topic::Part;
 
 /// What is read, and how.
@@ -29,6 +29,21 @@ pub(super) struct Plan {
     /// Vehicles of the transforms, by namespace and driver.
     bodies: BTreeMap<String, BTreeMap<String, Vec<Body>>>,
     notes: Vec<String>,
+}
+
+/// What brings a position into the frame that is asked for.
+pub(super) enum Way {
+    /// No transforms lead there.
+    None,
+    /// Transforms lead there, and one of them is not known then.
+    NotThen,
+    By(Known),
+}
+
+impl Way {
+    fn of(known: Option<Known>) -> Self {
+        known.map_or(Self::NotThen, Self::By)
+    }
 }
 
 impl Plan {
@@ -191,11 +206,10 @@ impl Plan {
         self.chains.get(space)?.get(frame)?.as_ref()
     }
 
-    /// What brings poses of a topic from a frame into the one that is asked for: none where no transforms lead there, and
-    /// none within where they are not known then.
-    pub(super) fn bring(&self, topic: &str, frame: &str, time_ns: i64) -> Result<Option<Option<Known>>, Fault> {
-        let Some((space, tree)) = self.outline.tree_of(topic) else { return Ok(None) };
-        self.chain(space, frame).map(|chain| tree.along(chain, time_ns, None)).transpose()
+    /// What brings poses of a topic from a frame into the one that is asked for.
+    pub(super) fn bring(&self, topic: &str, frame: &str, time_ns: i64) -> Result<Way, Fault> {
+        let Some((space, tree)) = self.outline.tree_of(topic) else { return Ok(Way::None) };
+        self.chain(space, frame).map_or(Ok(Way::None), |chain| Ok(Way::of(tree.along(chain, time_ns, None)?)))
     }
 
     /// The same for a vehicle of the transforms, of whose driver it is known where it is then. Of a vehicle that carries the
@@ -206,10 +220,10 @@ impl Plan {
         body: &Body,
         driver: Isometry3<f64>,
         time_ns: i64,
-    ) -> Result<Option<Option<Known>>, Fault> {
+    ) -> Result<Way, Fault> {
         let chain = self.chain(space, &body.frame).filter(|chain| chain.leads_up_over(&body.driver));
         let along = |chain| self.outline.trees[space].along(chain, time_ns, Some((&body.driver, driver)));
-        chain.map(along).transpose()
+        chain.map_or(Ok(Way::None), |chain| Ok(Way::of(along(chain)?)))
     }
 
     /// The fault of a recording without a position.
@@ -225,7 +239,7 @@ impl Plan {
                 )
             }
             None if trees().any(|tree| tree.frames().any(|frame| tree.moves(frame))) => {
-                let frames: Vec<_> = trees().flat_map(|tree| tree.frames()).map(quoted).collect();
+                let frames: Vec<_> = trees().flat_map(Tree::frames).map(quoted).collect();
                 let problem = format!("its transforms are of no vehicle: its frames are {}", frames.join(", "));
                 Fault::content(problem, "record the transforms of the vehicles' own frames as well")
             }
@@ -244,7 +258,7 @@ impl Plan {
         }
         let bodies: BTreeSet<_> =
             self.bodies.values().flat_map(|of| of.values().flatten()).map(|body| &*body.frame).collect();
-        let fixed = self.outline.trees.values().flat_map(|tree| tree.still());
+        let fixed = self.outline.trees.values().flat_map(Tree::still);
         let fixed: BTreeSet<_> = fixed.filter(|frame| !bodies.contains(frame)).collect();
         if !fixed.is_empty() {
             let fixed: Vec<_> = fixed.into_iter().collect();

@@ -8,7 +8,7 @@ use super::super::names::Names;
 use super::super::order::Row;
 use super::messages::{EARTH, Seen, What, Who};
 use super::outline::{is_static, place, seen_in, space};
-use super::plan::Plan;
+use super::plan::{Plan, Way};
 use super::rigid::{Known, Placed};
 use crate::record::mcap::topic::Message;
 
@@ -85,8 +85,8 @@ impl Poses {
         if *wanted == seen.frame {
             return Ok(Some(seen.position));
         }
-        let Some(known) = self.plan.bring(topic, &seen.frame, time_ns)? else { return Ok(None) };
-        self.brought.count(known);
+        let way = self.plan.bring(topic, &seen.frame, time_ns)?;
+        let known = self.brought.count(&way);
         Ok(known.map(|known| known.transform.transform_point(&Point3::from(seen.position)).coords))
     }
 
@@ -113,9 +113,8 @@ impl Poses {
                 Some(seen.position)
             } else {
                 let placed = Placed { position: seen.position, turn }.rigid()?;
-                let Some(known) = self.plan.bring_body(space, &body, placed, time_ns)? else { continue };
-                self.brought.count(known);
-                known.map(|known| known.transform.translation.vector)
+                let way = self.plan.bring_body(space, &body, placed, time_ns)?;
+                self.brought.count(&way).map(|known| known.transform.translation.vector)
             };
             let Some(position) = position else { continue };
             let several = self.plan.outline.trees.len() > 1;
@@ -168,13 +167,15 @@ impl Poses {
 }
 
 impl Brought {
-    fn count(&mut self, known: Option<Known>) {
-        let of = match known {
-            Some(Known { guessed: false, .. }) => &mut self.exactly,
-            Some(Known { guessed: true, .. }) => &mut self.guessed,
-            None => &mut self.unknown,
-        };
-        *of += 1;
+    /// Counts a position, and gives what brings it.
+    fn count(&mut self, way: &Way) -> Option<Known> {
+        match way {
+            Way::None => return None,
+            Way::NotThen => self.unknown += 1,
+            Way::By(Known { guessed: true, .. }) => self.guessed += 1,
+            Way::By(_) => self.exactly += 1,
+        }
+        if let Way::By(known) = way { Some(*known) } else { None }
     }
 }
 
