@@ -16,7 +16,7 @@
 mod channels;
 pub(crate) mod exported;
 mod foreign;
-mod foxglove;
+mod foxglove_poses;
 mod messages;
 mod outline;
 mod plan;

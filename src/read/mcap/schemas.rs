@@ -1,12 +1,12 @@
 //! The schemas of others that hold positions.
 
 use super::messages::Reader;
-use super::{foxglove, ros};
+use super::{foxglove_poses, ros};
 use crate::record::mcap::topic::{CDR, Declared};
 
 /// What reads the messages of a schema, where they hold positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {
-    foxglove::reader_of(schema).or_else(|| ros::reader_of(schema))
+    foxglove_poses::reader_of(schema).or_else(|| ros::reader_of(schema))
 }
 
 /// The same of a topic, where it is in an encoding that is read.
