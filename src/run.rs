@@ -37,7 +37,21 @@ pub fn run_while(
     sink: &mut (dyn Sink + Send),
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, SimError> {
-    let parts = Parts::of(scenario)?;
+    Ok(run_with(scenario, preflight, Parts::of(scenario)?, sink, carry_on)?.0)
+}
+
+/// As [`run_while`], with parts that need not be the scenario's, such as another law; `preflight` is of that law
+/// ([`Preflight::under`]). Says how the flight ended too.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
+    scenario: &Scenario,
+    preflight: &Preflight,
+    parts: Parts,
+    sink: &mut (dyn Sink + Send),
+    carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> Result<(Report, Ending), SimError> {
     let freedom = parts.law.controls().freedom();
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
         .free_by(freedom)
@@ -50,7 +64,8 @@ pub fn run_while(
     } else {
         sim::fly(scenario, parts, &mut sinks, carry_on)?
     };
-    Ok(report(scenario, preflight, &flight, &metrics, state_hash.finish()))
+    let report = report(scenario, preflight, &flight, &metrics, state_hash.finish());
+    Ok((report, flight.ending))
 }
 
 /// Smallest separations that differ by this part of delta or less are the same.
@@ -82,7 +97,8 @@ pub fn verify(scenario: &Scenario, report: &Report) -> Result<Verification, SimE
 /// Whether the energy is proved never to grow: relative velocities are damped, and nothing voids the proof but that it
 /// certifies no distance.
 fn energy_falls(preflight: &Preflight, certificate: &Certificate) -> bool {
-    let holds = |void: &Void| matches!(void, Void::NoBarrier | Void::GraphNotComplete | Void::Unresolved);
+    let holds =
+        |void: &Void| matches!(void, Void::NoBarrier | Void::GraphNotComplete | Void::StepsTooLong | Void::Unresolved);
     preflight.velocity_margin_per_s.is_some_and(|margin_per_s| margin_per_s >= 0.0)
         && certificate.void.iter().all(holds)
 }
@@ -149,6 +165,7 @@ fn report(
             dt_s: scenario.time.dt_s,
             steps: flight.steps,
             refined_steps: flight.refined_steps,
+            overlong_steps: flight.overlong_steps,
             ended_early,
             vehicles: scenario.count(),
             state_hash,

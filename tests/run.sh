@@ -16,7 +16,14 @@ sh tests/setup.sh
 cargo test --release --no-default-features --test bits
 cargo test "$@"
 
-# Campaigns on a cluster, with the program that was just built; arguments ask for some of cargo's tests alone.
+# Campaigns on a cluster, what others' continuous integration is given, and every command of the docs, with the program that was
+# just built; arguments ask for some of cargo's tests alone.
 if [ $# = 0 ]; then
-    target/cluster/bin/python -m unittest discover --verbose --start-directory tests/cluster
+    for tests in tests/cluster tests/ci tests/docs; do
+        target/cluster/bin/python -m unittest discover --verbose --start-directory "$tests"
+    done
+
+    # The Python package, as its users build it but for the optimisation.
+    VIRTUAL_ENV="$PWD/target/python" target/python/bin/maturin develop --manifest-path python/Cargo.toml
+    target/python/bin/python -m unittest discover --verbose --start-directory tests/python
 fi

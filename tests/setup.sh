@@ -44,21 +44,32 @@ if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; th
         libxkbcommon-x11-0
 fi
 
-# Ray, in a virtual environment of its own, for tests/cluster.
-if ! target/cluster/bin/python -c 'import ray' 2>/dev/null; then
+# A virtual environment below target/ that can import MODULES, with PACKAGES: environment NAME MODULES PACKAGE...
+environment() {
+    folder=target/$1
+    modules=$2
+    shift 2
+    if "$folder/bin/python" -c "import $modules" 2>/dev/null; then return; fi
     if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
         sudo=$([ "$(id -u)" = 0 ] || echo sudo)
         $sudo apt-get update
         $sudo apt-get install -y --no-install-recommends python3 python3-venv
     fi
-    rm -rf target/cluster
+    rm -rf "$folder"
     mkdir -p target
-    python3 -m venv target/cluster
-    if ! target/cluster/bin/pip install --quiet --disable-pip-version-check 'ray>=2.40,<3'; then
-        echo "tests/cluster needs Ray, which cannot be installed for $(python3 --version) here" >&2
+    python3 -m venv "$folder"
+    if ! "$folder/bin/pip" install --quiet --disable-pip-version-check "$@"; then
+        echo "$folder needs $*, which cannot be installed for $(python3 --version) here" >&2
         exit 1
     fi
-fi
+}
+
+# Ray, for tests/cluster; and what reads hooks, for tests/ci.
+environment cluster 'pre_commit, ray, yaml' 'ray>=2.40,<3' pre-commit pyyaml
+
+# What builds the Python package, and what tests/python runs it with.
+environment python 'gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
+    gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' pettingzoo pyarrow
 
 # Slurm, of which tests/cluster starts a node of its own.
 if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) >/dev/null; then

@@ -38,6 +38,7 @@ mod candidates;
 mod clearance;
 mod cross_check;
 mod enclosure;
+pub mod envelope;
 mod error;
 mod ledger;
 mod limits;

@@ -102,6 +102,20 @@ pub(super) fn stray(c: &[Vector3<f64>]) -> f64 {
     BernsteinBasis::of_degree(n - 1).points(c).enumerate().map(strays).fold(0.0, f64::max)
 }
 
+/// Farthest that a polynomial gets from the straight line between its ends, however it flies along it, by its control points:
+/// the distance from a line is a convex function of a place.
+pub(super) fn stray_across(c: &[Vector3<f64>]) -> f64 {
+    let n = c.len();
+    let Some(from) = c.first().filter(|_| n > 2) else { return 0.0 };
+    let by: Vector3<f64> = c[1..].iter().sum();
+    let squared = by.norm_squared();
+    let across = |point: Vector3<f64>| {
+        let along = if squared > 0.0 { ((point - from).dot(&by) / squared).clamp(0.0, 1.0) } else { 0.0 };
+        (point - from - by * along).norm()
+    };
+    BernsteinBasis::of_degree(n - 1).points(c).map(across).fold(0.0, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,6 +126,12 @@ mod tests {
         // The parabola rises by 1; its one inner control point by 2.
         assert_eq!(stray(&r), 2.0);
         assert_eq!(stray(&r[..2]), 0.0);
+        assert_eq!((stray_across(&r), stray_across(&r[..2])), (2.0, 0.0));
+        // Eased from rest to rest on a straight line it is never off that, and past its end as far as its control points are.
+        let eased = [0.0, 0.0, 3.0, -2.0].map(|x| Vector3::new(x, 2.0 * x, 0.0));
+        assert!(stray_across(&eased) < 1e-15 && stray(&eased) > 0.5);
+        let back = [0.0, 4.0, -3.0].map(|x| Vector3::new(x, 0.0, 0.0));
+        assert_eq!(stray_across(&back), 1.0);
         assert_eq!(BernsteinBasis::of_degree(2).range(&[0.0, 4.0, -4.0]), (0.0, 2.0));
     }
 

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -51,13 +52,24 @@ pub struct Program {
     pub sha256: String,
 }
 
+/// The file that holds this crate, where it is not that of the process.
+static HOLDER: OnceLock<PathBuf> = OnceLock::new();
+
 impl Program {
+    /// Says which file holds this crate where it is a library that a program of others loads. Said once, before any campaign:
+    /// what flies is known by that file then.
+    pub fn is_in(file: PathBuf) {
+        // Whoever says it again says the same.
+        let _ = HOLDER.set(file);
+    }
+
     /// The one that is running.
     ///
     /// # Errors
     /// [`CampaignError::Machine`] where its file cannot be read.
     pub fn running() -> Result<Self, CampaignError> {
-        let path = std::env::current_exe().map_err(|error| CampaignError::reading(Path::new("the program"), error))?;
+        let path = HOLDER.get().cloned().map_or_else(std::env::current_exe, Ok);
+        let path = path.map_err(|error| CampaignError::reading(Path::new("the program"), error))?;
         let program = fs::read(&path).map_err(|error| CampaignError::reading(&path, error))?;
         Ok(Self {
             name: env!("CARGO_PKG_NAME").to_owned(),

@@ -99,6 +99,7 @@ fn columns(campaign: &Campaign) -> Vec<(String, Cells<'_>)> {
         ("energy_max_over_initial", number(|flight| flight.energy_max_over_initial)),
         ("steps", whole(|flight| Some(flight.steps))),
         ("refined_steps", whole(|flight| Some(flight.refined_steps))),
+        ("overlong_steps", whole(|flight| Some(flight.overlong_steps))),
         ("scenario_sha256", text(|flight| Some(flight.scenario_sha256.clone()))),
         ("state_hash", text(|flight| Some(flight.state_hash.clone()))),
     ];

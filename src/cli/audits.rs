@@ -2,13 +2,19 @@
 
 use serde::Serialize;
 
-use super::audit::{AuditArguments, judge};
+use super::audit::judge;
+use super::audit_arguments::{Annotations, AuditArguments};
+use super::audit_config;
 use super::console::{self, Console};
-use super::{Exit, Failure, events};
+use super::judgement::Judgement;
+use super::{Exit, Failure, events, summary};
 use crate::report::recorded::RecordedReport;
-use crate::report::{Status, write_atomically};
+use crate::report::write_atomically;
 
-/// Judges each recording; bad where one is. One that cannot be judged does not keep the others from it, and fails the whole.
+/// Recordings that could not be judged, and why.
+type Failures = [(String, Failure)];
+
+/// Judges each recording; the exit code is the worst. One that cannot be judged does not keep the others from it.
 pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
     let recordings = arguments.reading.recordings();
     let is_one = recordings.len() == 1;
@@ -17,17 +23,22 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
         return Err(Failure::input("--html is a page on one recording, and several are given", help));
     }
     arguments.check_outputs()?;
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let (mut reports, mut failures) = (Vec::new(), Vec::new());
-    for reading in recordings {
+    let asked: Vec<_> = recordings
+        .into_iter()
+        .map(|reading| (reading.called(), audit_config::configured(AuditArguments { reading, ..arguments.clone() })))
+        .collect();
+    // Nothing is written where something would be written over what is read, of whichever recording.
+    asked.iter().filter_map(|(_, asked)| asked.as_ref().ok()).try_for_each(AuditArguments::check_outputs)?;
+    // A log in which a system looks for its own lines has none of ours, which hold foreign names.
+    let quiet = arguments.quiet || arguments.annotations.is_some();
+    let console = Console { data_on_stdout: arguments.json, quiet };
+    let (mut judged, mut failures) = (Vec::new(), Vec::new());
+    for (name, asked) in asked {
         if !is_one {
-            console.say(&format!("{}:", reading.called()));
+            console.say(&format!("{name}:"));
         }
-        let name = reading.called();
-        let mut one = arguments.clone();
-        one.reading = reading;
-        match judge(&one, console) {
-            Ok(report) => reports.push(report),
+        match asked.and_then(|asked| judgement(&asked, console)) {
+            Ok(judgement) => judged.push(judgement),
             Err(failure) => {
                 if !is_one {
                     console.say(&format!("not judged: {}", failure.said));
@@ -36,38 +47,54 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
             }
         }
     }
-    if !is_one || failures.is_empty() {
-        answer(arguments, &reports, &failures, is_one)?;
+    if !is_one {
+        console.say(&summary::counts(&judged, failures.len()));
     }
-    if let Some((_, failure)) = failures.into_iter().next() {
-        return Err(failure);
+    answer(arguments, &judged, &failures, is_one)?;
+    let worst = judged.iter().map(Judgement::exit).max_by_key(|exit| *exit as u8).unwrap_or(Exit::Good);
+    match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| failure.exit() as u8) {
+        // It was said in a line that means nothing else to the system.
+        Some(failure) if arguments.annotations.is_some() => Ok(failure.exit()),
+        Some(failure) => Err(failure),
+        None => Ok(worst),
     }
-    let is_good = |report: &RecordedReport| match report.status {
-        Status::Clear => true,
-        Status::Undecided => arguments.allow_undecided,
-        Status::Violation => false,
-    };
-    Ok(if reports.iter().all(is_good) { Exit::Good } else { Exit::Bad })
+}
+
+/// Judges one recording as it and the file of settings beside it ask.
+pub(super) fn one(arguments: AuditArguments, console: Console) -> Result<Judgement, Failure> {
+    let arguments = audit_config::configured(arguments)?;
+    arguments.check_outputs()?;
+    judgement(&arguments, console)
+}
+
+fn judgement(arguments: &AuditArguments, console: Console) -> Result<Judgement, Failure> {
+    let (allows_undecided, asked_by) = (arguments.allow_undecided, arguments.asked_by.clone());
+    Ok(Judgement { report: judge(arguments, console)?, allows_undecided, asked_by })
 }
 
 /// What is for programs: of one recording by itself, of several as a list, with those that could not be judged and why.
-fn answer(
-    arguments: &AuditArguments,
-    reports: &[RecordedReport],
-    failures: &[(String, Failure)],
-    is_one: bool,
-) -> Result<(), Failure> {
+fn answer(arguments: &AuditArguments, judged: &[Judgement], failures: &Failures, is_one: bool) -> Result<(), Failure> {
     if arguments.json {
-        match reports {
-            [report] if is_one => console::json(report)?,
-            reports => console::json(&Answers::of(reports, failures))?,
+        match judged {
+            [] if is_one => {}
+            [of] if is_one => console::json(&of.report)?,
+            judged => console::json(&Answers::of(judged, failures))?,
         }
     }
+    if let Some(Annotations::Github) = arguments.annotations {
+        let lines = summary::github(judged, failures);
+        if arguments.json { console::beside(&lines) } else { console::data(&lines)? }
+    }
     if let Some(file) = &arguments.events {
-        write_atomically(file, &events::csv(reports, !is_one)?)?;
+        write_atomically(file, &events::csv(judged, !is_one)?)?;
     }
     if let Some(file) = &arguments.junit {
-        write_atomically(file, events::junit(reports, failures, arguments.allow_undecided)?.as_bytes())?;
+        write_atomically(file, events::junit(judged, failures)?.as_bytes())?;
+    }
+    if let Some(file) = &arguments.summary {
+        // Pages of jobs are written by one step after another.
+        let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
+        write_atomically(file, &[before, summary::markdown(judged, failures).into_bytes()].concat())?;
     }
     Ok(())
 }
@@ -85,10 +112,10 @@ enum Answer<'a> {
 }
 
 impl<'a> Answers<'a> {
-    fn of(reports: &'a [RecordedReport], failures: &'a [(String, Failure)]) -> Self {
+    fn of(judged: &'a [Judgement], failures: &'a Failures) -> Self {
         let not_judged = failures
             .iter()
             .map(|(recording, failure)| Answer::NotJudged { recording, error: failure.said.to_string() });
-        Self(reports.iter().map(Answer::Judged).chain(not_judged).collect())
+        Self(judged.iter().map(|of| Answer::Judged(&of.report)).chain(not_judged).collect())
     }
 }

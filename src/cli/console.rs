@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use super::Failure;
+use super::caller;
 use super::diagnostic::harmless;
 
 /// Refresh rate of a progress bar \[Hz\].
@@ -24,7 +25,7 @@ pub(super) struct Console {
 impl Console {
     /// Says something to a person, and nothing to the terminal. What nobody reads any more is dropped.
     pub(super) fn say(self, text: &str) {
-        if self.quiet {
+        if self.quiet || caller::is_program() {
             return;
         }
         let text = harmless(text.trim_end());
@@ -51,7 +52,7 @@ impl Console {
 
     /// A progress bar on a terminal, nothing in a pipe.
     pub(super) fn progress(self, total: u64, message: String) -> ProgressBar {
-        if self.quiet || !io::stderr().is_terminal() {
+        if self.quiet || caller::is_program() || !io::stderr().is_terminal() {
             return ProgressBar::hidden();
         }
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(PROGRESS_HZ));
@@ -64,8 +65,11 @@ impl Console {
     }
 }
 
-/// Writes data to standard output.
+/// Writes data to standard output, or gives it to the program that called.
 pub(super) fn data(text: &str) -> Result<(), Failure> {
+    if caller::takes(text) {
+        return Ok(());
+    }
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -73,6 +77,11 @@ pub(super) fn data(text: &str) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Writes lines that are not for a person beside data on standard output: to standard error. What nobody reads is dropped.
+pub(super) fn beside(text: &str) {
+    let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// Writes an answer to standard output, as indented JSON.

@@ -93,6 +93,21 @@ impl Failure {
         Self { exit, said: Box::new(MietteDiagnostic::new(harmless(&message.into()))), source: None }
     }
 
+    /// Where in a text it is wrong, what is, and what helps, on one line.
+    pub(super) fn in_full(&self) -> String {
+        let place = || {
+            let (text, labels) = (self.source.as_deref()?, self.said.labels.as_deref()?);
+            let before = text.inner().get(..labels.first()?.offset())?;
+            Some(format!("{}, line {}: ", text.name(), 1 + before.matches('\n').count()))
+        };
+        place().unwrap_or_default() + &self.in_words()
+    }
+
+    /// How the program ends by it.
+    pub(super) fn exit(&self) -> Exit {
+        self.exit
+    }
+
     /// What is wrong and what helps, on one line.
     pub(super) fn in_words(&self) -> String {
         let message = &self.said.message;

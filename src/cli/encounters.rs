@@ -1,10 +1,9 @@
 //! Those who came closest in a recording, as figures.
 
 use super::Failure;
-use super::reading::ReadArguments;
+use super::open::Open;
 use crate::audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
 use crate::figures::{self, Encounter, Figure};
-use crate::read::ReadOptions;
 use crate::report::recorded::interval;
 
 /// Pairs, and approaches to obstacles, that are drawn.
@@ -12,8 +11,7 @@ const DRAWN: usize = 3;
 
 /// Reads the recording again for those who came closest, and for the places of all.
 pub(super) fn figures(
-    reading: &ReadArguments,
-    options: &ReadOptions,
+    open: &Open<'_>,
     settings: &Settings,
     outcome: &Outcome,
     places: &mut Places,
@@ -21,7 +19,7 @@ pub(super) fn figures(
     let follow = |approach: &Approach| Ok((PairSeries::new(settings, outcome, approach.pair)?, *approach));
     let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();
     let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
-    let mut recording = reading.open(options)?;
+    let mut recording = open()?;
     let (mut items, mut more) = (Vec::new(), true);
     while more {
         items.clear();

@@ -3,19 +3,20 @@
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::Failure;
+use super::judgement::Judgement;
 use crate::report::Status;
-use crate::report::recorded::{OfPair, OfVehicle, RecordedReport};
+use crate::report::recorded::{OfLimit, OfPair, OfVehicle, RecordedReport};
 
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
 
-/// Violations, undecided times and gaps, a row each, in order of time; where several recordings are asked about `named` puts
+/// Violations, undecided times and gaps of pairs and of single vehicles, a row each, in order of time; where several recordings are asked about `named` puts
 /// the recording in front.
-pub(super) fn csv(reports: &[RecordedReport], named: bool) -> Result<Vec<u8>, Failure> {
+pub(super) fn csv(judged: &[Judgement], named: bool) -> Result<Vec<u8>, Failure> {
     let failed = |error: csv::Error| Failure::machine(format!("cannot write the events: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(named.then_some("recording").into_iter().chain(COLUMNS)).map_err(failed)?;
-    for report in reports {
+    for Judgement { report, .. } in judged {
         let recording = named.then(|| report.source.recording.clone());
         for row in rows(report) {
             writer.write_record(recording.iter().cloned().chain(row)).map_err(failed)?;
@@ -38,12 +39,29 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
         .gaps
         .iter()
         .map(|OfVehicle { vehicle, finding: gap }| ("gap", [vehicle.as_str(), ""], [gap.from_s, gap.to_s], [None; 5]));
-    let mut rows: Vec<_> = violations.chain(undecided).chain(gaps).collect();
-    rows.sort_by(|a, b| a.2[0].total_cmp(&b.2[0]));
-    rows.into_iter().map(|(kind, who, span_s, numbers)| {
+    let rows = violations.chain(undecided).chain(gaps).map(|(kind, who, span_s, numbers)| {
         let words = [kind].into_iter().chain(who).map(str::to_owned);
+        (span_s, words.collect::<Vec<_>>(), numbers)
+    });
+    let mut rows: Vec<_> = rows.chain(report.limits.iter().flat_map(beyond)).collect();
+    rows.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+    rows.into_iter().map(|(span_s, words, numbers)| {
         let numbers = span_s.map(Some).into_iter().chain(numbers).map(|x| x.map_or_else(String::new, number));
-        words.chain(numbers).collect()
+        words.into_iter().chain(numbers).collect()
+    })
+}
+
+/// A time, what is said of it, and its numbers.
+type Row = ([f64; 2], Vec<String>, [Option<f64>; 5]);
+
+/// The rows of one limit on each vehicle by itself: its name stands in the place of a second vehicle.
+fn beyond(limit: &OfLimit) -> impl Iterator<Item = Row> + '_ {
+    let violations = limit.violations.iter().map(|of| ("violation", of));
+    let undecided = limit.undecided.iter().map(|of| ("undecided", of));
+    violations.chain(undecided).map(|(kind, OfVehicle { vehicle, finding })| {
+        let words = vec![kind.to_owned(), vehicle.clone(), limit.quantity.to_owned()];
+        let numbers = [Some(finding.lower), Some(finding.upper), Some(finding.at_s), Some(limit.allowed), None];
+        ([finding.from_s, finding.to_s], words, numbers)
     })
 }
 
@@ -54,13 +72,9 @@ fn number(x: f64) -> String {
 
 /// A suite for each recording, and an error for each that could not be judged. What is undecided fails, or is skipped where it
 /// is allowed.
-pub(super) fn junit(
-    reports: &[RecordedReport],
-    failures: &[(String, Failure)],
-    allow_undecided: bool,
-) -> Result<String, Failure> {
+pub(super) fn junit(judged: &[Judgement], failures: &[(String, Failure)]) -> Result<String, Failure> {
     let mut junit = Report::new("tautline audit");
-    junit.add_test_suites(reports.iter().map(|report| suite(report, allow_undecided)));
+    junit.add_test_suites(judged.iter().map(suite));
     junit.add_test_suites(failures.iter().map(|(recording, failure)| {
         let mut error = TestCaseStatus::non_success(NonSuccessKind::Error);
         error.set_message(failure.said.to_string());
@@ -74,14 +88,14 @@ pub(super) fn junit(
 }
 
 /// A case for the verdict and one for each thing found.
-fn suite(report: &RecordedReport, allow_undecided: bool) -> TestSuite {
+fn suite(Judgement { report, allows_undecided, .. }: &Judgement) -> TestSuite {
     let failed = |message: &str| {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
         status.set_message(message);
         status
     };
     let doubtful = |message: &str| {
-        if !allow_undecided {
+        if !allows_undecided {
             return failed(message);
         }
         let mut status = TestCaseStatus::skipped();
@@ -89,12 +103,15 @@ fn suite(report: &RecordedReport, allow_undecided: bool) -> TestSuite {
         status
     };
     let headline = report.headline();
-    let verdict = match report.status {
+    let verdict = |status: Status, words: &str| match status {
         Status::Clear => TestCaseStatus::success(),
-        Status::Violation => failed(&headline),
-        Status::Undecided => doubtful(&headline),
+        Status::Violation => failed(words),
+        Status::Undecided => doubtful(words),
     };
-    let mut cases = vec![TestCase::new("separation", verdict)];
+    let mut cases: Vec<_> =
+        report.separation().map(|status| TestCase::new("separation", verdict(status, &headline))).into_iter().collect();
+    cases
+        .extend(report.limits.iter().map(|limit| TestCase::new(limit.quantity, verdict(limit.status, &limit.brief()))));
     for OfPair { who: [first, second], finding: v } in &report.violations {
         let words = format!("{:?} below {:?} from {:?} s to {:?} s", v.min_m, v.limit_m, v.from_s, v.to_s);
         cases.push(TestCase::new(format!("{first} and {second} at {:.3} s", v.min_at_s), failed(&words)));

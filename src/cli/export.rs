@@ -70,6 +70,10 @@ impl Tracks for Interruptible {
     fn notes(&self) -> &[String] {
         self.tracks.notes()
     }
+
+    fn assumed(&self) -> Option<&str> {
+        self.tracks.assumed()
+    }
 }
 
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {

@@ -5,10 +5,15 @@
 
 mod attack;
 mod audit;
+mod audit_arguments;
+mod audit_config;
 mod audits;
+mod call;
+mod caller;
 mod campaign;
 mod campaign_worst;
 mod check;
+mod command;
 mod compare;
 mod completions;
 mod console;
@@ -18,12 +23,15 @@ mod drawing;
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 mod driver;
 mod encounters;
+mod envelope;
 mod events;
 mod export;
 mod folder;
+mod judgement;
 mod list;
 mod margin;
 mod obstacles;
+mod open;
 mod outputs;
 mod own;
 mod own_obstacles;
@@ -37,91 +45,45 @@ mod scenario;
 mod schema;
 #[cfg(feature = "viewer")]
 mod snapshots;
+mod summary;
+mod text_file;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;
 #[cfg(feature = "viewer")]
 mod worst;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::Parser as _;
 
-use crate::read;
+pub use call::{Answer, Held, Refusal, call, judge, open};
+pub use pictures::flight_page;
+
+pub use crate::figures::RunHistory;
+pub use crate::replay::Film;
+
+use command::{Arguments, Command, obey, quiet_guarded_panics};
 use diagnostic::{Exit, Failure};
-
-/// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
-///
-/// Without a command, flies the built-in scenario `pentagon`.
-#[derive(Debug, Parser)]
-#[command(
-    version,
-    after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed."
-)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Option<Command>,
-}
-
-#[derive(Debug, Subcommand)]
-#[cfg_attr(not(feature = "viewer"), expect(clippy::large_enum_variant, reason = "there is one of it"))]
-enum Command {
-    /// Fly a scenario, audit every step and leave a recording and a report.
-    Run(run::RunArguments),
-    /// Judge a recording of any origin: clear, a violation, or undecided at its sampling.
-    Audit(audit::AuditArguments),
-    /// Say what is known before the first step: stability, certified separation, step, traps.
-    Check(check::CheckArguments),
-    /// Reproduce the paper and judge every claim, ours and the paper's.
-    Validate(validate::ValidateArguments),
-    /// Fly the same starts under several laws and set them side by side.
-    Compare(compare::CompareArguments),
-    /// Find how much of one key a scenario survives: where between two values its verdict turns.
-    Margin(margin::MarginArguments),
-    /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
-    Campaign(campaign::CampaignArguments),
-    /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
-    Attack(attack::AttackArguments),
-    /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
-    Export(export::ExportArguments),
-    /// Draw a recording: pictures, films and contact sheets, without a screen.
-    #[cfg(feature = "viewer")]
-    Render(render::RenderArguments),
-    /// Open a window on a recording, or on a scenario that is flown while it is watched.
-    #[cfg(feature = "viewer")]
-    View(view::ViewArguments),
-    /// List the built-in scenarios, or print one as TOML to start from.
-    List(list::ListArguments),
-    /// Print the JSON Schema of the scenario file.
-    Schema,
-    /// Print a completion script for a shell.
-    Completions(completions::CompletionsArguments),
-}
-
-/// Keeps the panic hook from speaking of what becomes an error anyway.
-fn quiet_guarded_panics() {
-    let speak = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        #[cfg(feature = "viewer")]
-        if crate::render::is_in_window_library() {
-            std::process::exit(view::lose_display() as i32);
-        }
-        if !read::is_guarded() {
-            speak(panic);
-        }
-    }));
-}
 
 /// Runs the program with the arguments of the process.
 #[must_use]
 pub fn main() -> ExitCode {
+    entry(&std::env::args_os().collect::<Vec<_>>()).into()
+}
+
+/// Runs the program with these arguments, the first of which is its own name, and gives its exit code.
+#[must_use]
+pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
-    let arguments = match Arguments::try_parse() {
+    caller::by_person(arguments.iter().skip(1).map(|word| word.to_string_lossy().into_owned()).collect());
+    let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
             // A closed pipe is the reader's choice.
             let _ = usage.print();
-            return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good }.into();
+            return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good } as u8;
         }
     };
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::parse_from(["run"])));
@@ -134,35 +96,5 @@ pub fn main() -> ExitCode {
     } {
         driver::silence();
     }
-    let done = match command {
-        Command::Run(arguments) => run::run(&arguments),
-        Command::Audit(arguments) => audits::audits(&arguments),
-        Command::Check(arguments) => check::check(&arguments),
-        Command::Validate(arguments) => validate::validate(&arguments),
-        Command::Compare(arguments) => compare::compare(&arguments),
-        Command::Margin(arguments) => margin::margin(&arguments),
-        Command::Campaign(arguments) => campaign::campaign(&arguments),
-        Command::Attack(arguments) => attack::attack(&arguments),
-        Command::Export(arguments) => export::export(&arguments),
-        #[cfg(feature = "viewer")]
-        Command::Render(arguments) => render::render(&arguments),
-        #[cfg(feature = "viewer")]
-        Command::View(arguments) => view::view(&arguments),
-        Command::List(arguments) => list::list(&arguments),
-        Command::Schema => schema::schema(),
-        Command::Completions(arguments) => completions::completions(&arguments, &mut Arguments::command()),
-    };
-    done.unwrap_or_else(Failure::show).into()
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory as _;
-
-    use super::Arguments;
-
-    #[test]
-    fn the_arguments_are_consistent() {
-        Arguments::command().debug_assert();
-    }
+    obey(command).unwrap_or_else(Failure::show) as u8
 }

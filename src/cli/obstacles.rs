@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::Failure;
+use super::text_file;
 use crate::audit::Obstacle;
 use crate::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
 use crate::sim;
@@ -15,22 +16,17 @@ const MOST_BYTES: u64 = 64 << 20;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
+    /// Of the same place, read by itself.
+    #[serde(default)]
+    #[expect(dead_code, reason = "it may stand there")]
+    fence: Option<toml::Table>,
     #[serde(default)]
     obstacle: Vec<toml::Spanned<ObstacleTable>>,
 }
 
 /// Reads a file of obstacles.
 pub(super) fn read(path: &Path) -> Result<Vec<Obstacle>, Failure> {
-    let cannot = |error: std::io::Error| {
-        Failure::input(format!("cannot read {}: {error}", path.display()), "give a TOML file of obstacles")
-    };
-    let size = std::fs::metadata(path).map_err(cannot)?.len();
-    if size > MOST_BYTES {
-        let message = format!("{} has {size} bytes, more than a file of obstacles may have", path.display());
-        return Err(Failure::input(message, format!("give at most {MOST_BYTES} bytes")));
-    }
-    let text = std::fs::read_to_string(path).map_err(cannot)?;
-    parse(&text, path)
+    parse(&text_file::read(path, MOST_BYTES, "give a TOML file of obstacles")?, path)
 }
 
 fn parse(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::Failure;
 use crate::figures::{self, Criteria, Figure, RunHistory};
-use crate::replay::{Film, NoReplay, Replay, Stage};
+use crate::preflight::Preflight;
+use crate::replay::{Film, NoReplay, PAGE_BYTES, Replay, Stage};
 use crate::report::{Report, RunPage, write_atomically};
 use crate::scenario::Scenario;
 use crate::sim;
@@ -29,6 +30,23 @@ pub(super) fn figures(scenario: &Scenario, history: &RunHistory, report: &Report
         most_thrust_n: scenario.airframe.quadrotor().map(|quadrotor| quadrotor.model.max_thrust_n),
     };
     figures::of_run(history, &criteria)
+}
+
+/// The page on a flight that a program has flown itself, which `command` flies again; without pictures.
+#[must_use]
+pub fn flight_page(
+    scenario: &Scenario,
+    preflight: &Preflight,
+    (history, film): &(RunHistory, Film),
+    report: &Report,
+    command: &str,
+) -> String {
+    let warnings: Vec<_> =
+        preflight.warnings.iter().map(|warning| (warning.code.name().to_owned(), warning.message.clone())).collect();
+    let figures = figures(scenario, history, report);
+    let replay = replay(scenario, film, report, PAGE_BYTES);
+    let page = RunPage { scenario, warnings: &warnings, replay: &replay, figures: &figures, pictures: &[], command };
+    report.to_html(&page)
 }
 
 /// Writes `figures/*.svg` and `report.html` into a run's folder and gives the path of the page. Figures of an earlier run

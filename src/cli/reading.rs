@@ -14,7 +14,7 @@ use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, R
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Reading")]
 pub(super) struct ReadArguments {
-    /// The recording: a file, the folder of a run, or a folder or archive with a file for each vehicle.
+    /// The recording: a file, the folder of a run or of a ROS 2 bag, or a folder or archive with a file for each vehicle.
     #[arg(index = 1, value_name = "RECORDING", value_parser = recording())]
     pub(super) recording: PathBuf,
     /// More recordings, or with --join more files of the same one.
@@ -38,7 +38,7 @@ pub(super) struct ReadArguments {
     /// Metres per unit of length of the recording.
     #[arg(long, value_name = "METRES", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
-    /// Name of a column: t, id, x, y, z, vx, vy, vz or radius. In NPZ, t and x name the arrays.
+    /// Name of a column: t, id, x, y, z, vx, vy, vz, radius, or lat, lon, alt. In NPZ, t and x name the arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
     columns: Vec<(String, String)>,
     /// Where the curve of a vehicle starts [m], for polynomials that are relative to it; may be given several times.
@@ -47,9 +47,15 @@ pub(super) struct ReadArguments {
     /// Which axis of the positions of an NPZ archive comes first, where its shape does not tell.
     #[arg(long, value_name = "ORDER", value_parser = axis_order())]
     axis_order: Option<AxisOrder>,
-    /// The frame whose positions are read, where an MCAP file gives several.
+    /// The frame that all positions are brought into by the transforms of the recording, where messages give several.
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
+    /// A topic that is read, where messages on several tell of the same vehicles; may be given several times.
+    #[arg(long = "topic", value_name = "NAME")]
+    topics: Vec<String>,
+    /// What places on the Earth are measured from, in degrees and metres above the ellipsoid [default: the first place].
+    #[arg(long, value_name = "LAT,LON,HEIGHT", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<[f64; 3]>,
     /// Accept an MCAP file that was not closed, for what it holds.
     #[arg(long)]
     allow_unfinished: bool,
@@ -125,6 +131,8 @@ impl ReadArguments {
             columns,
             axis_order: self.axis_order,
             frame: self.frame.clone(),
+            topics: self.topics.clone(),
+            origin: self.origin,
             allow_unfinished: self.allow_unfinished,
         })
     }
@@ -151,10 +159,23 @@ fn column(text: &str) -> Result<(String, String), String> {
 
 fn start(text: &str) -> Result<(String, [f64; 3]), String> {
     let (name, place) = text.rsplit_once('=').ok_or("write NAME=X,Y,Z, such as cf3=0,1.5,0")?;
-    let numbers: Vec<f64> = place.split(',').filter_map(|number| number.trim().parse().ok()).collect();
-    match <[f64; 3]>::try_from(numbers) {
-        Ok(place) if place.iter().all(|x| x.is_finite()) => Ok((name.to_owned(), place)),
-        _ => Err(format!("`{place}` is not three numbers")),
+    Ok((name.to_owned(), three(place)?))
+}
+
+fn origin(text: &str) -> Result<[f64; 3], String> {
+    match three(text)? {
+        [latitude, longitude, _] if latitude.abs() > 90.0 || longitude.abs() > 360.0 => {
+            Err("a latitude is within 90 degrees, and a longitude within 360".to_owned())
+        }
+        place => Ok(place),
+    }
+}
+
+fn three(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    match <[f64; 3]>::try_from(numbers.unwrap_or_default()) {
+        Ok(numbers) if numbers.iter().all(|x| x.is_finite()) => Ok(numbers),
+        _ => Err(format!("`{text}` is not three numbers")),
     }
 }
 
@@ -191,6 +212,9 @@ pub(super) fn format() -> impl TypedValueParser<Value = Format> {
         Format::Mcap => "MCAP: our own, Foxglove or ROS 2 messages",
         Format::Crazyflie => "A folder of Crazyflie polynomials",
         Format::Skybrush => "A Skybrush show",
+        Format::Vviz => "A VVIZ show of Verge Aero or Finale 3D",
+        Format::Motive => "A take of OptiTrack Motive as CSV",
+        Format::Vicon => "An export of Vicon Nexus or Tracker as CSV",
     };
     one_of(Format::ALL.map(|format| (PossibleValue::new(format.name()).help(help(format)), format)).into())
 }

@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use super::Failure;
 use super::encounters;
-use super::reading::ReadArguments;
+use super::open::Open;
 use crate::audit::recorded::{Gap, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
 use crate::figures::Figure;
-use crate::read::ReadOptions;
 use crate::replay::{Film, MOST_INSTANTS, Nearest, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
 use crate::report::recorded::RecordedReport;
 use crate::swarm::ClosestApproach;
@@ -70,8 +69,7 @@ impl Instants {
 
 /// Reads a recording again for its replay, or why there is none, and for the figures of those who came closest.
 pub(super) fn of_recording(
-    reading: &ReadArguments,
-    options: &ReadOptions,
+    open: &Open<'_>,
     settings: &Settings,
     outcome: &Outcome,
     report: &RecordedReport,
@@ -85,7 +83,7 @@ pub(super) fn of_recording(
     let spans: Vec<_> = moments.iter().map(|moment| moment.span).chain(gaps).collect();
     let samples = instants.items;
     let mut places = Places::new(settings, outcome, instants.shown(outcome, &spans));
-    let figures = encounters::figures(reading, options, settings, outcome, &mut places)?;
+    let figures = encounters::figures(open, settings, outcome, &mut places)?;
     let mut near = Nearest::default();
     for found in &outcome.smallest {
         match found.and_then(|found| Some((found.pair.vehicles()?, found))) {

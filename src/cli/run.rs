@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Parser;
 use rayon::ThreadPool;
 
+use super::caller;
 use super::console::{self, Console};
 use super::folder::OutFolder;
 use super::pictures;
@@ -224,8 +225,11 @@ pub(super) fn threads(number: usize) -> Result<ThreadPool, Failure> {
     built.map_err(|error| Failure::machine(format!("cannot start threads: {error}")))
 }
 
-/// Set by Ctrl-C (and by a request to terminate). The second one does not wait for what is under way to end.
+/// Set by Ctrl-C (and by a request to terminate), or by the program that called. The second one does not wait for what is under way to end.
 pub(super) fn interruption() -> Result<Arc<AtomicBool>, Failure> {
+    if let Some(interrupted) = caller::interruption() {
+        return Ok(interrupted);
+    }
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     let again = move || {

@@ -67,6 +67,8 @@ pub struct FlightRow {
     pub steps: u64,
     /// Those of them that were flown in parts.
     pub refined_steps: u64,
+    /// Those of which even the shortest part was longer than the law allows: what was flown is not the law's motion.
+    pub overlong_steps: u64,
     /// SHA-256 of the resolved scenario.
     pub scenario_sha256: String,
     /// Hash over the bits of every recorded state.
@@ -116,6 +118,7 @@ impl FlightRow {
             energy_max_over_initial: report.energy.max_over_initial,
             steps: report.run.steps,
             refined_steps: report.run.refined_steps,
+            overlong_steps: report.run.overlong_steps,
             scenario_sha256: report.scenario.sha256,
             state_hash: report.run.state_hash,
             law_s: report.performance.law_s,

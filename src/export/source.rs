@@ -76,6 +76,9 @@ impl Source<'_> {
         about.names = recording.vehicles().to_vec();
         about.clock = recording.clock().clone();
         about.notes = recording.notes().to_vec();
+        if let Some(assumed) = recording.assumed() {
+            about.notes.push(format!("what is written does not say that samples hold only if {assumed}"));
+        }
         if let Some(hz) = self.sample_hz {
             about.notes.push(format!("curves were sampled at {hz} Hz: what is between the samples is lost"));
         }

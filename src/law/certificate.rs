@@ -80,6 +80,8 @@ pub enum Void {
     ObstaclesUnknown,
     /// The swarm is carried past obstacles that stand.
     CarriedPastObstacles,
+    /// The law asked for shorter steps than the flight was allowed to take.
+    StepsTooLong,
     /// What would be certified is so near delta that the plant's numbers do not tell the two apart.
     Unresolved,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
@@ -163,6 +165,7 @@ impl Void {
             Self::ReferenceNotFed => "reference-not-fed",
             Self::ObstaclesUnknown => "obstacles-unknown",
             Self::CarriedPastObstacles => "carried-past-obstacles",
+            Self::StepsTooLong => "steps-too-long",
             Self::Unresolved => "certificate-unresolved",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
@@ -216,6 +219,9 @@ impl fmt::Display for Void {
             }
             Self::CarriedPastObstacles => f.write_str(
                 "The reference moves and obstacles stand: what the swarm is carried by may press it against them.",
+            ),
+            Self::StepsTooLong => f.write_str(
+                "The law asked for shorter steps than could be flown: what was flown is not the motion that its proof is of.",
             ),
             Self::Unresolved => f.write_str(
                 "The distance that the law certifies is nearer to delta than positions are told apart: there is too much energy.",
@@ -279,6 +285,7 @@ mod tests {
             Void::ReferenceNotFed,
             Void::ObstaclesUnknown,
             Void::CarriedPastObstacles,
+            Void::StepsTooLong,
             Void::Unresolved,
             Void::StartRefused(collision),
             Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
@@ -307,6 +314,7 @@ mod tests {
             "reference-not-fed",
             "obstacles-unknown",
             "carried-past-obstacles",
+            "steps-too-long",
             "certificate-unresolved",
             "start-too-close",
             "start-refused",
@@ -317,7 +325,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[23].to_string(),
+            reasons[24].to_string(),
             "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }

@@ -8,6 +8,9 @@ use super::tension::TensionError;
 /// Why a law has no answer for a state.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LawError {
+    /// A law that is not one of ours failed, for a reason that whoever brought it knows.
+    #[error("it failed")]
+    Failed,
     /// A pair is at or inside the distance where its tension is infinite: a collision, not a number to clamp.
     #[error("vehicles {pair} are {separation_m} m apart, not more than the safety distance {delta_m} m")]
     Collision {

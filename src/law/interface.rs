@@ -77,6 +77,12 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Whether it is asked by the thread that flies and by no other. A large swarm's law is asked beside the audit unless this
+    /// is `true`.
+    fn stays_in_its_thread(&self) -> bool {
+        false
+    }
+
     /// Begins its random numbers anew.
     fn reseed(&mut self, _seed: u64) {}
 

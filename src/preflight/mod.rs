@@ -149,9 +149,14 @@ impl Preflight {
     /// # Errors
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
-        let law = scenario.law()?;
+        Ok(Self::under(scenario, scenario.law()?.as_ref()))
+    }
+
+    /// As [`Preflight::of`], under another law than the scenario's.
+    #[must_use]
+    pub fn under(scenario: &Scenario, law: &dyn Law) -> Self {
         let start = scenario.observation(&scenario.start);
-        let certificate = scenario.certificate(law.as_ref());
+        let certificate = scenario.certificate(law);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
         let drift = scenario.drift(law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()));
@@ -192,11 +197,11 @@ impl Preflight {
             dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.velocity_coefficient_per_s()).map(
                 |rate_per_s| {
                     let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
-                    scenario.time.max_rate_dt / rate_per_s.hypot(beside.sqrt())
+                    honest_rate_dt(scenario) / rate_per_s.hypot(beside.sqrt())
                 },
             ),
-            dt_links_s: links_step_s(law.as_ref(), scenario),
-            margins: margins::margins(law.as_ref(), scenario),
+            dt_links_s: links_step_s(law, scenario),
+            margins: margins::margins(law, scenario),
             samples: scenario.time.samples(),
             recording_bytes: scenario.time.samples() * TimeSpec::BYTES_PER_VEHICLE * scenario.count() as u64,
             start_dimension: motion_dimension(&scenario.start),
@@ -211,7 +216,7 @@ impl Preflight {
             barrier_m: law.barrier_m(),
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
-        let undamped = found.relative_velocity_unstable(law.as_ref(), scenario);
+        let undamped = found.relative_velocity_unstable(law, scenario);
         if scenario.wind.is_still()
             && certificate.void == [Void::GraphNotComplete]
             && found.velocity_margin_per_s.is_some()
@@ -223,7 +228,7 @@ impl Preflight {
         let warnings = [
             (Code::RelativeVelocityUnstable, undamped),
             (trap, found.start_too_flat()),
-            (Code::StepTooLong, step_too_long(law.as_ref(), scenario)),
+            (Code::StepTooLong, step_too_long(law, scenario)),
             (Code::DriftUnresolved, found.drift_unresolved(scenario)),
             (Code::BeyondMargin, margins::beyond(&found.margins, scenario)),
             (Code::NoCertificate, found.no_certificate()),
@@ -233,7 +238,7 @@ impl Preflight {
         ];
         let said = |(code, message): (Code, Option<String>)| Some(Warning { code, message: message? });
         found.warnings = warnings.into_iter().filter_map(said).collect();
-        Ok(found)
+        found
     }
 
     /// Stable names of the warnings that refuse the flight ([`Code::refuses`]).
@@ -388,10 +393,16 @@ impl Preflight {
     }
 }
 
+/// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
+/// energy.
+fn honest_rate_dt(scenario: &Scenario) -> f64 {
+    scenario.time.max_rate_dt.min(TimeSpec::DEFAULT_MAX_RATE_DT)
+}
+
 /// Longest step that the links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
 fn links_step_s(law: &dyn Law, scenario: &Scenario) -> Option<f64> {
     let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.velocity_coefficient_per_s())?;
-    (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| scenario.time.max_rate_dt / rate_per_s)
+    (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| honest_rate_dt(scenario) / rate_per_s)
 }
 
 /// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be

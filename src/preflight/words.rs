@@ -112,7 +112,10 @@ impl Preflight {
             Some(dt_max_s) => {
                 let down = significant(dt_max_s.max(self.dt_shortest_s));
                 let least = if dt_max_s < self.dt_shortest_s {
-                    format!(" (time.max_halvings; as near as is certified it could ask for {})", significant(dt_max_s))
+                    format!(
+                        " (time.max_halvings; as near as is certified it could ask for {}, and a flight that does will not pass)",
+                        significant(dt_max_s)
+                    )
                 } else {
                     String::new()
                 };

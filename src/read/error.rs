@@ -209,9 +209,7 @@ impl Fault {
             Self::System(error) if error.kind() == io::ErrorKind::NotFound => "look at the spelling of the path",
             Self::System(_) => "look at the permissions of the file and at the disk",
             Self::Empty => NOTHING_RECORDED,
-            Self::UnknownFormat => {
-                "name the format with --format: csv, text, parquet, npz, mcap, crazyflie or skybrush"
-            }
+            Self::UnknownFormat => "name the format with --format, such as csv or mcap; --help lists all",
             Self::WrongFormat(_) => "leave --format away to have the content recognised, or name another format",
             Self::LineTooLong(_) => "look whether the lines end as they should; a recording has a line for each time",
             Self::NotUtf8 => "save it as UTF-8",

@@ -17,12 +17,28 @@ pub enum Format {
     Crazyflie,
     /// A Skybrush show: `.skyc` or its JSON.
     Skybrush,
+    /// A VVIZ show of Verge Aero or Finale 3D.
+    Vviz,
+    /// A take of `OptiTrack` Motive as CSV.
+    Motive,
+    /// An export of Vicon Nexus or Tracker as CSV.
+    Vicon,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 7] =
-        [Self::Csv, Self::Text, Self::Parquet, Self::Npz, Self::Mcap, Self::Crazyflie, Self::Skybrush];
+    pub const ALL: [Self; 10] = [
+        Self::Csv,
+        Self::Text,
+        Self::Parquet,
+        Self::Npz,
+        Self::Mcap,
+        Self::Crazyflie,
+        Self::Skybrush,
+        Self::Vviz,
+        Self::Motive,
+        Self::Vicon,
+    ];
 
     /// What `--format` calls it, and what a sentence does.
     const fn names(self) -> [&'static str; 2] {
@@ -34,6 +50,9 @@ impl Format {
             Self::Mcap => ["mcap", "an MCAP file"],
             Self::Crazyflie => ["crazyflie", "a folder of Crazyflie polynomials"],
             Self::Skybrush => ["skybrush", "a Skybrush show"],
+            Self::Vviz => ["vviz", "a VVIZ show"],
+            Self::Motive => ["motive", "a take of OptiTrack Motive"],
+            Self::Vicon => ["vicon", "an export of Vicon"],
         }
     }
 

@@ -21,7 +21,16 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
     let fits = |dimensions: &Dimensions| count > 1 && (count - 1).is_multiple_of(dimensions.counts().1);
     let table = |time, names, bodies, words: &str| {
         let note = format!("there is no header: the numbers are taken as {words}");
-        Layout { time, unit: None, id: None, names, bodies, metres: vec![1.0; count], notes: vec![note] }
+        Layout {
+            time,
+            unit: None,
+            id: None,
+            names,
+            bodies,
+            metres: vec![1.0; count],
+            on_earth: false,
+            notes: vec![note],
+        }
     };
     let one = |time, position: [usize; 3], words| {
         let body = Body { position: position.map(Some), velocity: None, radius: None };

@@ -11,10 +11,24 @@ pub(super) const ID: Role = 1;
 pub(super) const POSITION: Role = 2;
 pub(super) const VELOCITY: Role = 5;
 pub(super) const RADIUS: Role = 8;
+/// Latitude, longitude and height.
+pub(super) const EARTH: Role = 9;
 
 pub(super) fn is_velocity(role: Role) -> bool {
     (VELOCITY..RADIUS).contains(&role)
 }
+
+/// Whether a column gives a latitude or a longitude.
+pub(super) fn is_angle(role: Role) -> bool {
+    (EARTH..EARTH + 2).contains(&role)
+}
+
+/// What latitude, longitude and height are called.
+const EARTH_NAMES: [&[&str]; 3] =
+    [&["lat", "latitude"], &["lon", "lng", "long", "longitude"], &["alt", "altitude", "height", "elevation", "ele"]];
+
+/// What may stand in front of these.
+const EARTH_STARTS: [&str; 4] = ["", "gps_", "gnss_", "global_"];
 
 /// Words that name a quantity with axes, and no vehicle.
 const QUANTITIES: [&str; 55] = [
@@ -99,12 +113,19 @@ impl<'a> Heading<'a> {
                 Some(Self { vehicle: number, ..Self::new("", quantity(&stem.to_lowercase())?) })
             }
             Some(_) => Self::without_unit(stem).map(|heading| Self { unit, ..heading }),
-            None => Self::without_unit(stem).or_else(|| {
-                units::endings(stem).find_map(|(stem, unit, velocity)| {
-                    let heading = Self::without_unit(stem).filter(|heading| is_velocity(heading.role) == velocity)?;
-                    Some(Self { unit: Some(unit), ..heading })
+            None => Self::without_unit(stem)
+                .or_else(|| {
+                    units::endings(stem).find_map(|(stem, unit, velocity)| {
+                        let heading =
+                            Self::without_unit(stem).filter(|heading| is_velocity(heading.role) == velocity)?;
+                        Some(Self { unit: Some(unit), ..heading }).filter(|heading| !is_angle(heading.role))
+                    })
                 })
-            }),
+                .or_else(|| {
+                    let (stem, unit) = stem.rsplit_once('_').filter(|(_, unit)| units::degrees(unit).is_some())?;
+                    let heading = Self::without_unit(stem).filter(|heading| is_angle(heading.role))?;
+                    Some(Self { unit: Some(unit), ..heading })
+                }),
         }
     }
 
@@ -148,7 +169,13 @@ fn quantity(name: &str) -> Option<Role> {
     let name = name.replace(['.', '/'], "_");
     let axis_after = |start: &&str| ["x", "y", "z"].iter().position(|axis| name.strip_prefix(start) == Some(axis));
     let axis = |role, starts: &[&str]| starts.iter().find_map(axis_after).map(|axis| role + axis);
-    axis(POSITION, &["", "p", "p_", "pos_", "position_"]).or_else(|| axis(VELOCITY, &["v", "vel_", "velocity_"]))
+    let on_earth = |start: &&str| {
+        let name = name.strip_prefix(start)?;
+        EARTH_NAMES.iter().position(|known| known.contains(&name)).map(|axis| EARTH + axis)
+    };
+    axis(POSITION, &["", "p", "p_", "pos_", "position_"])
+        .or_else(|| axis(VELOCITY, &["v", "vel_", "velocity_"]))
+        .or_else(|| EARTH_STARTS.iter().find_map(on_earth))
 }
 
 /// Whether the last word of a name is that of a quantity with axes, as in `cf1_gyro` and `../orientation`.
@@ -172,7 +199,7 @@ pub(super) fn tells_no_vehicle(name: &str) -> bool {
 
 /// Whether a column would be read as one of a table that names the vehicle of each row: no other may be called so.
 pub(crate) fn is_read(name: &str) -> bool {
-    let is_own = |heading: Heading<'_>| heading.vehicle.is_empty() || heading.is_numbered();
+    let is_own = |heading: Heading<'_>| heading.role < EARTH && (heading.vehicle.is_empty() || heading.is_numbered());
     is_clock(name) || may_be_id(name) || Heading::of(name).is_some_and(is_own)
 }
 

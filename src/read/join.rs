@@ -143,4 +143,8 @@ impl Tracks for Joined {
     fn notes(&self) -> &[String] {
         &self.notes
     }
+
+    fn assumed(&self) -> Option<&str> {
+        self.parts.iter().find_map(|part| part.tracks.assumed())
+    }
 }

@@ -7,14 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted};
-use super::heading::{self, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_velocity};
+use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::options::{ColumnNames, ReadOptions};
 use super::units;
 
 /// The columns of a position, and of what else is known of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Body {
-    /// x, y and z, if there is one.
+    /// x, y and z, if there is one; or latitude, longitude and height.
     pub(super) position: [Option<usize>; 3],
     pub(super) velocity: Option<[Option<usize>; 3]>,
     pub(super) radius: Option<usize>,
@@ -35,11 +35,13 @@ pub(super) struct Layout {
     pub(super) bodies: Vec<Body>,
     /// What the numbers of each column are multiplied by: the size of the unit that its name says \[m or m/s\], or 1.
     pub(super) metres: Vec<f64>,
+    /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
+    pub(super) on_earth: bool,
     /// What a person should know about the columns.
     pub(super) notes: Vec<String>,
 }
 
-const WORDS: [&str; 9] = [
+const WORDS: [&str; 12] = [
     "time",
     "the vehicle",
     "the position along x",
@@ -49,6 +51,9 @@ const WORDS: [&str; 9] = [
     "the velocity along y",
     "the velocity along z",
     "the radius",
+    "the latitude",
+    "the longitude",
+    "the height",
 ];
 
 fn missing(header: &[String], role: Role, of: &str) -> Fault {
@@ -60,7 +65,7 @@ fn missing(header: &[String], role: Role, of: &str) -> Fault {
 impl Layout {
     /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
-        let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new() };
+        let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new(), place: POSITION };
         for (role, name) in options.columns.given() {
             let column = header.iter().position(|column| column == name);
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
@@ -68,7 +73,7 @@ impl Layout {
             // A unit that is not known is the user's affair where the column is.
             let ending = || units::endings(name).find(|(_, _, velocity)| *velocity == is_velocity(role));
             let unit = units::bracketed(name).1.or_else(|| ending().map(|(_, unit, _)| unit));
-            let unit = unit.filter(|unit| units::size_of(unit, is_velocity(role)).is_some());
+            let unit = unit.filter(|unit| is_angle(role) || units::size_of(unit, is_velocity(role)).is_some());
             columns.units.extend(unit.map(|unit| (column, unit)));
         }
         let first = |is: fn(&str) -> bool| header.iter().position(|name| is(name));
@@ -79,13 +84,20 @@ impl Layout {
         let id = columns.get("", ID).or_else(|| first(heading::is_id)).or_else(may_be_id);
 
         let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
-        let headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
+        let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
+        // Metres go before degrees where a table has both.
+        let gives = |role: Role| {
+            headings.iter().any(|(_, of)| of.role == role) || options.columns.given().any(|(given, _)| given == role)
+        };
+        let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
+        headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { heading.role < EARTH });
+        columns.place = if on_earth { EARTH } else { POSITION };
         for (column, heading) in headings.iter().filter(|(_, heading)| heading.vehicle.is_empty()) {
             if options.columns.given().all(|(known, _)| known != heading.role) {
                 columns.claim("", heading, *column)?;
             }
         }
-        let one = columns.get("", POSITION).is_some();
+        let one = columns.get("", columns.place).is_some();
         // A table that repeats its columns has more vehicles than its rows name.
         let repeated = headings.iter().filter(|(_, heading)| heading.is_numbered() && (one || id.is_some()));
         for (column, heading) in repeated {
@@ -99,7 +111,8 @@ impl Layout {
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
-        let mut layout = Self { time: Some(time), unit, id, names, bodies, metres: Vec::new(), notes: Vec::new() };
+        let mut layout =
+            Self { time: Some(time), unit, id, names, bodies, metres: Vec::new(), on_earth, notes: Vec::new() };
         let used = layout.columns();
         layout.metres = columns.metres(&used, options.scale)?;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -108,7 +121,8 @@ impl Layout {
             return Err(missing(header, ID, ""));
         }
         if layout.bodies.iter().any(|body| body.position[2].is_none()) {
-            layout.notes.push("there is no column for z: it is taken as 0".to_owned());
+            let what = if on_earth { "the height" } else { "z" };
+            layout.notes.push(format!("there is no column for {what}: it is taken as 0"));
         }
         if !unused.is_empty() {
             layout.notes.push(format!("columns not used: {}", unused.join(", ")));
@@ -153,6 +167,8 @@ struct Columns<'a> {
     found: BTreeMap<(String, Role), usize>,
     /// The unit that the name of a column says.
     units: BTreeMap<usize, &'a str>,
+    /// The role of the first axis of positions.
+    place: Role,
 }
 
 impl<'a> Columns<'a> {
@@ -209,11 +225,11 @@ impl<'a> Columns<'a> {
     fn body(&self, vehicle: &str) -> Result<Body, Fault> {
         let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
         let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
-        let (position, velocity) = (axes(POSITION), axes(VELOCITY));
+        let (position, velocity) = (axes(self.place), axes(VELOCITY));
         let moves = velocity.iter().any(Option::is_some);
         for axis in 0..3 {
             let lacks = match (position[axis], velocity[axis]) {
-                (None, moving) if axis < 2 || moving.is_some() => POSITION,
+                (None, moving) if axis < 2 || moving.is_some() => self.place,
                 (Some(_), None) if moves => VELOCITY,
                 _ => continue,
             };
@@ -231,6 +247,14 @@ impl<'a> Columns<'a> {
             self.found.iter().filter(|((_, role), column)| *role >= POSITION && used.binary_search(column).is_ok());
         for (&(_, role), &column) in lengths {
             let name = quoted(&self.header[column]);
+            if is_angle(role) {
+                let unit = self.units.get(&column).map_or("deg", |unit| *unit);
+                metres[column] = units::degrees(unit).ok_or_else(|| {
+                    let problem = format!("column {name} says a unit of angle that is not known, {}", quoted(unit));
+                    Fault::content(problem, "write it in degrees, and name the column without a unit")
+                })?;
+                continue;
+            }
             let Some(unit) = self.units.get(&column) else {
                 silent = Some(name);
                 continue;
@@ -245,6 +269,10 @@ impl<'a> Columns<'a> {
             if metres[column] != 1.0 {
                 other = Some(name);
             }
+        }
+        if self.place == EARTH && scale != 1.0 {
+            let problem = format!("places on the Earth are in metres, and --scale {scale} says another unit");
+            return Err(Fault::content(problem, "leave --scale away"));
         }
         let Some(other) = other else { return Ok(metres) };
         if let Some(silent) = silent {

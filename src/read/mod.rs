@@ -13,10 +13,13 @@
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
 mod archive;
+mod bag;
+mod capture;
 mod clock;
 mod crazyflie;
 mod csv;
 mod curves;
+mod earth;
 mod error;
 mod folder;
 mod format;
@@ -25,6 +28,7 @@ mod heading;
 mod join;
 mod layout;
 pub(crate) mod mcap;
+mod motive;
 mod names;
 mod npy;
 mod npz;
@@ -38,6 +42,8 @@ mod source;
 mod stranger;
 mod table;
 mod units;
+mod vicon;
+mod vviz;
 
 #[cfg(feature = "parquet")]
 pub use self::parquet::is_guarded;
@@ -56,12 +62,13 @@ use folder::{ARCHIVE, Folder};
 use recognise::recognise;
 use source::Source;
 
-/// Opens a recording: a file, or a folder or archive with a file for each vehicle.
+/// Opens a recording: a file, the folder of a ROS 2 bag, or a folder or archive with a file for each vehicle.
 ///
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is of no known format, or is wrong where it was looked at so far.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     let opened = match look(path) {
+        _ if bag::is_bag(path) => open_bag(path, options),
         Ok(Some(folder)) => open_folder(folder, options),
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
@@ -121,8 +128,9 @@ pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
 fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
-        if let Some(stranger) = stranger::of_folder(path) {
-            return Err(stranger.into());
+        if bag::is_bag(path) {
+            let remedy = "give it alone, without --join: its topics are its vehicles";
+            return Err(Fault::content("it is a ROS 2 bag, and no file of one vehicle", remedy).into());
         }
         let folder = Folder::open(path)?;
         let remedy =
@@ -166,15 +174,17 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
 }
 
+fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
+    options.check()?;
+    if let Some(format) = options.format.filter(|format| *format != Format::Mcap) {
+        return Err(Fault::WrongFormat(format).into());
+    }
+    options.refuse_needless(Format::Mcap)?;
+    bag::open(path, options)
+}
+
 fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    if !(options.scale.is_finite() && options.scale > 0.0) {
-        let problem = format!("its lengths cannot be scaled by {}", options.scale);
-        return Err(Fault::content(problem, "give a positive number of metres per unit of length").into());
-    }
-    if let Some(rate) = options.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-        let problem = format!("its times cannot be counted with {rate} in a second");
-        return Err(Fault::content(problem, "give a positive number with --fps or --time-scale").into());
-    }
+    options.check()?;
     let format = recognise(&mut source, options.format)?;
     options.refuse_needless(format)?;
     if matches!(format, Format::Npz | Format::Parquet) {
@@ -194,5 +204,8 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
             Err(Fault::content(problem, "build it with the feature of the format's name").into())
         }
         Format::Skybrush => skybrush::open(source, options),
+        Format::Vviz => vviz::open(source, options),
+        Format::Motive => motive::open(source, options),
+        Format::Vicon => vicon::open(source, options),
     }
 }

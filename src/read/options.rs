@@ -56,11 +56,12 @@ impl Dimensions {
 
 /// Names of columns, where they are not the usual ones: one for each of [`ColumnNames::ROLES`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ColumnNames([Option<String>; 9]);
+pub struct ColumnNames([Option<String>; 12]);
 
 impl ColumnNames {
-    /// Roles that a column can have: time, vehicle, position \[m\], velocity \[m/s\] and radius \[m\] of the vehicle.
-    pub const ROLES: [&str; 9] = ["t", "id", "x", "y", "z", "vx", "vy", "vz", "radius"];
+    /// Roles that a column can have: time, vehicle, position \[m\], velocity \[m/s\] and radius \[m\] of the vehicle, or its
+    /// latitude and longitude \[degrees\] and height \[m\].
+    pub const ROLES: [&str; 12] = ["t", "id", "x", "y", "z", "vx", "vy", "vz", "radius", "lat", "lon", "alt"];
 
     /// Gives the column of a role a name; `false` where there is no such role.
     pub fn set(&mut self, role: &str, name: &str) -> bool {
@@ -100,8 +101,14 @@ pub struct ReadOptions {
     pub starts: BTreeMap<String, [f64; 3]>,
     /// Which axis of an array comes first, where its shape does not tell.
     pub axis_order: Option<AxisOrder>,
-    /// The frame whose poses are read, where messages have several.
+    /// The frame that all poses are brought into, where messages have several; those that no transforms lead from are left
+    /// out.
     pub frame: Option<String>,
+    /// The topics of messages that are read; all with positions where none is named.
+    pub topics: Vec<String>,
+    /// What places on the Earth are measured from: latitude and longitude \[degrees\] and height above the ellipsoid
+    /// \[m\]; the first place where nothing is said.
+    pub origin: Option<[f64; 3]>,
     /// Whether to accept an MCAP file that was not closed, for what it holds.
     pub allow_unfinished: bool,
 }
@@ -120,12 +127,27 @@ impl Default for ReadOptions {
             columns: ColumnNames::default(),
             axis_order: None,
             frame: None,
+            topics: Vec::new(),
+            origin: None,
             allow_unfinished: false,
         }
     }
 }
 
 impl ReadOptions {
+    /// Refuses numbers out of range.
+    pub(super) fn check(&self) -> Result<(), Fault> {
+        if !(self.scale.is_finite() && self.scale > 0.0) {
+            let problem = format!("its lengths cannot be scaled by {}", self.scale);
+            return Err(Fault::content(problem, "give a positive number of metres per unit of length"));
+        }
+        if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            let problem = format!("its times cannot be counted with {rate} in a second");
+            return Err(Fault::content(problem, "give a positive number with --fps or --time-scale"));
+        }
+        Ok(())
+    }
+
     /// Refuses an option that means nothing for a format.
     pub(super) fn refuse_needless(&self, format: Format) -> Result<(), Fault> {
         let is_table = matches!(format, Format::Csv | Format::Text | Format::Parquet | Format::Npz);
@@ -141,7 +163,9 @@ impl ReadOptions {
             ),
             (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
             (self.axis_order.is_some() && !is_npz, "--axis-order", "has no arrays"),
+            (self.origin.is_some() && !is_mcap && (!is_table || is_npz), "--origin", "has no latitudes and longitudes"),
             (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
+            (!self.topics.is_empty() && !is_mcap, "--topic", "has no topics"),
             (self.allow_unfinished && !is_mcap, "--allow-unfinished", "cannot be read before it is closed"),
         ];
         match given.into_iter().find(|(needless, ..)| *needless) {

@@ -47,6 +47,11 @@ pub(super) trait Rows {
         Vec::new()
     }
 
+    /// What was assumed to know positions at their times, if anything was.
+    fn assumed(&self) -> Option<String> {
+        None
+    }
+
     /// The place that a row's number means.
     fn place(&self, number: u64) -> Place;
 
@@ -116,6 +121,7 @@ pub(super) struct Ordered<R> {
     rows: R,
     timing: Timing,
     notes: Vec<String>,
+    assumed: Option<String>,
     scale: f64,
     /// Rows read that have not been given out.
     batch: std::vec::IntoIter<Row>,
@@ -151,11 +157,13 @@ impl<R: Rows> Ordered<R> {
         let (mut timing, note) = times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
         notes.extend(note);
+        // What is known by now of all rows, where they were surveyed.
+        let assumed = rows.assumed();
+        notes.extend(rows.notes());
         if !rows.is_wide() {
             rows.settle_names();
             rows.rewind()?;
         }
-        notes.extend(rows.notes());
         if !probe.in_order {
             while rows.next(&mut first)? {}
             // Stable: rows of one time stay in the order of the file.
@@ -164,7 +172,7 @@ impl<R: Rows> Ordered<R> {
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
         let batch = first.into_iter();
-        Ok(Self { path, rows, timing, notes, scale, batch, ended, now: None, last: Vec::new() })
+        Ok(Self { path, rows, timing, notes, assumed, scale, batch, ended, now: None, last: Vec::new() })
     }
 
     fn error(&self, row: &Row, fault: Fault) -> ReadError {
@@ -260,5 +268,9 @@ impl<R: Rows> Tracks for Ordered<R> {
 
     fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    fn assumed(&self) -> Option<&str> {
+        self.assumed.as_deref()
     }
 }

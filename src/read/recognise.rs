@@ -8,9 +8,11 @@ use super::archive::Archive;
 use super::error::{Fault, ReadError};
 use super::format::Format;
 use super::heading;
+use super::motive;
 use super::skybrush::SHOW;
 use super::source::{GZIP_MAGIC, Source};
 use super::stranger;
+use super::vicon;
 
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;
@@ -22,6 +24,9 @@ const MAGICS: [(Format, &[u8]); 4] = [
     (Format::Npz, b"PK\x03\x04"),
     (Format::Npz, b"PK\x05\x06"),
 ];
+
+/// Keys that a VVIZ show has in front of what may be long.
+const VVIZ_KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
 
 /// Recognises a file, and finds out whether it is packed by gzip.
 pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
@@ -39,7 +44,7 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
         None => format_of(&head)?,
     };
     let packed = source.entry.is_some();
-    let unpacks = matches!(format, Format::Csv | Format::Text | Format::Npz | Format::Parquet);
+    let unpacks = !matches!(format, Format::Mcap | Format::Crazyflie | Format::Skybrush);
     if (source.gzip || packed) && !unpacks && !(packed && format == Format::Crazyflie) {
         let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
         let problem = format!("it is {} inside {within}", format.title());
@@ -109,7 +114,14 @@ fn format_of(head: &[u8]) -> Result<Format, Fault> {
         return Err(Fault::UnknownFormat);
     }
     if text.starts_with(b"{") {
-        return Ok(Format::Skybrush);
+        let is_vviz = VVIZ_KEYS.iter().any(|key| memchr::memmem::find(text, key).is_some());
+        return Ok(if is_vviz { Format::Vviz } else { Format::Skybrush });
+    }
+    if text.starts_with(motive::BEGIN) {
+        return Ok(Format::Motive);
+    }
+    if vicon::is_export(text) {
+        return Ok(Format::Vicon);
     }
     if let Some(stranger) = stranger::of_text(text) {
         return Err(stranger);

@@ -20,6 +20,9 @@ const BLOCK_BYTES: usize = 256 * 1024;
 /// First bytes of a gzip file.
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
+/// First bytes of a file in Zstandard.
+pub(super) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
 /// A file, alone or in an archive, that can be read from its start as often as needed.
 #[derive(Clone, Debug)]
 pub(super) struct Source {
@@ -27,6 +30,7 @@ pub(super) struct Source {
     /// The entry of the archive that `path` then is.
     pub(super) entry: Option<String>,
     pub(super) gzip: bool,
+    pub(super) zstd: bool,
     /// Where what was an entry has been unpacked to, and what errors call it.
     unpacked: Option<(Arc<TempPath>, PathBuf)>,
 }
@@ -34,7 +38,7 @@ pub(super) struct Source {
 impl Source {
     /// A file of its own.
     pub(super) fn file(path: &Path) -> Self {
-        Self { path: path.to_owned(), entry: None, gzip: false, unpacked: None }
+        Self { path: path.to_owned(), entry: None, gzip: false, zstd: false, unpacked: None }
     }
 
     /// An entry of an archive.
@@ -42,15 +46,17 @@ impl Source {
         Self { entry: Some(name), ..Self::file(archive) }
     }
 
-    /// As a file of its own, whose bytes can be read in any order: an entry is unpacked, until the last copy of this is gone.
+    /// As a file of its own, whose bytes can be read in any order: an entry or a packed file is unpacked, until the last copy
+    /// of this is gone.
     pub(super) fn seekable(self) -> Result<Self, ReadError> {
-        if self.entry.is_none() && !self.gzip {
+        if self.entry.is_none() && !self.gzip && !self.zstd {
             return Ok(self);
         }
         let mut file = tempfile::NamedTempFile::new()?;
         std::io::copy(&mut self.bytes()?, &mut file)?;
         let unpacked = Arc::new(file.into_temp_path());
-        Ok(Self { path: unpacked.to_path_buf(), entry: None, gzip: false, unpacked: Some((unpacked, self.shown())) })
+        let called = self.shown();
+        Ok(Self { unpacked: Some((unpacked.clone(), called)), ..Self::file(&unpacked) })
     }
 
     /// What errors call it.
@@ -79,6 +85,9 @@ impl Source {
             let bytes = file.metadata()?.len();
             (Box::new(file), bytes)
         };
+        if self.zstd {
+            return Ok(Box::new(Growing::new(zstd::Decoder::new(file)?, packed_bytes)));
+        }
         if !self.gzip {
             return Ok(file);
         }

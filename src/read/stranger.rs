@@ -1,11 +1,9 @@
 //! Files that are known and not read: what they are, and the way in.
 
-use std::path::Path;
-
 use super::error::Fault;
 
 /// Beginnings of files, what they are, and what helps.
-const STRANGERS: [(&[u8], &str, &str); 14] = [
+const STRANGERS: [(&[u8], &str, &str); 13] = [
     (b"#ROSBAG V", "a ROS 1 bag", "convert it with `rosbags-convert` to a ROS 2 bag in MCAP, and give its .mcap file"),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
     (
@@ -13,7 +11,6 @@ const STRANGERS: [(&[u8], &str, &str); 14] = [
         "a ULog of PX4",
         "write its vehicle_local_position with `ulog2csv`, and give a file for each vehicle",
     ),
-    (b"Format Version,", "a take of OptiTrack Motive", "write the positions of its rigid bodies as a table t,id,x,y,z"),
     (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
     (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
@@ -30,12 +27,12 @@ const STRANGERS: [(&[u8], &str, &str); 14] = [
     (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
-const BAG: &str = "convert it with `ros2 bag convert` to MCAP, and give the .mcap file";
+pub(super) const BAG: &str = "convert it with `ros2 bag convert` to MCAP, and give the .mcap file";
 const DATAFLASH: &str =
     "write the messages of position with `mavlogdump.py --format csv`, a file for each vehicle in metres";
 const UNPACK: &str = "unpack it, and give the folder";
 pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z";
-const EARTH: &str = "convert degrees to metres in a plane first, and give a table t,id,x,y,z";
+const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
 
 /// What a file is and what helps, where it is known and not read.
 pub(super) fn of_bytes(head: &[u8]) -> Option<Fault> {
@@ -63,22 +60,4 @@ pub(super) fn of_text(text: &[u8]) -> Option<Fault> {
         _ => return None,
     };
     Some(Fault::content(format!("it is {what}, which is not read"), remedy))
-}
-
-/// The same of a folder.
-pub(super) fn of_folder(path: &Path) -> Option<Fault> {
-    if !path.join("metadata.yaml").is_file() {
-        return None;
-    }
-    let files = std::fs::read_dir(path).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut bags: Vec<_> =
-        files.filter(|file| file.extension().is_some_and(|end| end == "mcap" || end == "db3")).collect();
-    bags.sort();
-    let bag = bags.first()?;
-    let remedy = if bag.extension().is_some_and(|end| end == "mcap") {
-        format!("give {}, which lies in it", bag.file_name()?.to_string_lossy())
-    } else {
-        BAG.to_owned()
-    };
-    Some(Fault::content("it is the folder of a ROS 2 bag, which is not read", remedy))
 }

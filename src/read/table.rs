@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit};
+use super::earth::Local;
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
 use super::layout::{Body, Layout};
 use super::names::Names;
@@ -83,6 +84,8 @@ struct Table<C> {
     cells: C,
     layout: Layout,
     names: Names,
+    /// What turns latitude, longitude and height into metres.
+    local: Option<Local>,
     /// Vehicle of the last row.
     vehicle: usize,
     /// Rows before the current one.
@@ -98,11 +101,42 @@ pub(super) fn open<C: Cells + 'static>(
     epoch_ns: i64,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
-    let about = About::new(source, options, unit.or(layout.unit), layout.notes.clone(), Fault::header_only());
+    let mut about = About::new(source, options, unit.or(layout.unit), layout.notes.clone(), Fault::header_only());
     let names = Names::from_list(layout.names.clone());
+    let local = origin(&mut cells, &layout, options)?;
+    about.notes.extend(local.map(|local| local.note()));
     cells.restart(&layout.columns(), true)?;
-    let table = Table { cells, layout, names, vehicle: 0, count: 0 };
+    let table = Table { cells, layout, names, local, vehicle: 0, count: 0 };
     Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
+}
+
+/// The frame of places on the Earth: where the user says, or at the first place of the table.
+fn origin<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Result<Option<Local>, ReadError> {
+    if !layout.on_earth {
+        let needless = Fault::content("it has no columns of latitude and longitude", "leave --origin away");
+        return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
+    }
+    if let Some(origin) = options.origin {
+        return Ok(Some(Local::at(origin.into())?));
+    }
+    cells.restart(&layout.columns(), true)?;
+    while cells.advance()? {
+        for body in &layout.bodies {
+            let place =
+                vector(cells, &body.position, &layout.metres).and_then(|place| place.map(Local::at).transpose());
+            match place.map_err(|fault| fault.at(C::place(cells.row())))? {
+                // Another file would begin somewhere else.
+                Some(local) if options.one_vehicle => {
+                    let problem = "nobody says what its places on the Earth are measured from, the same for all files";
+                    let remedy = format!("say it with --origin, such as --origin {}", local.origin());
+                    return Err(Fault::content(problem, remedy).into());
+                }
+                Some(local) => return Ok(Some(local)),
+                None => {}
+            }
+        }
+    }
+    Ok(None)
 }
 
 impl<C: Cells> Table<C> {
@@ -147,7 +181,11 @@ impl<C: Cells> Table<C> {
         let stamp = self.stamp()?;
         let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
         for (place, body) in self.layout.bodies.iter().enumerate() {
-            rows.extend(row(&self.cells, stamp, first + place, body, &self.layout.metres)?);
+            let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
+            if let Some(local) = &self.local {
+                row.position = local.place(row.position)?;
+            }
+            rows.push(row);
         }
         self.count += 1;
         Ok(())

@@ -42,6 +42,16 @@ pub(super) fn size_of(unit: &str, velocity: bool) -> Option<f64> {
     Some(size(&LENGTHS_M, length.trim())? / size(&TIMES_S, time.trim())?)
 }
 
+/// The size of a unit of latitude and longitude \[degrees\]; none where it is none.
+pub(super) fn degrees(unit: &str) -> Option<f64> {
+    match unit.trim().to_lowercase().as_str() {
+        "deg" | "degree" | "degrees" | "°" => Some(1.0),
+        "rad" | "radian" | "radians" => Some(1.0_f64.to_degrees()),
+        "dege7" | "1e-7 deg" | "1e7" => Some(1e-7),
+        _ => None,
+    }
+}
+
 /// The name of a column without the unit at its end, and the unit: `x [mm]`, `x (ft)`.
 pub(super) fn bracketed(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();

@@ -104,6 +104,9 @@ pub struct Run {
     /// Those of them that were flown in parts, for a law too fast for them or vehicles too near each other.
     #[serde(default)]
     pub refined_steps: u64,
+    /// Those of which even the shortest part was longer than the law allows: what was flown is not the law's motion.
+    #[serde(default)]
+    pub overlong_steps: u64,
     /// Why the run ended before its time, such as [`INTERRUPTED`]; null where it did not.
     pub ended_early: Option<String>,
     /// Number of vehicles N.

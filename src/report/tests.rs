@@ -115,6 +115,7 @@ impl Case {
                 dt_s: 1.0 / 240.0,
                 steps: 28_800,
                 refined_steps: 0,
+                overlong_steps: 0,
                 ended_early: self.ended_early.map(str::to_owned),
                 vehicles: 5,
                 state_hash: "0123456789abcdef".to_owned(),
@@ -209,6 +210,7 @@ run
   dt_s
   steps
   refined_steps
+  overlong_steps
   ended_early
   vehicles
   state_hash

@@ -11,7 +11,7 @@ use crate::audit::Status;
 use crate::metrics::Summary;
 use crate::record::EnergyRise;
 use crate::target::Arrival;
-use crate::text::{metres, metres_below, seconds};
+use crate::text::{counted, metres, metres_below, seconds};
 
 /// The judgement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,6 +36,7 @@ impl Verdict {
             disagreement(findings),
             undecided(findings),
             broken_certificate(findings),
+            steps_too_long(findings),
             risen_energy(findings),
             ended_early(findings),
             not_reached(findings),
@@ -196,6 +197,18 @@ fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
             metres(certified_m),
             closest.pair,
             metres_below(closest.separation_m, certified_m),
+        )
+    })
+}
+
+/// Where even the shortest part of a step is too long for the law, nothing that is flown from there on is its motion.
+fn steps_too_long(findings: &Findings<'_>) -> Option<String> {
+    let overlong = findings.run.overlong_steps;
+    (overlong > 0).then(|| {
+        format!(
+            "{} longer than the law allows in the state that it was in, and could be halved no further: what was flown is not the \
+             motion of the law. Shorten time.dt_s, raise time.max_halvings, or make the law gentler.",
+            counted(overlong, "step was", "steps were")
         )
     })
 }

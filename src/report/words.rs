@@ -21,11 +21,16 @@ impl Report {
         let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
         let hulls = self.hulls.brief().map(|hulls| format!("; {hulls}"));
         let legs = super::legs::brief(&self.legs).map(|legs| format!("; {legs}"));
+        let overlong = match self.run.overlong_steps {
+            0 => String::new(),
+            n => format!("; {} too long for the law", counted(n, "step", "steps")),
+        };
         let changes = self.changes().map(|changes| format!("; {changes}"));
         self.judged()
             + &legs.unwrap_or_default()
             + &changes.unwrap_or_default()
             + &hulls.unwrap_or_default()
+            + &overlong
             + &ended.unwrap_or_default()
             + &refused
     }

@@ -25,7 +25,9 @@ pub struct Flight {
     pub steps: u64,
     /// Those of them that were flown in parts.
     pub refined_steps: u64,
-    /// The law's promise, made before the first step.
+    /// Those of which even the shortest part was longer than the law allows: from the first on it is not the law's motion.
+    pub overlong_steps: u64,
+    /// The law's promise, made before the first step; void where the steps were too long for it.
     pub certificate: Certificate,
     /// What the independent judge found.
     pub audit: AuditOutcome,

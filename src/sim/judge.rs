@@ -155,6 +155,11 @@ impl Judge {
         Some(if is_violated { least_m.min(-f64::MIN_POSITIVE) } else { least_m.max(0.0) })
     }
 
+    /// The closest that two vehicles came so far.
+    pub(super) fn least_separation(&self) -> Option<ClosestApproach> {
+        self.auditor.closest()
+    }
+
     /// Who came closest to which obstacle so far.
     pub(super) fn closest_to_obstacles(&self) -> impl Iterator<Item = Event> + '_ {
         let closest = self.clearance.iter().flat_map(ClearanceAuditor::closest);
@@ -196,6 +201,40 @@ impl Judge {
         // A pair that begins farther apart keeps half of its clearance.
         self.near.update(start, metric.longest_m(barrier_m) + 4.0 * metric.ratio().max(1.0 / metric.ratio()) * moved_m);
         self.near.pairs().iter().copied().any(loses_half)
+    }
+
+    /// The smallest separation of any pair that the law joins or senses over the move from `start` to `end`, in the judge's
+    /// lengths; or a bound of it from below that is `enough`. Behind it how far the swarm moved at most \[m\].
+    pub(super) fn nearest_over(
+        &mut self,
+        (law, links): (&dyn Law, &Graph),
+        (start, path, end): (&Swarm, &Path, &Swarm),
+        enough: impl Fn(f64, f64) -> bool,
+    ) -> (f64, f64) {
+        let start = &start.positions_m;
+        let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
+        let moved_m = instants()
+            .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
+            .fold(0.0, f64::max);
+        let least_m = self.nearest_m - self.metric.most_scaled(2.0 * moved_m);
+        if enough(least_m, moved_m) {
+            return (least_m, moved_m);
+        }
+        let metric = self.metric;
+        let swept_m = |(i, j): (usize, usize)| {
+            let apart = |rows: &Rows| metric.scaled(row(rows, j) - row(rows, i));
+            let mut from = apart(start);
+            let passes = instants().map(apart).map(|to| swept_separation_m(std::mem::replace(&mut from, to), to));
+            passes.fold(f64::INFINITY, f64::min)
+        };
+        let nearest_m = if law.sensing_range_m().is_none() {
+            links.edges().map(swept_m).fold(f64::INFINITY, f64::min)
+        } else {
+            let ratio = metric.ratio().max(1.0 / metric.ratio());
+            self.near.update(start, metric.longest_m(self.nearest_m.max(0.0)) + 4.0 * ratio * moved_m);
+            self.near.pairs().iter().copied().map(swept_m).fold(f64::INFINITY, f64::min)
+        };
+        (nearest_m, moved_m)
     }
 
     fn nears_an_obstacle(&self, start: &Rows, path: &Path, end: &Swarm) -> bool {

@@ -14,7 +14,7 @@ use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Peaks, Sample};
 use crate::scenario::Scenario;
-use crate::swarm::{Rows, Swarm, first_row_not_finite};
+use crate::swarm::{ClosestApproach, Rows, Swarm, first_row_not_finite};
 
 /// A flight under way: law, link, supervisor, vehicles and judge, with everything that any of them remembers.
 ///
@@ -56,6 +56,8 @@ pub struct Simulation {
     shortest: u64,
     /// Steps that were flown in parts.
     refined_steps: u64,
+    /// Steps of which even the shortest part was too long for the law.
+    overlong_steps: u64,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     watch: Watch,
@@ -116,6 +118,7 @@ impl Simulation {
             events: other_law.into_iter().collect(),
             shortest: 0,
             refined_steps: 0,
+            overlong_steps: 0,
             energy: None,
             watch: Watch::default(),
             peaks: Peaks::default(),
@@ -145,7 +148,8 @@ impl Simulation {
     /// ([`crate::scenario::TimeSpec::max_rate_dt`]) is flown in halves (at most
     /// [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between. A step that
     /// takes more than half of the clearance above the law's barrier from some pair is refused, undone and flown in halves;
-    /// so is one on which a path bends by more than 1e-5 m from the straight line that the audit sweeps.
+    /// so is one on which a path bends by more than 1e-5 m from the straight line that the audit sweeps. A step of which even
+    /// the shortest part is too long is flown all the same, counted ([`Flight::overlong_steps`]), and voids the certificate.
     pub fn step(&mut self) {
         if self.ending.is_none() && std::mem::take(&mut self.overruled) {
             let asked = self.ask();
@@ -239,6 +243,19 @@ impl Simulation {
         self.judge.least_clearance_m()
     }
 
+    /// The closest that two vehicles came so far, between steps included \[m\]; in scaled lengths where what must stay empty
+    /// around a vehicle is an ellipsoid ([`crate::space::Metric`]). None of fewer than two vehicles.
+    #[must_use]
+    pub fn closest(&self) -> Option<ClosestApproach> {
+        self.judge.least_separation()
+    }
+
+    /// The smallest distance of two vehicles over the last step \[m\], in the same lengths; at the start, of the start.
+    #[must_use]
+    pub fn separation_m(&self) -> f64 {
+        self.judge.nearest_m
+    }
+
     /// Takes what happened since this was asked last, in its order.
     pub fn events(&mut self) -> impl Iterator<Item = Event> + '_ {
         self.events.drain(..)
@@ -289,6 +306,7 @@ impl Simulation {
             duration_s: self.time_s,
             steps: self.steps,
             refined_steps: self.refined_steps,
+            overlong_steps: self.overlong_steps,
             certificate: self.certificate,
             audit,
             in_metres,

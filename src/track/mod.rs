@@ -100,4 +100,10 @@ pub trait Tracks {
     /// What a person should know about how the recording was read, a sentence each: that rows were sorted, that the unit
     /// of time was inferred.
     fn notes(&self) -> &[String];
+
+    /// What was assumed to know positions at the very times of items, in words that go on after "if": nothing may be said to
+    /// be proved then. None where the recording says them itself.
+    fn assumed(&self) -> Option<&str> {
+        None
+    }
 }

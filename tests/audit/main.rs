@@ -2,6 +2,7 @@
 
 mod curves_at_limits;
 mod encounters;
+mod envelope;
 mod findings;
 mod flown;
 mod recorded;

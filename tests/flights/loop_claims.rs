@@ -95,7 +95,7 @@ impl Plant for Lost {
 }
 
 /// Two vehicles on the x axis with these velocities \[m/s\], and a third far away.
-fn duel(x_m: [f64; 2], speeds_m_s: [f64; 2], delta_m: f64, dt_s: f64, duration_s: f64) -> Scenario {
+pub(super) fn duel(x_m: [f64; 2], speeds_m_s: [f64; 2], delta_m: f64, dt_s: f64, duration_s: f64) -> Scenario {
     let mut start = Swarm::at_rest(Rows::from_row_slice(&[x_m[0], 0.0, 0.0, x_m[1], 0.0, 0.0, 0.0, 60.0, 0.0]));
     start.velocities_m_s[(0, 0)] = speeds_m_s[0];
     start.velocities_m_s[(1, 0)] = speeds_m_s[1];
@@ -106,7 +106,7 @@ fn duel(x_m: [f64; 2], speeds_m_s: [f64; 2], delta_m: f64, dt_s: f64, duration_s
     scenario
 }
 
-fn refinements(log: &Log) -> Vec<(f64, f64)> {
+pub(super) fn refinements(log: &Log) -> Vec<(f64, f64)> {
     let refined = |event: &Event| match *event {
         Event::StepRefined { time_s, dt_s } => Some((time_s, dt_s)),
         _ => None,
@@ -117,7 +117,7 @@ fn refinements(log: &Log) -> Vec<(f64, f64)> {
 // Energy
 
 /// By how much the energy was above E(0) over any step, relative to it.
-fn energy_excess(log: &Log) -> f64 {
+pub(super) fn energy_excess(log: &Log) -> f64 {
     let initial = log.samples[0].energy.expect("the law has an energy");
     log.samples.iter().filter_map(|sample| sample.peaks.energy).fold(0.0, f64::max) / initial - 1.0
 }
@@ -225,83 +225,6 @@ fn looking_at_the_samples_alone_misses_that_vehicle_and_so_does_the_engine() {
     let nearest_m = log.samples.iter().map(apart_m).fold(f64::INFINITY, f64::min);
     assert!(nearest_m > scenario.delta_m, "{nearest_m} m");
     assert!(flight.engine_contacts.is_empty(), "{:?}", flight.engine_contacts);
-}
-
-// Refused steps
-
-/// Closing at 20 m/s with 0.4 m to go before the barrier.
-fn barrier_ahead(dt_s: f64) -> Scenario {
-    duel([-1.2, 1.2], [10.0, -10.0], 2.0, dt_s, 5.0)
-}
-
-#[test]
-fn a_step_that_would_jump_the_barrier_is_flown_in_parts() {
-    for dt_s in [1.0 / 240.0, 1.0 / 60.0, 0.125, 0.25, 0.5] {
-        let scenario = barrier_ahead(dt_s);
-        let (flight, log) = fly(&scenario);
-        assert_eq!((flight.ending, flight.audit.status), (Ending::Completed, Status::Clear), "dt = {dt_s} s");
-        assert_eq!(flight.steps, scenario.time.steps());
-        assert!(flight.audit.steps > flight.steps, "the judge sees the parts");
-        let refined = refinements(&log);
-        assert!(!refined.is_empty());
-        for (time_s, part_s) in refined {
-            assert!(part_s < dt_s && part_s >= dt_s / 1024.0, "{part_s} s");
-            assert_eq!((dt_s / part_s).log2().fract(), 0.0, "halves of halves");
-            assert_eq!((time_s / dt_s).fract(), 0.0, "a step begins at {time_s} s");
-        }
-    }
-}
-
-#[test]
-fn without_halvings_that_step_jumps_the_barrier_and_is_called_a_violation() {
-    let mut scenario = barrier_ahead(0.5);
-    scenario.time.max_halvings = 0;
-    let (flight, log) = fly(&scenario);
-    assert_eq!(flight.audit.status, Status::Violation);
-    assert_eq!(refinements(&log), []);
-}
-
-#[test]
-fn without_halvings_a_step_that_lands_within_the_barrier_ends_the_run_as_a_collision() {
-    let mut scenario = barrier_ahead(0.125);
-    scenario.time.max_halvings = 0;
-    let (flight, log) = fly(&scenario);
-    let Ending::LawUndefined(LawError::Collision { pair, separation_m, delta_m }) = flight.ending else {
-        panic!("{:?}", flight.ending)
-    };
-    assert_eq!((pair, delta_m), (Pair::new(0, 1), 2.0));
-    assert!(separation_m < delta_m);
-    assert_eq!(flight.audit.status, Status::Violation);
-    assert_eq!((flight.steps, flight.duration_s), (1, 0.125));
-    let last = log.samples.last().expect("samples");
-    assert_eq!((last.time_s, last.step, last.energy), (0.125, 1, None));
-    assert_eq!(&last.swarm, &flight.last);
-    assert_eq!(last.control.nrows(), 0, "no command follows from a state without one");
-    let Some(Event::EndedEarly { time_s, reason }) = log.events.last() else { panic!("{:?}", log.events) };
-    assert!(*time_s == 0.125 && reason.contains("vehicles 1-2"), "{reason}");
-}
-
-#[test]
-fn a_law_without_a_barrier_is_never_refused_a_step() {
-    let mut scenario = barrier_ahead(1.0);
-    scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
-    scenario.time.max_rate_dt = 1.0;
-    let (flight, log) = fly(&scenario);
-    assert_eq!((refinements(&log), flight.audit.steps), (vec![], flight.steps));
-}
-
-#[test]
-fn a_step_too_long_for_the_fastest_rate_is_flown_in_parts_and_keeps_the_energy_below_its_start() {
-    let mut scenario =
-        builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10", "plant.precision=double"]);
-    let (honest, log) = fly(&scenario);
-    assert!(!refinements(&log).is_empty(), "it is told");
-    assert!(honest.audit.steps > honest.steps);
-    assert!(energy_excess(&log) < 1e-3, "{}", energy_excess(&log));
-    (scenario.time.max_rate_dt, scenario.time.max_halvings) = (1e9, 0);
-    let (whole, log) = fly(&scenario);
-    let collided = matches!(whole.ending, Ending::LawUndefined(_));
-    assert!(collided || energy_excess(&log) > 0.01, "taken whole, such steps gain energy: {}", energy_excess(&log));
 }
 
 // Endings

@@ -21,5 +21,6 @@ mod safety;
 mod scenario_files;
 mod shapes;
 mod simulation;
+mod steps;
 mod unicycles;
 mod wind;

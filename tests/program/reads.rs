@@ -69,3 +69,62 @@ fn what_is_wrong_inside_a_recording_is_said_with_its_file() {
     assert_eq!(ran.exit, Some(2), "{ran:?}");
     assert!(ran.err.contains("flight.csv: vehicle a at 1.0 s"), "{}", ran.err);
 }
+
+/// A bag of `tests/recordings`: two robots 2 m apart, whose odometry drifts.
+fn bag(name: &str) -> String {
+    format!("{}/tests/recordings/bags/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn nothing_is_proved_of_positions_that_interpolated_transforms_brought() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ran = |name: &str, arguments: &[&str]| {
+        let bag = bag(name);
+        ran_by(
+            TAUTLINE,
+            folder.path(),
+            &[&["audit", bag.as_str(), "--delta", "1", "--frame", "map"], arguments].concat(),
+        )
+    };
+    let bounded = ["--motion", "bounded", "--max-accel", "1"];
+    let exact = ran("robots_exact", &bounded);
+    assert!(exact.exit == Some(0) && exact.out.starts_with("PROVED CLEAR"), "{exact:?}");
+    let guessed = ran("robots", &bounded);
+    let if_so = "CLEAR if accelerations of at most 1.0 m/s^2, transforms even between their samples";
+    assert!(guessed.exit == Some(0) && guessed.out.starts_with(if_so), "{guessed:?}");
+    assert!(guessed.err.contains("10 by those of their very time, 32 by some between"), "{guessed:?}");
+    let json: serde_json::Value = serde_json::from_str(&ran("robots", &["--json"]).out).expect("a report");
+    assert_eq!(json["audit"]["proved"], false);
+    assert_eq!(json["audit"]["assumes"], "straight between samples, transforms even between their samples");
+    assert_eq!(json["vehicles"], serde_json::json!(["r1/base_link", "r2/base_link"]));
+    let refused = ran_by(TAUTLINE, folder.path(), &["audit", &bag("robots"), "--delta", "1"]);
+    assert!(refused.exit == Some(2) && refused.err.contains("--frame"), "{refused:?}");
+}
+
+#[test]
+fn bags_and_places_on_the_earth_are_exported_as_they_are_judged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let gps = "t,id,lat,lon,alt\n0,a,47,8,400\n0,b,47.0001,8,400\n1,a,47,8,401\n1,b,47.0001,8,401\n";
+    fs::write(folder.path().join("gps.csv"), gps).expect("written");
+    let split = bag("split");
+    let lost = "samples hold only if transforms even between their samples";
+    let robots = bag("robots");
+    for (recording, options, said) in [
+        (split.as_str(), &[][..], ""),
+        ("gps.csv", &["--origin", "47,8,390"], "--origin 47.0,8.0,390.0"),
+        (robots.as_str(), &["--frame", "map"], lost),
+    ] {
+        let exported = ["export", recording, "-o", "out.csv", "--force"];
+        let ran = ran_by(TAUTLINE, folder.path(), &[&exported[..], options].concat());
+        assert!(ran.exit == Some(0) && ran.err.contains(said), "{ran:?}");
+        let distance = |path: &str, options: &[&str]| {
+            let asked = ["audit", path, "--delta", "0.1", "--json", "--quiet"];
+            let ran = ran_by(TAUTLINE, folder.path(), &[&asked[..], options].concat());
+            let json: serde_json::Value = serde_json::from_str(&ran.out).expect("a report");
+            json["separation"]["min_m"].as_f64().expect("a distance")
+        };
+        assert_eq!(distance("out.csv", &[]), distance(recording, options));
+    }
+    let wrong = ran_by(TAUTLINE, folder.path(), &["audit", "gps.csv", "--delta", "1", "--origin", "95,8,0"]);
+    assert!(wrong.exit == Some(2) && wrong.err.contains("within 90 degrees"), "{wrong:?}");
+}

@@ -5,11 +5,15 @@ mod recording;
 
 mod any_bytes;
 mod beside;
+mod capture;
 mod columns;
 mod containers;
+mod earth;
 mod exports;
 mod formats;
+mod messages;
 mod own;
 mod parquet;
 mod refusals;
+mod ros;
 mod vehicles;

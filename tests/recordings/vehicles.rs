@@ -200,24 +200,22 @@ fn strangers_are_told_the_way_in() {
         (b"\xa3\x95\x80\x80", "ArduPilot", "mavlogdump"),
         (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n", "ArduPilot", "mavlogdump"),
         (b"\0\x05\xf0\0\0\0\0\0\xfd\x09", "MAVLink", "mavlogdump"),
-        (b"<?xml version=\"1.0\"?>\n<gpx creator=\"x\">", "GPX", "metres"),
-        (b"<?xml version=\"1.0\"?>\n<kml xmlns=\"x\">", "KML", "metres"),
+        (b"<?xml version=\"1.0\"?>\n<gpx creator=\"x\">", "GPX", "lat,lon,alt"),
+        (b"<?xml version=\"1.0\"?>\n<kml xmlns=\"x\">", "KML", "lat,lon,alt"),
         (b"  <?xml version=\"1.0\"?><flight/>", "XML", "t,id,x,y,z"),
         (b"{\"type\": \"FeatureCollection\", \"features\": []}", "no Skybrush show", "t,id,x,y,z"),
         (b"[{\"t\": 0, \"x\": 1}]", "no Skybrush show", "t,id,x,y,z"),
         (b"\x89HDF\r\n\x1a\n\0", "HDF5", "numpy.savez"),
         (b"7z\xbc\xaf\x27\x1c\0\x04", "7z archive", "give the folder"),
         (&[&[b'a'; 257][..], b"ustar\x0000"].concat(), "tar archive", "give the folder"),
-        (b"Format Version,1.23,Take Name,one\n", "OptiTrack Motive", "t,id,x,y,z"),
     ] {
         let path = folder.path().join("recording");
         fs::write(&path, bytes).expect("written");
         let error = whole(&path).expect_err(said);
         assert!(error.to_string().contains(said) && error.help().contains(way), "{error}\n{}", error.help());
     }
-    for (bag, way) in [("flight_0.mcap", "give flight_0.mcap"), ("flight_0.db3", "ros2 bag convert")] {
-        let folder = self::folder(&[("metadata.yaml", "rosbag2_bagfile_information:\n"), (bag, "")]);
-        let error = whole(folder.path()).expect_err("refused");
-        assert!(error.to_string().contains("ROS 2 bag") && error.help().contains(way), "{error}\n{}", error.help());
-    }
+    let said = "rosbag2_bagfile_information:\n  storage_identifier: sqlite3\n  relative_file_paths: [flight_0.db3]\n";
+    let bag = self::folder(&[("metadata.yaml", said), ("flight_0.db3", "")]);
+    let error = whole(bag.path()).expect_err("refused");
+    assert!(error.to_string().contains("`sqlite3`") && error.help().contains("ros2 bag convert"), "{error}");
 }

@@ -13,6 +13,7 @@ pub(crate) struct Whole {
     pub(crate) items: Vec<Item>,
     pub(crate) clock: Clock,
     pub(crate) notes: Vec<String>,
+    pub(crate) assumed: Option<String>,
 }
 
 impl Whole {
@@ -21,7 +22,8 @@ impl Whole {
         let mut items = Vec::new();
         while tracks.read(&mut items)? {}
         let vehicles = tracks.vehicles().to_vec();
-        Ok(Self { vehicles, items, clock: tracks.clock().clone(), notes: tracks.notes().to_vec() })
+        let (clock, notes) = (tracks.clock().clone(), tracks.notes().to_vec());
+        Ok(Self { vehicles, items, clock, notes, assumed: tracks.assumed().map(str::to_owned) })
     }
 
     /// The samples as (time, name, position).

@@ -8,6 +8,7 @@ use super::smallest::Smallest;
 use super::told::{AllTold, Counted};
 use super::vehicle::Vehicle;
 use super::window::Windows;
+use crate::audit::envelope::Watch;
 use crate::audit::outcome::Status;
 use crate::audit::results::Results;
 use crate::audit::sweep::Interval;
@@ -33,6 +34,7 @@ pub struct TrackAuditor {
     results: Results,
     gaps: Vec<Gap>,
     smallest: Option<Smallest>,
+    envelope: Option<Watch>,
     told: AllTold,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
@@ -65,6 +67,7 @@ impl TrackAuditor {
         Ok(Self {
             least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
             windows: Windows::new(settings.limits(), &settings.obstacles),
+            envelope: (!settings.envelope.is_empty()).then(|| Watch::new(&settings.envelope, settings.window())),
             settings,
             vehicles: Vec::new(),
             rates: None,
@@ -140,6 +143,9 @@ impl TrackAuditor {
         if unseen {
             vehicle.check(&self.settings)?;
         }
+        if let Some(envelope) = &mut self.envelope {
+            envelope.take(item, vehicle.seen(gap.is_some()));
+        }
         self.pending += 1;
         if let Some(gap) = gap {
             self.note(gap);
@@ -187,7 +193,9 @@ impl TrackAuditor {
 
     fn judge_until(&mut self, to_s: f64) {
         let window = Interval { from_s: self.done_s, to_s };
-        self.windows.judge(&self.vehicles, window, &mut self.results);
+        if self.asks_for_separation() {
+            self.windows.judge(&self.vehicles, window, &mut self.results);
+        }
         if let Some(smallest) = &mut self.smallest {
             smallest.follow(&self.vehicles, window);
         }
@@ -195,6 +203,21 @@ impl TrackAuditor {
             self.segments += vehicle.forget(to_s) as u64;
         }
         self.done_s = to_s;
+    }
+
+    /// Whether anything says how close two may come: where single vehicles alone are asked about, a recording's own radii
+    /// do.
+    fn asks_for_separation(&self) -> bool {
+        self.settings.asks_for_separation() || self.vehicles.iter().any(|vehicle| vehicle.radius_m.is_some())
+    }
+
+    /// Whether the verdict is on pairs too: always where the question is about them. Limits that a recording brings of its own
+    /// count beside a question about single vehicles where there are two, and each of them has one.
+    fn is_separation_asked(&self) -> bool {
+        let is_own = self.settings.is_own_limit || !self.settings.asks_for_separation();
+        let mut judged = self.vehicles.iter().filter(|vehicle| vehicle.is_judged());
+        let are_two = judged.clone().count() > 1 && judged.all(|vehicle| vehicle.has_limit(&self.settings));
+        if is_own && !self.settings.envelope.is_empty() { are_two && self.asks_for_separation() } else { true }
     }
 
     /// Notes a gap as far as it lies in the window that is asked for.
@@ -221,13 +244,26 @@ impl TrackAuditor {
         let span_s = there().map(|there| (there.from_s, there.to_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let contradiction =
             self.vehicles.iter().filter_map(|v| v.contradiction).max_by(|a, b| a.needs_m_s2.total_cmp(&b.needs_m_s2));
-        // Of a gap that nobody could have used nothing is asked.
+        let separates = self.is_separation_asked();
+        if !separates {
+            self.results = Results::default();
+        }
+        let envelope = self.envelope.take().map(|envelope| {
+            let judged: Vec<_> = self.vehicles.iter().map(Vehicle::is_judged).collect();
+            envelope.finish(&judged, self.gaps.is_empty() && contradiction.is_none())
+        });
+        // Of a gap that nobody could have used nothing is asked about pairs.
         let obstructed = !self.settings.obstacles.is_empty();
-        self.gaps.retain(|gap| {
+        let matters = |gap: &Gap| {
             let others = presence.iter().enumerate().filter(|(vehicle, _)| *vehicle != gap.vehicle);
             let meets = |other: &Presence| other.from_s < gap.to_s && gap.from_s < other.to_s;
             obstructed || others.filter_map(|(_, there)| there.as_ref()).any(meets)
-        });
+        };
+        let is_gapless = !self.gaps.iter().any(matters);
+        if envelope.is_none() {
+            self.gaps.retain(matters);
+        }
+        let envelope = envelope.unwrap_or_default();
         self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
         let counts = |vehicle: usize| {
             let of = self.vehicles.get(vehicle).filter(|of| of.asked_for)?;
@@ -237,11 +273,16 @@ impl TrackAuditor {
         self.told.correct(&mut self.results, &self.settings, self.vehicles.len(), counts);
         let Results { ledger, closest, obstacles, swept } = self.results;
         let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
-        let decided = looked_at && ledger.is_decided() && self.gaps.is_empty() && contradiction.is_none();
+        let decided = looked_at && ledger.is_decided() && is_gapless && contradiction.is_none();
         let parry = ledger.parry;
         let (violations, undecided) = ledger.into_lists();
         Ok(Outcome {
-            status: Status::new(!violations.is_empty(), decided),
+            status: Status::new(
+                !violations.is_empty() || envelope.is_exceeded(),
+                (decided || !separates) && envelope.is_kept(),
+            ),
+            separation: separates.then(|| Status::new(!violations.is_empty(), decided)),
+            envelope,
             max_gaps_s: self.vehicles.iter().map(|vehicle| vehicle.max_gap_s).collect(),
             vehicles: self.vehicles.into_iter().map(|vehicle| vehicle.name).collect(),
             presence,

@@ -101,6 +101,12 @@ pub enum RecordedError {
         /// What it changes to \[m\].
         radius_m: f64,
     },
+    /// A limit on speeds or accelerations of vehicles that jump.
+    #[error("vehicles that are held between samples jump: nothing can be said of their {limit}")]
+    LimitOfJumps {
+        /// What was to be limited.
+        limit: &'static str,
+    },
     /// Obstacles and an ellipsoid.
     #[error("obstacles cannot be judged by an ellipsoid")]
     ObstaclesAndEllipsoid,

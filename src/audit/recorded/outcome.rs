@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::audit::envelope::EnvelopeOutcome;
 use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use crate::swarm::{ClosestApproach, Pair};
@@ -90,8 +91,13 @@ pub struct Contradiction {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Clear where everything asked for was judged and nothing came too close; undecided where something could not be
-    /// told, or there never were two to keep apart; a violation, whatever else there was, where two came too close.
+    /// told, or there never were two to keep apart; a violation, whatever else there was, where two came too close or a
+    /// vehicle was beyond a limit.
     pub status: Status,
+    /// The verdict on how close any two came alone; none where only single vehicles were asked about.
+    pub separation: Option<Status>,
+    /// What was found of each vehicle by itself.
+    pub envelope: EnvelopeOutcome,
     /// Names of the vehicles, as the recording has them; those that were not asked for are among them.
     pub vehicles: Vec<String>,
     /// When each vehicle is there within what was asked; `None` where it is not, or was not asked for.
@@ -112,7 +118,8 @@ pub struct Outcome {
     pub violations: Vec<Violation<ObjectPair>>,
     /// Every time that could not be decided, in order of time.
     pub undecided: Vec<Undecided<ObjectPair>>,
-    /// Every gap in which somebody else was there or an obstacle in the way, in order of time: what happened is not known.
+    /// Every gap in which somebody else was there or an obstacle in the way (any gap where single vehicles are asked about), in
+    /// order of time: what happened is not known.
     pub gaps: Vec<Gap>,
     /// The largest contradiction to the assumed bound on acceleration, if there is one: then nothing is proved clear.
     pub contradiction: Option<Contradiction>,

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::error::RecordedError;
+use crate::audit::envelope::{Envelope, Limit};
 use crate::audit::limits::{Limits, TOUCHING_ELLIPSOIDS};
 use crate::audit::obstacle::Obstacle;
 use crate::audit::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
@@ -74,6 +75,11 @@ pub struct Settings {
     pub only: Option<BTreeSet<String>>,
     /// What else is in the way.
     pub obstacles: Vec<Obstacle>,
+    /// What each vehicle may do by itself. Where it is all that is asked, nothing is said of how close two came.
+    pub envelope: Envelope,
+    /// Whether delta or the ellipsoid are what the recording says of itself: beside an `envelope` that asks nothing of vehicles
+    /// that are alone.
+    pub is_own_limit: bool,
 }
 
 impl Settings {
@@ -85,6 +91,15 @@ impl Settings {
 
     pub(super) fn window(&self) -> Interval {
         Interval { from_s: self.from_s.unwrap_or(f64::NEG_INFINITY), to_s: self.to_s.unwrap_or(f64::INFINITY) }
+    }
+
+    /// Whether something beside a recording's own radii says how close two may come, or a vehicle and an obstacle.
+    pub(super) fn asks_for_separation(&self) -> bool {
+        let asks = [self.delta_m.is_some(), self.ellipsoid_m.is_some(), self.radius_m.is_some()];
+        asks.contains(&true)
+            || !self.obstacles.is_empty()
+            || self.vehicles.values().any(|of| of.radius_m.is_some())
+            || self.envelope.is_empty()
     }
 
     pub(super) fn limits(&self) -> Limits {
@@ -128,6 +143,13 @@ impl Settings {
             check(&format!("the radius of {name}"), of.radius_m, RADIUS)?;
             check(&format!("the clock offset of {name}"), Some(of.offset_s), FINITE)?;
             check(&format!("the largest acceleration of {name}"), of.max_accel_m_s2, ACCELERATION)?;
+        }
+        for Limit { quantity, allowed } in &self.envelope.limits {
+            let range = if quantity.derivative() == 0 { FINITE } else { POSITIVE };
+            check(&format!("the limit of {}", quantity.name()), Some(*allowed), range)?;
+        }
+        if let Some(quantity) = self.envelope.of_motion().filter(|_| self.motion == Some(Motion::Hold)) {
+            return Err(RecordedError::LimitOfJumps { limit: quantity.name() });
         }
         if self.ellipsoid_m.is_some() && !self.obstacles.is_empty() {
             return Err(RecordedError::ObstaclesAndEllipsoid);

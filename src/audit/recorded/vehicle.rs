@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::error::RecordedError;
 use super::outcome::{Contradiction, Gap, Presence};
 use super::settings::{Motion, Settings};
+use crate::audit::envelope::Seen;
 use crate::audit::polynomial::{BernsteinBasis, parts_told};
 use crate::audit::segment::{Curve, Deviation, Segment};
 use crate::audit::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
@@ -83,11 +84,27 @@ impl Vehicle {
         if self.motion == Some(Motion::Bounded) && self.max_accel_m_s2.is_nan() {
             return Err(RecordedError::NoBound { vehicle: self.name.clone() });
         }
-        let limited = settings.delta_m.is_some() || settings.ellipsoid_m.is_some();
-        if !limited && self.radius_m.is_none_or(|radius_m| radius_m < MIN_LIMIT_M) {
+        if settings.asks_for_separation() && !self.has_limit(settings) {
             return Err(RecordedError::NoLimit { vehicle: self.name.clone() });
         }
         Ok(())
+    }
+
+    /// Whether something says how close another may come to it.
+    pub(super) fn has_limit(&self, settings: &Settings) -> bool {
+        let limited = settings.delta_m.is_some() || settings.ellipsoid_m.is_some();
+        limited || self.radius_m.is_some_and(|radius_m| radius_m >= MIN_LIMIT_M)
+    }
+
+    /// Whether it was asked for and there.
+    pub(super) fn is_judged(&self) -> bool {
+        self.asked_for && self.presence.is_some()
+    }
+
+    /// How its items are taken by what follows it alone.
+    pub(super) fn seen(&self, after_gap: bool) -> Seen {
+        let bounded_by_m_s2 = (self.motion == Some(Motion::Bounded)).then_some(self.max_accel_m_s2);
+        Seen { offset_s: self.offset_s, after_gap, bounded_by_m_s2 }
     }
 
     #[inline]

@@ -6,16 +6,27 @@
 //! | `tautline_msgs/msg/Tracks` | cdr | its name |
 //! | `foxglove.PosesInFrame`, `geometry_msgs/msg/PoseArray` | protobuf or json, cdr | its place in the list |
 //! | `foxglove.FrameTransform(s)`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/TransformStamped` | the same | the child frame |
-//! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped` | the same | the topic |
+//! | `motion_capture_tracking_interfaces/msg/NamedPoseArray` | cdr | the name of the pose |
+//! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped`, `PointStamped`, `nav_msgs/msg/Odometry`, `sensor_msgs/msg/NavSatFix` | the same | the topic |
 //!
-//! Times are those of the messages; where no message of a channel has one, those when they were logged. All positions must be given
-//! in one frame. A file that was not closed is refused, unless the user accepts what it holds.
+//! Times are those of the messages; where no message of a topic has one, those when they were logged. All positions must be
+//! given in one frame, or be brought there by transforms. A file that was not closed is refused, unless the user accepts
+//! what it holds.
 
 mod channels;
 pub(crate) mod exported;
 mod foreign;
+mod foxglove_poses;
 mod messages;
+mod outline;
+mod plan;
+mod poses;
+mod rigid;
+mod ros;
 mod run;
+mod schemas;
+mod splits;
+mod tree;
 
 pub use channels::Channels;
 
@@ -27,6 +38,11 @@ use super::source::Source;
 use crate::record::mcap::topic::{Part, TopicReader};
 use crate::record::{ReadFault, RecordError};
 
+/// Opens the files of a ROS 2 bag, which follow each other.
+pub(super) fn open_bag(folder: &Source, files: Vec<Source>, options: &ReadOptions) -> Result<Recording, ReadError> {
+    foreign::open(folder, files, options)
+}
+
 /// Opens a recording, going by the first schema that is known.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut topics = TopicReader::open(&source.path)?;
@@ -34,13 +50,16 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         match part {
             Part::Schema("tautline_msgs/msg/Swarm") => return run::open(source, options),
             Part::Schema(name) if name == exported::TRACKS.schema_name => return exported::open(source, options),
-            Part::Schema(name) if messages::reader_of(name).is_some() => return foreign::open(source, options),
+            Part::Schema(name) if schemas::reader_of(name).is_some() => {
+                return foreign::open(source, vec![source.clone()], options);
+            }
             _ => {}
         }
     }
     options.accept_unfinished(topics.is_complete())?;
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
-                  geometry_msgs/msg/PoseArray or tf2_msgs/msg/TFMessage are read";
+                  geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, sensor_msgs/msg/NavSatFix, \
+                  motion_capture_tracking_interfaces/msg/NamedPoseArray or tf2_msgs/msg/TFMessage are read";
     Err(Fault::content("it has no topic with positions", remedy).into())
 }
 

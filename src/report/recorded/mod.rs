@@ -2,9 +2,13 @@
 //!
 //! `separation` and `audit` have the keys of a flight's `report.json`; what a recording adds stands beside them.
 
+mod envelope;
 mod moments;
+mod named;
 mod report;
 mod words;
 
-pub use report::{Basis, Between, Clock, Obstacles, OfPair, OfVehicle, RecordedAudit, RecordedReport, Source};
+pub use envelope::OfLimit;
+pub use named::{OfPair, OfVehicle};
+pub use report::{Basis, Between, Clock, Obstacles, RecordedAudit, RecordedReport, Source};
 pub use words::interval;

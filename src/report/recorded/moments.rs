@@ -1,14 +1,16 @@
 //! What a replay of a recording jumps to.
 
-use super::report::{OfPair, RecordedReport};
+use super::named::OfPair;
+use super::report::RecordedReport;
 use super::words::interval;
+use crate::audit::envelope::Exceeding;
 use crate::audit::recorded::{Approach, ObjectPair};
 use crate::audit::{Undecided, Violation};
 use crate::replay::{Judged, Kind, Moment, Span};
 
 impl RecordedReport {
     /// The closest approach, every violation and every time that cannot be decided, the weightiest first, with the judge's
-    /// distances and times.
+    /// distances and times; behind them those of single vehicles.
     #[must_use]
     pub fn moments(&self) -> Vec<Moment> {
         let over = |of: &Violation<ObjectPair>| of.min_m - of.limit_m;
@@ -24,7 +26,15 @@ impl RecordedReport {
             let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
             moment(Kind::Undecided, pair, span, format!("Undecided: {}", of.words()))
         });
-        closest.chain(violations).chain(undecided).collect()
+        let limits = self.limits.iter().flat_map(|limit| {
+            let violations = limit.violations.iter().zip(limit.violations_in_words()).map(|of| (Kind::Violation, of));
+            let undecided = limit.undecided.iter().zip(limit.undecided_in_words()).map(|of| (Kind::Undecided, of));
+            violations.chain(undecided).map(|(kind, (of, said))| {
+                let Exceeding { vehicle, from_s, to_s, at_s, .. } = of.finding;
+                Moment { kind, vehicles: vec![vehicle], obstacle: None, span: Span { from_s, to_s, at_s }, said }
+            })
+        });
+        closest.chain(violations).chain(undecided).chain(limits).collect()
     }
 
     /// The verdict, and what distances of two vehicles are held against.

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::envelope::OfLimit;
+use super::named::{OfPair, OfVehicle};
 use crate::audit::recorded::{Approach, Contradiction, Gap, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS};
 use crate::audit::{Status, Undecided, Violation};
 use crate::report::findings::finite;
@@ -92,32 +94,17 @@ pub struct RecordedReport {
     pub closest: Vec<OfPair<Approach>>,
     /// What obstacles were in the way of.
     pub obstacles: Obstacles,
+    /// What each vehicle may do by itself, limit by limit.
+    pub limits: Vec<OfLimit>,
     /// When vehicles were not seen.
     pub gaps: Vec<OfVehicle<Gap>>,
     /// When it cannot be told whether two came too close.
     pub undecided: Vec<OfPair<Undecided<ObjectPair>>>,
     /// Where the recording contradicts the assumed bound on acceleration.
     pub contradiction: Option<OfVehicle<Contradiction>>,
-}
-
-/// A finding on a pair, with their names.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfPair<T> {
-    /// Their names.
-    pub who: [String; 2],
-    /// What was found.
-    #[serde(flatten)]
-    pub finding: T,
-}
-
-/// A finding on a vehicle, with its name.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfVehicle<T> {
-    /// Its name.
-    pub vehicle: String,
-    /// What was found.
-    #[serde(flatten)]
-    pub finding: T,
+    /// Whether it was asked how close two came, and not single vehicles alone.
+    #[serde(skip)]
+    pub(super) separation_asked: bool,
 }
 
 /// Obstacles and who came close to them.
@@ -136,6 +123,11 @@ impl RecordedReport {
         let first = outcome.closest.first();
         let scaled = settings.ellipsoid_m.is_some();
         let min_m = first.and_then(|first| finite(first.certain_m()));
+        let limits: Vec<_> = outcome.envelope.limits.iter().map(|found| OfLimit::new(found, outcome)).collect();
+        let by_limits = limits.iter().filter_map(|limit| limit.assumes.map(str::to_owned));
+        let by_motion = (between.basis != Basis::Recorded).then_some(between.motion.clone());
+        let assumes: Vec<_> = by_motion.into_iter().chain(by_limits).collect();
+        let is_assumed = between.basis == Basis::Assumed || limits.iter().any(|limit| limit.assumes.is_some());
         let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
         let closest = |of: &[Approach]| of.iter().map(|a| OfPair { who: names(a.pair), finding: *a }).collect();
         let violations: Vec<_> =
@@ -145,7 +137,7 @@ impl RecordedReport {
             status: outcome.status,
             source,
             measure: if scaled { "ellipsoids" } else { "metres" },
-            motion: between.motion.clone(),
+            motion: between.motion,
             vehicles: outcome.vehicles.clone(),
             judged: outcome.presence.iter().flatten().count(),
             span_s: outcome.span_s,
@@ -161,7 +153,7 @@ impl RecordedReport {
             },
             audit: RecordedAudit {
                 flight: Audit {
-                    status: outcome.status,
+                    status: outcome.separation.unwrap_or_default(),
                     violations: outcome
                         .violations
                         .iter()
@@ -176,8 +168,8 @@ impl RecordedReport {
                     },
                     rapier: Rapier { contact_pairs: None },
                 },
-                proved: outcome.status == Status::Clear && between.basis != Basis::Assumed,
-                assumes: (between.basis != Basis::Recorded).then_some(between.motion),
+                proved: outcome.status == Status::Clear && !is_assumed,
+                assumes: (!assumes.is_empty()).then(|| assumes.join(" and ")),
             },
             closest: closest(&outcome.closest),
             obstacles: Obstacles {
@@ -185,6 +177,8 @@ impl RecordedReport {
                 violations: violations.iter().filter(|v| v.finding.pair.vehicles().is_none()).cloned().collect(),
             },
             violations,
+            limits,
+            separation_asked: outcome.separation.is_some(),
             gaps: outcome
                 .gaps
                 .iter()
@@ -195,6 +189,12 @@ impl RecordedReport {
                 .contradiction
                 .map(|finding| OfVehicle { vehicle: outcome.name(finding.vehicle), finding }),
         }
+    }
+
+    /// The verdict on how close any two came alone; none where only single vehicles were asked about.
+    #[must_use]
+    pub fn separation(&self) -> Option<Status> {
+        self.separation_asked.then_some(self.audit.flight.status)
     }
 
     /// The report as indented JSON with a line end.

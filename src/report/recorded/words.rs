@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::report::{OfPair, OfVehicle, RecordedReport};
+use super::envelope::OfLimit;
+use super::named::{OfPair, OfVehicle};
+use super::report::RecordedReport;
 use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
@@ -22,20 +24,29 @@ impl RecordedReport {
     /// The verdict in one line.
     #[must_use]
     pub fn headline(&self) -> String {
-        format!("{}: {}", self.verdict(), self.finding())
+        one_line(&format!("{}: {}", self.verdict(), self.finding()))
     }
 
-    fn verdict(&self) -> String {
+    /// The verdict alone, such as `PROVED CLEAR`.
+    #[must_use]
+    pub fn verdict(&self) -> String {
         match self.status {
             Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
-            Status::Clear => format!("CLEAR if {}", self.motion),
+            Status::Clear => format!("CLEAR if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
             Status::Violation => "VIOLATION".to_owned(),
             Status::Undecided => "UNDECIDED".to_owned(),
         }
     }
 
-    /// The headline behind the verdict.
+    /// The headline behind the verdict: of pairs, and of the limits that decide it.
     fn finding(&self) -> String {
+        let decides = |limit: &&OfLimit| limit.status == self.status;
+        let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
+        let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
+        of_pairs.then(|| self.finding_of_pairs()).into_iter().chain(limits).collect::<Vec<_>>().join("; ")
+    }
+
+    fn finding_of_pairs(&self) -> String {
         let unit = self.unit();
         let delta = self.separation.delta_m.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
         match self.status {
@@ -86,7 +97,7 @@ impl RecordedReport {
         let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
         if let Some(OfPair { who: [first, second], finding }) = closest {
             let rate =
-                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", fixed(hz, 1)));
+                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
             let (low, high, at) = (at_least(finding.lower_m, 6), at_most(finding.upper_m, 6), seconds(finding.to_s));
             return if finding.upper_m.is_finite() {
                 format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
@@ -117,9 +128,11 @@ impl RecordedReport {
 
     /// What was found of each kind, a sentence each.
     fn lists(&self) -> [(&'static str, Vec<String>); 3] {
+        let beyond = self.limits.iter().flat_map(OfLimit::violations_in_words);
+        let undecided = self.limits.iter().flat_map(OfLimit::undecided_in_words);
         [
-            ("Violations", self.violations.iter().map(OfPair::<Violation<_>>::words).collect()),
-            ("Undecided", self.undecided.iter().map(OfPair::<Undecided<_>>::words).collect()),
+            ("Violations", self.violations.iter().map(OfPair::<Violation<_>>::words).chain(beyond).collect()),
+            ("Undecided", self.undecided.iter().map(OfPair::<Undecided<_>>::words).chain(undecided).collect()),
             ("Gaps", self.gaps.iter().map(OfVehicle::words).collect()),
         ]
     }
@@ -130,7 +143,7 @@ impl RecordedReport {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let mut line = |words: String| {
-            let _ = writeln!(text, "{words}");
+            let _ = writeln!(text, "{}", one_line(&words));
         };
         let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
         line(format!(
@@ -148,6 +161,10 @@ impl RecordedReport {
                 let (apart, at) = (interval(finding.lower_m, finding.upper_m), fixed(finding.time_s, 3));
                 line(format!("  {apart}  at {at} s  {first} and {second}"));
             }
+        }
+        if !self.limits.is_empty() {
+            line("limits on each vehicle".to_owned());
+            self.limits.iter().for_each(|limit| line(format!("  {}", limit.brief())));
         }
         for (heading, lines) in self.lists() {
             if !lines.is_empty() {
@@ -168,6 +185,14 @@ impl RecordedReport {
         let mut sections = vec![section("Replay", &[replay])];
         if !self.closest.is_empty() {
             sections.push(section("Closest pairs", &[closest_table(&self.closest)]));
+        }
+        if !self.limits.is_empty() {
+            let columns = ["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
+            let rows = self.limits.iter().map(OfLimit::row);
+            sections.push(section(
+                "Each vehicle by itself",
+                &[page::numbers("Limits, and who came nearest", &columns, rows)],
+            ));
         }
         if !figures.is_empty() {
             sections.push(section("Figures", &[page::figures(figures)]));
@@ -207,6 +232,11 @@ impl RecordedReport {
     }
 }
 
+/// Words with foreign names in them, on one line whatever the names hold.
+fn one_line(words: &str) -> String {
+    words.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
 /// The first of some lines, and how many more there are.
 fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
     let rest = lines.len().saturating_sub(most);
@@ -230,7 +260,7 @@ impl OfPair<Violation<ObjectPair>> {
 impl OfPair<Undecided<ObjectPair>> {
     pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
-        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", fixed(hz, 1)));
+        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
         let apart = if finding.upper_m.is_finite() {
             interval(finding.lower_m, finding.upper_m)
         } else {

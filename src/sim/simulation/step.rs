@@ -6,20 +6,30 @@ use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M};
 use super::Simulation;
 use crate::feedback::Feedback as _;
+use crate::law::{Law, Void};
 use crate::record::Event;
-use crate::scenario::MAX_HALVINGS;
+use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
 use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
 const SIDE_BY_SIDE_FROM: usize = 512;
 
+/// Into how many parts a step had to be cut, and whether that was enough.
+struct Fineness {
+    /// The fewest parts that were flown at once.
+    shortest: u64,
+    /// A part that cannot be halved was still too long for the law.
+    is_overlong: bool,
+}
+
 impl Simulation {
     /// Flies one step, in halves where it is refused.
     pub(super) fn advance(&mut self, step: u64) -> Result<(), Ending> {
         let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
-        let mut shortest = whole;
-        let flown = self.fly_parts(step, whole, &mut shortest);
+        let mut parts = Fineness { shortest: whole, is_overlong: false };
+        let flown = self.fly_parts(step, whole, &mut parts);
+        let Fineness { shortest, is_overlong } = parts;
         if shortest < whole && shortest != self.shortest {
             let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
             let dt_s = length_s * (shortest as f64 / whole as f64);
@@ -27,46 +37,54 @@ impl Simulation {
         }
         self.shortest = shortest;
         self.refined_steps += u64::from(shortest < whole);
+        if is_overlong && self.overlong_steps == 0 {
+            self.certificate = self.certificate.clone().void_where(true, Void::StepsTooLong);
+        }
+        self.overlong_steps += u64::from(is_overlong);
         flown
     }
 
-    /// Longest step that is honest at the present state \[s\]. Continuous time chooses its own.
-    fn longest_step_s(&self) -> f64 {
-        let (law, nearest_m) = (&self.controller.law, self.judge.nearest_m);
-        let rate_per_s = law.fastest_rate_per_s(Some(nearest_m), self.scenario.velocity_coefficient_per_s());
-        let rate_per_s = match law.obstacle_rate_squared(self.judge.room_m) {
-            0.0 => rate_per_s,
-            squared => rate_per_s.map(|rate_per_s| (rate_per_s.powi(2) + squared).sqrt()),
-        };
-        rate_per_s
-            .filter(|_| self.motion.holds_commands())
-            .map_or(f64::INFINITY, |rate_per_s| self.scenario.time.max_rate_dt / rate_per_s)
+    /// The law's fastest rate at the present state \[1/s\]; 0 in continuous time, which chooses its own steps.
+    fn rate_per_s(&self) -> f64 {
+        if !self.motion.holds_commands() {
+            return 0.0;
+        }
+        let Self { controller, scenario, judge, .. } = self;
+        rate_per_s(controller.law.as_ref(), scenario, (judge.nearest_m, judge.room_m))
     }
 
-    /// Flies the `whole` parts of a step, as many at once as are honest and not refused; the fewest at once are
-    /// `shortest`.
-    fn fly_parts(&mut self, step: u64, whole: u64, shortest: &mut u64) -> Result<(), Ending> {
+    /// Whether every part that the law asks for changes the motion: where a command is held for a period of its own, or
+    /// comes from outside, the vehicles move as they are commanded however long a part is.
+    fn follows_the_law(&self) -> bool {
+        !self.overruled && self.scenario.time.control_hz.is_none()
+    }
+
+    /// Flies the `whole` parts of a step, as many at once as are honest and not refused.
+    fn fly_parts(&mut self, step: u64, whole: u64, fineness: &mut Fineness) -> Result<(), Ending> {
         let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
         let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
         let (mut flown, mut part) = (0, whole);
         while flown < whole {
-            let longest_s = self.longest_step_s();
-            while part > 1 && seconds(part) > longest_s {
+            let rate_per_s = self.rate_per_s();
+            while part > 1 && seconds(part) * rate_per_s > self.scenario.time.max_rate_dt {
                 part /= 2;
-                *shortest = part.min(*shortest);
+                fineness.shortest = part.min(fineness.shortest);
             }
             self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();
-            if part > 1 && (bend_m > MAX_BEND_M || self.is_refused()) {
+            let (is_refused, most_rate_per_s) = self.refuses(seconds(part), rate_per_s);
+            if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
                 self.motion.restore(&self.state);
                 self.controller.link.forget_after(self.time_s);
                 part /= 2;
-                *shortest = part.min(*shortest);
+                fineness.shortest = part.min(fineness.shortest);
                 continue;
             }
             if bend_m > MAX_BEND_M {
                 return Err(Breakdown::Bent { step, bend_m }.into());
             }
+            let is_honest = seconds(part) * most_rate_per_s <= TimeSpec::DEFAULT_MAX_RATE_DT;
+            fineness.is_overlong |= (is_refused || !is_honest) && self.follows_the_law();
             flown += part;
             let from_s = self.time_s;
             if flown == whole {
@@ -98,9 +116,23 @@ impl Simulation {
         }
     }
 
-    fn is_refused(&mut self) -> bool {
-        let Controller { law, links, .. } = &self.controller;
-        self.judge.refuses(law.as_ref(), links, &self.state, &self.path, &self.next)
+    /// Whether the move that was just made is to be made in halves: it comes too near to the barrier, or to where the law is
+    /// too fast for a step of this length \[s\]. Behind it the fastest rate that the law had on the way \[1/s\], at most; that at
+    /// its start where the law has no barrier.
+    fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
+        let Self { controller: Controller { law, links, .. }, judge, state, path, next, scenario, motion, .. } = self;
+        let law = law.as_ref();
+        let Some(barrier_m) = law.barrier_m().filter(|_| motion.holds_commands()) else {
+            return (judge.refuses(law, links, state, path, next), at_start_per_s);
+        };
+        let (room_m, most) = (judge.room_m, scenario.time.max_rate_dt.min(TimeSpec::DEFAULT_MAX_RATE_DT));
+        let rate = |nearest_m: f64, moved_m: f64| rate_per_s(law, scenario, (nearest_m, room_m - moved_m));
+        let enough =
+            |nearest_m: f64, moved_m: f64| nearest_m > barrier_m && rate(nearest_m, moved_m) * length_s <= most;
+        let (nearest_m, moved_m) = judge.nearest_over((law, links), (state, path, next), enough);
+        let most_rate_per_s = rate(nearest_m, moved_m);
+        let is_too_fast = most_rate_per_s * length_s > scenario.time.max_rate_dt;
+        (is_too_fast || judge.refuses(law, links, state, path, next), most_rate_per_s)
     }
 
     /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
@@ -123,6 +155,7 @@ impl Simulation {
             self.motion.apply(&self.control, &mut self.state);
         }
         let Self { judge, controller, state, control, time_s, events, .. } = self;
+        let may_move = !controller.law.stays_in_its_thread();
         let (state, time_s): (&Swarm, f64) = (state, *time_s);
         let mut audit = || {
             let began = Instant::now();
@@ -137,7 +170,7 @@ impl Simulation {
             let began = Instant::now();
             (controller.act(time_s, state, is_asked.then_some(control)), began.elapsed())
         };
-        let side_by_side = state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
+        let side_by_side = may_move && state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
         let ((judged, audit_time), (commanded, law_time)) =
             if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
         self.performance.audit += audit_time;
@@ -178,5 +211,14 @@ impl Simulation {
         self.watch.take(self.controller.target.view().revision, self.energy);
         self.peaks.take(largest_row_norm(&self.control), self.energy);
         Ok(())
+    }
+}
+
+/// The fastest rate of a law \[1/s\] where no two are nearer and no obstacle leaves less room \[m\].
+fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, room_m): (f64, f64)) -> f64 {
+    let of_pairs = law.fastest_rate_per_s(Some(nearest_m), scenario.velocity_coefficient_per_s()).unwrap_or(0.0);
+    match law.obstacle_rate_squared(room_m) {
+        0.0 => of_pairs,
+        squared => (of_pairs.powi(2) + squared).sqrt(),
     }
 }

@@ -1,0 +1,19 @@
+#!/bin/sh
+# Packs the program for one system: sh .github/package.sh PROGRAM TARGET FOLDER
+# FOLDER gets tautline-VERSION-TARGET.tar.gz and its SHA-256.
+set -eu
+[ $# = 3 ] || { echo "usage: package.sh PROGRAM TARGET FOLDER" >&2; exit 2; }
+program=$1 target=$2 folder=$3
+root=$(cd "$(dirname "$0")/.." && pwd)
+version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$root/Cargo.toml" | head -n 1)
+name=tautline-$version-$target
+
+mkdir -p "$folder"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir "$work/$name"
+cp "$program" "$root/README.md" "$root/CHANGELOG.md" "$root/LICENSE-MIT" "$root/LICENSE-APACHE" "$work/$name/"
+tar -czf "$folder/$name.tar.gz" -C "$work" "$name"
+cd "$folder"
+if command -v sha256sum >/dev/null; then sha256sum "$name.tar.gz"; else shasum -a 256 "$name.tar.gz"; fi >"$name.tar.gz.sha256"
+echo "$folder/$name.tar.gz"

@@ -1,0 +1,10 @@
+# The program without viewer: docker build -t tautline .
+FROM rust:1-bookworm AS build
+WORKDIR /tautline
+COPY . .
+RUN cargo build --release --locked --no-default-features --features program
+
+FROM debian:bookworm-slim
+COPY --from=build /tautline/target/release/tautline /usr/local/bin/tautline
+WORKDIR /data
+ENTRYPOINT ["tautline"]

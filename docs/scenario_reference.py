@@ -1,0 +1,222 @@
+"""Makes docs/scenario.md of the schema of the program:
+
+    tautline schema | python3 docs/scenario_reference.py > docs/scenario.md
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any, Iterator
+
+Schema = dict[str, Any]
+
+HEAD = """\
+# Scenario reference
+
+Every key of a scenario file: [ten-minutes.md](ten-minutes.md) flies one, `tautline list --show pentagon` prints one to start from, and
+`tautline schema` prints the JSON Schema that this page is made of by `docs/scenario_reference.py`. An editor that knows the schema
+completes and checks as you type. An unknown key is refused with its line, its column and the nearest name; so is a value out of range.
+
+`tautline run`, `check`, `margin`, `attack` and `compare` set any key for one run: `--set time.duration_s=20`,
+`--set 'start={shape="grid", spacing_m=2}'`, `--set start.positions_m.4.x=-1`. Lists count from 1.
+
+*Unit* is that of the key's name. *Default* is what stands where the key does not; `needed` says that the key has to be there, and `-`
+that nothing does, or what the last column says. *Range* says which values are taken; what it does not say is checked all the same, and
+refused with a remedy.
+"""
+
+# The order in which a flight is told; what the schema has and this list does not, comes last.
+ORDER = (
+    "name swarm start formation leg law laws graph reference breathing arrival obstacle safety vehicle wind sensing network "
+    "actuation failure noise time plant"
+).split()
+
+# Ends of names and what they say, longest first.
+UNITS = {
+    "_n_per_rpm2": "N/rpm^2", "_n_per_rpm": "N/rpm", "_n_s2_m2": "N s^2/m^2", "_m4_per_s2": "m^4/s^2", "_s_per_m2": "s/m^2",
+    "_n_s_m": "N s/m", "_per_s2": "1/s^2", "_kg_m2": "kg m^2", "_per_s": "1/s", "_m_s2": "m/s^2", "_rad_s": "rad/s", "_m_s": "m/s",
+    "_deg": "degrees", "_hz": "Hz", "_kg": "kg", "_m": "m", "_s": "s", "_n": "N",
+}  # fmt: skip
+UNNAMED = {"alpha": "m^2/s^2"}
+
+COLUMNS = "| key | type | unit | default | range | what it means |\n| --- | --- | --- | --- | --- | --- |"
+
+
+class Reference:
+    """The page, made of a schema."""
+
+    def __init__(self, schema: Schema) -> None:
+        self.schema = schema
+        self.definitions: dict[str, Schema] = schema["$defs"]
+
+    def page(self) -> str:
+        keys: dict[str, Schema] = self.schema["properties"]
+        names = [name for name in ORDER if name in keys] + [name for name in keys if name not in ORDER]
+        tables = [name for name in names if self.is_table(keys[name]) and not keys[name].get("deprecated")]
+        plain = {name: keys[name] for name in names if name not in tables}
+        required = self.schema["required"]
+        parts = [HEAD, "## The file\n", self.rows(plain, required), ""]
+        parts.append(f"The tables {listed([f'[`[{name}]`](#{name})' for name in required], 'and')} are needed, and no others.\n")
+        for name in tables:
+            parts.extend(self.section(name, keys[name], 2))
+        return "\n".join(parts)
+
+    def section(self, path: str, use: Schema, level: int) -> Iterator[str]:
+        """A table of the file, and then the tables in it."""
+        table = self.followed(use)
+        several = table.get("type") == "array"
+        table = self.followed(table["items"]) if several else table
+        table, both = self.one_of_several(table)
+        yield f"{'#' * level} {self.heading(path, several)}\n"
+        used, own = sentence(use.get("description", "")), sentence(table.get("description", ""))
+        yield max(used, own, key=len) + (" A `[[table]]` for each, or a list." if both else "") + "\n"
+        values = table.get("additionalProperties")
+        if isinstance(values, dict):
+            table = self.followed(values)
+        yield from self.keys(path, table, level)
+
+    def keys(self, path: str, table: Schema, level: int) -> Iterator[str]:
+        keys: dict[str, Schema] = table.get("properties", {})
+        common = self.rows(keys, table.get("required", []))
+        variants = self.variants(table)
+        if keys:
+            yield common + "\n"
+        if variants:
+            yield from self.varied(path, table, variants)
+        for name, key in keys.items():
+            if self.is_table(key):
+                yield from self.section(f"{path}.{name}", key, min(level + 1, 3))
+
+    def varied(self, path: str, table: Schema, variants: list[Schema]) -> Iterator[str]:
+        """The keys that depend on the value of one of them."""
+        said = next((name for name in ("formation", "law") if name != path and self.same(name, variants)), None)
+        if said:
+            tag = self.tag(variants[0])
+            yield f"{'Beside these, ' if table.get('properties') else ''}`{tag}` with the keys of its own, as in [`[{said}]`](#{said}).\n"
+            return
+        tag = self.tag(variants[0])
+        names = [variant["properties"][tag]["const"] for variant in variants]
+        yield f"`{tag}` is {alternatives(names)}. The keys below each are its own.\n"
+        rows = [COLUMNS]
+        for name, variant in zip(names, variants):
+            default = "" if tag in variant.get("required", []) else f" This is what stands where no `{tag}` is given."
+            rows.append(f"| **`{tag} = \"{name}\"`** | | | | | {cell(variant['description'])}{default} |")
+            own = {key: value for key, value in variant["properties"].items() if key != tag}
+            rows += [self.row(key, value, key in variant.get("required", [])) for key, value in own.items()]
+        yield "\n".join(rows) + "\n"
+
+    def rows(self, keys: dict[str, Schema], required: list[str]) -> str:
+        return "\n".join([COLUMNS, *(self.row(name, key, name in required) for name, key in keys.items())])
+
+    def row(self, name: str, key: Schema, needed: bool) -> str:
+        kind = self.followed(key)
+        default = "needed" if needed else f"`{toml(key['default'])}`" if "default" in key else "-"
+        words = [cell(key.get("description") or kind.get("description", ""))]
+        words += [f"`{one['const']}`: {cell(one['description'])}" for one in self.words(kind)]
+        range_ = self.range_of(kind)
+        return f"| `{name}` | {self.type_of(key)} | {unit(name, kind)} | {default} | {range_} | {'<br>'.join(words)} |"
+
+    def type_of(self, key: Schema) -> str:
+        kind = self.followed(key)
+        if "anyOf" in kind and not self.variants(kind):
+            return alternatives([self.type_of(one) for one in kind["anyOf"]], quoted=False)
+        if self.is_table(key):
+            return "list of tables" if kind.get("type") == "array" else "table"
+        if self.words(kind):
+            return "word"
+        if kind["type"] == "array":
+            few = kind.get("minItems"), kind.get("maxItems")
+            count = "" if few == (None, None) else f"{few[0]} " if few[0] == few[1] else f"{few[0]} to {few[1]} "
+            return f"list of {count}{plural(self.type_of(kind['items']))}"
+        return {"number": "number", "integer": "whole number", "boolean": "`true` or `false`", "string": "text"}[kind["type"]]
+
+    def range_of(self, kind: Schema) -> str:
+        if "anyOf" in kind:
+            return next((said for one in kind["anyOf"] if (said := self.range_of(self.followed(one)))), "")
+        if kind.get("type") == "array":
+            return self.range_of(self.followed(kind["items"]))
+        if words := self.words(kind):
+            return ", ".join(f"`{one['const']}`" for one in words)
+        if "maxLength" in kind:
+            letters = f", of `{kind['pattern']}`" if "pattern" in kind else ""
+            return f"{kind.get('minLength', 0)} to {kind['maxLength']} characters{letters}"
+        low = f"> {kind['exclusiveMinimum']:g}" if "exclusiveMinimum" in kind else ""
+        low = f">= {kind['minimum']:g}" if "minimum" in kind else low
+        if "maximum" in kind:
+            return f"{kind['minimum']:g} to {kind['maximum']:g}" if "minimum" in kind else f"<= {kind['maximum']:g}"
+        return low
+
+    def heading(self, path: str, several: bool) -> str:
+        return f"`[[{path}]]`" if several else f"`[{path}]`"
+
+    def one_of_several(self, table: Schema) -> tuple[Schema, bool]:
+        """The table where one of them or a list of them is taken, and whether a list is."""
+        options = [self.followed(one) for one in table.get("anyOf", [])]
+        found = [one for one in options if "properties" in one]
+        lists = any(one.get("type") == "array" for one in options)
+        return (found[0], lists) if len(found) == 1 and "properties" not in table else (table, False)
+
+    def variants(self, table: Schema) -> list[Schema]:
+        """The tables that the value of one key tells apart."""
+        options = table.get("oneOf", [])
+        for one in table.get("anyOf", []):
+            options = options or one.get("oneOf", [])
+        options = options or table.get("anyOf", [])
+        return options if options and all("properties" in one for one in options) else []
+
+    def same(self, name: str, variants: list[Schema]) -> bool:
+        there = self.variants(self.followed(self.schema["properties"][name]))
+        return [one["properties"] for one in there] == [one["properties"] for one in variants]
+
+    @staticmethod
+    def tag(variant: Schema) -> str:
+        return next(name for name, key in variant["properties"].items() if "const" in key)
+
+    def words(self, kind: Schema) -> list[Schema]:
+        options = kind.get("oneOf", [])
+        return options if all("const" in one for one in options) else []
+
+    def is_table(self, key: Schema) -> bool:
+        kind = self.followed(key)
+        if kind.get("type") == "array":
+            return self.is_table(kind["items"])
+        if "anyOf" in kind and "properties" not in kind and not self.variants(kind):
+            return any(self.is_table(one) for one in kind["anyOf"])
+        return "properties" in kind or bool(self.variants(kind)) or isinstance(kind.get("additionalProperties"), dict)
+
+    def followed(self, key: Schema) -> Schema:
+        return self.definitions[key["$ref"].rsplit("/", 1)[1]] if "$ref" in key else key
+
+
+def unit(name: str, kind: Schema) -> str:
+    return UNNAMED.get(name) or next((said for end, said in UNITS.items() if name.endswith(end)), "")
+
+
+def plural(said: str) -> str:
+    many = {"number": "numbers", "whole number": "whole numbers", "table": "tables", "word": "words", "text": "texts"}
+    return many.get(said, said.replace("list", "lists", 1))
+
+
+def alternatives(names: list[str], quoted: bool = True) -> str:
+    return listed([f'`"{name}"`' for name in names] if quoted else names, "or")
+
+
+def listed(names: list[str], last: str) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}"
+
+
+def toml(value: Any) -> str:
+    return json.dumps(value)
+
+
+def sentence(words: str) -> str:
+    return " ".join(words.split())
+
+
+def cell(words: str) -> str:
+    return sentence(words).replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    sys.stdout.write(Reference(json.load(sys.stdin)).page())

@@ -1,0 +1,117 @@
+//! Arrays of positions as a recording: borrowed, looked at an instant at a time.
+
+use numpy::ndarray::{ArrayView1, ArrayView3};
+use tautline::read::{Fault, Place, ReadError};
+use tautline::track::{Clock, Item, Sample, Tracks};
+
+/// Items that are made at a time, about: few enough to stay near the processor.
+const BATCH: usize = 4096;
+
+/// Positions, and velocities where there are any, of N vehicles at T instants.
+#[derive(Clone)]
+pub(crate) struct Arrays<'a> {
+    /// T times \[s\].
+    pub(crate) times_s: ArrayView1<'a, f64>,
+    /// T x N x 3 (or x 2, in the plane z = 0) \[m\]; NaN where a vehicle was not seen.
+    pub(crate) positions_m: ArrayView3<'a, f64>,
+    /// As positions \[m/s\]; NaN where not known.
+    pub(crate) velocities_m_s: Option<ArrayView3<'a, f64>>,
+    /// A name for each vehicle.
+    pub(crate) names: &'a [String],
+    /// What should be said of them, a sentence each.
+    pub(crate) notes: &'a [String],
+    clock: Clock,
+    /// The next instant.
+    at: usize,
+}
+
+impl<'a> Arrays<'a> {
+    pub(crate) fn new(
+        times_s: ArrayView1<'a, f64>,
+        positions_m: ArrayView3<'a, f64>,
+        velocities_m_s: Option<ArrayView3<'a, f64>>,
+        names: &'a [String],
+        notes: &'a [String],
+    ) -> Self {
+        let clock = Clock { unit: "s", ..Clock::default() };
+        Self { times_s, positions_m, velocities_m_s, names, notes, clock, at: 0 }
+    }
+
+    /// The next instant, appended to `items`.
+    fn instant(&mut self, items: &mut Vec<Item>) -> Result<(), ReadError> {
+        let (k, time_s) = (self.at, self.times_s[self.at]);
+        let wrong = |place: String, problem: String, remedy: &str| ReadError {
+            file: "arrays".to_owned(),
+            place: Some(Place::Part(place)),
+            fault: Fault::Content { problem, remedy: remedy.to_owned() },
+        };
+        if !time_s.is_finite() {
+            return Err(wrong(format!("t[{k}]"), format!("it is {time_s}"), "times are finite: take the instant out"));
+        }
+        if let Some(before_s) = k.checked_sub(1).map(|before| self.times_s[before]).filter(|before| *before >= time_s) {
+            let how = if before_s == time_s { "is repeated" } else { "runs backwards" };
+            let problem = format!("time {how}: {time_s} s comes after {before_s} s");
+            return Err(wrong(format!("t[{k}]"), problem, "sort the instants by time, and take repeated ones out"));
+        }
+        for vehicle in 0..self.positions_m.shape()[1] {
+            let position = vector(&self.positions_m, k, vehicle);
+            let velocity = self.velocities_m_s.as_ref().map(|of| vector(of, k, vehicle));
+            if position.iter().all(|x| x.is_finite()) {
+                let velocity = velocity.filter(|of| !of.iter().all(|x| x.is_nan()));
+                if let Some(odd) = velocity.and_then(|of| of.into_iter().find(|x| !x.is_finite())) {
+                    let remedy = "velocities are finite, or NaN in every axis where they are not known";
+                    return Err(wrong(format!("velocities[{k}, {vehicle}]"), format!("it holds {odd}"), remedy));
+                }
+                items.push(Item::Sample(Sample {
+                    vehicle,
+                    time_s,
+                    position_m: position.into(),
+                    velocity_m_s: velocity.map(Into::into),
+                    radius_m: None,
+                }));
+            } else if !is_unseen(&self.positions_m, k, vehicle) {
+                let odd = position.into_iter().find(|x| !x.is_finite()).unwrap_or_default();
+                let remedy = "positions are finite, or NaN in every axis where a vehicle was not seen";
+                return Err(wrong(format!("positions[{k}, {vehicle}]"), format!("it holds {odd}"), remedy));
+            }
+        }
+        self.at += 1;
+        Ok(())
+    }
+}
+
+/// The vector of a vehicle at an instant; what a plane lacks is 0.
+#[inline]
+fn vector(of: &ArrayView3<'_, f64>, instant: usize, vehicle: usize) -> [f64; 3] {
+    let z = if of.shape()[2] == 3 { of[(instant, vehicle, 2)] } else { 0.0 };
+    [of[(instant, vehicle, 0)], of[(instant, vehicle, 1)], z]
+}
+
+/// Whether it is NaN in every axis.
+fn is_unseen(of: &ArrayView3<'_, f64>, instant: usize, vehicle: usize) -> bool {
+    (0..of.shape()[2]).all(|axis| of[(instant, vehicle, axis)].is_nan())
+}
+
+impl Tracks for Arrays<'_> {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        self.names
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        let (from, before) = (self.at, items.len());
+        while self.at < self.times_s.len() && items.len() < before + BATCH {
+            self.instant(items)?;
+        }
+        Ok(self.at > from)
+    }
+
+    fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    fn notes(&self) -> &[String] {
+        self.notes
+    }
+}

@@ -1,0 +1,127 @@
+//! Audits of arrays and of files.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use numpy::ndarray::{Ix1, Ix3};
+use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods as _};
+use pyo3::prelude::*;
+use tautline::audit::recorded::{self, Settings};
+use tautline::cli::{self, Held};
+use tautline::report::recorded::RecordedReport;
+use tautline::track::Tracks as _;
+
+use crate::arrays::Arrays;
+use crate::errors::{Raised, broken, wrong};
+use crate::numbers::{borrowed, shown};
+use crate::work::away;
+
+/// The verdict in words, the headline, the summary, and the report as JSON.
+type Judged = (String, String, String, String);
+
+fn judged(report: &RecordedReport) -> PyResult<Judged> {
+    let json = serde_json::to_string(report).map_err(|error| broken(&error.to_string()))?;
+    Ok((report.verdict(), report.headline(), report.text(), json))
+}
+
+/// The arrays that are judged.
+struct Given<'py> {
+    times: PyReadonlyArray1<'py, f64>,
+    positions: PyReadonlyArray3<'py, f64>,
+    velocities: Option<PyReadonlyArray3<'py, f64>>,
+}
+
+impl<'py> Given<'py> {
+    fn new(
+        times: &Bound<'py, PyAny>,
+        positions: &Bound<'py, PyAny>,
+        velocities: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let given = Self {
+            times: borrowed::<Ix1>(times, "t", "(T,)")?,
+            positions: borrowed::<Ix3>(positions, "positions", "(T, N, 3) or (T, N, 2)")?,
+            velocities: velocities.map(|of| borrowed::<Ix3>(of, "velocities", "(T, N, 3)")).transpose()?,
+        };
+        given.check()?;
+        Ok(given)
+    }
+
+    fn check(&self) -> PyResult<()> {
+        let (instants, shape) = (self.times.len(), self.positions.shape());
+        if !matches!(shape[2], 2 | 3) {
+            let shape = shown(shape);
+            return Err(wrong(format!("positions: the last axis is x, y and z, or x and y; the shape is {shape}")));
+        }
+        if shape[0] != instants {
+            let help = if shape[1] == instants { "; the first axis is time: give .swapaxes(0, 1)" } else { "" };
+            return Err(wrong(format!("positions: they are of shape {} for {instants} times{help}", shown(shape))));
+        }
+        if let Some(velocities) = self.velocities.as_ref().filter(|of| of.shape() != shape) {
+            let (found, expected) = (shown(velocities.shape()), shown(shape));
+            return Err(wrong(format!("velocities: they are of shape {found}, and positions of shape {expected}")));
+        }
+        if self.positions.len() == 0 {
+            let shape = shown(shape);
+            return Err(wrong(format!("positions: they are of shape {shape}, which holds nothing to judge")));
+        }
+        Ok(())
+    }
+}
+
+/// Judges arrays of positions as the words of `tautline audit` ask.
+#[pyfunction]
+#[pyo3(signature = (words, command, times, positions, velocities, names))]
+pub(crate) fn audit<'py>(
+    py: Python<'py>,
+    words: Vec<String>,
+    command: &str,
+    times: Option<&Bound<'py, PyAny>>,
+    positions: Option<&Bound<'py, PyAny>>,
+    velocities: Option<&Bound<'py, PyAny>>,
+    names: Vec<String>,
+) -> PyResult<Judged> {
+    let interrupted = Arc::default();
+    let (Some(times), Some(positions)) = (times, positions) else {
+        let report = away(py, &interrupted, || cli::judge(&words, None, &interrupted))?;
+        return judged(&report.map_err(Raised::raised)?);
+    };
+    let given = Given::new(times, positions, velocities)?;
+    if names.len() != given.positions.shape()[1] {
+        return Err(wrong(format!("names: {} for {} vehicles", names.len(), given.positions.shape()[1])));
+    }
+    let (times, positions) = (given.times.as_array(), given.positions.as_array());
+    let velocities = given.velocities.as_ref().map(PyReadonlyArray3::as_array);
+    let is_plane = positions.shape()[2] == 2;
+    let notes: Vec<String> =
+        is_plane.then(|| "positions have two columns: z is taken as 0".to_owned()).into_iter().collect();
+    let arrays = Arrays::new(times, positions, velocities, &names, &notes);
+    let work = || {
+        let held = Held { command, open: &|| Ok(Box::new(arrays.clone())) };
+        cli::judge(&words, Some(&held), &interrupted)
+    };
+    let report = away(py, &interrupted, work)?;
+    judged(&report.map_err(Raised::raised)?)
+}
+
+/// How long the library takes in Rust \[s\] to judge the same positions, at first as items that it made before, then with the
+/// time to make them: what `bench/ratios.py` compares `audit` with.
+#[pyfunction]
+pub(crate) fn audit_in_rust(
+    times: &Bound<'_, PyAny>,
+    positions: &Bound<'_, PyAny>,
+    delta_m: f64,
+) -> PyResult<(f64, f64)> {
+    let given = Given::new(times, positions, None)?;
+    let names: Vec<_> = (1..=given.positions.shape()[1]).map(|number| number.to_string()).collect();
+    let began = Instant::now();
+    let mut items = Vec::with_capacity(given.positions.len() / 3);
+    let mut arrays = Arrays::new(given.times.as_array(), given.positions.as_array(), None, &names, &[]);
+    while arrays.read(&mut items).map_err(|error| wrong(error.to_string()))? {}
+    let made_s = began.elapsed().as_secs_f64();
+    let began = Instant::now();
+    let outcome =
+        recorded::audit(&names, &items, Settings::delta(delta_m)).map_err(|error| wrong(error.to_string()))?;
+    let judged_s = began.elapsed().as_secs_f64();
+    drop(outcome);
+    Ok((judged_s, made_s + judged_s))
+}

@@ -1,0 +1,63 @@
+//! Errors of the library as exceptions.
+
+use pyo3::create_exception;
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use tautline::cli::Refusal;
+use tautline::preflight::Preflight;
+use tautline::scenario::ScenarioError;
+use tautline::sim::SimError;
+
+create_exception!(
+    tautline,
+    Error,
+    PyValueError,
+    "The input is wrong: the message names the place, the value and the remedy, as the command line does."
+);
+
+/// The input is wrong.
+pub(crate) fn wrong(message: impl Into<String>) -> PyErr {
+    Error::new_err(message.into())
+}
+
+/// Something is not of the type that it must be.
+pub(crate) fn wrong_type(message: impl Into<String>) -> PyErr {
+    PyTypeError::new_err(message.into())
+}
+
+/// The library broke a promise.
+pub(crate) fn broken(what: &str) -> PyErr {
+    PyRuntimeError::new_err(format!("tautline failed inside, please report it: {what}"))
+}
+
+/// The library's errors, which another crate's exceptions cannot be made of by `From`.
+pub(crate) trait Raised {
+    /// The exception that says the same.
+    fn raised(self) -> PyErr;
+}
+
+impl Raised for Refusal {
+    fn raised(self) -> PyErr {
+        if self.is_machine { PyOSError::new_err(self.message) } else { wrong(self.message) }
+    }
+}
+
+impl Raised for ScenarioError {
+    fn raised(self) -> PyErr {
+        wrong(self.to_string())
+    }
+}
+
+impl Raised for SimError {
+    fn raised(self) -> PyErr {
+        match self {
+            Self::Record(error) => PyOSError::new_err(error.to_string()),
+            error => wrong(error.to_string()),
+        }
+    }
+}
+
+/// What is known before the first step, as JSON.
+pub(crate) fn json(answer: &Preflight) -> PyResult<String> {
+    serde_json::to_string(answer).map_err(|error| broken(&error.to_string()))
+}

@@ -1,0 +1,172 @@
+//! Whole flights.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use numpy::{PyArray1, PyArray3};
+use pyo3::exceptions::PyOSError;
+use pyo3::prelude::*;
+use tautline::cli::{Film, RunHistory, flight_page};
+use tautline::preflight::Preflight;
+use tautline::record::mcap::{Header, McapRecorder};
+use tautline::record::{Event, RecordError, Sample, Sink};
+use tautline::report::Report;
+use tautline::run::run_with;
+use tautline::sim::{Breakdown, Ending, Parts, SimError};
+
+use crate::errors::{Raised as _, broken, wrong};
+use crate::law::PythonLaw;
+use crate::numbers::{by_row, cube};
+use crate::scenario::Scenario;
+use crate::work::{Signals, here};
+
+/// The samples of a flight, in memory.
+#[derive(Default)]
+struct Samples {
+    is_kept: bool,
+    vehicles: usize,
+    times_s: Vec<f64>,
+    positions_m: Vec<f64>,
+    velocities_m_s: Vec<f64>,
+    commands_m_s2: Vec<f64>,
+    separations_m: Vec<f64>,
+}
+
+impl Sink for Samples {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        if !self.is_kept {
+            return Ok(());
+        }
+        self.times_s.push(sample.time_s);
+        self.positions_m.extend(by_row(&sample.swarm.positions_m));
+        self.velocities_m_s.extend(by_row(&sample.swarm.velocities_m_s));
+        self.commands_m_s2.extend(by_row(sample.control));
+        // There is no command where the law had none.
+        self.commands_m_s2.resize(self.positions_m.len(), f64::NAN);
+        self.separations_m.push(sample.separation.map_or(f64::NAN, |closest| closest.separation_m));
+        Ok(())
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
+}
+
+/// What a flight gives back: its report in words and as JSON, and its samples.
+#[pyclass(frozen, get_all, module = "tautline._native")]
+pub(crate) struct Flown {
+    passed: bool,
+    headline: String,
+    text: String,
+    report: String,
+    t: Py<PyArray1<f64>>,
+    positions: Py<PyArray3<f64>>,
+    velocities: Py<PyArray3<f64>>,
+    commands: Py<PyArray3<f64>>,
+    separations_m: Py<PyArray1<f64>>,
+}
+
+impl Flown {
+    fn new(py: Python<'_>, report: &Report, samples: Samples) -> PyResult<Self> {
+        let shape = [samples.times_s.len(), samples.vehicles, 3];
+        Ok(Self {
+            passed: report.verdict.pass,
+            headline: report.headline(),
+            text: report.text(),
+            report: serde_json::to_string(report).map_err(|error| broken(&error.to_string()))?,
+            t: PyArray1::from_vec(py, samples.times_s).unbind(),
+            positions: cube(py, samples.positions_m, shape)?.unbind(),
+            velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
+            commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
+            separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
+        })
+    }
+}
+
+/// Where what is recorded goes beside memory.
+#[derive(Default)]
+struct Beside {
+    recording: Option<McapRecorder>,
+    page: Option<(RunHistory, Film)>,
+}
+
+impl Sink for Beside {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.recording.as_mut().map_or(Ok(()), |recording| recording.sample(sample))?;
+        self.page.as_mut().map_or(Ok(()), |page| page.sample(sample))
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        self.recording.as_mut().map_or(Ok(()), |recording| recording.event(event))?;
+        self.page.as_mut().map_or(Ok(()), |page| page.event(event))
+    }
+
+    fn step(&mut self, step: &tautline::record::Step<'_>) {
+        if let Some(page) = &mut self.page {
+            page.step(step);
+        }
+    }
+
+    fn looks_at_steps(&self) -> bool {
+        self.page.as_ref().is_some_and(Sink::looks_at_steps)
+    }
+}
+
+/// Flies a scenario to its end, under a law in Python where one is given.
+#[pyfunction]
+#[pyo3(signature = (scenario, law, record, html, command, keep))]
+pub(crate) fn fly(
+    py: Python<'_>,
+    scenario: &Scenario,
+    law: Option<&Bound<'_, PyAny>>,
+    record: Option<PathBuf>,
+    html: Option<PathBuf>,
+    command: &str,
+    keep: bool,
+) -> PyResult<Flown> {
+    let scenario = &scenario.scenario;
+    let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
+    let raising = law.as_ref().map(PythonLaw::raising);
+    let samples = Samples { is_kept: keep, vehicles: scenario.count(), ..Samples::default() };
+    let mut signals = Signals::new();
+    let flown = here(py, || -> Result<_, SimError> {
+        let preflight = match &law {
+            Some(law) => Preflight::under(scenario, law),
+            None => Preflight::of(scenario)?,
+        };
+        let parts = match law {
+            Some(law) => Parts::under(scenario, Box::new(law)),
+            None => Parts::of(scenario)?,
+        };
+        let recording = record.as_deref().map(|path| {
+            let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+            McapRecorder::create(path, &header)
+        });
+        let page = html.is_some().then(|| (RunHistory::new().scaled_by(scenario.metric()), Film::new()));
+        let mut sinks = (samples, Beside { recording: recording.transpose()?, page });
+        let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+        let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
+        let (samples, Beside { recording, page }) = sinks;
+        let closed = recording.map_or(Ok(()), McapRecorder::finish);
+        let (report, ending) = flown?;
+        closed?;
+        let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));
+        Ok((report, ending, samples, page))
+    })?;
+    if let Some(raised) = signals.raised.or_else(|| raising.as_ref()?.take()) {
+        return Err(raised);
+    }
+    let (report, ending, samples, page) = flown.map_err(SimError::raised)?;
+    if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), Some(_)) = (&ending, &raising) {
+        return Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")));
+    }
+    if let (Some(page), Some(path)) = (page, html) {
+        tautline::report::write_atomically(&path, page.as_bytes())
+            .map_err(|error| PyOSError::new_err(error.to_string()))?;
+    }
+    Flown::new(py, &report, samples)
+}

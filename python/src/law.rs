@@ -1,0 +1,128 @@
+//! Laws that are written in Python.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use numpy::ndarray::Ix2;
+use numpy::{PyArray1, PyArrayMethods as _, PyUntypedArrayMethods as _};
+use pyo3::intern;
+use pyo3::prelude::*;
+use tautline::law::{Controls, Law, LawError};
+use tautline::observation;
+use tautline::scenario::Scenario;
+use tautline::swarm::Rows;
+
+use crate::errors::{wrong, wrong_type};
+use crate::numbers::{borrowed, shown};
+use crate::observation::Observation;
+
+/// A law whose answers come from an object's method `control(obs, out)`.
+///
+/// Clones ask the same object: what it remembers is its own, and no simulation saves it.
+#[derive(Clone)]
+pub(crate) struct PythonLaw {
+    name: String,
+    sensing_range_m: Option<f64>,
+    controls: Controls,
+    asked: Arc<Asked>,
+}
+
+/// The object, and what it raised.
+struct Asked {
+    control: Py<PyAny>,
+    raised: Mutex<Option<PyErr>>,
+}
+
+/// What a law raised, to be raised again.
+#[derive(Clone)]
+pub(crate) struct Raising(Arc<Asked>);
+
+impl Raising {
+    pub(crate) fn take(&self) -> Option<PyErr> {
+        self.0.raised.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+impl PythonLaw {
+    /// The law of an object that has a method `control`, and may have `name`, `sensing_range_m` and `reaches`.
+    pub(crate) fn new(object: &Bound<'_, PyAny>, scenario: &Scenario) -> PyResult<Self> {
+        let py = object.py();
+        let control = object.getattr_opt(intern!(py, "control"))?.filter(PyAnyMethods::is_callable);
+        let Some(control) = control else {
+            let kind = object.get_type().qualname()?;
+            return Err(wrong_type(format!(
+                "law: {kind} has no method control(obs, out); derive it from tautline.Law"
+            )));
+        };
+        let given = |name: &str| PyResult::Ok(object.getattr_opt(name)?.filter(|value| !value.is_none()));
+        let name = match given("name")? {
+            Some(name) => name.extract::<String>()?,
+            None => object.get_type().qualname()?.to_string(),
+        };
+        if scenario.law().is_ok_and(|own| own.name() == name) {
+            return Err(wrong(format!("law: `{name}` is the name of the scenario's own law; give it another `name`")));
+        }
+        let sensing_range_m = given("sensing_range_m")?.map(|range| range.extract::<f64>()).transpose()?;
+        if let Some(range_m) = sensing_range_m.filter(|range_m| !(range_m.is_finite() && *range_m > 0.0)) {
+            return Err(wrong(format!("law: sensing_range_m is {range_m}; it must be a positive number of metres")));
+        }
+        let controls = match given("reaches")?.map(|reaches| reaches.extract::<String>()).transpose()?.as_deref() {
+            None | Some("displacements") => Controls::Displacements,
+            Some("distances") => Controls::Distances,
+            Some("places") => Controls::Places,
+            Some(other) => {
+                let message = format!("law: reaches is `{other}`; it is `places`, `displacements` or `distances`");
+                return Err(wrong(message));
+            }
+        };
+        let asked = Asked { control: control.unbind(), raised: Mutex::default() };
+        Ok(Self { name, sensing_range_m, controls, asked: Arc::new(asked) })
+    }
+
+    /// Where what it raises is to be found.
+    pub(crate) fn raising(&self) -> Raising {
+        Raising(Arc::clone(&self.asked))
+    }
+
+    fn ask(&self, py: Python<'_>, at: &observation::Observation<'_>, command: &mut Rows) -> PyResult<()> {
+        let count = at.own.count();
+        let out = PyArray1::from_vec(py, vec![f64::NAN; 3 * count]).reshape([count, 3])?;
+        let seen = Observation::new(py, at, self.sensing_range_m.is_some())?;
+        let returned = self.asked.control.bind(py).call1((seen, &out))?;
+        if !returned.is_none() {
+            let kind = returned.get_type().qualname()?;
+            return Err(wrong_type(format!("control() writes into `out` (out[:] = ...) and returns None, not {kind}")));
+        }
+        let written = borrowed::<Ix2>(out.as_any(), "out", "(N, 3)")?;
+        if written.shape() != [count, 3] {
+            return Err(wrong(format!("out: it was made an array of shape {}", shown(written.shape()))));
+        }
+        let written = written.as_array();
+        command.iter_mut().enumerate().for_each(|(k, x)| *x = written[(k % count, k / count)]);
+        Ok(())
+    }
+}
+
+impl Law for PythonLaw {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn command(&mut self, at: &observation::Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        Python::attach(|py| self.ask(py, at, command)).map_err(|raised| {
+            *self.asked.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
+            LawError::Failed
+        })
+    }
+
+    fn sensing_range_m(&self) -> Option<f64> {
+        self.sensing_range_m
+    }
+
+    fn stays_in_its_thread(&self) -> bool {
+        true
+    }
+
+    fn controls(&self) -> Controls {
+        self.controls
+    }
+}

@@ -1,0 +1,117 @@
+//! What a law in Python is told.
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
+use pyo3::prelude::*;
+use tautline::observation::{self, Neighbour, Others};
+
+use crate::numbers::{cube, table, vectors};
+
+/// What a law is told at one instant; the arrays are its own and may be kept.
+#[pyclass(frozen, get_all, module = "tautline")]
+pub(crate) struct Observation {
+    /// Time of the flight [s].
+    t: f64,
+    /// (N, 3) positions [m]: row i is what vehicle i knows of itself.
+    positions: Py<PyArray2<f64>>,
+    /// (N, 3) velocities [m/s].
+    velocities: Py<PyArray2<f64>>,
+    /// (N, 3) where the vehicles shall be now [m]: the slots of the leg, carried along with the reference.
+    slots_m: Py<PyArray2<f64>>,
+    /// The leg, from 0.
+    leg: usize,
+    /// (3,) velocity of the reference [m/s].
+    reference_velocity_m_s: (f64, f64, f64),
+    /// (3,) acceleration of the reference [m/s^2].
+    reference_acceleration_m_s2: (f64, f64, f64),
+    /// (K, 2) pairs i < j of vehicles that are near each other; none unless the law has a sensing range.
+    near: Py<PyArray2<i64>>,
+    /// Whether all know of each other what each knows of itself, `positions` and `velocities`; what follows is None then.
+    shared: bool,
+    /// (N, N, 3) positions [m]: row j of page i is what vehicle i last heard of vehicle j.
+    heard_positions: Option<Py<PyArray3<f64>>>,
+    /// (N, N, 3) velocities [m/s], in the same way.
+    heard_velocities: Option<Py<PyArray3<f64>>>,
+    /// (N, N) how old that is [s].
+    heard_ages_s: Option<Py<PyArray2<f64>>>,
+    /// (N, N, 3) positions [m] that vehicle i sees of vehicle j with its own sensor, where the law has a sensing range.
+    seen_positions: Option<Py<PyArray3<f64>>>,
+    /// (N, N, 3) velocities [m/s], in the same way.
+    seen_velocities: Option<Py<PyArray3<f64>>>,
+}
+
+impl Observation {
+    pub(crate) fn new(py: Python<'_>, at: &observation::Observation<'_>, sees: bool) -> PyResult<Self> {
+        let (target, r) = (&at.target, at.target.reference.position_m);
+        let slots_m = &target.formation.slots_m;
+        let carried = (0..slots_m.nrows()).flat_map(|i| (0..3).map(move |axis| slots_m[(i, axis)] + r[axis]));
+        let (v, a) = (target.reference.velocity_m_s, target.reference.acceleration_m_s2);
+        let pairs = at.near.iter().flat_map(|&(i, j)| [i64::try_from(i), i64::try_from(j)]);
+        let near = PyArray1::from_vec(py, pairs.map(|index| index.unwrap_or(i64::MAX)).collect());
+        let shared = matches!(at.others, Others::Shared);
+        let heard = (!shared).then(|| Pictures::of(py, at, |i, j| at.heard(i, j))).transpose()?;
+        let seen = (!shared && sees).then(|| Pictures::of(py, at, |i, j| at.seen(i, j))).transpose()?;
+        let (heard_positions, heard_velocities, heard_ages_s) = Pictures::apart(heard);
+        let (seen_positions, seen_velocities, _) = Pictures::apart(seen);
+        Ok(Self {
+            t: at.time_s,
+            positions: table(py, &at.own.positions_m)?.unbind(),
+            velocities: table(py, &at.own.velocities_m_s)?.unbind(),
+            slots_m: vectors(py, carried.collect())?.unbind(),
+            leg: target.leg,
+            reference_velocity_m_s: (v.x, v.y, v.z),
+            reference_acceleration_m_s2: (a.x, a.y, a.z),
+            near: near.reshape([at.near.len(), 2])?.unbind(),
+            shared,
+            heard_positions,
+            heard_velocities,
+            heard_ages_s,
+            seen_positions,
+            seen_velocities,
+        })
+    }
+}
+
+/// What each vehicle knows of each other.
+struct Pictures {
+    positions: Py<PyArray3<f64>>,
+    velocities: Py<PyArray3<f64>>,
+    ages_s: Py<PyArray2<f64>>,
+}
+
+type Apart = (Option<Py<PyArray3<f64>>>, Option<Py<PyArray3<f64>>>, Option<Py<PyArray2<f64>>>);
+
+impl Pictures {
+    fn of(
+        py: Python<'_>,
+        at: &observation::Observation<'_>,
+        known: impl Fn(usize, usize) -> Neighbour,
+    ) -> PyResult<Self> {
+        let count = at.own.count();
+        let pairs = || (0..count).flat_map(|i| (0..count).map(move |j| (i, j)));
+        let (mut positions, mut velocities, mut ages_s) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, j) in pairs() {
+            let Neighbour { position_m: p, velocity_m_s: v, age_s } = if i == j { own(at, i) } else { known(i, j) };
+            positions.extend([p.x, p.y, p.z]);
+            velocities.extend([v.x, v.y, v.z]);
+            ages_s.push(age_s);
+        }
+        Ok(Self {
+            positions: cube(py, positions, [count, count, 3])?.unbind(),
+            velocities: cube(py, velocities, [count, count, 3])?.unbind(),
+            ages_s: PyArray1::from_vec(py, ages_s).reshape([count, count])?.unbind(),
+        })
+    }
+
+    fn apart(pictures: Option<Self>) -> Apart {
+        match pictures {
+            Some(Self { positions, velocities, ages_s }) => (Some(positions), Some(velocities), Some(ages_s)),
+            None => (None, None, None),
+        }
+    }
+}
+
+/// What a vehicle knows of itself.
+fn own(at: &observation::Observation<'_>, i: usize) -> Neighbour {
+    let row = tautline::swarm::row;
+    Neighbour { position_m: row(&at.own.positions_m, i), velocity_m_s: row(&at.own.velocities_m_s, i), age_s: 0.0 }
+}

@@ -1,0 +1,112 @@
+//! Recordings as columns.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use tautline::cli::{self, Refusal};
+use tautline::read::ReadError;
+use tautline::track::{Item, Piece, Sample};
+
+use crate::errors::{Raised as _, wrong};
+use crate::numbers::{cube, vectors};
+use crate::work::away;
+
+/// A recording in memory: M samples and K pieces of curves, each in order of time.
+#[pyclass(frozen, get_all, module = "tautline._native")]
+pub(crate) struct Columns {
+    vehicles: Vec<String>,
+    notes: Vec<String>,
+    unit: String,
+    epoch_ns: i64,
+    /// (M,) which vehicle, from 0.
+    vehicle: Py<PyArray1<i64>>,
+    /// (M,) when [s].
+    t: Py<PyArray1<f64>>,
+    /// (M, 3) where [m].
+    position: Py<PyArray2<f64>>,
+    /// (M, 3) how fast [m/s]; NaN where that is not known.
+    velocity: Py<PyArray2<f64>>,
+    /// (M,) how large [m]; NaN where that is not known.
+    radius: Py<PyArray1<f64>>,
+    /// (K,) whose piece, from 0.
+    piece_vehicle: Py<PyArray1<i64>>,
+    /// (K, 2) from when to when [s].
+    piece_span: Py<PyArray2<f64>>,
+    /// (K, D, 3) coefficients [m/s^k] of the time since the piece began.
+    piece_coefficients: Py<PyArray3<f64>>,
+}
+
+/// What was read so far.
+#[derive(Default)]
+struct Read {
+    vehicles: Vec<String>,
+    notes: Vec<String>,
+    unit: String,
+    epoch_ns: i64,
+    samples: Vec<Sample>,
+    pieces: Vec<Piece>,
+}
+
+/// Reads a recording as the words of `tautline audit` say.
+#[pyfunction]
+pub(crate) fn read(py: Python<'_>, words: Vec<String>) -> PyResult<Columns> {
+    let interrupted = Arc::default();
+    away(py, &interrupted, || all(&words, &interrupted))??.columns(py)
+}
+
+fn all(words: &[String], interrupted: &AtomicBool) -> PyResult<Read> {
+    let failed = |error: ReadError| {
+        Refusal { is_machine: error.is_machine(), message: format!("{error} ({})", error.help()) }.raised()
+    };
+    let mut recording = cli::open(words).map_err(Refusal::raised)?;
+    let (mut read, mut items) = (Read::default(), Vec::new());
+    while recording.read(&mut items).map_err(failed)? {
+        if interrupted.load(Ordering::Relaxed) {
+            return Err(wrong("interrupted"));
+        }
+        for item in items.drain(..) {
+            match item {
+                Item::Sample(sample) => read.samples.push(sample),
+                Item::Piece(piece) => read.pieces.push(piece),
+            }
+        }
+    }
+    let clock = recording.clock();
+    (read.unit, read.epoch_ns) = (clock.unit.to_owned(), clock.epoch_ns);
+    (read.vehicles, read.notes) = (recording.vehicles().to_vec(), recording.notes().to_vec());
+    Ok(read)
+}
+
+impl Read {
+    fn columns(self, py: Python<'_>) -> PyResult<Columns> {
+        let Self { vehicles, notes, unit, epoch_ns, samples, pieces } = self;
+        let index = |vehicle: usize| i64::try_from(vehicle).unwrap_or(i64::MAX);
+        let numbers = |of: &dyn Fn(&Sample) -> f64| PyArray1::from_iter(py, samples.iter().map(of)).unbind();
+        let most = pieces.iter().map(|piece| piece.coefficients.len()).max().unwrap_or(1);
+        let velocities = samples.iter().flat_map(|of| of.velocity_m_s.map_or([f64::NAN; 3], Into::into));
+        let coefficients = pieces
+            .iter()
+            .flat_map(|piece| (0..most).flat_map(|k| piece.coefficients.get(k).map_or([0.0; 3], |&of| of.into())));
+        Ok(Columns {
+            vehicle: PyArray1::from_iter(py, samples.iter().map(|of| index(of.vehicle))).unbind(),
+            t: numbers(&|of| of.time_s),
+            position: vectors(py, samples.iter().flat_map(|of| <[f64; 3]>::from(of.position_m)).collect())?.unbind(),
+            velocity: vectors(py, velocities.collect())?.unbind(),
+            radius: numbers(&|of| of.radius_m.unwrap_or(f64::NAN)),
+            piece_vehicle: PyArray1::from_iter(py, pieces.iter().map(|of| index(of.vehicle))).unbind(),
+            piece_span: spans(py, &pieces)?.unbind(),
+            piece_coefficients: cube(py, coefficients.collect(), [pieces.len(), most, 3])?.unbind(),
+            vehicles,
+            notes,
+            unit,
+            epoch_ns,
+        })
+    }
+}
+
+fn spans<'py>(py: Python<'py>, pieces: &[Piece]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    use numpy::PyArrayMethods as _;
+    PyArray1::from_iter(py, pieces.iter().flat_map(|of| [of.from_s, of.to_s])).reshape([pieces.len(), 2])
+}

@@ -1,0 +1,104 @@
+//! Scenarios.
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use tautline::preflight::Preflight;
+use tautline::scenario::{self, Override, Source};
+
+use crate::errors::{Raised as _, json, wrong};
+use crate::numbers::table;
+use crate::work::here;
+
+/// What is to be flown, complete and checked.
+#[pyclass(frozen, module = "tautline._native")]
+pub(crate) struct Scenario {
+    pub(crate) scenario: scenario::Scenario,
+}
+
+#[pymethods]
+impl Scenario {
+    /// The built-in scenario or the file of this name, or a text of TOML; with overrides as `--set` takes them.
+    #[new]
+    fn new(py: Python<'_>, source: String, is_text: bool, overrides: Vec<String>) -> PyResult<Self> {
+        let read = || {
+            let overrides = overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+            let name = || "TOML".to_owned();
+            let source = if is_text { Source::Text { name: name(), text: source } } else { Source::resolve(&source)? };
+            scenario::Scenario::read(&source, &overrides)
+        };
+        Ok(Self { scenario: here(py, read)?.map_err(scenario::ScenarioError::raised)? })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.scenario.name
+    }
+
+    #[getter]
+    fn count(&self) -> usize {
+        self.scenario.count()
+    }
+
+    #[getter]
+    fn delta_m(&self) -> f64 {
+        self.scenario.delta_m
+    }
+
+    #[getter]
+    fn duration_s(&self) -> f64 {
+        self.scenario.time.end_s(self.scenario.time.steps())
+    }
+
+    #[getter]
+    fn dt_s(&self) -> f64 {
+        self.scenario.time.dt_s
+    }
+
+    #[getter]
+    fn steps(&self) -> u64 {
+        self.scenario.time.steps()
+    }
+
+    #[getter]
+    fn law(&self) -> PyResult<String> {
+        let law = self.scenario.law().map_err(|error| wrong(error.to_string()))?;
+        Ok(law.name().to_owned())
+    }
+
+    #[getter]
+    fn positions_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, &self.scenario.start.positions_m)
+    }
+
+    #[getter]
+    fn velocities_m_s<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, &self.scenario.start.velocities_m_s)
+    }
+
+    #[getter]
+    fn slots_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, &self.scenario.formation().slots_m)
+    }
+
+    /// Pairs of vehicles, from 0, that hear each other.
+    #[getter]
+    fn links(&self) -> Vec<(usize, usize)> {
+        self.scenario.graph.edges().collect()
+    }
+
+    #[getter]
+    fn toml(&self) -> String {
+        self.scenario.resolved_toml()
+    }
+
+    #[getter]
+    fn sha256(&self) -> String {
+        self.scenario.sha256_hex()
+    }
+
+    /// What is known before the first step: whether nothing refuses the flight, a headline, a summary, and all as JSON.
+    fn check(&self, py: Python<'_>) -> PyResult<(bool, String, String, String)> {
+        let found = here(py, || Preflight::of(&self.scenario))?.map_err(|error| wrong(error.to_string()))?;
+        Ok((!found.refuses(), found.headline(), found.text(), json(&found)?))
+    }
+}

@@ -1,0 +1,224 @@
+//! A flight that the caller steps.
+
+use std::sync::{Mutex, TryLockError};
+use std::time::{Duration, Instant};
+
+use numpy::PyArray2;
+use numpy::PyUntypedArrayMethods as _;
+use numpy::ndarray::Ix2;
+use pyo3::prelude::*;
+use tautline::sim::{self, Ending, Parts, SimError};
+use tautline::swarm::{Pair, first_row_not_finite};
+
+use crate::errors::{Raised as _, wrong};
+use crate::law::{PythonLaw, Raising};
+use crate::numbers::{borrowed, shown, table, to_rows};
+use crate::scenario::Scenario;
+use crate::work::here;
+
+/// Steps are flown for so long between two looks at Ctrl-C.
+const AT_ONCE: Duration = Duration::from_millis(50);
+
+/// A flight under way.
+#[pyclass(frozen, module = "tautline._native")]
+pub(crate) struct Simulation {
+    count: usize,
+    raising: Option<Raising>,
+    state: Mutex<sim::Simulation>,
+}
+
+/// Someone closer than delta: the pair, from 1, from when to when \[s\], and how close \[m\].
+type Violation = ((usize, usize), f64, f64, f64);
+
+/// The closest two: the pair, from 1, how far apart \[m\], and when \[s\].
+type Closest = ((usize, usize), f64, f64);
+
+impl Simulation {
+    /// Does something with the simulation, unless somebody else does.
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut sim::Simulation) -> T + Send) -> PyResult<T> {
+        let done = here(py, || match self.state.try_lock() {
+            Ok(mut simulation) => Ok(work(&mut simulation)),
+            Err(TryLockError::WouldBlock) => {
+                Err("the simulation is being stepped, by another thread or by this law's own")
+            }
+            Err(TryLockError::Poisoned(_)) => Err("the simulation failed before; make a new one"),
+        })?;
+        done.map_err(wrong)
+    }
+
+    /// Raises what the law raised, and what it wrote that is no number.
+    fn raise(&self, py: Python<'_>) -> PyResult<()> {
+        let Some(raising) = &self.raising else { return Ok(()) };
+        if let Some(raised) = raising.take() {
+            return Err(raised);
+        }
+        match self.with(py, |simulation| simulation.ending().cloned())? {
+            Some(Ending::BrokeDown(why @ sim::Breakdown::CommandNotFinite { .. })) => {
+                Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (scenario, law))]
+    fn new(py: Python<'_>, scenario: &Scenario, law: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let scenario = &scenario.scenario;
+        let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
+        let raising = law.as_ref().map(PythonLaw::raising);
+        let made = here(py, || -> Result<_, SimError> {
+            let parts = match law {
+                Some(law) => Parts::under(scenario, Box::new(law)),
+                None => Parts::of(scenario)?,
+            };
+            sim::Simulation::with(scenario, parts)
+        })?;
+        let state = Mutex::new(made.map_err(SimError::raised)?);
+        let simulation = Self { count: scenario.count(), raising, state };
+        simulation.raise(py)?;
+        Ok(simulation)
+    }
+
+    /// Flies so many steps, with these accelerations where there are any; fewer where the flight ends.
+    fn step(&self, py: Python<'_>, commands: Option<&Bound<'_, PyAny>>, steps: u64) -> PyResult<()> {
+        let commands = match commands {
+            None => None,
+            Some(given) => {
+                let given = borrowed::<Ix2>(given, "u", "(N, 3) or (N, 2)")?;
+                if given.shape()[0] != self.count || !matches!(given.shape()[1], 2 | 3) {
+                    let (count, shape) = (self.count, shown(given.shape()));
+                    return Err(wrong(format!("u: accelerations of shape ({count}, 3) are needed, not {shape}")));
+                }
+                Some(to_rows(given.as_array()))
+            }
+        };
+        let commands = commands.as_ref();
+        if let Some(vehicle) = commands.and_then(first_row_not_finite) {
+            let step = self.with(py, |simulation| simulation.steps())? + 1;
+            return Err(wrong(format!("step {step}: the command for vehicle {} is not a finite number", vehicle + 1)));
+        }
+        let mut left = steps;
+        while left > 0 {
+            let flown = self.with(py, |simulation| -> Result<u64, SimError> {
+                let (began, mut flown) = (Instant::now(), 0);
+                while flown < left && began.elapsed() < AT_ONCE {
+                    if simulation.ending().is_some() {
+                        return Ok(left);
+                    }
+                    match commands {
+                        Some(commands) => simulation.step_with(commands)?,
+                        None => simulation.step(),
+                    }
+                    // What is recorded elsewhere is for nobody here.
+                    simulation.events().for_each(drop);
+                    simulation.sample();
+                    flown += 1;
+                }
+                Ok(flown)
+            })?;
+            self.raise(py)?;
+            left -= flown.map_err(SimError::raised)?;
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    #[getter]
+    fn t(&self, py: Python<'_>) -> PyResult<f64> {
+        self.with(py, |simulation| simulation.time_s())
+    }
+
+    #[getter]
+    fn steps(&self, py: Python<'_>) -> PyResult<u64> {
+        self.with(py, |simulation| simulation.steps())
+    }
+
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, &self.with(py, |simulation| simulation.state().positions_m.clone())?)
+    }
+
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, &self.with(py, |simulation| simulation.state().velocities_m_s.clone())?)
+    }
+
+    /// The accelerations that are held from now on; none where the law had no answer.
+    #[getter]
+    fn commands<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, &self.with(py, |simulation| simulation.control().clone())?)
+    }
+
+    /// The smallest distance of two vehicles over the last stretch that was judged.
+    #[getter]
+    fn separation_m(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        self.with(py, |simulation| simulation.closest().map(|_| simulation.separation_m()))
+    }
+
+    /// The closest pair so far, from 1, how far apart, and when.
+    #[getter]
+    fn closest(&self, py: Python<'_>) -> PyResult<Option<Closest>> {
+        let closest = self.with(py, |simulation| simulation.closest())?;
+        Ok(closest.map(|closest| (numbers(closest.pair), closest.separation_m, closest.time_s)))
+    }
+
+    #[getter]
+    fn least_clearance_m(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        self.with(py, |simulation| simulation.least_clearance_m())
+    }
+
+    /// What the judge has found so far: `clear`, `violation` or `undecided`, and the violations of two vehicles.
+    fn judged(&self, py: Python<'_>) -> PyResult<(String, Vec<Violation>)> {
+        let flight = self.with(py, |simulation| simulation.clone().finish())?;
+        let found = flight.audit.violations.iter().map(|of| (numbers(of.pair), of.from_s, of.to_s, of.min_m));
+        let past = flight.clearance.as_ref().map(|clearance| clearance.status);
+        let worst = [Some(flight.audit.status), past].into_iter().flatten().max_by_key(|status| rank(*status));
+        let status = worst.map_or("undecided", word);
+        Ok((status.to_owned(), found.collect()))
+    }
+
+    /// How the flight ended, once it has: `completed`, or why before its time.
+    #[getter]
+    fn ending(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let ending = self.with(py, |simulation| simulation.ending().cloned())?;
+        Ok(ending.map(|ending| ending.reason().unwrap_or_else(|| "completed".to_owned())))
+    }
+
+    /// A simulation that goes on from here by itself, with other random numbers where a seed is given.
+    fn copy(&self, py: Python<'_>, noise_seed: Option<u64>) -> PyResult<Self> {
+        let copied = self.with(py, |simulation| {
+            let mut copy = simulation.clone();
+            if noise_seed.is_some() {
+                copy.load(&simulation.save(), noise_seed);
+            }
+            copy
+        })?;
+        Ok(Self { count: self.count, raising: self.raising.clone(), state: Mutex::new(copied) })
+    }
+}
+
+fn numbers(pair: Pair) -> (usize, usize) {
+    let [first, second] = pair.numbers();
+    (first, second)
+}
+
+fn rank(status: tautline::audit::Status) -> u8 {
+    use tautline::audit::Status;
+    match status {
+        Status::Clear => 0,
+        Status::Undecided => 1,
+        Status::Violation => 2,
+    }
+}
+
+fn word(status: tautline::audit::Status) -> &'static str {
+    use tautline::audit::Status;
+    match status {
+        Status::Clear => "clear",
+        Status::Undecided => "undecided",
+        Status::Violation => "violation",
+    }
+}

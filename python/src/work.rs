@@ -1,0 +1,83 @@
+//! Work that the interpreter does not wait for, and that Ctrl-C ends.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use pyo3::prelude::*;
+
+use crate::errors::broken;
+
+/// How often it is looked whether somebody pressed Ctrl-C.
+const SIGNALS_EVERY: Duration = Duration::from_millis(50);
+/// Stack of a thread that works: as much as a program's own has on most systems \[bytes\].
+const STACK: usize = 8 << 20;
+
+/// Does work in a thread of its own, without the interpreter's lock. Ctrl-C sets `interrupted`, which the work is to look at,
+/// and is raised once it has come to its end.
+pub(crate) fn away<T: Send>(
+    py: Python<'_>,
+    interrupted: &Arc<AtomicBool>,
+    work: impl FnOnce() -> T + Send,
+) -> PyResult<T> {
+    let is_done = AtomicBool::new(false);
+    let mut raised = None;
+    let done = thread::scope(|scope| {
+        let (caller, flag) = (thread::current(), &is_done);
+        let guarded = move || {
+            let done = catch_unwind(AssertUnwindSafe(work));
+            flag.store(true, Ordering::Release);
+            caller.unpark();
+            done
+        };
+        let worker = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, guarded)?;
+        while !is_done.load(Ordering::Acquire) {
+            py.detach(|| thread::park_timeout(SIGNALS_EVERY));
+            if let Err(signal) = py.check_signals() {
+                interrupted.store(true, Ordering::Relaxed);
+                raised = Some(signal);
+            }
+        }
+        PyResult::Ok(py.detach(|| worker.join()).unwrap_or_else(Err))
+    })?;
+    match raised {
+        Some(signal) => Err(signal),
+        None => done.map_err(|panic| broken(&words(panic.as_ref()))),
+    }
+}
+
+/// Does work in this thread, without the interpreter's lock.
+pub(crate) fn here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| broken(&words(panic.as_ref())))
+}
+
+/// What a panic said.
+fn words(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(ToString::to_string);
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it panicked".to_owned())
+}
+
+/// Looks for signals now and then, from a thread that does not hold the lock.
+pub(crate) struct Signals {
+    looked: Instant,
+    /// What a signal raised.
+    pub(crate) raised: Option<PyErr>,
+}
+
+impl Signals {
+    pub(crate) fn new() -> Self {
+        Self { looked: Instant::now(), raised: None }
+    }
+
+    /// Whether none has been raised.
+    pub(crate) fn are_silent(&mut self) -> bool {
+        if self.looked.elapsed() >= SIGNALS_EVERY {
+            self.raised = Python::attach(|py| py.check_signals().err());
+            self.looked = Instant::now();
+        }
+        self.raised.is_none()
+    }
+}

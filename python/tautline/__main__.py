@@ -1,0 +1,19 @@
+"""The command line: ``tautline``, or ``python -m tautline``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from . import _native
+
+
+def main() -> int:
+    """Runs the command of the process's arguments and gives its exit code."""
+    # Ctrl-C is the program's own business, as in a process without Python.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return _native.main(["tautline", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

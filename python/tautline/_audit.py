@@ -1,0 +1,259 @@
+"""Audits: did any two vehicles come closer than they may, between samples too?"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _display, _native
+from ._native import Error
+from ._tables import Findings
+from ._words import PathLike, number, numbers, of_each, options, path, paths, reading, with_files
+
+Judged = tuple[str, str, str, str]
+
+
+class ViolationError(Error):
+    """A judgement that is not clear, where clear was asked for; ``audit`` is the judgement."""
+
+    def __init__(self, judgement: Audit) -> None:
+        super().__init__(judgement.headline)
+        self.audit = judgement
+
+
+class Audit:
+    """What the judge says of a recording."""
+
+    #: ``PROVED CLEAR``, ``CLEAR if straight between samples`` (or as it was asked), ``VIOLATION`` or ``UNDECIDED``.
+    verdict: str
+    #: The verdict and what it rests on, in a line.
+    headline: str
+    #: The summary that the command line prints.
+    text: str
+
+    def __init__(self, judged: Judged, again: Callable[[str], Judged]) -> None:
+        self.verdict, self.headline, self.text, self._json = judged
+        self._report: dict[str, Any] = json.loads(self._json)
+        self._again = again
+
+    @property
+    def status(self) -> str:
+        """``clear``, ``violation`` or ``undecided``, as in the JSON."""
+        return str(self._report["status"])
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether nothing came too close: proved, or as assumed between samples."""
+        return self.status == "clear"
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether it is clear and nothing was assumed of the time between samples."""
+        return bool(self._report["audit"]["proved"])
+
+    @property
+    def assumes(self) -> str | None:
+        """What was assumed of the motion between samples; None where the recording says it itself."""
+        assumed: str | None = self._report["audit"]["assumes"]
+        return assumed
+
+    @property
+    def delta_m(self) -> float | None:
+        """The safety distance asked about [m] (a scaled distance with an ellipsoid); None where radii alone were."""
+        delta: float | None = self._report["separation"]["delta_m"]
+        return delta
+
+    @property
+    def separation_m(self) -> float | None:
+        """The smallest distance of two vehicles [m] (scaled with an ellipsoid), of curves and bounds a lower bound of it; None
+        where there never were two."""
+        smallest: float | None = self._report["separation"]["min_m"]
+        return smallest
+
+    @property
+    def closest(self) -> Findings:
+        """The ten closest pairs: ``pair``, ``lower_m``, ``upper_m``, ``time_s``, ``limit_m``."""
+        return Findings(self._report["closest"])
+
+    @property
+    def violations(self) -> Findings:
+        """Every violation in order of time: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``."""
+        return Findings(self._report["violations"])
+
+    @property
+    def undecided(self) -> Findings:
+        """When it cannot be told: ``pair``, ``from_s``, ``to_s``, ``lower_m``, ``upper_m``, ``limit_m``, ``rate_hz``."""
+        return Findings(self._report["undecided"])
+
+    @property
+    def gaps(self) -> Findings:
+        """When vehicles were not seen: ``vehicle``, ``from_s``, ``to_s``."""
+        return Findings(self._report["gaps"])
+
+    @property
+    def obstacles(self) -> Findings:
+        """The closest approaches to obstacles: as :attr:`closest`."""
+        return Findings(self._report["obstacles"]["closest"])
+
+    @property
+    def limits(self) -> Findings:
+        """What vehicles did by themselves, where ``limit`` or ``fence`` asked: each limit with its verdict, as in the JSON."""
+        return Findings(self._report["limits"])
+
+    @property
+    def vehicles(self) -> list[str]:
+        """Names of the vehicles."""
+        return list(self._report["vehicles"])
+
+    @property
+    def notes(self) -> list[str]:
+        """What should be known of how it was read, a sentence each."""
+        return list(self._report["notes"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that ``tautline audit --json`` prints."""
+        report: dict[str, Any] = json.loads(self._json)
+        return report
+
+    def to_html(self, file: PathLike) -> None:
+        """Writes the report for people, with figures. The recording is judged again for them.
+
+        Raises :class:`Error` where it has changed since, ``OSError`` where the file cannot be written.
+        """
+        if self._again(path(file, "file"))[3] != self._json:
+            raise Error("the recording is not what it was when it was judged: audit it again")
+
+    def raise_for_violation(self, allow_undecided: bool = False) -> None:
+        """Raises :class:`ViolationError` unless it is clear: of a violation, and of what cannot be told unless that is allowed."""
+        if not (self.is_clear or (allow_undecided and self.status == "undecided")):
+            raise ViolationError(self)
+
+    def __repr__(self) -> str:
+        return f"<Audit {self.headline}>"
+
+    def __str__(self) -> str:
+        return f"{self.headline}\n{self.text}"
+
+    def _repr_html_(self) -> str:
+        tone = {"clear": "good", "violation": "bad"}.get(self.status, "open")
+        closest = self._report["closest"]
+        rows = [
+            ("finding", self.headline.partition(": ")[2]),
+            ("vehicles judged", str(self._report["judged"])),
+            ("violations", str(len(self.violations))),
+            ("undecided", str(len(self.undecided))),
+            ("gaps", str(len(self.gaps))),
+        ]
+        drawing = _display.bars(
+            [" ".join(near["who"]) for near in closest],
+            [near["lower_m"] for near in closest],
+            [near["limit_m"] for near in closest],
+            "Smallest distances of the closest pairs, and their limits",
+        )
+        return _display.card(tone, self.verdict, rows, drawing)
+
+
+def audit(
+    t: NDArray[np.float64] | PathLike | Sequence[PathLike],
+    positions: NDArray[np.float64] | None = None,
+    *,
+    delta: float | None = None,
+    velocities: NDArray[np.float64] | None = None,
+    names: Sequence[str] | None = None,
+    motion: str | None = None,
+    max_accel: float | Mapping[str, float] | None = None,
+    radius: float | Mapping[str, float] | None = None,
+    ellipsoid: Sequence[float] | None = None,
+    obstacles: PathLike | None = None,
+    limit: Mapping[str, float] | None = None,
+    fence: PathLike | None = None,
+    config: PathLike | Literal[False] | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    above: float | None = None,
+    ids: Iterable[str] | None = None,
+    offset: Mapping[str, float] | None = None,
+    expect_vehicles: int | None = None,
+    max_gap: float | None = None,
+    **read_as: Any,
+) -> Audit:
+    """Judges positions over time, of arrays or of a recording of any format.
+
+    ``tl.audit(t, positions, delta=1.5)``: ``t`` (T,) times [s], ``positions`` (T, N, 3) or (T, N, 2) [m], both float64 in any
+    order of memory; they are borrowed, not copied, and must not be written to until this returns. NaN in every axis: the
+    vehicle was not seen. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
+
+    ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
+    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``scale``, ``dimensions``, ``column``, ``start``, ``axis_order``,
+    ``frame``, ``topic``, ``origin``, ``allow_unfinished``.
+
+    ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep
+    max(delta, r1 + r2). ``ellipsoid`` (3,) [m] are half axes of what must stay empty, with delta scaled by them. ``motion`` says what
+    happens between samples: ``linear``, ``hold``, ``polynomial``, ``bounded`` (with ``max_accel`` [m/s^2]). ``obstacles`` is a TOML
+    file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2], ``height`` [m]; ``fence`` is a TOML file of
+    what each must stay within. Of a file, ``config`` is a ``tautline.toml`` that fills what is not asked here; the one beside the
+    recording unless given, and none where it is False. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
+    judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap.
+
+    Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
+    wrong with the input. docs/audit.md says what each verdict means.
+    """
+    words = ["audit"]
+    words += [] if delta is None else [f"--delta={number(delta, 'delta')}"]
+    words += options(motion=motion, expect_vehicles=expect_vehicles)
+    words += of_each("--max-accel", max_accel, "max_accel") + of_each("--radius", radius, "radius")
+    words += [] if ellipsoid is None else [f"--ellipsoid={numbers(ellipsoid, 'ellipsoid')}"]
+    words += ["--no-config"] if config is False else []
+    files = {"obstacles": obstacles, "fence": fence, "config": None if config is False else config}
+    given = [path(file, what) for what, file in files.items() if file is not None]
+    words += [f"--{what}={path(file, what)}" for what, file in files.items() if file is not None]
+    words += [f"--limit={what}={number(most, 'limit')}" for what, most in (limit or {}).items()]
+    for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap)):
+        words += [] if value is None else [f"--{option}={number(value, option)}"]
+    words += [f"--ids={quoted(name)}" for name in ids or ()]
+    words += [f"--offset={name}={number(seconds, 'offset')}" for name, seconds in (offset or {}).items()]
+    if positions is None:
+        return of_files(words + reading(**read_as), t, given, velocities is not None or names is not None)
+    if read_as:
+        raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
+    return with_files(given, lambda: of_arrays(words, t, positions, velocities, names))
+
+
+def of_files(words: list[str], t: object, beside: list[str], has_more: bool) -> Audit:
+    if isinstance(t, np.ndarray):
+        raise TypeError("positions: an array (T, N, 3) is needed beside the times, or a path in their place")
+    if has_more:
+        raise TypeError("velocities and names belong to arrays, and a recording is given")
+    files = paths(t, "t")
+    inputs = files + beside
+
+    def judged(*more: str) -> Judged:
+        ask = [*words, *more, "--", *files]
+        return with_files(inputs, lambda: _native.audit(ask, "", None, None, None, []))
+
+    return Audit(judged(), lambda file: judged(f"--html={file}"))
+
+
+def of_arrays(words: list[str], t: Any, positions: Any, velocities: Any, names: Sequence[str] | None) -> Audit:
+    if isinstance(t, (str, os.PathLike)):
+        raise TypeError("t: times are needed beside positions, or a path alone")
+    count = positions.shape[1] if isinstance(positions, np.ndarray) and positions.ndim == 3 else 0
+    called = [str(number) for number in range(1, count + 1)] if names is None else [str(name) for name in names]
+    if len(set(called)) < len(called):
+        raise Error("names: two vehicles have the same name")
+    command = " ".join(["tautline.audit(t, positions)", "#", *words[1:]]) if words[1:] else "tautline.audit(t, positions)"
+
+    def judged(*more: str) -> Judged:
+        return _native.audit([*words, *more, "arrays"], command, t, positions, velocities, called)
+
+    return Audit(judged(), lambda file: judged(f"--html={file}"))
+
+
+def quoted(name: str) -> str:
+    """A name as the command line takes it in a list between commas."""
+    return '"' + str(name).replace('"', '""') + '"'

@@ -1,0 +1,152 @@
+"""Commands of the command line as functions: exports, laws side by side, margins, attacks, the claims of the paper."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import _native
+from ._scenario import Scenario, scenario_of
+from ._tables import Finding, Findings
+from ._words import PathLike, number, options, path, paths, reading, with_files
+
+
+class Answer(Finding):
+    """What a command answers: a mapping with the keys of its JSON, which are attributes too; lists of rows become tables."""
+
+    def __init__(self, is_good: bool, text: str) -> None:
+        super().__init__(json.loads(text))
+        #: Whether the command line would end with 0.
+        self._is_good = is_good
+
+    @property
+    def is_good(self) -> bool:
+        """Whether the command line would end with exit code 0: judged and good."""
+        return self._is_good
+
+    def __getattr__(self, key: str) -> Any:
+        value = super().__getattr__(key)
+        is_rows = isinstance(value, list) and value and all(isinstance(row, dict) for row in value)
+        return Findings(value) if is_rows else value
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that ``--json`` prints."""
+        return dict(self)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {'good' if self.is_good else 'bad'}: {', '.join(self)}>"
+
+
+def export(
+    recording: PathLike | Sequence[PathLike],
+    output: PathLike,
+    *,
+    to: str | None = None,
+    sample_hz: float | None = None,
+    force: bool = False,
+    **read_as: Any,
+) -> None:
+    """Writes a recording of any format as CSV, Parquet, NPZ or MCAP, the same to the last bit.
+
+    The format is that of the name of ``output``, or ``to``: ``csv``, ``parquet``, ``npz``, ``mcap``. Curves are sampled at ``sample_hz``. A file
+    that exists is overwritten with ``force``. ``read_as`` is as in :func:`tautline.audit`. Raises as :func:`tautline.read`, and ``OSError`` where the file
+    cannot be written.
+    """
+    files = paths(recording, "recording")
+    format = read_as.pop("format", None)
+    words = ["export", f"--output={path(output, 'output')}", *options(format=to, force=force, input_format=format)]
+    words += [] if sample_hz is None else [f"--sample-hz={number(sample_hz, 'sample_hz')}"]
+    words += [*reading(**read_as), "--", *files]
+    with_files(files, lambda: _native.call(words))
+
+
+def asked(command: str, scenario: Scenario | PathLike, set: Mapping[str, Any] | None, words: list[str]) -> Answer:
+    """Asks a command about a scenario."""
+    with scenario_of(scenario, set)._words() as which:
+        return Answer(*_native.call([command, "--json=-", *words, *which]))
+
+
+def compare(
+    scenario: Scenario | PathLike,
+    laws: Sequence[str] | None = None,
+    *,
+    runs: int = 20,
+    seed: int = 0,
+    set: Mapping[str, Any] | None = None,
+    csv: PathLike | None = None,
+    latex: PathLike | None = None,
+    html: PathLike | None = None,
+    force: bool = False,
+    threads: int | None = None,
+) -> Answer:
+    """Flies laws from the same starts, on all cores: ``answer.laws.to_pandas()`` is a row a law. docs/compare.md says what each number means.
+
+    Laws are kinds or names of tables ``[laws.NAME]``; all that the scenario has unless given. Files that exist are overwritten
+    with ``force``.
+    """
+    words = options(runs=runs, seed=seed, csv=csv, latex=latex, html=html, force=force, threads=threads)
+    words += [] if laws is None else [f"--laws={','.join(laws)}"]
+    return asked("compare", scenario, set, words)
+
+
+def margin(
+    scenario: Scenario | PathLike,
+    key: str,
+    start: float,
+    stop: float,
+    *,
+    runs: int = 1,
+    seed: int = 0,
+    verdict: str = "pass",
+    scan: int = 5,
+    halvings: int = 6,
+    log: bool = False,
+    set: Mapping[str, Any] | None = None,
+    csv: PathLike | None = None,
+    html: PathLike | None = None,
+    force: bool = False,
+    threads: int | None = None,
+) -> Answer:
+    """How much of one key a verdict (``pass``, ``clear``, ``reached``) survives: the two values between ``start`` and ``stop`` between which it
+    turns. docs/margins.md says more."""
+    words = [f"--key={key}", f"--from={number(start, 'start')}", f"--to={number(stop, 'stop')}"]
+    words += options(runs=runs, seed=seed, verdict=verdict, scan=scan, halvings=halvings, log=log)
+    words += options(csv=csv, html=html, force=force, threads=threads)
+    return asked("margin", scenario, set, words)
+
+
+def attack(
+    scenario: Scenario | PathLike,
+    *,
+    start: float | None = None,
+    velocity: float | None = None,
+    vary: Mapping[str, tuple[float, float]] | None = None,
+    apart: float | None = None,
+    flights: int = 1000,
+    seeds: int = 1,
+    method: str = "cma-es",
+    seed: int = 0,
+    set: Mapping[str, Any] | None = None,
+    out: PathLike | None = None,
+    csv: PathLike | None = None,
+    html: PathLike | None = None,
+    force: bool = False,
+    threads: int | None = None,
+) -> Answer:
+    """Searches for the worst start (up to ``start`` [m] from the scenario's), velocity (``velocity`` [m/s]) or keys (``vary``, with bounds). What
+    it does not find is no proof. docs/attack.md says more."""
+    words = options(start=start, velocity=velocity, apart=apart, flights=flights, seeds=seeds, method=method, seed=seed)
+    words += [f"--vary={key}={number(low, key)}..{number(high, key)}" for key, (low, high) in (vary or {}).items()]
+    words += options(out=out, csv=csv, html=html, force=force, threads=threads)
+    return asked("attack", scenario, set, words)
+
+
+def validate(out: PathLike | None = None, *, force: bool = False, threads: int | None = None) -> Answer:
+    """Reproduces the paper and judges its claims and ours; figures and a page are left in the folder ``out`` where one is given."""
+    with tempfile.TemporaryDirectory() as folder:
+        at = Path(folder) / "validate" if out is None else Path(os.fspath(out))
+        return Answer(*_native.call(["validate", "--json", f"--out={at}", *options(force=force, threads=threads)]))

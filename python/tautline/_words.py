@@ -1,0 +1,119 @@
+"""Options of functions as the words of the command line, which says what they mean and what is wrong with them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ._native import Error
+
+T = TypeVar("T")
+PathLike = str | os.PathLike[str]
+
+
+def number(value: object, what: str) -> str:
+    """A number in digits that read back to the same bits."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise TypeError(f"{what}: a number is needed, not {type(value).__name__}")
+    return repr(float(value))
+
+
+def numbers(value: Iterable[object], what: str) -> str:
+    """Numbers between commas."""
+    return ",".join(number(x, what) for x in value)
+
+
+def of_each(option: str, value: object, what: str) -> list[str]:
+    """A number of every vehicle, or a dictionary of numbers by vehicle."""
+    if value is None:
+        return []
+    if isinstance(value, Mapping):
+        return [f"{option}={name}={number(x, what)}" for name, x in value.items()]
+    return [f"{option}={number(value, what)}"]
+
+
+def option(name: str, value: Any) -> list[str]:
+    """``--name=value``, or nothing of None and False; a word alone of True; once for each of a list."""
+    word = "--" + name.replace("_", "-")
+    if value is None or value is False:
+        return []
+    if value is True:
+        return [word]
+    if isinstance(value, (list, tuple)):
+        return [part for each in value for part in option(name, each)]
+    if isinstance(value, os.PathLike):
+        return [f"{word}={os.fspath(value)}"]
+    if isinstance(value, (int, str)):
+        return [f"{word}={value}"]
+    return [f"{word}={number(value, name)}"]
+
+
+def options(**given: Any) -> list[str]:
+    """Each as :func:`option`."""
+    return [word for name, value in given.items() for word in option(name, value)]
+
+
+def path(value: object, what: str) -> str:
+    """A path as text that is never taken for an option."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise TypeError(f"{what}: a path is needed, not {type(value).__name__}")
+    text = os.fspath(value)
+    return f".{os.sep}{text}" if text.startswith("-") else text
+
+
+def paths(given: object, what: str) -> list[str]:
+    """A path or a list of them."""
+    files = [path(file, what) for file in (given if isinstance(given, (list, tuple)) else [given])]
+    if not files:
+        raise Error(f"{what}: none is given")
+    return files
+
+
+def with_files(files: Iterable[PathLike], do: Callable[[], T]) -> T:
+    """Does something that reads files; where that fails and one is missing, it is a ``FileNotFoundError``."""
+    try:
+        return do()
+    except Error as error:
+        if all(Path(file).exists() for file in files):
+            raise
+        raise FileNotFoundError(str(error)) from None
+
+
+def reading(
+    *,
+    format: str | None = None,
+    time_unit: str | None = None,
+    fps: float | None = None,
+    time_scale: float | None = None,
+    scale: float | None = None,
+    dimensions: str | None = None,
+    column: Mapping[str, str] | None = None,
+    start: Mapping[str, Iterable[float]] | None = None,
+    axis_order: str | None = None,
+    frame: str | None = None,
+    topic: str | Sequence[str] | None = None,
+    origin: Iterable[float] | None = None,
+    join: bool = False,
+    allow_unfinished: bool = False,
+) -> list[str]:
+    """How a recording is read: the words of ``tautline audit --help`` under *Reading*."""
+    words = options(
+        format=format,
+        time_unit=time_unit,
+        fps=fps,
+        time_scale=time_scale,
+        scale=scale,
+        dimensions=dimensions,
+        axis_order=axis_order,
+        frame=frame,
+        topic=list(topic) if isinstance(topic, (list, tuple)) else topic,
+        join=join,
+        allow_unfinished=allow_unfinished,
+    )
+    words += [] if origin is None else [f"--origin={numbers(origin, 'origin')}"]
+    words += [f"--column={role}={name}" for role, name in (column or {}).items()]
+    return words + [f"--start={name}={numbers(place, 'start')}" for name, place in (start or {}).items()]

@@ -1,0 +1,26 @@
+//! What one vehicle may do by itself: how fast, how high and where it flies, between samples too.
+//!
+//! Every [`Limit`] is on something that must not exceed a number: speeds, accelerations and heights, and how far a vehicle
+//! is outside of a [`Fence`]. Over each stretch of a recording its largest value is enclosed, by what is taken to happen
+//! between samples ([`Motion`](super::recorded::Motion)):
+//!
+//! - On a **straight** line at constant speed it is known. An acceleration is what the parabola through three samples in a row
+//!   has, 2 |v2 - v1| / (h1 + h2) with the mean velocities v over intervals h; no motion through them does with less.
+//! - On **curves** all but the fence are convex functions of a polynomial, so that none exceeds its largest value at a control
+//!   point: parts are halved until both bounds meet. The room to the fence is that of the chord, less how far control points
+//!   stray from it.
+//! - Under acceleration **bounded** by A, over h, the largest speed is at least that of the mean velocity and at most A h / 2 more
+//!   (Peano's form of the error of a mean); a position is within A h^2 / 8 of the chord.
+//!
+//! A number counts as exceeded where it is by more than 1e-9 of itself, or 1e-9 where it is below 1: less than that is rounding.
+
+mod extremum;
+mod fence;
+mod limit;
+mod outcome;
+mod watch;
+
+pub use fence::{Fence, FenceError};
+pub use limit::{Envelope, Limit, Quantity};
+pub use outcome::{EnvelopeOutcome, Exceeding, LimitOutcome};
+pub(super) use watch::{Seen, Watch};

@@ -1,0 +1,64 @@
+//! What an audit says of single vehicles.
+
+use serde::Serialize;
+
+use super::limit::Limit;
+use crate::audit::outcome::Status;
+
+/// What was found of all that is asked of each vehicle by itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EnvelopeOutcome {
+    /// Limit by limit, in the order in which they were given; that of the fence last.
+    pub limits: Vec<LimitOutcome>,
+}
+
+/// What was found of one limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LimitOutcome {
+    /// What was asked.
+    pub limit: Limit,
+    /// The verdict.
+    pub status: Status,
+    /// The value that came nearest to the limit, or went farthest beyond it; none where nothing tells any.
+    pub extreme: Option<Exceeding>,
+    /// Every time that a vehicle was beyond it, in order of time.
+    pub violations: Vec<Exceeding>,
+    /// Every time of which it cannot be told, in order of time.
+    pub undecided: Vec<Exceeding>,
+    /// Vehicles of which nothing tells it at all.
+    pub unknown: Vec<usize>,
+    /// What was taken for granted to tell it, beyond what happens between samples.
+    pub assumes: Option<&'static str>,
+}
+
+/// A vehicle over a time. The time is that of the samples or pieces around.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Exceeding {
+    /// The vehicle.
+    #[serde(skip)]
+    pub vehicle: usize,
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// The worst value within is at least this, in the unit of its limit.
+    pub lower: f64,
+    /// And at most this.
+    pub upper: f64,
+    /// When the worst that is certain is reached \[s\].
+    pub at_s: f64,
+}
+
+impl EnvelopeOutcome {
+    /// Whether some limit is exceeded.
+    #[must_use]
+    pub fn is_exceeded(&self) -> bool {
+        self.limits.iter().any(|limit| limit.status == Status::Violation)
+    }
+
+    /// Whether every limit is known to be kept, or nothing is asked.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.limits.iter().all(|limit| limit.status == Status::Clear)
+    }
+}

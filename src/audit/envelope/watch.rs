@@ -1,0 +1,406 @@
+//! Limits on single vehicles, followed through a recording.
+
+use nalgebra::Vector3;
+
+use super::extremum::{Enclosure, Goal, WIDTH, derivative, largest, largest_of};
+use super::fence::Fence;
+use super::limit::{Envelope, Limit, Quantity};
+use super::outcome::{EnvelopeOutcome, Exceeding, LimitOutcome};
+use crate::audit::outcome::Status;
+use crate::audit::polynomial::{rescale, stray_across, value};
+use crate::audit::sweep::Interval;
+use crate::track::{Item, Piece, Sample};
+
+/// Pieces of a curve that meet within this \[m\], and whose velocities do within this \[m/s\], are one smooth curve: their
+/// coefficients are written with so many digits. Places that are off by so much change the velocity at the end of a piece of
+/// degree n and length h by twice n / h times as much: whether there is a corner then is not known.
+const SMOOTH: f64 = 1e-3;
+/// Part of the room that is left to a fence to which a curve's least room is told.
+const COARSE: f64 = 1e-3;
+/// What is taken of accelerations between samples where nothing bounds them.
+const BY_THREE_SAMPLES: &str = "accelerations are those of the parabolas through three samples in a row";
+
+/// What is known of an item beside itself.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::audit) struct Seen {
+    /// Added to its times \[s\].
+    pub(in crate::audit) offset_s: f64,
+    /// Whether nothing is known of the time before it.
+    pub(in crate::audit) after_gap: bool,
+    /// Largest acceleration between samples \[m/s^2\]; none where they are joined by straight lines.
+    pub(in crate::audit) bounded_by_m_s2: Option<f64>,
+}
+
+/// Follows every limit, vehicle by vehicle.
+#[derive(Clone, Debug)]
+pub(in crate::audit) struct Watch {
+    fence: Option<Fence>,
+    window: Interval,
+    of: Vec<Followed>,
+    vehicles: Vec<Last>,
+}
+
+/// What was seen of a vehicle last.
+#[derive(Clone, Copy, Debug, Default)]
+struct Last {
+    sample: Option<Sample>,
+    /// Velocity at the end of its last piece \[m/s\], and how far that is off where places are by [`SMOOTH`].
+    curve_end: Option<(Vector3<f64>, f64)>,
+    /// Mean velocity over its last interval \[m/s\], and how long that was \[s\].
+    interval: Option<(Vector3<f64>, f64)>,
+}
+
+/// A limit as far as the recording was read.
+#[derive(Clone, Debug)]
+struct Followed {
+    limit: Limit,
+    extreme: Option<Exceeding>,
+    violations: Times,
+    undecided: Times,
+    /// Which vehicles something was told of.
+    told: Vec<bool>,
+    assumes: Option<&'static str>,
+}
+
+/// A value over a time of which it is the extreme, turned so that it must not exceed its bound.
+type Found = (Interval, Enclosure);
+
+impl Watch {
+    pub(in crate::audit) fn new(envelope: &Envelope, window: Interval) -> Self {
+        let of = envelope.all().into_iter().map(Followed::new).collect();
+        Self { fence: envelope.fence.clone(), window, of, vehicles: Vec::new() }
+    }
+
+    /// Takes what is said of a vehicle next.
+    pub(in crate::audit) fn take(&mut self, item: &Item, seen: Seen) {
+        let vehicle = item.vehicle();
+        if self.vehicles.len() <= vehicle {
+            self.vehicles.resize(vehicle + 1, Last::default());
+        }
+        let last = std::mem::take(&mut self.vehicles[vehicle]);
+        let last = if seen.after_gap { Last::default() } else { last };
+        self.vehicles[vehicle] = match item {
+            Item::Sample(sample) => {
+                self.sample(last, Sample { time_s: sample.time_s + seen.offset_s, ..*sample }, seen)
+            }
+            Item::Piece(piece) => self.piece(last, piece, seen.offset_s),
+        };
+    }
+
+    fn sample(&mut self, last: Last, seen: Sample, Seen { bounded_by_m_s2, .. }: Seen) -> Last {
+        let Some(before) = last.sample else {
+            self.instant(&seen);
+            return Last { sample: Some(seen), ..Last::default() };
+        };
+        let over = Interval { from_s: before.time_s, to_s: seen.time_s };
+        let h = over.to_s - over.from_s;
+        let mean = (seen.position_m - before.position_m) / h;
+        let bound_m_s2 = bounded_by_m_s2.unwrap_or(0.0);
+        self.each(seen.vehicle, |limit, fence, window, known| match limit.quantity.derivative() {
+            0 => place_between(limit, fence, window, (&before, &seen), (bound_m_s2, known)),
+            1 => speed_between(limit, window, (&before, &seen), mean, bound_m_s2),
+            _ => None,
+        });
+        self.corner(&before, &seen, (last.interval, mean), bounded_by_m_s2);
+        Last { sample: Some(seen), interval: Some((mean, h)), curve_end: None }
+    }
+
+    /// Accelerations around a sample, from the mean velocities on both sides and its own velocity.
+    fn corner(
+        &mut self,
+        before: &Sample,
+        seen: &Sample,
+        (last, mean): (Option<(Vector3<f64>, f64)>, Vector3<f64>),
+        bounded_by_m_s2: Option<f64>,
+    ) {
+        let h = seen.time_s - before.time_s;
+        let shortest_s = last.map_or(h, |(_, h_before)| h.min(h_before));
+        let rounding = 4.0 * rounding_m(before, seen) / (h * shortest_s);
+        let needs = [
+            last.map(|(mean_before, h_before)| 2.0 * (mean - mean_before).norm() / (h_before + h)),
+            before.velocity_m_s.map(|start| 2.0 * (mean - start).norm() / h),
+            seen.velocity_m_s.map(|end| 2.0 * (end - mean).norm() / h),
+            before.velocity_m_s.zip(seen.velocity_m_s).map(|(start, end)| (end - start).norm() / h),
+        ];
+        let needed = needs.into_iter().flatten().reduce(f64::max).map(|needed| (needed - rounding).max(0.0));
+        let from_s = before.time_s - last.map_or(0.0, |(_, h_before)| h_before);
+        self.each(seen.vehicle, |limit, _, window, _| {
+            let needed = needed.filter(|_| limit.quantity == Quantity::Acceleration)?;
+            // Of a bounded motion it is known that it needed as much somewhere between the samples, and not where.
+            let is_whole = window.from_s <= from_s && seen.time_s <= window.to_s;
+            let lower = if is_whole || bounded_by_m_s2.is_none() { needed } else { f64::NEG_INFINITY };
+            let upper = bounded_by_m_s2.map_or(lower, |most| most.max(lower));
+            let over = Interval { from_s: from_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
+            let at =
+                if over.to_s > over.from_s { (before.time_s - over.from_s) / (over.to_s - over.from_s) } else { 0.0 };
+            (over.from_s < over.to_s).then_some((over, Enclosure { lower, upper, at }))
+        });
+        if bounded_by_m_s2.is_none() {
+            let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
+            accelerations.for_each(|of| of.assumes = Some(BY_THREE_SAMPLES));
+        }
+    }
+
+    /// A vehicle of which nothing is known before.
+    fn instant(&mut self, seen: &Sample) {
+        let over = Interval { from_s: seen.time_s, to_s: seen.time_s };
+        self.each(seen.vehicle, |limit, fence, window, _| {
+            let is_asked = window.from_s <= seen.time_s && seen.time_s <= window.to_s;
+            let exact = match (limit.quantity, limit.quantity.derivative()) {
+                (Quantity::Fence, _) => -fence?.room_m(seen.position_m, seen.position_m),
+                (quantity, 0) => quantity.of(seen.position_m),
+                (quantity, 1) => quantity.of(seen.velocity_m_s?),
+                _ => return None,
+            };
+            is_asked.then_some((over, Enclosure { lower: exact, upper: exact, at: 0.0 }))
+        });
+    }
+
+    fn piece(&mut self, last: Last, piece: &Piece, offset_s: f64) -> Last {
+        let over = Interval { from_s: piece.from_s + offset_s, to_s: piece.to_s + offset_s };
+        let (vehicle, length_s) = (piece.vehicle, over.to_s - over.from_s);
+        let mut whole = piece.coefficients.clone();
+        rescale(&mut whole, 0.0, length_s);
+        let (start, start_m_s) = (whole[0], derivative(&whole, length_s)[0]);
+        let (end, end_m_s) = (value(&whole, 1.0), value(&derivative(&whole, length_s), 1.0));
+        let off_m_s = 2.0 * SMOOTH * (piece.coefficients.len() - 1) as f64 / length_s;
+        self.join(&last, vehicle, (over.from_s, start), (start_m_s, off_m_s));
+        let clip = Interval { from_s: over.from_s.max(self.window.from_s), to_s: over.to_s.min(self.window.to_s) };
+        if clip.from_s < clip.to_s {
+            let mut part = piece.coefficients.clone();
+            let clipped_s = clip.to_s - clip.from_s;
+            rescale(&mut part, clip.from_s - over.from_s, clipped_s);
+            let first = derivative(&part, clipped_s);
+            let second = derivative(&first, clipped_s);
+            for of in &mut self.of {
+                let goal = Goal {
+                    known: of.known(),
+                    bound: of.limit.bound(),
+                    width: WIDTH * of.limit.allowance(),
+                    coarse: 0.0,
+                };
+                let found = match (of.limit.quantity, of.limit.quantity.derivative()) {
+                    (Quantity::Fence, _) => {
+                        self.fence.as_ref().map(|fence| outside(fence, &part, Goal { coarse: COARSE, ..goal }))
+                    }
+                    (quantity, order) => Some(largest_of(quantity, [&part, &first, &second][order], goal)),
+                };
+                of.note(vehicle, found.map(|found| (clip, found)));
+            }
+        }
+        let sample = Sample { vehicle, time_s: over.to_s, position_m: end, velocity_m_s: None, radius_m: None };
+        Last { sample: Some(sample), curve_end: Some((end_m_s, off_m_s)), interval: None }
+    }
+
+    /// Where a piece does not go on where the one before it ended, no speed is known; where it goes on at another velocity, it
+    /// has no acceleration that a vehicle could have.
+    fn join(
+        &mut self,
+        last: &Last,
+        vehicle: usize,
+        (from_s, start): (f64, Vector3<f64>),
+        (start_m_s, off_m_s): (Vector3<f64>, f64),
+    ) {
+        let Some((before, (end_m_s, off_before_m_s))) = last.sample.zip(last.curve_end) else { return };
+        let apart_s = from_s - before.time_s;
+        let jumps = (start - before.position_m).norm() > SMOOTH;
+        let by_m_s = (start_m_s - end_m_s).norm();
+        let (may_bend, bends) = (by_m_s > SMOOTH, by_m_s > SMOOTH + off_m_s + off_before_m_s);
+        let over = Interval { from_s: before.time_s.min(from_s), to_s: from_s };
+        self.each(vehicle, |limit, fence, window, _| {
+            let in_window = window.from_s <= from_s && from_s <= window.to_s;
+            let lower = match limit.quantity.derivative() {
+                0 if limit.quantity == Quantity::Fence => -fence?.room_m(before.position_m, start),
+                0 => limit.quantity.of(before.position_m).max(limit.quantity.of(start)),
+                2 if bends => by_m_s / apart_s.max(0.0),
+                2 if may_bend => f64::NEG_INFINITY,
+                _ if jumps => f64::NEG_INFINITY,
+                _ => return None,
+            };
+            let upper = if limit.quantity.derivative() == 0 { lower } else { f64::INFINITY };
+            in_window.then_some((over, Enclosure { lower, upper, at: 1.0 }))
+        });
+    }
+
+    /// Asks for what was found of each limit, given the worst value that is known of it, and notes it.
+    fn each(&mut self, vehicle: usize, mut find: impl FnMut(Limit, Option<&Fence>, Interval, f64) -> Option<Found>) {
+        let Self { fence, window, of, .. } = self;
+        for of in of {
+            let known = of.known();
+            of.note(vehicle, find(of.limit, fence.as_ref(), *window, known));
+        }
+    }
+
+    /// The verdicts, for vehicles that are judged; `is_whole` says that nothing of any was missed, and nothing contradicts what
+    /// was taken for granted.
+    pub(in crate::audit) fn finish(self, judged: &[bool], is_whole: bool) -> EnvelopeOutcome {
+        EnvelopeOutcome { limits: self.of.into_iter().map(|of| of.finish(judged, is_whole)).collect() }
+    }
+}
+
+/// Heights and the room to a fence between two samples: those of the straight line, and of whatever is within A h^2 / 8 of it.
+fn place_between(
+    limit: Limit,
+    fence: Option<&Fence>,
+    window: Interval,
+    (before, seen): (&Sample, &Sample),
+    (bound_m_s2, known): (f64, f64),
+) -> Option<Found> {
+    let whole_s = seen.time_s - before.time_s;
+    let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
+    let place = |time_s: f64| before.position_m.lerp(&seen.position_m, (time_s - before.time_s) / whole_s);
+    let from = if over.from_s > before.time_s { place(over.from_s) } else { before.position_m };
+    let to = if over.to_s < seen.time_s { place(over.to_s) } else { seen.position_m };
+    let stray_m = bound_m_s2 * whole_s * whole_s / 8.0;
+    let (first, second, drawn) = match fence.filter(|_| limit.quantity == Quantity::Fence) {
+        None => {
+            let ends = [from, to].map(|here| limit.quantity.of(here));
+            (ends[0], ends[1], ends[0].max(ends[1]))
+        }
+        Some(fence) => {
+            let drawn = -fence.room_m(from, to);
+            // Where it is no worse than what is known, nobody asks at which end.
+            let [first, second] = if stray_m == 0.0 && drawn <= known.min(limit.bound()) {
+                [drawn; 2]
+            } else {
+                [from, to].map(|here| -fence.room_m(here, here))
+            };
+            (first, second, drawn)
+        }
+    };
+    let is_seen = |time_s: f64| time_s == before.time_s || time_s == seen.time_s;
+    let ends = [(over.from_s, first), (over.to_s, second)].into_iter().filter(|&(time_s, _)| is_seen(time_s));
+    let lower = if stray_m == 0.0 { drawn } else { ends.map(|(_, value)| value).fold(f64::NEG_INFINITY, f64::max) };
+    let at = if second > first { 1.0 } else { 0.0 };
+    (over.from_s <= over.to_s).then_some((over, Enclosure { lower, upper: drawn + stray_m, at }))
+}
+
+/// Speeds between two samples: that of the mean velocity, those that are recorded, and what a bounded acceleration adds.
+fn speed_between(
+    limit: Limit,
+    window: Interval,
+    (before, seen): (&Sample, &Sample),
+    mean: Vector3<f64>,
+    bound_m_s2: f64,
+) -> Option<Found> {
+    let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
+    let recorded = |of: &Sample| {
+        let in_window = window.from_s <= of.time_s && of.time_s <= window.to_s;
+        of.velocity_m_s.filter(|_| in_window).map(|velocity| limit.quantity.of(velocity))
+    };
+    let (start, end) = (recorded(before), recorded(seen));
+    let added = bound_m_s2 * (seen.time_s - before.time_s);
+    // What the digits of its places leave open is no speed.
+    let drawn = limit.quantity.of(mean) - 2.0 * rounding_m(before, seen) / (seen.time_s - before.time_s);
+    let drawn = if over.from_s < over.to_s { drawn } else { f64::NEG_INFINITY };
+    let is_whole = over.from_s == before.time_s && over.to_s == seen.time_s;
+    let of_mean = if is_whole || bound_m_s2 == 0.0 { drawn } else { f64::NEG_INFINITY };
+    let seen_most = start.into_iter().chain(end).fold(f64::NEG_INFINITY, f64::max);
+    let lower = of_mean.max(seen_most);
+    let by_ends = start.zip(end).map_or(f64::INFINITY, |(start, end)| 0.5 * (start + end + added));
+    let upper = if bound_m_s2 == 0.0 { lower } else { lower.max((drawn + 0.5 * added).min(by_ends)) };
+    let at = if end == Some(lower) { 1.0 } else { 0.0 };
+    let is_told = over.from_s < over.to_s || (over.from_s == over.to_s && seen_most.is_finite());
+    is_told.then_some((over, Enclosure { lower, upper, at }))
+}
+
+/// How far places of two samples may be off by their digits \[m\].
+fn rounding_m(before: &Sample, seen: &Sample) -> f64 {
+    f64::EPSILON * before.position_m.amax().max(seen.position_m.amax())
+}
+
+/// How far outside of a fence a curve gets.
+fn outside(fence: &Fence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
+    largest(part, goal, |part, _| {
+        let (from, to) = (part[0], value(part, 1.0));
+        [-fence.room_m(from, from), -fence.room_m(to, to), stray_across(part) - fence.room_m(from, to)]
+    })
+}
+
+impl Followed {
+    fn new(limit: Limit) -> Self {
+        let (violations, undecided) = (Times::default(), Times::default());
+        Self { limit, extreme: None, violations, undecided, told: Vec::new(), assumes: None }
+    }
+
+    /// The worst value that is known.
+    fn known(&self) -> f64 {
+        self.extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.lower)
+    }
+
+    fn note(&mut self, vehicle: usize, found: Option<Found>) {
+        let Some((over, Enclosure { lower, upper, at })) = found else { return };
+        if self.told.len() <= vehicle {
+            self.told.resize(vehicle + 1, false);
+        }
+        self.told[vehicle] = true;
+        let at_s = over.from_s + at * (over.to_s - over.from_s);
+        let found = Exceeding { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
+        let bound = self.limit.bound();
+        if lower > bound {
+            self.violations.add(found);
+        } else if upper > bound {
+            self.undecided.add(found);
+        }
+        let extreme = self.extreme.get_or_insert(found);
+        if found.lower > extreme.lower {
+            *extreme = Exceeding { upper: extreme.upper.max(upper), ..found };
+        } else {
+            extreme.upper = extreme.upper.max(upper);
+        }
+    }
+
+    fn finish(self, judged: &[bool], is_whole: bool) -> LimitOutcome {
+        let Self { limit, extreme, violations, undecided, told, assumes } = self;
+        let is_told = |vehicle: usize| told.get(vehicle).copied().unwrap_or(false);
+        let unknown: Vec<_> =
+            judged.iter().enumerate().filter(|&(vehicle, &asked)| asked && !is_told(vehicle)).map(|(k, _)| k).collect();
+        let turned = |of: Exceeding| {
+            let (lower, upper) = if limit.quantity.is_least() { (-of.upper, -of.lower) } else { (of.lower, of.upper) };
+            Exceeding { lower, upper, ..of }
+        };
+        let in_order = |times: Times| {
+            let mut all: Vec<_> = times.all.into_iter().map(turned).collect();
+            all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
+            all
+        };
+        let (violations, undecided) = (in_order(violations), in_order(undecided));
+        let decided = is_whole && undecided.is_empty() && unknown.is_empty() && extreme.is_some();
+        LimitOutcome {
+            status: Status::new(!violations.is_empty(), decided),
+            extreme: extreme.map(turned),
+            violations,
+            undecided,
+            unknown,
+            assumes,
+            limit,
+        }
+    }
+}
+
+/// Times of vehicles, those of one that go on as one.
+#[derive(Clone, Debug, Default)]
+struct Times {
+    all: Vec<Exceeding>,
+    /// Where the last one of a vehicle is.
+    last: Vec<Option<usize>>,
+}
+
+impl Times {
+    fn add(&mut self, found: Exceeding) {
+        if self.last.len() <= found.vehicle {
+            self.last.resize(found.vehicle + 1, None);
+        }
+        let last = self.last[found.vehicle].and_then(|last| self.all.get_mut(last));
+        if let Some(of) = last.filter(|of| of.to_s >= found.from_s) {
+            of.to_s = of.to_s.max(found.to_s);
+            of.upper = of.upper.max(found.upper);
+            if found.lower > of.lower {
+                (of.lower, of.at_s) = (found.lower, found.at_s);
+            }
+        } else {
+            self.last[found.vehicle] = Some(self.all.len());
+            self.all.push(found);
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! What `tautline audit` is asked.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValue, TypedValueParser};
+use nalgebra::Vector3;
+
+use super::Failure;
+use super::envelope;
+use super::obstacles;
+use super::outputs;
+use super::own::OwnRecording;
+use super::reading::{self, ReadArguments, one_of};
+use crate::audit::envelope::Limit;
+use crate::audit::recorded::{Motion, Outcome, Settings, VehicleSettings};
+use crate::read::{Format, Recording};
+use crate::report::recorded::{Basis, Between};
+use crate::text::counted;
+
+/// Arguments of `tautline audit`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "\
+Exits with 0 where nothing came too close, proved or as assumed between samples, with 1 where something did or where it \
+cannot be told (unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
+below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
+pub(super) struct AuditArguments {
+    #[command(flatten)]
+    pub(super) reading: ReadArguments,
+    /// Format of the recording [default: recognised by its content].
+    #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
+    pub(super) format: Option<Format>,
+
+    /// Safety distance between two centres [m], by default that of a recording of tautline; with --ellipsoid a scaled
+    /// distance, by default 2.
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) delta: Option<f64>,
+    /// What happens between samples [default: linear for samples, polynomial for curves].
+    #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Question")]
+    pub(super) motion: Option<Motion>,
+    /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
+    #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) max_accel: Vec<Named>,
+    /// Radius [m] of every vehicle, or of one; may be given several times.
+    #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) radius: Vec<Named>,
+    /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash; two touch at a scaled distance of 2.
+    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, allow_hyphen_values = true, conflicts_with_all = ["radius", "obstacles"], help_heading = "Question")]
+    pub(super) ellipsoid: Option<Vector3<f64>>,
+    /// TOML file of obstacles: balls, boxes, capsules, half-spaces; at rest or moving.
+    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    pub(super) obstacles: Option<PathBuf>,
+    /// Limits on each vehicle by itself: speed, horizontal, climb and descent [m/s], accel [m/s^2], height and floor [m].
+    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = envelope::limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
+    pub(super) limit: Vec<Limit>,
+    /// TOML file of a fence that every vehicle must stay within.
+    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    pub(super) fence: Option<PathBuf>,
+    /// Judge from here on [s].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) from: Option<f64>,
+    /// Judge up to here [s].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) to: Option<f64>,
+    /// Leave out pairs while both are at or below this height [m].
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) above: Option<f64>,
+    /// Judge these vehicles alone; a name with a comma in quotes. May be given several times.
+    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Question")]
+    pub(super) ids: Vec<Listed>,
+    /// Add this to the times of a vehicle whose clock was off [s]; may be given several times.
+    #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
+    pub(super) offset: Vec<(String, f64)>,
+    /// How many vehicles there must be to judge: another number is wrong input.
+    #[arg(long, value_name = "N", help_heading = "Question")]
+    pub(super) expect_vehicles: Option<usize>,
+    /// Longest time between two samples that is no gap [s] [default: 1.5 of the vehicle's usual interval].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) max_gap: Option<f64>,
+
+    /// Ask what this file says, in the place of the nearest tautline.toml beside the recording and above it, up to the working
+    /// folder.
+    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    pub(super) config: Option<PathBuf>,
+    /// Ask what the command line says alone, and look for no tautline.toml.
+    #[arg(long, conflicts_with = "config", help_heading = "Question")]
+    pub(super) no_config: bool,
+    /// What a tautline.toml asked.
+    #[arg(skip)]
+    pub(super) asked_by: Option<String>,
+
+    /// Print the report as JSON on standard output, and nothing else there.
+    #[arg(long, help_heading = "Answer")]
+    pub(super) json: bool,
+    /// Print no summary and no progress: the exit code says it.
+    #[arg(long, help_heading = "Answer")]
+    pub(super) quiet: bool,
+    /// Write the verdict as a `JUnit` file.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    pub(super) junit: Option<PathBuf>,
+    /// Write violations, undecided times and gaps as CSV.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    pub(super) events: Option<PathBuf>,
+    /// Write a report for people, with figures.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    pub(super) html: Option<PathBuf>,
+    /// Write a summary in Markdown, as for the page of a job.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    pub(super) summary: Option<PathBuf>,
+    /// Print a line for each recording that marks it in the log and on the page of a job.
+    #[arg(long, value_name = "SYSTEM", help_heading = "Answer")]
+    pub(super) annotations: Option<Annotations>,
+    /// Exit with 0 where it cannot be told, too.
+    #[arg(long, help_heading = "Answer")]
+    pub(super) allow_undecided: bool,
+}
+
+pub(super) fn motion() -> impl TypedValueParser<Value = Motion> {
+    one_of(vec![
+        (PossibleValue::new("linear").help("Straight lines"), Motion::Linear),
+        (PossibleValue::new("hold").help("Nothing, with a jump at each sample"), Motion::Hold),
+        (PossibleValue::new("polynomial").help("The recording's own curves"), Motion::Polynomial),
+        (PossibleValue::new("bounded").help("Anything within the largest acceleration"), Motion::Bounded),
+    ])
+}
+
+/// Whose lines mark what was found.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub(super) enum Annotations {
+    /// GitHub Actions
+    Github,
+}
+
+/// A number, perhaps of one vehicle alone.
+pub(super) type Named = (Option<String>, f64);
+
+/// Names of vehicles.
+#[derive(Clone, Debug)]
+pub(super) struct Listed(Vec<String>);
+
+fn listed(text: &str) -> Result<Listed, String> {
+    let mut lines = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
+    match lines.records().next() {
+        Some(Ok(names)) => Ok(Listed(names.iter().map(str::to_owned).collect())),
+        Some(Err(error)) => Err(error.to_string()),
+        None => Err("name at least one vehicle".to_owned()),
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(format!("`{text}` is not a number")),
+    }
+}
+
+fn named(text: &str) -> Result<Named, String> {
+    match text.rsplit_once('=') {
+        Some((name, value)) => Ok((Some(name.to_owned()), number(value)?)),
+        None => Ok((None, number(text)?)),
+    }
+}
+
+fn offset(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.rsplit_once('=').ok_or("write NAME=SECONDS, such as cf3=-0.12")?;
+    Ok((name.to_owned(), number(value)?))
+}
+
+fn axes(text: &str) -> Result<Vector3<f64>, String> {
+    let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    let [x, y, z] = numbers[..] else { return Err("write three half axes, such as 0.125,0.125,0.375".to_owned()) };
+    Ok(Vector3::new(x, y, z))
+}
+
+impl AuditArguments {
+    /// Opens the recording.
+    pub(super) fn open(&self) -> Result<Recording, Failure> {
+        Ok(self.reading.open(&self.reading.options(self.format)?)?)
+    }
+
+    pub(super) fn settings(&self) -> Result<Settings, Failure> {
+        let mut vehicles: BTreeMap<String, VehicleSettings> = BTreeMap::new();
+        let (mut radius_m, mut max_accel_m_s2) = (None, None);
+        for (name, value) in &self.radius {
+            match name {
+                Some(name) => vehicles.entry(name.clone()).or_default().radius_m = Some(*value),
+                None => radius_m = Some(*value),
+            }
+        }
+        for (name, value) in &self.max_accel {
+            match name {
+                Some(name) => vehicles.entry(name.clone()).or_default().max_accel_m_s2 = Some(*value),
+                None => max_accel_m_s2 = Some(*value),
+            }
+        }
+        for (name, value) in &self.offset {
+            vehicles.entry(name.clone()).or_default().offset_s = *value;
+        }
+        if !self.max_accel.is_empty() && self.motion != Some(Motion::Bounded) {
+            let help = "add --motion bounded, or leave --max-accel out";
+            return Err(Failure::input("--max-accel says nothing of a motion that is known exactly", help));
+        }
+        let only: BTreeSet<String> = self.ids.iter().flat_map(|Listed(names)| names.iter().cloned()).collect();
+        Ok(Settings {
+            delta_m: self.delta,
+            motion: self.motion,
+            max_accel_m_s2,
+            radius_m,
+            ellipsoid_m: self.ellipsoid,
+            is_told_scaled: false,
+            from_s: self.from,
+            to_s: self.to,
+            above_m: self.above,
+            max_gap_s: self.max_gap,
+            vehicles,
+            only: (!only.is_empty()).then_some(only),
+            obstacles: self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)?,
+            is_own_limit: false,
+            envelope: envelope::envelope(&self.limit, self.fence.as_deref())?,
+        })
+    }
+
+    pub(super) fn check_outputs(&self) -> Result<(), Failure> {
+        let mut inputs: Vec<_> = self.reading.paths().map(|path| ("the recording", path)).collect();
+        inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        inputs.extend(self.config.as_deref().map(|path| ("the file of settings", path)));
+        inputs.extend(self.fence.as_deref().map(|path| ("the file of the fence", path)));
+        let outputs = [
+            ("--events", &self.events),
+            ("--junit", &self.junit),
+            ("--html", &self.html),
+            ("--summary", &self.summary),
+        ];
+        let outputs: Vec<_> =
+            outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
+        outputs::check(&inputs, &outputs)
+    }
+
+    /// Refuses to judge a vehicle alone, and another number of vehicles than is expected.
+    pub(super) fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
+        let path = self.reading.called();
+        let judged = outcome.presence.iter().flatten().count();
+        if let Some(expected) = self.expect_vehicles
+            && judged != expected
+        {
+            let message = format!("{path}: {} to judge, not {expected}", counted(judged as u64, "vehicle", "vehicles"));
+            return Err(Failure::input(
+                message,
+                "look for who is missing or too many, or give another --expect-vehicles",
+            ));
+        }
+        let asked =
+            outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
+        let asked = asked.count();
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() {
+            let message =
+                format!("{path}: {} to judge, and nothing to keep apart", counted(asked as u64, "vehicle", "vehicles"));
+            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME say which are there), or --obstacles, --limit, --fence";
+            return Err(Failure::input(message, help));
+        }
+        if judged == 0 && (self.from.is_some() || self.to.is_some()) {
+            let message = format!("{path}: no vehicle is there between --from and --to");
+            return Err(Failure::input(message, "give a window in which the recording has vehicles"));
+        }
+        Ok(())
+    }
+
+    /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording.
+    pub(super) fn refuse_guessed_seconds(&self, unit: &str) -> Result<(), Failure> {
+        let asked = [
+            (matches!(self.motion, Some(Motion::Bounded)), "--motion bounded"),
+            (self.from.is_some(), "--from"),
+            (self.to.is_some(), "--to"),
+            (self.max_gap.is_some(), "--max-gap"),
+            (!self.offset.is_empty(), "--offset"),
+            (self.limit.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
+        ];
+        let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
+        let path = self.reading.called();
+        let message = format!(
+            "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
+        );
+        Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")))
+    }
+
+    /// What is taken to happen between samples of a recording of curves alone, or that may be ours; nothing is proved where
+    /// the samples themselves are assumed.
+    pub(super) fn between(&self, curves: bool, own: Option<&OwnRecording>, assumed: Option<&str>) -> Between {
+        let most = |accel: &[Named]| {
+            let listed = accel.iter().map(|(name, a)| match name {
+                Some(name) => format!("{a:?} m/s^2 for {name}"),
+                None => format!("{a:?} m/s^2"),
+            });
+            listed.collect::<Vec<_>>().join(", ")
+        };
+        let (motion, basis) = match self.motion {
+            Some(Motion::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
+            Some(Motion::Bounded) => (format!("accelerations of at most {}", most(&self.max_accel)), Basis::Bounded),
+            _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
+            _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
+            _ => ("straight between samples".to_owned(), Basis::Assumed),
+        };
+        match assumed {
+            Some(assumed) => Between { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
+            None => Between { motion, basis },
+        }
+    }
+}

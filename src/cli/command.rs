@@ -1,0 +1,112 @@
+//! The commands, and who does each.
+
+use std::sync::Once;
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+use super::{Exit, Failure};
+use super::{
+    attack, audit_arguments, audits, campaign, check, compare, completions, export, list, margin, run, schema, validate,
+};
+#[cfg(feature = "viewer")]
+use super::{render, view};
+use crate::read;
+
+/// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
+///
+/// Without a command, flies the built-in scenario `pentagon`.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed."
+)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    pub(super) command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it")]
+pub(super) enum Command {
+    /// Fly a scenario, audit every step and leave a recording and a report.
+    Run(run::RunArguments),
+    /// Judge a recording of any origin: clear, a violation, or undecided at its sampling.
+    Audit(audit_arguments::AuditArguments),
+    /// Say what is known before the first step: stability, certified separation, step, traps.
+    Check(check::CheckArguments),
+    /// Reproduce the paper and judge every claim, ours and the paper's.
+    Validate(validate::ValidateArguments),
+    /// Fly the same starts under several laws and set them side by side.
+    Compare(compare::CompareArguments),
+    /// Find how much of one key a scenario survives: where between two values its verdict turns.
+    Margin(margin::MarginArguments),
+    /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
+    Campaign(campaign::CampaignArguments),
+    /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
+    Attack(attack::AttackArguments),
+    /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
+    Export(export::ExportArguments),
+    /// Draw a recording: pictures, films and contact sheets, without a screen.
+    #[cfg(feature = "viewer")]
+    Render(render::RenderArguments),
+    /// Open a window on a recording, or on a scenario that is flown while it is watched.
+    #[cfg(feature = "viewer")]
+    View(view::ViewArguments),
+    /// List the built-in scenarios, or print one as TOML to start from.
+    List(list::ListArguments),
+    /// Print the JSON Schema of the scenario file.
+    Schema,
+    /// Print a completion script for a shell.
+    Completions(completions::CompletionsArguments),
+}
+
+/// Keeps the panic hook from speaking of what becomes an error anyway.
+pub(super) fn quiet_guarded_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let speak = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            #[cfg(feature = "viewer")]
+            if crate::render::is_in_window_library() {
+                std::process::exit(view::lose_display() as i32);
+            }
+            if !read::is_guarded() {
+                speak(panic);
+            }
+        }));
+    });
+}
+
+/// Does what a command asks for.
+pub(super) fn obey(command: Command) -> Result<Exit, Failure> {
+    match command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Audit(arguments) => audits::audits(&arguments),
+        Command::Check(arguments) => check::check(&arguments),
+        Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Compare(arguments) => compare::compare(&arguments),
+        Command::Margin(arguments) => margin::margin(&arguments),
+        Command::Campaign(arguments) => campaign::campaign(&arguments),
+        Command::Attack(arguments) => attack::attack(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::Render(arguments) => render::render(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::View(arguments) => view::view(&arguments),
+        Command::List(arguments) => list::list(&arguments),
+        Command::Schema => schema::schema(),
+        Command::Completions(arguments) => completions::completions(&arguments, &mut Arguments::command()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::Arguments;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+}

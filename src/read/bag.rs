@@ -1,0 +1,156 @@
+//! ROS 2 bags: a folder with `metadata.yaml` and files in MCAP, which follow each other and may be packed by zstd.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::Read as _;
+use std::path::{Component, Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::error::{Fault, Place, ReadError, quoted};
+use super::mcap;
+use super::options::ReadOptions;
+use super::order::Recording;
+use super::source::{Source, ZSTD_MAGIC};
+use super::stranger::BAG;
+
+/// What a bag says of itself.
+const METADATA: &str = "metadata.yaml";
+
+/// Longest that it may be \[bytes\]: a bag of a thousand topics has a tenth of it.
+const METADATA_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
+
+const REINDEX: &str = "copy the whole folder again, or have `ros2 bag reindex` write metadata.yaml anew";
+
+#[derive(Deserialize)]
+struct Metadata {
+    #[serde(rename = "rosbag2_bagfile_information")]
+    bag: Bag,
+}
+
+#[derive(Deserialize)]
+struct Bag {
+    storage_identifier: String,
+    relative_file_paths: Vec<String>,
+    #[serde(default)]
+    compression_mode: Option<String>,
+    #[serde(default)]
+    compression_format: Option<String>,
+}
+
+/// Whether a folder is a bag.
+pub(super) fn is_bag(folder: &Path) -> bool {
+    let path = folder.join(METADATA);
+    path.is_file()
+        && bytes_of(&path).is_ok_and(|bytes| memchr::memmem::find(&bytes, b"rosbag2_bagfile_information").is_some())
+}
+
+/// Opens a bag.
+pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let metadata = folder.join(METADATA);
+    let bag = read(&metadata).map_err(|error| error.of(&metadata))?;
+    let files = files_of(&bag, folder).map_err(|fault| ReadError::new(&metadata, fault))?;
+    refuse_others(folder, &files)?;
+    let packed = |path: &PathBuf| {
+        let mut source = Source::file(path);
+        let (mut begin, mut bytes) =
+            (File::open(path).map_err(|error| ReadError::new(path, missing(error)))?, Vec::new());
+        begin
+            .by_ref()
+            .take(ZSTD_MAGIC.len() as u64)
+            .read_to_end(&mut bytes)
+            .map_err(|error| ReadError::new(path, error.into()))?;
+        source.zstd = bytes == ZSTD_MAGIC;
+        Ok(source)
+    };
+    let files = files.iter().map(packed).collect::<Result<_, ReadError>>()?;
+    mcap::open_bag(&Source::file(folder), files, options)
+}
+
+fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(METADATA_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > METADATA_LIMIT_BYTES {
+        return Err(Fault::content(format!("it is longer than {METADATA_LIMIT_BYTES} bytes"), REINDEX));
+    }
+    Ok(bytes)
+}
+
+fn read(path: &Path) -> Result<Bag, ReadError> {
+    let bytes = bytes_of(path)?;
+    let text = std::str::from_utf8(&bytes).map_err(|_| Fault::NotUtf8)?;
+    let metadata: Metadata = serde_saphyr::from_str(text).map_err(|error| {
+        let place = error.location().map(|location| Place::Line(location.line()));
+        let said = error.to_string();
+        let problem = format!("it is not what a ROS 2 bag says of itself: {}", said.lines().next().unwrap_or_default());
+        ReadError { place, ..Fault::content(problem, REINDEX).into() }
+    })?;
+    Ok(metadata.bag)
+}
+
+fn missing(error: std::io::Error) -> Fault {
+    if error.kind() == std::io::ErrorKind::NotFound {
+        return Fault::content("the bag lists this file, and it is not there", REINDEX);
+    }
+    error.into()
+}
+
+/// The files that a bag lists, in their order.
+fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
+    if bag.storage_identifier != "mcap" {
+        let problem = format!("the bag is stored as {}, which is not read", quoted(&bag.storage_identifier));
+        return Err(Fault::content(problem, BAG));
+    }
+    let mode = bag.compression_mode.as_deref().unwrap_or_default().to_uppercase();
+    let format = bag.compression_format.as_deref().unwrap_or_default();
+    if mode == "MESSAGE" || !(format.is_empty() || format == "zstd") {
+        let problem = format!("the bag is packed by {} in mode {}", quoted(format), quoted(&mode));
+        return Err(Fault::content(
+            problem,
+            "have `ros2 bag convert` write it without compression, or with that of files",
+        ));
+    }
+    if bag.relative_file_paths.is_empty() {
+        return Err(Fault::content("the bag lists no file", REINDEX));
+    }
+    let (mut files, mut known) = (Vec::new(), BTreeSet::new());
+    for listed in &bag.relative_file_paths {
+        let path = Path::new(listed);
+        let odd = |part| !matches!(part, Component::Normal(_) | Component::CurDir);
+        // Bags of version 3 and before name themselves in front.
+        let name = path.file_name().filter(|_| !path.components().any(odd));
+        let Some(name) = name else {
+            let problem = format!("the bag lists {}, which is no file in its folder", quoted(listed));
+            return Err(Fault::content(problem, REINDEX));
+        };
+        let file = folder.join(name);
+        if !known.insert(file.clone()) {
+            return Err(Fault::content(format!("the bag lists {} twice", quoted(listed)), REINDEX));
+        }
+        files.push(file);
+    }
+    Ok(files)
+}
+
+/// Refuses files in the folder that the bag does not list: they may be parts of it.
+fn refuse_others(folder: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
+    let (listed, mut others): (BTreeSet<_>, Vec<_>) = (files.iter().collect(), Vec::new());
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let is_part = [".mcap", ".mcap.zstd", ".db3"].iter().any(|end| name.ends_with(end));
+        if is_part && !name.starts_with('.') && !listed.contains(&path) {
+            others.push(name);
+        }
+    }
+    others.sort();
+    match others.first() {
+        None => Ok(()),
+        Some(other) => {
+            let problem = format!("{other} lies beside the files of the bag, which does not list it");
+            let remedy =
+                "take the file away if it is none of the bag; else have `ros2 bag reindex` write metadata.yaml anew";
+            Err(Fault::content(problem, remedy).into())
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Places on the Earth in metres east, north and up of an origin, on the ellipsoid of WGS 84.
+//!
+//! The way is exact and not that of a flat map: to coordinates around the centre of the Earth, and from there into the
+//! frame of the origin. A double resolves 1 nm at that distance, and so do the places.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::error::{Fault, quoted};
+
+/// Half the equator's diameter \[m\].
+const EQUATOR_M: f64 = 6_378_137.0;
+
+/// How much shorter the axis is.
+const FLATTENING: f64 = 1.0 / 298.257_223_563;
+
+/// Latitude and longitude \[degrees\], and height above the ellipsoid \[m\].
+pub(super) type Geodetic = Vector3<f64>;
+
+/// The frame of an origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Local {
+    origin: Geodetic,
+    centre_m: Vector3<f64>,
+    /// Rows: east, north, up.
+    axes: Matrix3<f64>,
+}
+
+impl Local {
+    /// The frame that is there.
+    pub(super) fn at(origin: Geodetic) -> Result<Self, Fault> {
+        let centre_m = centred(origin)?;
+        let [(north_sine, north_cosine), (east_sine, east_cosine)] = angles(origin);
+        let axes = Matrix3::new(
+            -east_sine,
+            east_cosine,
+            0.0,
+            -north_sine * east_cosine,
+            -north_sine * east_sine,
+            north_cosine,
+            north_cosine * east_cosine,
+            north_cosine * east_sine,
+            north_sine,
+        );
+        Ok(Self { origin, centre_m, axes })
+    }
+
+    /// A place, east, north and up of the origin \[m\].
+    pub(super) fn place(&self, place: Geodetic) -> Result<Vector3<f64>, Fault> {
+        Ok(self.axes * (centred(place)? - self.centre_m))
+    }
+
+    /// The origin, as the user would say it.
+    pub(super) fn origin(&self) -> String {
+        let [latitude, longitude, height] = self.origin.into();
+        format!("{latitude:?},{longitude:?},{height:?}")
+    }
+
+    /// What a person should know.
+    pub(super) fn note(&self) -> String {
+        let origin = self.origin();
+        format!(
+            "places on the Earth are in metres east, north and up of {origin} on WGS 84 (--origin {origin} says so)"
+        )
+    }
+}
+
+/// Sine and cosine of latitude and of longitude.
+fn angles(place: Geodetic) -> [(f64, f64); 2] {
+    [place.x, place.y].map(|degrees| libm::sincos(degrees.to_radians()))
+}
+
+/// A place in the frame of the Earth's centre \[m\].
+fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
+    let range = |what: &str, value: f64, most: f64| {
+        if value.abs() <= most {
+            return Ok(());
+        }
+        let problem = format!("{} is no {what}: it is not within {most} degrees", quoted(&format!("{value:?}")));
+        let remedy = "write degrees with decimals; whole numbers of 1e-7 degrees are to be divided by 1e7";
+        Err(Fault::content(problem, remedy))
+    };
+    range("latitude", place.x, 90.0)?;
+    range("longitude", place.y, 360.0)?;
+    let [(sine, cosine), (east_sine, east_cosine)] = angles(place);
+    let squash = (1.0 - FLATTENING) * (1.0 - FLATTENING);
+    let curvature_m = EQUATOR_M / (cosine * cosine + squash * sine * sine).sqrt();
+    let from_axis_m = (curvature_m + place.z) * cosine;
+    Ok(Vector3::new(from_axis_m * east_cosine, from_axis_m * east_sine, (squash * curvature_m + place.z) * sine))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+
+    /// Half the shorter diameter \[m\].
+    const POLE_M: f64 = EQUATOR_M * (1.0 - FLATTENING);
+
+    /// Two units in the last place of a coordinate around the Earth's centre.
+    const ROUNDING_M: f64 = 2e-9;
+
+    /// The same by the reduced latitude, and with the system's own functions.
+    fn by_reduced_latitude(place: Geodetic) -> Vector3<f64> {
+        let (latitude, longitude) = (place.x.to_radians(), place.y.to_radians());
+        let reduced = (POLE_M * latitude.sin()).atan2(EQUATOR_M * latitude.cos());
+        let from_axis = EQUATOR_M * reduced.cos() + place.z * latitude.cos();
+        let along = POLE_M * reduced.sin() + place.z * latitude.sin();
+        vector![from_axis * longitude.cos(), from_axis * longitude.sin(), along]
+    }
+
+    /// The way back, by iteration.
+    fn geodetic(centred: Vector3<f64>) -> Geodetic {
+        let squash = (1.0 - FLATTENING) * (1.0 - FLATTENING);
+        let from_axis = centred.x.hypot(centred.y);
+        let mut latitude = centred.z.atan2(squash * from_axis);
+        for _ in 0..20 {
+            let curvature = EQUATOR_M / (1.0 - (1.0 - squash) * latitude.sin().powi(2)).sqrt();
+            latitude = (centred.z + (1.0 - squash) * curvature * latitude.sin()).atan2(from_axis);
+        }
+        let curvature = EQUATOR_M / (1.0 - (1.0 - squash) * latitude.sin().powi(2)).sqrt();
+        let (sine, cosine) = latitude.sin_cos();
+        let height = from_axis * cosine + centred.z * sine - curvature * (1.0 - (1.0 - squash) * sine * sine);
+        vector![latitude.to_degrees(), centred.y.atan2(centred.x).to_degrees(), height]
+    }
+
+    fn places() -> impl Iterator<Item = Geodetic> {
+        let latitudes = [-90.0, -89.999_999, -47.3, -1e-9, 0.0, 12.5, 47.397_742, 89.999_999, 90.0];
+        let longitudes = [-180.0, -122.4, -1e-9, 0.0, 8.545_594, 179.999_999_9, 180.0];
+        let heights = [-400.0, 0.0, 488.0, 9000.0];
+        latitudes.into_iter().flat_map(move |latitude| {
+            longitudes.into_iter().flat_map(move |longitude| heights.map(|height| vector![latitude, longitude, height]))
+        })
+    }
+
+    #[test]
+    fn places_agree_with_an_independent_formula_and_with_the_way_back() {
+        for place in places() {
+            let found = centred(place).expect("a place");
+            assert!((found - by_reduced_latitude(place)).norm() < 2.0 * ROUNDING_M, "{place}");
+            let back = by_reduced_latitude(geodetic(found));
+            assert!((found - back).norm() < 2.0 * ROUNDING_M, "{place}: {}", (found - back).norm());
+        }
+    }
+
+    #[test]
+    fn the_frame_of_an_origin_turns_and_shifts_alone() {
+        let all: Vec<_> = places().collect();
+        for origin in &all {
+            let local = Local::at(*origin).expect("a place");
+            assert_eq!(local.place(*origin).expect("a place"), Vector3::zeros());
+            assert!((local.axes * local.axes.transpose() - Matrix3::identity()).norm() < 1e-15);
+            assert!((local.axes.determinant() - 1.0).abs() < 1e-15);
+            let above = local.place(origin + vector![0.0, 0.0, 100.0]).expect("a place");
+            assert!((above - vector![0.0, 0.0, 100.0]).norm() < 3.0 * ROUNDING_M, "{origin}: {above}");
+        }
+    }
+
+    #[test]
+    fn a_second_of_arc_is_as_long_as_the_radii_of_curvature_say() {
+        let origin = vector![47.0, 8.0, 0.0];
+        let local = Local::at(origin).expect("a place");
+        let second = 1.0 / 3600.0;
+        let squared = FLATTENING * (2.0 - FLATTENING);
+        let sine = 47.0_f64.to_radians().sin();
+        let across = EQUATOR_M / (1.0 - squared * sine * sine).sqrt();
+        let along = across * (1.0 - squared) / (1.0 - squared * sine * sine);
+        let east = local.place(origin + vector![0.0, second, 0.0]).expect("a place");
+        let north = local.place(origin + vector![second, 0.0, 0.0]).expect("a place");
+        let arc = second.to_radians();
+        assert!((east.x - across * 47.0_f64.to_radians().cos() * arc).abs() < 1e-6 && east.y.abs() < 1e-3, "{east}");
+        assert!((north.y - along * arc).abs() < 1e-6 && north.x.abs() < ROUNDING_M, "{north}");
+    }
+
+    #[test]
+    fn the_antimeridian_and_the_poles_are_places_like_any_other() {
+        let local = Local::at(vector![0.0, 179.999_99, 0.0]).expect("a place");
+        let over = local.place(vector![0.0, -179.999_99, 0.0]).expect("a place");
+        assert!((over.x - 2.0e-5_f64.to_radians() * EQUATOR_M).abs() < 1e-6, "{over}");
+        let pole = Local::at(vector![90.0, 0.0, 0.0]).expect("a place");
+        let turned = pole.place(vector![90.0, 123.0, 0.0]).expect("a place");
+        assert!(turned.norm() < ROUNDING_M, "every longitude is the pole: {turned}");
+    }
+
+    #[test]
+    fn what_is_no_place_is_refused() {
+        for place in [vector![90.1, 0.0, 0.0], vector![473_977_420.0, 0.0, 0.0], vector![f64::NAN, 0.0, 0.0]] {
+            assert!(Local::at(place).is_err(), "{place}");
+        }
+        assert!(Local::at(vector![0.0, 360.1, 0.0]).is_err());
+    }
+}

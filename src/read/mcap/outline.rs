@@ -1,0 +1,233 @@
+//! What a recording of others holds: its topics with positions, its frames, and who is told of twice.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Vector3;
+
+use super::super::error::{Fault, Place, ReadError, quoted};
+use super::messages::{EARTH, Seen, What, Who};
+use super::rigid::Placed;
+use super::schemas::reader_of_topic;
+use super::splits::Splits;
+use super::tree::{Body, Tree};
+use crate::record::mcap::topic::{Message, Part};
+
+/// Most parts of a topic that may be namespaces of transforms.
+const DEEPEST: usize = 16;
+
+/// A topic with positions.
+#[derive(Debug, Default)]
+pub(super) struct Told {
+    pub(super) schema: String,
+    /// Frames that its positions are given in.
+    pub(super) frames: BTreeSet<String>,
+    /// The vehicles that its messages name.
+    names: BTreeSet<String>,
+    /// The robot's own frame, in odometry.
+    child: Option<String>,
+    /// Whether the topic itself is a vehicle.
+    is_vehicle: bool,
+}
+
+/// What a first look at all messages finds.
+#[derive(Debug, Default)]
+pub(super) struct Outline {
+    /// Frames, by the namespace of the topics that tell of them.
+    pub(super) trees: BTreeMap<String, Tree>,
+    /// Topics with positions, without those of transforms.
+    pub(super) topics: BTreeMap<String, Told>,
+    /// Topics of transforms that move.
+    transforms: BTreeSet<String>,
+    /// Topics with a message that says its time.
+    pub(super) stamped: BTreeSet<String>,
+    /// The first position on the Earth, in degrees and metres.
+    pub(super) first_fix: Option<Vector3<f64>>,
+}
+
+/// Whether a topic holds transforms that never change.
+pub(super) fn is_static(topic: &str) -> bool {
+    topic.rsplit('/').next() == Some("tf_static")
+}
+
+/// The namespace of a topic, without its last part: `/cf1` of `/cf1/pose`.
+fn namespace(topic: &str) -> &str {
+    topic.rsplit_once('/').map_or("", |(before, _)| before)
+}
+
+/// The namespace that a topic of transforms speaks of: `/r1` of `/r1/tf`, and the common one of a topic called otherwise.
+pub(super) fn space(topic: &str) -> &str {
+    if matches!(topic.rsplit('/').next(), Some("tf" | "tf_static")) { namespace(topic) } else { "" }
+}
+
+/// What is read of a message, and where the message is.
+pub(super) fn seen_in(message: &Message<'_>, number: &mut u64) -> Result<Vec<Seen>, ReadError> {
+    let Some(reader) = reader_of_topic(message.of) else { return Ok(Vec::new()) };
+    *number += 1;
+    reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
+}
+
+/// Where a message is.
+pub(super) fn place(number: u64, message: &Message<'_>) -> Place {
+    Place::Part(format!("message {number} on topic `{}`", message.of.topic))
+}
+
+impl Outline {
+    /// Looks at all messages.
+    pub(super) fn of(splits: &mut Splits) -> Result<Self, ReadError> {
+        let (mut outline, mut number) = (Self::default(), 0);
+        splits.visit_all(|part| {
+            let Part::Message(message) = part else { return Ok(()) };
+            for seen in seen_in(&message, &mut number)? {
+                outline.learn(&message, seen).map_err(|fault| fault.at(place(number, &message)))?;
+            }
+            Ok(())
+        })?;
+        Ok(outline)
+    }
+
+    fn learn(&mut self, message: &Message<'_>, seen: Seen) -> Result<(), Fault> {
+        let topic = &message.of.topic;
+        if seen.stamp_ns != 0 && !self.stamped.contains(topic) {
+            self.stamped.insert(topic.clone());
+        }
+        if let (What::Transform(turn), Who::Named(child)) = (&seen.what, &seen.who) {
+            let still = is_static(topic).then_some(Placed { position: seen.position, turn: *turn });
+            if still.is_none() && !self.transforms.contains(topic) {
+                self.transforms.insert(topic.clone());
+            }
+            return self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, still);
+        }
+        if seen.frame == EARTH && self.first_fix.is_none() {
+            self.first_fix = Some(seen.position);
+        }
+        let told = self.topics.entry(topic.clone()).or_default();
+        told.schema.clone_from(&message.of.schema);
+        if !told.frames.contains(&seen.frame) {
+            told.frames.insert(seen.frame);
+        }
+        match seen.who {
+            Who::Topic => told.is_vehicle = true,
+            Who::Named(name) => drop(told.names.insert(name)),
+            Who::Listed(_) => {}
+        }
+        let What::Odometry(child) = seen.what else { return Ok(()) };
+        if let Some(known) = told.child.as_ref().filter(|known| **known != child) {
+            let problem = format!("it is the odometry of {}, and of {} before", quoted(&child), quoted(known));
+            return Err(Fault::content(problem, "record each robot on a topic of its own"));
+        }
+        told.child = Some(child);
+        Ok(())
+    }
+
+    /// The frames that a topic speaks of, and their namespace: the nearest one that is around the topic.
+    pub(super) fn tree_of(&self, topic: &str) -> Option<(&str, &Tree)> {
+        let around = topic.rmatch_indices('/').map(|(at, _)| &topic[..at]).take(DEEPEST).chain([""]);
+        let mut nearest = around.filter_map(|space| self.trees.get_key_value(space));
+        nearest.next().map(|(space, tree)| (space.as_str(), tree))
+    }
+
+    /// Names of all topics with positions, those of transforms last.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.topics.keys().chain(&self.transforms).cloned().collect()
+    }
+
+    /// Whether some of these topics tell of the frames of a namespace.
+    pub(super) fn is_told_by(&self, wanted: &str, topics: &[String]) -> bool {
+        self.transforms.iter().any(|topic| space(topic) == wanted && topics.contains(topic))
+    }
+
+    /// Refuses topics that tell of one vehicle twice, of those that are read.
+    pub(super) fn refuse_twice(&self, reads: impl Fn(&str) -> bool) -> Result<(), Fault> {
+        let read = || self.topics.iter().filter(|(topic, _)| reads(topic));
+        let twice = |first: &str, second: &str, who: &str| {
+            let problem = format!("topics {} and {} both tell of {who}", quoted(first), quoted(second));
+            Fault::content(problem, "say which is read with --topic NAME, once for each topic that is")
+        };
+        let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
+        for (topic, told) in read() {
+            for name in &told.names {
+                if let Some(first) = named.insert(name.as_str(), topic) {
+                    return Err(twice(first, topic, &quoted(name)));
+                }
+            }
+        }
+        for (topic, told) in read().filter(|(_, told)| told.is_vehicle) {
+            if let Some((name, first)) = topic.rsplit('/').take(2).find_map(|part| named.get_key_value(part)) {
+                return Err(twice(first, topic, &quoted(name)));
+            }
+            let (first, schema) = *robots.entry(namespace(topic)).or_insert((topic, &told.schema));
+            if *schema != told.schema {
+                let robot = namespace(topic);
+                return Err(twice(
+                    first,
+                    topic,
+                    &if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) },
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Topics that are vehicles, of those that are read, with each frame that they are given in.
+    pub(super) fn given_in(&self, reads: impl Fn(&str) -> bool) -> impl Iterator<Item = (&str, &str)> {
+        let vehicles = self.topics.iter().filter(move |(topic, told)| told.is_vehicle && reads(topic));
+        vehicles.flat_map(|(topic, told)| told.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
+    }
+
+    /// What topics of poses tell of the vehicles of transforms.
+    pub(super) fn cover(&self) -> Cover<'_> {
+        let mut cover = Cover::default();
+        for (topic, told) in &self.topics {
+            cover.names.extend(told.names.iter().map(String::as_str));
+            cover.names.extend(Some(last(namespace(topic))).filter(|name| told.is_vehicle && !name.is_empty()));
+            let Some((child, (space, tree))) = told.child.as_deref().zip(self.tree_of(topic)) else { continue };
+            cover.children.insert((space, child));
+            cover.carriers.extend(tree.way_up(child).into_iter().flatten().map(|frame| (space, frame)));
+        }
+        cover
+    }
+}
+
+/// The last part of a name.
+fn last(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or_default()
+}
+
+/// Whom topics of poses tell of.
+#[derive(Default)]
+pub(super) struct Cover<'a> {
+    /// Names in messages and of the namespaces of topics.
+    names: BTreeSet<&'a str>,
+    /// Frames of odometry by their namespace, and those with all that carries them.
+    children: BTreeSet<(&'a str, &'a str)>,
+    carriers: BTreeSet<(&'a str, &'a str)>,
+}
+
+impl Cover<'_> {
+    /// Whether a vehicle of the transforms in a namespace is among them.
+    pub(super) fn holds(&self, space: &str, tree: &Tree, body: &Body) -> bool {
+        let robot = body.frame.rsplit_once('/').map_or("", |(robot, _)| last(robot));
+        let is_named = [robot, &body.frame, last(space)].iter().any(|name| self.names.contains(name));
+        let way = tree.way_up(&body.frame);
+        is_named
+            || self.carriers.contains(&(space, &body.frame))
+            || way.is_ok_and(|way| way.iter().any(|frame| self.children.contains(&(space, frame))))
+    }
+}
+
+/// Refuses positions of several robots, by whom they are told, in frames of the same name that each robot has of its own, as
+/// a rule.
+pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
+    let is_own = |frame: &str| frame.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom");
+    let mut known: BTreeMap<&str, &str> = BTreeMap::new();
+    for (teller, frame) in given.filter(|(_, frame)| is_own(frame)) {
+        let Some(first) = known.insert(frame, teller).filter(|first| *first != teller) else { continue };
+        let (first, teller, shown) = (quoted(first), quoted(teller), quoted(frame));
+        let problem = format!(
+            "{first} and {teller} give positions in a frame {shown}, of which each robot has one of its own as a rule"
+        );
+        let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
+        return Err(Fault::content(problem, remedy));
+    }
+    Ok(())
+}

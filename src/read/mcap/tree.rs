@@ -1,0 +1,302 @@
+//! The tree of frames that transforms make, and which of its frames are vehicles.
+//!
+//! A frame has one parent. A vehicle is the first frame on the way up from `map` and `odom`, which only carry it, that
+//! moves; where some frame of its branch is called `base_link` or `base_footprint`, it is the first of those. What hangs on
+//! a vehicle (wheels, cameras, rotors) is part of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Isometry3;
+
+use super::super::error::{Fault, quoted};
+use super::rigid::{self, Known, Placed};
+
+/// Longest way from a frame to its root \[frames\].
+const DEEPEST: usize = 64;
+
+/// What the body of a robot is called.
+const BODIES: [&str; 2] = ["base_link", "base_footprint"];
+
+/// Words in the names of frames that carry robots, as REP 105 calls them.
+const CARRIERS: [&str; 4] = ["map", "odom", "world", "earth"];
+
+/// How a frame lies in its parent.
+#[derive(Clone, Debug)]
+struct Edge {
+    parent: String,
+    /// Where it stands still.
+    still: Option<Placed>,
+    /// Whether it is said to stand still in several places, or to move as well.
+    torn: bool,
+    /// Where it was at some times \[ns\], once these are needed.
+    samples: Vec<(i64, Isometry3<f64>)>,
+}
+
+/// Frames and their parents.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree {
+    edges: BTreeMap<String, Edge>,
+}
+
+/// The transforms between two frames: children of those that lead up from the one to what both are in, and of those that
+/// lead down from there to the other, as seen from below.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Chain {
+    up: Vec<String>,
+    down: Vec<String>,
+}
+
+impl Chain {
+    /// Whether one of the transforms that lead up is that of a frame.
+    pub(super) fn leads_up_over(&self, child: &str) -> bool {
+        self.up.iter().any(|frame| frame == child)
+    }
+
+    /// Children of all transforms.
+    pub(super) fn frames(&self) -> impl Iterator<Item = &String> {
+        self.up.iter().chain(&self.down)
+    }
+}
+
+/// A vehicle that transforms speak of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Body {
+    pub(super) frame: String,
+    /// The nearest frame above it, or itself, that moves in its parent: with each sample of that it is seen.
+    pub(super) driver: String,
+    /// What its driver moves in.
+    pub(super) carrier: String,
+}
+
+impl Tree {
+    /// Learns what a frame lies in, and where it stands still there.
+    pub(super) fn learn(&mut self, child: &str, parent: &str, still: Option<Placed>) -> Result<(), Fault> {
+        let Some(known) = self.edges.get_mut(child) else {
+            let edge = Edge { parent: parent.to_owned(), still, torn: false, samples: Vec::new() };
+            self.edges.insert(child.to_owned(), edge);
+            return Ok(());
+        };
+        if known.parent != parent {
+            let (child, first, second) = (quoted(child), quoted(&known.parent), quoted(parent));
+            let problem = format!("frame {child} is given in {first} and in {second}");
+            let remedy = "a frame has one parent: record robots under namespaces of their own";
+            return Err(Fault::content(problem, remedy));
+        }
+        known.torn |= known.still != still;
+        Ok(())
+    }
+
+    /// Whether a frame moves in its parent.
+    pub(super) fn moves(&self, frame: &str) -> bool {
+        self.edges.get(frame).is_some_and(|edge| edge.still.is_none())
+    }
+
+    /// Frames that stand still in their parents.
+    pub(super) fn still(&self) -> impl Iterator<Item = &str> {
+        self.edges.iter().filter(|(_, edge)| edge.still.is_some()).map(|(frame, _)| frame.as_str())
+    }
+
+    /// All frames that have a parent.
+    pub(super) fn frames(&self) -> impl Iterator<Item = &str> {
+        self.edges.keys().map(String::as_str)
+    }
+
+    /// A frame and all that it is in, up to the root.
+    pub(super) fn way_up<'a>(&'a self, frame: &'a str) -> Result<Vec<&'a str>, Fault> {
+        let mut way = vec![frame];
+        while let Some(edge) = way.last().and_then(|last| self.edges.get(*last)) {
+            if way.len() > DEEPEST {
+                let problem = format!("transforms lead from {} through more than {DEEPEST} frames", quoted(frame));
+                return Err(Fault::content(problem, "look whether they go round in a circle"));
+            }
+            way.push(&edge.parent);
+        }
+        Ok(way)
+    }
+
+    /// The vehicles.
+    pub(super) fn bodies(&self) -> Result<Vec<Body>, Fault> {
+        let ways: BTreeMap<_, _> =
+            self.frames().map(|frame| Ok((frame, self.way_up(frame)?))).collect::<Result<_, Fault>>()?;
+        let moved = |way: &[&str]| way.iter().any(|frame| self.moves(frame));
+        let named: BTreeSet<&str> = ways
+            .iter()
+            .filter(|(frame, way)| is_body(frame) && moved(way) && !way[1..].iter().any(|above| is_body(above)))
+            .map(|(frame, _)| *frame)
+            .collect();
+        // Frames with a body somewhere below them.
+        let carrying: BTreeSet<&str> = named.iter().flat_map(|body| ways[body][1..].iter().copied()).collect();
+        let unnamed = |frame: &str| self.moves(frame) && !is_carrier(frame);
+        let is_vehicle = |frame: &str, way: &[&str]| {
+            let above = &way[1..];
+            named.contains(frame)
+                || (unnamed(frame)
+                    && !carrying.contains(frame)
+                    && !above
+                        .iter()
+                        .any(|above| named.contains(above) || (unnamed(above) && !carrying.contains(above))))
+        };
+        let vehicles = ways.iter().filter(|(frame, way)| is_vehicle(frame, way));
+        let body = |(frame, way): (&&str, &Vec<&str>)| {
+            let at = way.iter().position(|frame| self.moves(frame))?;
+            let [driver, carrier] = [way[at], way[at + 1]].map(str::to_owned);
+            Some(Body { frame: (*frame).to_owned(), driver, carrier })
+        };
+        Ok(vehicles.filter_map(body).collect())
+    }
+
+    /// The transforms from a frame into another; none where they have nothing in common.
+    pub(super) fn chain(&self, from: &str, into: &str) -> Result<Option<Chain>, Fault> {
+        let (up, down) = (self.way_up(from)?, self.way_up(into)?);
+        let meeting = up.iter().enumerate().find_map(|(k, frame)| Some((k, down.iter().position(|of| of == frame)?)));
+        let Some((top, bottom)) = meeting else { return Ok(None) };
+        let owned = |frames: &[&str]| frames.iter().map(|frame| (*frame).to_owned()).collect();
+        Ok(Some(Chain { up: owned(&up[..top]), down: owned(&down[..bottom]) }))
+    }
+
+    /// Remembers where a moving frame was.
+    pub(super) fn remember(&mut self, frame: &str, time_ns: i64, placed: &Placed) -> Result<(), Fault> {
+        let transform = placed.rigid()?;
+        if let Some(edge) = self.edges.get_mut(frame) {
+            edge.samples.push((time_ns, transform));
+        }
+        Ok(())
+    }
+
+    /// Puts what is remembered in order of time.
+    pub(super) fn settle(&mut self) -> Result<(), Fault> {
+        for (frame, edge) in &mut self.edges {
+            edge.samples.sort_by_key(|(time_ns, _)| *time_ns);
+            edge.samples.dedup();
+            if let Some([(time_ns, _), _]) = edge.samples.array_windows().find(|[a, b]| a.0 == b.0) {
+                let problem = format!("frame {} is in two places of its parent at {time_ns} ns", quoted(frame));
+                return Err(Fault::content(problem, "record again, with one publisher of each transform"));
+            }
+        }
+        Ok(())
+    }
+
+    /// What turns places at the begin of a chain into places at its end, at a time; `given` is where one of its frames is
+    /// known to be then.
+    pub(super) fn along(
+        &self,
+        chain: &Chain,
+        time_ns: i64,
+        given: Option<(&str, Isometry3<f64>)>,
+    ) -> Result<Option<Known>, Fault> {
+        let mut guessed = false;
+        let mut product = |frames: &[String]| -> Result<Option<Isometry3<f64>>, Fault> {
+            let mut whole = Isometry3::identity();
+            for frame in frames {
+                let part = match given.filter(|(known, _)| known == frame) {
+                    Some((_, transform)) => Known { transform, guessed: false },
+                    None => match self.place(frame, time_ns)? {
+                        Some(known) => known,
+                        None => return Ok(None),
+                    },
+                };
+                guessed |= part.guessed;
+                whole = part.transform * whole;
+            }
+            Ok(Some(whole))
+        };
+        let (up, down) = (product(&chain.up)?, product(&chain.down)?);
+        Ok(up.zip(down).map(|(up, down)| Known { transform: down.inverse() * up, guessed }))
+    }
+
+    fn place(&self, frame: &str, time_ns: i64) -> Result<Option<Known>, Fault> {
+        let Some(edge) = self.edges.get(frame) else { return Ok(None) };
+        if edge.torn {
+            let problem = format!("frame {} stands still in more than one place, or moves as well", quoted(frame));
+            return Err(Fault::content(problem, "record again, with one publisher of each transform"));
+        }
+        match &edge.still {
+            Some(placed) => Ok(Some(Known { transform: placed.rigid()?, guessed: false })),
+            None => Ok(rigid::at(&edge.samples, time_ns)),
+        }
+    }
+}
+
+/// Whether a frame is called as the body of a robot is, perhaps behind the name of the robot.
+fn is_body(frame: &str) -> bool {
+    BODIES
+        .iter()
+        .any(|body| frame.strip_suffix(body).is_some_and(|robot| robot.is_empty() || robot.ends_with(['/', '_'])))
+}
+
+/// Whether a frame carries robots and is none.
+fn is_carrier(frame: &str) -> bool {
+    let frame = frame.to_lowercase();
+    frame.split(|c: char| !c.is_alphanumeric()).any(|word| CARRIERS.contains(&word))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::super::messages::NO_TURN;
+    use super::*;
+
+    const STILL: Option<Placed> = Some(Placed { position: Vector3::new(0.0, 0.0, 0.5), turn: NO_TURN });
+
+    fn tree(edges: &[(&str, &str, Option<Placed>)]) -> Tree {
+        let mut tree = Tree::default();
+        for (parent, child, still) in edges {
+            tree.learn(child, parent, *still).expect("one parent");
+        }
+        tree
+    }
+
+    fn bodies(edges: &[(&str, &str, Option<Placed>)]) -> Vec<[String; 2]> {
+        let bodies = tree(edges).bodies().expect("a tree");
+        bodies.into_iter().map(|body| [body.frame, body.driver]).collect()
+    }
+
+    #[test]
+    fn a_robot_is_its_body_and_neither_what_carries_it_nor_what_hangs_on_it() {
+        let robot = [
+            ("map", "r1/odom", None),
+            ("r1/odom", "r1/base_footprint", None),
+            ("r1/base_footprint", "r1/base_link", STILL),
+            ("r1/base_link", "r1/wheel", None),
+            ("r1/base_link", "r1/camera", STILL),
+        ];
+        assert_eq!(bodies(&robot), [["r1/base_footprint", "r1/base_footprint"]]);
+        assert_eq!(bodies(&robot[..1]), Vec::<[String; 2]>::new());
+        let odd = [("map", "odom", None), ("odom", "robot", None), ("robot", "gimbal", None), ("map", "cf1", None)];
+        assert_eq!(bodies(&odd), [["cf1", "cf1"], ["robot", "robot"]]);
+        let markers = [("world", "drone", None), ("drone", "drone/base_link", STILL), ("world", "drone2", None)];
+        assert_eq!(bodies(&markers), [["drone/base_link", "drone"], ["drone2", "drone2"]]);
+    }
+
+    #[test]
+    fn chains_lead_up_and_down_and_circles_are_refused() {
+        let tree =
+            tree(&[("map", "a", STILL), ("a", "b", STILL), ("map", "c", STILL), ("x", "y", None), ("y", "x", None)]);
+        let along = |from, into| {
+            let chain = tree.chain(from, into).expect("a tree")?;
+            let known = tree.along(&chain, 0, None).expect("rotations").expect("all stand still");
+            Some((known.transform.translation.z, known.guessed))
+        };
+        assert_eq!(along("b", "map"), Some((1.0, false)));
+        assert_eq!(along("c", "b"), Some((-0.5, false)));
+        assert_eq!(along("b", "elsewhere"), None);
+        assert!(tree.chain("x", "map").is_err() && tree.bodies().is_err());
+    }
+
+    #[test]
+    fn a_frame_has_one_parent_and_one_place_in_it() {
+        let mut tree = tree(&[("map", "a", STILL), ("map", "b", None)]);
+        assert!(tree.learn("a", "map", STILL).is_ok());
+        assert!(tree.learn("a", "odom", STILL).is_err());
+        assert!(tree.learn("a", "map", None).is_ok());
+        let chain = tree.chain("a", "map").expect("a tree").expect("a way");
+        assert!(tree.along(&chain, 0, None).is_err());
+        let at = |x| Placed { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
+        tree.remember("b", 5, &at(1.0)).expect("a rotation");
+        tree.remember("b", 5, &at(1.0)).expect("a rotation");
+        assert!(tree.settle().is_ok());
+        tree.remember("b", 5, &at(2.0)).expect("a rotation");
+        assert!(tree.settle().is_err());
+    }
+}

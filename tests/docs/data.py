@@ -1,0 +1,108 @@
+"""Blocks of a page that are files: scenarios, campaigns and obstacles are given to the program, the rest is parsed."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from commands import help_of, run, spoken, unknown_arguments
+from exceptions import AROUND
+from pages import ROOT, Block
+
+WRONG_INPUT = 2
+
+# Files that an audit is given, by their first key, and the option that takes them.
+ASKED_OF_AUDIT = {"obstacle": "--obstacles", "fence": "--fence", "audit": "--config"}
+
+TWO = "t,id,x,y,z\n0,a,100,100,100\n0,b,110,100,100\n1,a,100,100,100\n1,b,110,100,100\n"
+
+
+def wrong_data(block: Block, folder: Path, programs: Path) -> list[str]:
+    """What is wrong with a block that is no command."""
+    try:
+        if block.language == "toml":
+            return wrong_toml(block, folder, programs)
+        if block.language == "json":
+            json.loads(block.text)
+        elif block.language == "yaml":
+            return wrong_yaml(block)
+        elif block.language == "python":
+            compile(block.text, block.place, "exec")
+        elif block.language == "rust":
+            return wrong_excerpt(block)
+    except (ValueError, SyntaxError) as error:
+        return [f"{block.place}: {error}"]
+    known = ("toml", "json", "yaml", "python", "rust", "csv", "")
+    return [] if block.language in known else [f"{block.place}: nobody tests blocks of `{block.language}`"]
+
+
+def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
+    keys = tomllib.loads(block.text)
+    if block.name == "Cargo.toml":
+        return wrong_features(block, keys)
+    path = folder / Path(block.name or f"block-{block.line}.toml").name
+    path.write_text(block.text + "\n", encoding="utf-8")
+    file = shlex.quote(path.name)
+    if {"start", "formation", "time"} <= keys.keys():
+        command = f"tautline check {file}"
+    elif "scenario" in keys:
+        command = f"tautline campaign plan {file} --out plan-{block.line}"
+    elif len(keys) == 1 and keys.keys() <= ASKED_OF_AUDIT.keys():
+        (folder / "two.csv").write_text(TWO, encoding="utf-8")
+        command = f"tautline audit two.csv --delta 0.5 {' '.join(ASKED_OF_AUDIT[key] for key in keys)} {file}"
+    else:
+        sets = [*AROUND.get(block.page, []), *settings(keys)]
+        command = f"tautline check pentagon {' '.join(f'--set {shlex.quote(one)}' for one in sets)}"
+    ran = run(command, folder, programs)
+    wrong = ran.exit_code >= WRONG_INPUT
+    return [f"{block.place}: {command}\n{ran.output.strip()}"] if wrong else []
+
+
+def wrong_features(block: Block, keys: dict[str, Any]) -> list[str]:
+    """What is wrong with how a crate of the reader's asks for this one."""
+    ours = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
+    asked = keys["dependencies"][ours["package"]["name"]].get("features", [])
+    return [f"{block.place}: there is no feature {one}" for one in asked if one not in ours["features"]]
+
+
+def settings(table: dict[str, Any], path: str = "") -> list[str]:
+    """What `--set` takes to set every key of a table by itself."""
+    made = []
+    for key, value in table.items():
+        place = f"{path}.{key}" if path else key
+        if isinstance(value, dict) and place != "laws":
+            made += settings(value, place)
+        else:
+            made.append(f"{place}={inline(value)}")
+    return made
+
+
+def inline(value: Any) -> str:
+    """A value as TOML has it within a line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {inline(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(inline(one) for one in value) + "]"
+    return json.dumps(value)
+
+
+def wrong_yaml(block: Block) -> list[str]:
+    import yaml  # comes with Ray, beside which tests/run.sh runs this
+
+    try:
+        yaml.safe_load(block.text)
+    except yaml.YAMLError as error:
+        return [f"{block.place}: {error}"]
+    return [f"{block.place}: {one}" for arguments in spoken(block.text) for one in unknown_arguments(arguments)]
+
+
+def wrong_excerpt(block: Block) -> list[str]:
+    """Rust on a page is compiled where it comes from: the file in its first line has it word for word, but for `// ...`."""
+    if not block.name:
+        return [f"{block.place}: the first line of Rust names the file that it stands in: // examples/own_law.rs"]
+    source = (ROOT / block.name).read_text(encoding="utf-8")
+    parts = block.text.split("\n", 1)[1].split("// ...\n")
+    return [f"{block.place}: {block.name} does not have\n{part}" for part in parts if part.strip("\n") not in source]

@@ -1,0 +1,130 @@
+"""The book: its contents name every page once, its index says what each answers, and scenario.md is what the schema says."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+import tomllib
+import unittest
+from pathlib import Path
+
+from commands import TAUTLINE
+from pages import ROOT, Page
+
+DOCS = ROOT / "docs"
+# Keys whose description speaks of another number's unit.
+OF_ANOTHER = ("thrust_n_per_rpm2",)
+
+ITEM = re.compile(r"^- \[([^\]]+)\]\(([\w-]+\.md)\)(: .+)?$", re.MULTILINE)
+
+sys.path.insert(0, str(DOCS))
+import scenario_reference  # noqa: E402
+
+
+def items(docs: Path, page: str) -> list[tuple[str, ...]]:
+    """Title, file and what stands behind them, of each page that a page lists."""
+    return ITEM.findall((docs / page).read_text(encoding="utf-8"))
+
+
+def faults(docs: Path) -> list[str]:
+    """What is wrong with the order of the pages and with where they link to."""
+    contents, index = items(docs, "SUMMARY.md"), items(docs, "README.md")
+    there = {path.name for path in docs.glob("*.md")} - {"SUMMARY.md", "README.md"}
+    named = [file for _, file, _ in contents]
+    wrong = [f"SUMMARY.md does not name {file}" for file in sorted(there - set(named))]
+    wrong += [f"{file} of SUMMARY.md is not there" for file in sorted(set(named) - there)]
+    wrong += [f"SUMMARY.md names {file} twice" for file in sorted(set(named)) if named.count(file) > 1]
+    if [one[:2] for one in contents] != [one[:2] for one in index]:
+        wrong.append("SUMMARY.md and README.md name other pages, or in another order")
+    wrong += [f"README.md does not say what {file} answers" for _, file, answer in index if len(answer) < 10]
+    links = [link for path in sorted(docs.glob("*.md")) for link in Page(path, docs).links]
+    outside = [link for link in links if re.match(r"\.\.|/", link.target)]
+    return wrong + [f"{link.place}: {link.target} is dead where the book is read" for link in outside]
+
+
+class Book(unittest.TestCase):
+    """The order of the pages."""
+
+    def test_contents_and_index_name_every_page_and_links_stay_in_the_book(self) -> None:
+        self.assertEqual(faults(DOCS), [])
+
+    def test_what_is_wrong_with_a_book_is_found(self) -> None:
+        right = {
+            "SUMMARY.md": "- [A](a.md)\n- [B](b.md)\n",
+            "README.md": "- [A](a.md): what is that?\n- [B](b.md): and what is this?\n",
+            "a.md": "# A\n\n[b](b.md)\n",
+            "b.md": "# B\n",
+        }
+        changes = {
+            "": ("SUMMARY.md", right["SUMMARY.md"]),
+            "does not name c.md": ("c.md", "# C\n"),
+            "c.md of SUMMARY.md is not there": ("SUMMARY.md", "- [A](a.md)\n- [B](b.md)\n- [C](c.md)\n"),
+            "names a.md twice": ("SUMMARY.md", "- [A](a.md)\n- [B](b.md)\n- [A](a.md)\n"),
+            "in another order": ("SUMMARY.md", "- [B](b.md)\n- [A](a.md)\n"),
+            "does not say what b.md answers": ("README.md", "- [A](a.md): what is that?\n- [B](b.md)\n"),
+            "a.md:3: ../x.md is dead": ("a.md", "# A\n\n[x](../x.md)\n"),
+        }
+        for said, (file, text) in changes.items():
+            with self.subTest(said), tempfile.TemporaryDirectory() as place:
+                for name, words in (right | {file: text}).items():
+                    (Path(place) / name).write_text(words, encoding="utf-8")
+                found = faults(Path(place))
+                self.assertTrue(any(said in one for one in found) if said else not found, found)
+
+    def test_mdbook_finds_the_pages(self) -> None:
+        book = tomllib.loads((DOCS / "book.toml").read_text(encoding="utf-8"))
+        self.assertEqual(book["book"]["src"], ".")
+
+
+class ScenarioReference(unittest.TestCase):
+    """docs/scenario.md"""
+
+    schema: dict
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        printed = subprocess.run([TAUTLINE, "schema"], capture_output=True, check=True).stdout
+        cls.schema = scenario_reference.json.loads(printed)
+        cls.made = scenario_reference.Reference(cls.schema).page()
+
+    def test_the_page_is_what_the_schema_says(self) -> None:
+        page = (DOCS / "scenario.md").read_text(encoding="utf-8")
+        self.assertEqual(page, self.made, "make it anew: tautline schema | python3 docs/scenario_reference.py > docs/scenario.md")
+
+    def test_every_key_of_the_schema_is_on_the_page(self) -> None:
+        for key in sorted(keys_of(self.schema)):
+            self.assertTrue(f"`{key}`" in self.made or f"[{key}" in self.made, key)
+
+    def test_a_unit_is_the_one_that_the_description_says(self) -> None:
+        """What a description says of its unit, "... in m/s", ends the name of the key too."""
+        units = sorted({*scenario_reference.UNITS.values(), *scenario_reference.UNNAMED.values()}, key=len, reverse=True)
+        said = re.compile(rf" in ({'|'.join(map(re.escape, units))})(?= |[,.:;]|$)")
+        checked = 0
+        for line in self.made.splitlines():
+            if not line.startswith("| `") or line.startswith(tuple(f"| `{key}`" for key in OF_ANOTHER)):
+                continue
+            cells = [cell.strip() for cell in line.split(" | ")]
+            if cells[1] != "text" and (found := said.search(cells[-1])):
+                self.assertEqual(cells[2], found[1], line)
+                checked += 1
+        self.assertGreater(checked, 80)
+
+    def test_a_key_that_is_changed_changes_the_page(self) -> None:
+        other = scenario_reference.json.loads(scenario_reference.json.dumps(self.schema))
+        other["$defs"]["TimeTable"]["properties"]["duration_s"]["exclusiveMinimum"] = 7
+        self.assertNotEqual(scenario_reference.Reference(other).page(), self.made)
+
+
+def keys_of(schema: object) -> set[str]:
+    if isinstance(schema, list):
+        return set().union(*map(keys_of, schema))
+    if not isinstance(schema, dict):
+        return set()
+    own = set(schema["properties"]) if isinstance(schema.get("properties"), dict) else set()
+    return own.union(*map(keys_of, schema.values()))
+
+
+if __name__ == "__main__":
+    unittest.main()

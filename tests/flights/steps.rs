@@ -1,0 +1,150 @@
+//! A step is honest or it is refined, and one that cannot be refined is not called the law's motion.
+
+use crate::flight::{builtin, fly};
+use crate::loop_claims::{duel, energy_excess, refinements};
+use tautline::audit::Status;
+use tautline::law::{LaplacianKeys, LawError, LawSpec, Void};
+use tautline::record::Event;
+use tautline::run;
+use tautline::scenario::Scenario;
+use tautline::sim::Ending;
+use tautline::swarm::Pair;
+
+/// Closing at 20 m/s with 0.4 m to go before the barrier.
+fn barrier_ahead(dt_s: f64) -> Scenario {
+    duel([-1.2, 1.2], [10.0, -10.0], 2.0, dt_s, 5.0)
+}
+
+#[test]
+fn a_step_that_would_jump_the_barrier_is_flown_in_parts() {
+    for dt_s in [1.0 / 240.0, 1.0 / 60.0, 0.125, 0.25, 0.5] {
+        let scenario = barrier_ahead(dt_s);
+        let (flight, log) = fly(&scenario);
+        assert_eq!((flight.ending, flight.audit.status), (Ending::Completed, Status::Clear), "dt = {dt_s} s");
+        assert_eq!(flight.steps, scenario.time.steps());
+        assert!(flight.audit.steps > flight.steps, "the judge sees the parts");
+        let refined = refinements(&log);
+        assert!(!refined.is_empty());
+        for (time_s, part_s) in refined {
+            assert!(part_s < dt_s && part_s >= dt_s / 1024.0, "{part_s} s");
+            assert_eq!((dt_s / part_s).log2().fract(), 0.0, "halves of halves");
+            assert_eq!((time_s / dt_s).fract(), 0.0, "a step begins at {time_s} s");
+        }
+    }
+}
+
+#[test]
+fn without_halvings_that_step_jumps_the_barrier_and_is_called_a_violation() {
+    let mut scenario = barrier_ahead(0.5);
+    scenario.time.max_halvings = 0;
+    let (flight, log) = fly(&scenario);
+    assert_eq!(flight.audit.status, Status::Violation);
+    assert_eq!(refinements(&log), []);
+}
+
+#[test]
+fn without_halvings_a_step_that_lands_within_the_barrier_ends_the_run_as_a_collision() {
+    let mut scenario = barrier_ahead(0.125);
+    scenario.time.max_halvings = 0;
+    let (flight, log) = fly(&scenario);
+    let Ending::LawUndefined(LawError::Collision { pair, separation_m, delta_m }) = flight.ending else {
+        panic!("{:?}", flight.ending)
+    };
+    assert_eq!((pair, delta_m), (Pair::new(0, 1), 2.0));
+    assert!(separation_m < delta_m);
+    assert_eq!(flight.audit.status, Status::Violation);
+    assert_eq!((flight.steps, flight.duration_s), (1, 0.125));
+    let last = log.samples.last().expect("samples");
+    assert_eq!((last.time_s, last.step, last.energy), (0.125, 1, None));
+    assert_eq!(&last.swarm, &flight.last);
+    assert_eq!(last.control.nrows(), 0, "no command follows from a state without one");
+    let Some(Event::EndedEarly { time_s, reason }) = log.events.last() else { panic!("{:?}", log.events) };
+    assert!(*time_s == 0.125 && reason.contains("vehicles 1-2"), "{reason}");
+}
+
+#[test]
+fn a_law_without_a_barrier_is_never_refused_a_step() {
+    let mut scenario = barrier_ahead(1.0);
+    scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
+    scenario.time.max_rate_dt = 1.0;
+    let (flight, log) = fly(&scenario);
+    assert_eq!((refinements(&log), flight.audit.steps), (vec![], flight.steps));
+}
+
+#[test]
+fn a_step_too_long_for_the_fastest_rate_is_flown_in_parts_and_keeps_the_energy_below_its_start() {
+    let mut scenario =
+        builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10", "plant.precision=double"]);
+    let (honest, log) = fly(&scenario);
+    assert!(!refinements(&log).is_empty(), "it is told");
+    assert!(honest.audit.steps > honest.steps);
+    assert!(energy_excess(&log) < 1e-3, "{}", energy_excess(&log));
+    (scenario.time.max_rate_dt, scenario.time.max_halvings) = (1e9, 0);
+    let (whole, log) = fly(&scenario);
+    let collided = matches!(whole.ending, Ending::LawUndefined(_));
+    assert!(collided || energy_excess(&log) > 0.01, "taken whole, such steps gain energy: {}", energy_excess(&log));
+}
+
+#[test]
+fn steps_that_no_halving_makes_short_enough_void_the_certificate_and_never_pass() {
+    let stiff = builtin("pentagon", &["law.alpha=997335080"]);
+    let (flight, _) = fly(&stiff);
+    assert!(flight.overlong_steps > 0, "the law asks for shorter steps than there are");
+    assert_eq!((flight.certificate.certified_m, &flight.certificate.void[..]), (None, &[Void::StepsTooLong][..]));
+    let report = run::run(&stiff, &mut ()).expect("a report");
+    assert_eq!(report.run.overlong_steps, flight.overlong_steps);
+    assert!(!report.verdict.pass && !report.breaks_certificate());
+    assert!(report.headline().contains("too long for the law"), "{}", report.headline());
+    assert!(report.verdict.reasons.iter().any(|reason| reason.contains("longer than the law allows")));
+}
+
+#[test]
+fn a_flight_that_is_clear_and_home_does_not_pass_on_steps_too_long_for_the_law() {
+    let report = |max_halvings: &str| {
+        let keys = ["law.alpha=100", "time.dt_s=0.01", "plant.precision=double", max_halvings];
+        let scenario = builtin("pentagon", &keys);
+        run::run(&scenario, &mut ()).expect("a report")
+    };
+    let [refined, whole] = ["time.max_halvings=10", "time.max_halvings=0"].map(report);
+    assert_eq!((refined.run.overlong_steps, refined.verdict.pass), (0, true));
+    assert!(whole.run.overlong_steps > 0 && !whole.verdict.pass, "{:?}", whole.verdict);
+    assert_eq!(whole.separation.certified_m, None);
+}
+
+#[test]
+fn a_step_is_short_enough_where_it_leads_to_and_not_only_where_it_began() {
+    // Fast contacts that one step lands deep in: the law looks slow before, and the barrier is far.
+    for (name, keys) in [
+        ("swap", &["law.alpha=5000", "time.dt_s=0.1", "time.record_hz=4", "time.duration_s=5"][..]),
+        (
+            "pentagon",
+            &[
+                "law.kind=displacement",
+                "law.alpha=1e6",
+                "time.record_hz=4",
+                "time.duration_s=10",
+                "plant.precision=double",
+            ],
+        ),
+        (
+            "pentagon",
+            &["law.alpha=400", "time.dt_s=0.045", "time.record_hz=4", "time.max_rate_dt=1e9", "time.duration_s=30"],
+        ),
+    ] {
+        let report = run::run(&builtin(name, keys), &mut ()).expect("a report");
+        assert!(!report.breaks_certificate(), "{name} {keys:?}: {}", report.headline());
+        let rises = report.energy.max_over_leg_start.is_some_and(|ratio| ratio > 1.01);
+        assert!(
+            !rises || (report.run.overlong_steps > 0 && !report.verdict.pass),
+            "{name} {keys:?}: {}",
+            report.headline()
+        );
+    }
+}
+
+#[test]
+fn vehicles_that_hold_a_command_for_a_period_of_its_own_ask_for_no_shorter_steps() {
+    let keys = ["law.alpha=100", "time.dt_s=0.01", "time.max_halvings=0", "time.control_hz=100"];
+    let (flight, _) = fly(&builtin("pentagon", &keys));
+    assert_eq!(flight.overlong_steps, 0);
+}

@@ -1,0 +1,102 @@
+//! Limits on single vehicles and fences, through the program: every answer has them, and wrong ones are refused.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+/// A vehicle that flies along x with 5 m/s, and rises with 1 m/s from 2 s on; another that stands.
+fn recording() -> String {
+    (0..=40).fold("t,id,x,y,z\n".to_owned(), |mut text, k| {
+        let t = f64::from(k) / 10.0;
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{t},a,{},0,{}\n{t},b,0,9,0\n", 5.0 * t, (t - 2.0).max(0.0));
+        text
+    })
+}
+
+fn audit(words: &[&str]) -> (Ran, tempfile::TempDir) {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("flight.csv"), recording()).expect("written");
+    let venue = "[fence]\npolygon_m = [[-1, -1], [15, -1], [15, 12], [-1, 12]]\nheight_m = [-1, 9]\n\n\
+                 [[obstacle]]\nname = \"mast\"\nball = { radius_m = 0.5 }\nat_m = [0, 50, 0]\nclearance_m = 1\n";
+    fs::write(folder.path().join("venue.toml"), venue).expect("written");
+    (ran_by(TAUTLINE, folder.path(), &[&["audit", "flight.csv"], words].concat()), folder)
+}
+
+#[test]
+fn limits_are_in_every_answer() {
+    let words = [
+        "--limit",
+        "speed=5,climb=0.5",
+        "--fence",
+        "venue.toml",
+        "--events",
+        "e.csv",
+        "--junit",
+        "j.xml",
+        "--html",
+        "p.html",
+    ];
+    let (ran, folder) = audit(&words);
+    assert_eq!(ran.exit, Some(1), "{ran:?}");
+    assert!(ran.out.starts_with("VIOLATION: speed of a was 5.099 m/s"), "{ran:?}");
+    assert!(ran.out.contains("room to the fence of a was -5.000 m at 4.00 s (limit at least 0.000 m)"), "{ran:?}");
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect(name);
+    let events = read("e.csv");
+    let rows: Vec<_> =
+        events.lines().skip(1).map(|line| line.split(',').take(3).collect::<Vec<_>>().join(" ")).collect();
+    assert_eq!(rows, ["violation a speed_m_s", "violation a climb_m_s", "violation a fence_room_m"]);
+    let junit = read("j.xml");
+    assert!(junit.contains(r#"tests="3""#) && junit.contains(r#"failures="3""#), "{junit}");
+    assert!(!junit.contains("separation"), "it was not asked how close two came");
+    let page = read("p.html");
+    assert!(page.contains("Each vehicle by itself") && page.contains("room to the fence"));
+}
+
+#[test]
+fn nothing_is_said_of_distances_that_were_not_asked_about() {
+    let (ran, _) = audit(&["--limit", "speed=6"]);
+    assert_eq!(ran.exit, Some(0), "{ran:?}");
+    assert_eq!(
+        ran.out.lines().next(),
+        Some("CLEAR if straight between samples: speed at most 5.100 m/s (limit 6.000 m/s)")
+    );
+    let (ran, _) = audit(&["--limit", "speed=6", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
+    assert_eq!((&report["status"], &report["audit"]["status"]), (&"clear".into(), &"undecided".into()));
+    assert_eq!(
+        (&report["separation"]["min_m"], &report["limits"][0]["status"]),
+        (&serde_json::Value::Null, &"clear".into())
+    );
+    let (ran, _) = audit(&["--limit", "speed=6", "--delta", "1"]);
+    assert!(
+        ran.exit == Some(0) && ran.out.contains("never closer than") && ran.out.contains("; speed at most"),
+        "{ran:?}"
+    );
+}
+
+#[test]
+fn one_file_holds_fence_and_obstacles() {
+    let (ran, _) = audit(&["--delta", "1", "--obstacles", "venue.toml", "--fence", "venue.toml", "--to", "2.9"]);
+    assert!(ran.exit == Some(0) && ran.out.contains("mast"), "{ran:?}");
+}
+
+#[test]
+fn what_is_no_limit_is_refused() {
+    for (words, expected) in [
+        (&["--limit", "speed=fast"][..], "`fast` is not a number"),
+        (&["--limit", "sped=5"], "`sped` is no limit: the limits are speed, horizontal"),
+        (&["--limit", "speed=5,speed=6"], "--limit speed is given twice"),
+        (&["--limit", "speed=0"], "the limit of speed must be above 0"),
+        (&["--limit", "speed=5", "--motion", "hold"], "vehicles that are held between samples jump"),
+        (&["--fence", "flight.csv"], "flight.csv, line 1"),
+        (&["--fence", "nowhere.toml"], "cannot read nowhere.toml"),
+        (&["--limit", "speed=5", "--events", "flight.csv"], "would overwrite the recording"),
+    ] {
+        let (ran, _) = audit(words);
+        assert_eq!(ran.exit, Some(2), "{words:?}: {ran:?}");
+        let said = ran.err.split_whitespace().collect::<Vec<_>>().join(" ").replace("│ ", "");
+        assert!(said.contains(expected), "{words:?}: {said}");
+    }
+}

@@ -1,0 +1,52 @@
+"""What the tests of the Python package share."""
+
+from __future__ import annotations
+
+import tempfile
+import unittest
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import tautline as tl
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def passing(instants: int = 100) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Four vehicles 3 m apart on a line, of which the first comes within half a metre of the second: t (T,), p (T, 4, 3)."""
+    t = np.arange(instants) * 0.1
+    p = np.zeros((instants, 4, 3))
+    p[:, :, 0] = 3.0 * np.arange(4)
+    p[:, 0, 0] = np.linspace(0.0, 2.5, instants)
+    return t, p
+
+
+def short(name: str = "pentagon", **sets: object) -> tl.Scenario:
+    """A built-in scenario of two seconds."""
+    return tl.Scenario(name, set={"time.duration_s": 2.0, **sets})
+
+
+class Case(unittest.TestCase):
+    """A test with a folder of its own."""
+
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def refuses(self, kind: type[BaseException], says: str, do: Callable[[], object]) -> None:
+        """Asserts that an error of exactly this class is raised whose message says something."""
+        with self.assertRaises(kind) as caught:
+            do()
+        self.assertIs(type(caught.exception), kind)
+        self.assertIn(says, str(caught.exception))
+
+
+class Springs(tl.Law):
+    """Pulls every vehicle to its slot."""
+
+    def control(self, obs, out):
+        out[:] = obs.slots_m - obs.positions - 2 * obs.velocities

@@ -1,0 +1,160 @@
+"""Audits of arrays and of files: the same verdicts as the command line's, whatever the order in memory."""
+
+import json
+
+import numpy as np
+import tautline as tl
+from shared import Case, passing
+from tautline import _native
+
+
+def told(words: list[str]) -> dict:
+    """What the command line prints as JSON."""
+    return json.loads(_native.call(words)[1])
+
+
+class Arrays(Case):
+    def test_a_violation_is_found_between_samples_and_named(self) -> None:
+        t = np.array([0.0, 1.0])
+        p = np.array([[[-5.0, 0, 0], [5.0, 1, 0]], [[5.0, 0, 0], [-5.0, 1, 0]]])
+        a = tl.audit(t, p, delta=2.0, names=["alpha", "bravo"])
+        self.assertEqual((a.verdict, a.separation_m, a.closest[0].pair), ("VIOLATION", 1.0, ("alpha", "bravo")))
+        self.assertEqual(a.closest[0].time_s, 0.5)
+        self.assertEqual(tl.audit(t, p, delta=0.5).verdict, "CLEAR if straight between samples")
+
+    def test_the_four_verdicts_are_the_command_lines(self) -> None:
+        t, p = passing()
+        tl_path = self.folder / "p.npz"
+        np.savez(tl_path, t=t, positions=p, names=np.array(["1", "2", "3", "4"]))
+        asked = {
+            "CLEAR if straight between samples": ({"delta": 0.4}, ["--delta=0.4"]),
+            "VIOLATION": ({"delta": 1.5}, ["--delta=1.5"]),
+            "UNDECIDED": ({"delta": 0.4, "max_gap": 0.01}, ["--delta=0.4", "--max-gap=0.01"]),
+            "PROVED CLEAR": (
+                {"delta": 0.4, "motion": "bounded", "max_accel": 1.0},
+                ["--delta=0.4", "--motion=bounded", "--max-accel=1"],
+            ),
+        }
+        for verdict, (options, words) in asked.items():
+            with self.subTest(verdict=verdict):
+                a = tl.audit(t, p, **options)
+                self.assertEqual(a.verdict, verdict)
+                self.assertEqual(tl.audit(tl_path, **options).verdict, verdict)
+                printed = told(["audit", "--json", *words, str(tl_path)])
+                ours = a.to_dict()
+                for key in ("status", "separation", "audit", "closest", "violations", "undecided", "gaps", "vehicles", "span_s"):
+                    self.assertEqual(ours[key], printed[key], key)
+
+    def test_the_order_in_memory_changes_nothing(self) -> None:
+        rng = np.random.default_rng(1)
+        t, p = np.arange(40) * 0.1, rng.normal(scale=5.0, size=(40, 5, 3))
+        expected = tl.audit(t, p, delta=0.5).to_dict()
+        orders = {
+            "Fortran": np.asfortranarray(p),
+            "axes swapped": np.ascontiguousarray(p.transpose(2, 1, 0)).transpose(2, 1, 0),
+            "backwards": p[::-1].copy()[::-1],
+            "every second": np.repeat(p, 2, axis=1)[:, ::2],
+        }
+        for order, same in orders.items():
+            self.assertEqual(tl.audit(t, same, delta=0.5).to_dict(), expected, order)
+        other = p.copy()
+        other[7, 2, 1] += 3.0
+        self.assertNotEqual(tl.audit(t, other, delta=0.5).to_dict(), expected)
+
+    def test_a_plane_is_the_plane_z_0_and_is_said(self) -> None:
+        t, p = passing()
+        flat, space = tl.audit(t, p[:, :, :2], delta=1.5), tl.audit(t, p, delta=1.5)
+        self.assertEqual((flat.verdict, flat.separation_m), (space.verdict, space.separation_m))
+        self.assertIn("z is taken as 0", flat.notes[0])
+
+    def test_who_was_not_seen_is_a_gap_and_never_clear(self) -> None:
+        t, p = passing()
+        p[40:60, 2] = np.nan
+        a = tl.audit(t, p, delta=0.1)
+        self.assertEqual(a.verdict, "UNDECIDED")
+        self.assertEqual([gap.vehicle for gap in a.gaps], ["3"])
+        with self.assertRaises(tl.ViolationError):
+            a.raise_for_violation()
+        a.raise_for_violation(allow_undecided=True)
+
+    def test_velocities_sharpen_what_is_bounded(self) -> None:
+        t = np.arange(30) * 0.5
+        angle = 0.3 * t
+        circle = np.stack([np.cos(angle), np.sin(angle), 0 * t], axis=1)
+        p, v = np.zeros((30, 2, 3)), np.zeros((30, 2, 3))
+        p[:, 0], p[:, 1] = 5 * circle, -5 * circle
+        v[:, 0] = 1.5 * np.stack([-np.sin(angle), np.cos(angle), 0 * t], axis=1)
+        v[:, 1] = -v[:, 0]
+        without, sharp = (tl.audit(t, p, delta=1.0, velocities=x, motion="bounded", max_accel=0.6) for x in (None, v))
+        self.assertGreater(sharp.separation_m, without.separation_m)
+        self.assertLessEqual(sharp.separation_m, 10.0)
+
+    def test_radii_obstacles_windows_limits_and_names_are_asked_as_on_the_command_line(self) -> None:
+        t, p = passing()
+        self.assertEqual(tl.audit(t, p, radius={"1": 0.5, "2": 0.6, "3": 0.1, "4": 0.1}).violations[0].limit_m, 1.1)
+        self.assertTrue(tl.audit(t, p, delta=1.5, to_s=1.0).is_clear)
+        self.assertTrue(tl.audit(t, p, delta=1.5, ids=["3", "4"]).is_clear)
+        self.assertEqual(tl.audit(t, p, delta=1.5, names=["a", "b,c", "d", "e"], ids=["b,c", "d"]).to_dict()["judged"], 2)
+        fence = self.folder / "solid.toml"
+        fence.write_text('[[obstacle]]\nname = "pole"\nball = { radius_m = 0.5 }\nat_m = [9.0, 1.0, 0.0]\nclearance_m = 0.6\n')
+        self.assertEqual(tl.audit(t, p, delta=0.1, obstacles=fence).violations[0].pair, ("4", "pole"))
+        self.assertEqual(tl.audit(t, p, delta=0.1, limit={"speed": 0.1}).verdict, "VIOLATION")
+        self.assertTrue(tl.audit(t, p, delta=0.1, limit={"speed": 5.0}).is_clear)
+
+    def test_the_page_is_that_of_the_judgement_or_of_none(self) -> None:
+        t, p = passing()
+        a = tl.audit(t, p, delta=1.5)
+        page = self.folder / "a.html"
+        a.to_html(page)
+        self.assertIn("VIOLATION", page.read_text())
+        p[0, 3] = 50.0
+        self.refuses(tl.Error, "not what it was", lambda: a.to_html(page))
+
+
+class Files(Case):
+    def test_a_file_is_judged_as_on_the_command_line(self) -> None:
+        file = self.folder / "run.mcap"
+        tl.fly("pentagon-laplacian", record=file)
+        a = tl.audit(file)
+        self.assertEqual(a.to_dict(), told(["audit", "--json", str(file)]))
+        self.assertEqual(a.verdict, "VIOLATION")
+        a.to_html(self.folder / "a.html")
+        self.assertTrue((self.folder / "a.html").exists())
+
+    def test_a_tautline_toml_beside_the_recording_is_heeded(self) -> None:
+        t, p = passing()
+        np.savez(self.folder / "p.npz", t=t, positions=p)
+        (self.folder / "tautline.toml").write_text("[audit]\ndelta_m = 1.5\n")
+        self.assertEqual(tl.audit(self.folder / "p.npz").verdict, "VIOLATION")
+        self.assertTrue(tl.audit(self.folder / "p.npz", delta=0.1).is_clear)
+        self.refuses(tl.Error, "there is no delta", lambda: tl.audit(self.folder / "p.npz", config=False))
+
+    def test_files_of_a_vehicle_each_are_joined(self) -> None:
+        for name, x in (("a", 0.0), ("b", 1.0)):
+            (self.folder / f"{name}.csv").write_text(f"t,x,y,z\n0,{x},0,0\n1,{x},0,0\n")
+        files = [self.folder / "a.csv", self.folder / "b.csv"]
+        self.assertEqual(tl.audit(files, delta=0.5, join=True).vehicles, ["a", "b"])
+        self.refuses(tl.Error, "several recordings are given", lambda: tl.audit(files, delta=0.5))
+
+
+class Shown(Case):
+    def test_what_a_notebook_shows_has_no_script_and_names_are_escaped(self) -> None:
+        t, p = passing()
+        shown = tl.audit(t, p, delta=1.5, names=["<b>", "&", "c", "d"])._repr_html_()
+        self.assertIn("VIOLATION", shown)
+        self.assertIn("<svg", shown)
+        self.assertIn("&lt;b&gt;", shown)
+        for forbidden in ("<script", "http://", "https://", "<b>\"", "onload"):
+            self.assertNotIn(forbidden, shown.replace("http://www.w3.org/2000/svg", ""))
+
+    def test_findings_are_tables(self) -> None:
+        t, p = passing()
+        table = tl.audit(t, p, delta=1.5).violations.to_pandas()
+        self.assertEqual(list(table.columns[:4]), ["first", "second", "from_s", "to_s"])
+        self.assertEqual(table["first"].iloc[0], "1")
+
+
+if __name__ == "__main__":
+    import unittest
+
+    unittest.main()

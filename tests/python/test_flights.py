@@ -1,0 +1,273 @@
+"""Flights and laws in Python: the same bits as the program flies, exceptions whole, the interpreter free."""
+
+import json
+import os
+import signal
+import threading
+import traceback
+import unittest
+
+import numpy as np
+import tautline as tl
+from shared import Case, Springs, short
+from tautline import _native
+
+
+class Flights(Case):
+    def test_a_flight_is_the_programs_to_the_bit(self) -> None:
+        ours = tl.fly(short(), record=self.folder / "ours.mcap").to_dict()
+        words = ["run", "pentagon", "--set=time.duration_s=2.0", "--json", "--no-figures", f"--out={self.folder / 'theirs'}"]
+        theirs = json.loads(_native.call(words)[1])
+        for report in (ours, theirs):
+            del report["performance"]
+        self.assertEqual(ours, theirs)
+        read = tl.read(self.folder / "ours.mcap").to_numpy()
+        again = tl.read(self.folder / "theirs" / "run.mcap").to_numpy()
+        np.testing.assert_array_equal(read[1], again[1])
+
+    def test_arrays_are_what_is_recorded(self) -> None:
+        f = tl.fly(short(), record=self.folder / "run.mcap")
+        t, p = tl.read(self.folder / "run.mcap").to_numpy()
+        np.testing.assert_array_equal(f.t, t)
+        np.testing.assert_array_equal(f.positions, p)
+        # The engine's positions are single precision.
+        np.testing.assert_allclose(f.positions[0], f.scenario.positions_m, atol=1e-7)
+        self.assertEqual(f.velocities.shape, f.positions.shape)
+        self.assertEqual(f.separations_m.min(), f.separation_m)
+        self.assertEqual(f.to_pandas().shape, (len(t) * 5, 11))
+        self.assertEqual(tl.fly(short(), keep=False).positions.shape, (0, 5, 3))
+
+    def test_a_violation_is_reported_and_shown(self) -> None:
+        f = tl.fly("pentagon-laplacian", html=self.folder / "f.html")
+        self.assertEqual((f.status, f.passed), ("violation", False))
+        self.assertIn("VIOLATION", f._repr_html_())
+        self.assertNotIn("<script", f._repr_html_())
+        self.assertIn("VIOLATION", (self.folder / "f.html").read_text())
+        self.assertEqual(len(f.plot().axes), 2)
+        self.assertEqual(f.audit().status, "violation")
+        self.assertEqual(f.audit(delta=0.5).status, "clear")
+
+
+class Laws(Case):
+    def test_a_law_flies_and_says_that_it_is_another(self) -> None:
+        f = tl.fly("pentagon", law=Springs(), record=self.folder / "run.mcap")
+        self.assertEqual(f.report["separation"]["certified_m"], None)
+        np.testing.assert_allclose(f.positions[-1] - f.positions[-1].mean(0), f.scenario.slots_m - f.scenario.slots_m.mean(0), atol=1e-3)
+        self.assertTrue(any("Springs" in note for note in tl.audit(self.folder / "run.mcap").notes))
+
+    def test_a_law_is_told_what_is_true(self) -> None:
+        seen = []
+
+        class Looks(tl.Law):
+            sensing_range_m = 4.0
+
+            def control(self, obs, out):
+                seen.append(obs)
+                out[:] = 0
+
+        f = tl.fly(short(), law=Looks())
+        first, last = seen[0], seen[-1]
+        np.testing.assert_array_equal(first.positions, f.positions[0])
+        np.testing.assert_array_equal(first.slots_m, f.scenario.slots_m)
+        self.assertEqual((first.t, last.t, first.leg, first.shared), (0.0, 2.0, 0, True))
+        near = {(i, j) for i, j in first.near.tolist()}
+        apart = np.linalg.norm(first.positions[:, None] - first.positions[None], axis=2)
+        self.assertLessEqual({(i, j) for i in range(5) for j in range(i + 1, 5) if apart[i, j] <= 4.0}, near)
+        self.assertEqual(len(seen), 2 * 240 + 1)
+
+    def test_over_a_network_a_law_is_told_what_was_heard(self) -> None:
+        seen = []
+
+        class Looks(tl.Law):
+            def control(self, obs, out):
+                seen.append(obs)
+                out[:] = 1.0
+
+        tl.fly(short(**{"network.latency_s": 0.1, "network.rate_hz": 20}), law=Looks())
+        obs = seen[-1]
+        self.assertFalse(obs.shared)
+        self.assertEqual((obs.heard_positions.shape, obs.heard_ages_s.shape), ((5, 5, 3), (5, 5)))
+        self.assertTrue((obs.heard_ages_s[~np.eye(5, dtype=bool)] >= 0.1 - 1e-9).all())
+        np.testing.assert_array_equal(obs.heard_positions[2, 2], obs.positions[2])
+        self.assertTrue((obs.heard_positions[0, 1] != obs.positions[1]).any())
+        self.assertIsNone(obs.seen_positions)
+
+    def test_what_a_law_raises_is_raised_whole(self) -> None:
+        class Fails(tl.Law):
+            def control(self, obs, out):
+                out[:] = 0
+                if obs.t >= 1.0:
+                    self.deep({})
+
+            def deep(self, empty):
+                return empty["lost"]
+
+        try:
+            tl.fly(short(), law=Fails(), record=self.folder / "run.mcap")
+            self.fail("nothing was raised")
+        except KeyError as raised:
+            names = [frame.name for frame in traceback.extract_tb(raised.__traceback__)]
+        self.assertEqual(names[-2:], ["control", "deep"])
+        t, _ = tl.read(self.folder / "run.mcap").to_numpy()
+        self.assertAlmostEqual(t[-1], 1.0, delta=0.01)
+        sim = tl.Simulation(short(), law=Fails())
+        with self.assertRaises(KeyError):
+            sim.step(steps=480)
+        self.assertEqual(sim.ending, "the law is undefined: it failed")
+
+    def test_exceptions_that_are_no_errors_pass_too(self) -> None:
+        class Leaves(tl.Law):
+            def control(self, obs, out):
+                raise SystemExit(3)
+
+        with self.assertRaises(SystemExit) as caught:
+            tl.fly(short(), law=Leaves())
+        self.assertEqual(caught.exception.code, 3)
+
+    def test_a_law_that_writes_no_number_is_named_with_vehicle_and_step(self) -> None:
+        class Forgets(tl.Law):
+            def __init__(self, value):
+                self.value = value
+
+            def control(self, obs, out):
+                out[:4] = 0
+                if obs.t < 1.0:
+                    out[4] = 0
+                elif self.value is not None:
+                    out[4, 1] = self.value
+
+        for value in (None, np.nan, np.inf):
+            self.refuses(tl.Error, "step 240: the law's command for vehicle 5 is not a finite number", lambda value=value: tl.fly(short(), law=Forgets(value)))
+        self.refuses(tl.Error, "step 240: the law's command for vehicle 5", lambda: tl.Simulation(short(), law=Forgets(None)).step(steps=480))
+
+    def test_a_law_that_returns_or_reshapes_is_told_what_to_do(self) -> None:
+        class Returns(tl.Law):
+            def control(self, obs, out):
+                return obs.positions
+
+        class Reshapes(tl.Law):
+            def control(self, obs, out):
+                out[:] = 0
+                out.shape = (3, 5)
+
+        self.refuses(TypeError, "writes into `out`", lambda: tl.fly(short(), law=Returns()))
+        self.refuses(tl.Error, "made an array of shape (3, 5)", lambda: tl.fly(short(), law=Reshapes()))
+        self.refuses(NotImplementedError, "write control", lambda: tl.fly(short(), law=tl.Law()))
+
+    def test_a_large_swarms_law_stays_in_the_thread_that_flies(self) -> None:
+        threads = set()
+
+        class Where(Springs):
+            def control(self, obs, out):
+                threads.add(threading.get_ident())
+                super().control(obs, out)
+
+        scenario = tl.Scenario("thousand", set={"time.duration_s": 1.0, "arrival.hold_s": 0.5})
+        sim = tl.Simulation(scenario, law=Where())
+        sim.step(steps=5)
+        self.assertEqual(threads, {threading.get_ident()})
+
+
+class Threads(Case):
+    def test_python_runs_while_a_flight_is_flown_and_a_recording_judged(self) -> None:
+        count, is_over = 0, threading.Event()
+
+        def counts() -> None:
+            nonlocal count
+            while not is_over.is_set():
+                count += 1
+
+        counter = threading.Thread(target=counts)
+        counter.start()
+        try:
+            scenario = tl.Scenario("pentagon", set={"time.duration_s": 60})
+            t, p = np.arange(3000) * 0.1, np.random.default_rng(0).normal(scale=20, size=(3000, 20, 3))
+            for work in (lambda: tl.fly(scenario), lambda: tl.audit(t, p, delta=0.1)):
+                before = count
+                work()
+                self.assertGreater(count - before, 100)
+        finally:
+            is_over.set()
+            counter.join()
+
+    def test_ctrl_c_ends_a_flight_and_leaves_its_recording(self) -> None:
+        def presses_once(path) -> None:
+            while not path.exists() or path.stat().st_size == 0:
+                pass
+            os.kill(os.getpid(), signal.SIGINT)
+
+        for law in (None, Springs()):
+            file = self.folder / f"run-{law is None}.mcap"
+            presser = threading.Thread(target=presses_once, args=(file,))
+            presser.start()
+            with self.assertRaises(KeyboardInterrupt):
+                tl.fly("pentagon", law=law, record=file, set={"time.duration_s": 5000}, keep=False)
+            presser.join()
+            t, _ = tl.read(file).to_numpy()
+            self.assertLess(t[-1], 5000)
+
+    def test_a_simulation_is_stepped_by_one_at_a_time(self) -> None:
+        class Steps(tl.Law):
+            sim = None
+
+            def control(self, obs, out):
+                out[:] = 0
+                if self.sim is not None:
+                    self.sim.step()
+
+        law = Steps()
+        law.sim = tl.Simulation(short(), law=law)
+        self.refuses(tl.Error, "is being stepped", lambda: law.sim.step())
+
+
+class Simulations(Case):
+    def test_stepped_by_its_law_a_simulation_is_the_flight(self) -> None:
+        f, sim = tl.fly(short()), tl.Simulation(short())
+        while not sim.is_over:
+            sim.step(steps=7)
+        np.testing.assert_array_equal(sim.positions, f.positions[-1])
+        np.testing.assert_array_equal(sim.velocities, f.velocities[-1])
+        self.assertEqual(sim.closest.separation_m, f.separation_m)
+        self.assertEqual((sim.status, len(sim.violations)), ("clear", 0))
+
+    def test_commands_from_outside_are_flown(self) -> None:
+        sim = tl.Simulation(short(**{"swarm.a22_per_s": 0.0}))
+        u = np.zeros((5, 3))
+        u[0, 1] = 2.0
+        sim.step(u, steps=240)
+        np.testing.assert_allclose(sim.positions[0, 1] - sim.scenario.positions_m[0, 1], 1.0, rtol=1e-5)
+        np.testing.assert_allclose(sim.velocities[0, 1], 2.0, rtol=1e-5)
+        np.testing.assert_array_equal(sim.commands, u)
+        self.assertEqual(sim.t, 1.0)
+
+    def test_the_judge_follows_and_nothing_passes_between_steps(self) -> None:
+        sim = tl.Simulation(short(**{"time.dt_s": 0.5, "time.max_halvings": 0}))
+        u = np.zeros((5, 3))
+        where = sim.positions
+        first, second = np.argsort(where[:, 0])[:2]
+        u[first] = 20 * (where[second] - where[first])
+        sim.step(u, steps=2)
+        self.assertLess(sim.separation_m, sim.scenario.delta_m)
+        self.assertLess(sim.least_clearance_m, 0)
+        self.assertEqual(sim.status, "violation")
+        self.assertEqual(set(sim.violations[0].pair), {str(first + 1), str(second + 1)})
+
+    def test_a_copy_goes_on_by_itself_with_the_same_bits(self) -> None:
+        sim = tl.Simulation(short())
+        sim.step(steps=100)
+        copy = sim.copy()
+        sim.step(steps=100)
+        self.assertEqual(copy.steps, 100)
+        copy.step(steps=100)
+        np.testing.assert_array_equal(copy.positions, sim.positions)
+        noisy = tl.Simulation(short(**{"sensing.position_noise_m": 0.05, "sensing.rate_hz": 100}))
+        noisy.step(steps=10)
+        same, other = noisy.copy(), noisy.copy(noise_seed=9)
+        for one in (noisy, same, other):
+            one.step(steps=200)
+        np.testing.assert_array_equal(same.positions, noisy.positions)
+        self.assertTrue((other.positions != noisy.positions).any())
+
+
+if __name__ == "__main__":
+    unittest.main()

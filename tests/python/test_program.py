@@ -1,0 +1,184 @@
+"""The command line inside the package, and its commands as functions."""
+
+import inspect
+import json
+import os
+import re
+import subprocess
+import sys
+import unittest
+from pathlib import Path
+
+import numpy as np
+import tautline as tl
+from shared import Case, passing, short
+from tautline import _words
+
+SPEC = """\
+scenario = "pentagon"
+runs = {runs}
+seed = 5
+[set]
+time.duration_s = 2.0
+[vary]
+"start.jitter_m" = {{ uniform = [0.0, 0.3] }}
+"""
+
+
+def tautline(*words: object, **options) -> subprocess.CompletedProcess[str]:
+    """Runs the command that the package installs."""
+    command = [str(Path(sys.executable).with_name("tautline")), *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, **options)
+
+
+class Command(Case):
+    def test_the_installed_command_has_the_programs_exit_codes(self) -> None:
+        t, p = passing()
+        np.savez(self.folder / "p.npz", t=t, positions=p)
+        for code, words in (
+            (0, ["--version"]),
+            (0, ["audit", self.folder / "p.npz", "--delta", "0.4"]),
+            (1, ["audit", self.folder / "p.npz", "--delta", "1.5"]),
+            (2, ["audit", self.folder / "none.npz", "--delta", "1.5"]),
+            (2, ["bogus"]),
+            (3, ["export", self.folder / "p.npz", "-o", self.folder / "none" / "p.csv"]),
+        ):
+            self.assertEqual(tautline(*words).returncode, code, words)
+
+    def test_it_is_a_module_too_and_pages_repeat_the_command(self) -> None:
+        t, p = passing()
+        np.savez(self.folder / "p.npz", t=t, positions=p)
+        words = [sys.executable, "-m", "tautline", "audit", "p.npz", "--delta", "0.4", "--html", "a.html"]
+        ran = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, check=False, timeout=300)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("CLEAR if straight between samples", ran.stdout)
+        self.assertIn("tautline audit p.npz --delta 0.4", (self.folder / "a.html").read_text())
+
+    def test_every_question_of_the_command_line_can_be_asked_in_python(self) -> None:
+        asked = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
+        self.assertIn("max-gap", asked)
+        answers = {"json", "quiet", "junit", "events", "html", "summary", "annotations", "allow-undecided", "no-config", "help"}
+        taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_words.reading).parameters}
+        taken |= {"from", "to"} if {"from_s", "to_s"} <= taken else set()
+        self.assertEqual({name for name in asked - answers if name.replace("-", "_") not in taken}, set())
+
+    def test_nothing_is_printed_by_functions(self) -> None:
+        text = "import tautline as tl\ntl.compare('pentagon', ['laplacian'], runs=1, set={'time.duration_s': 2})\ntl.fly('pentagon', set={'time.duration_s': 2})"
+        ran = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True, timeout=300)
+        self.assertEqual((ran.stdout, ran.stderr), ("", ""))
+
+    def test_pandas_and_matplotlib_are_imported_when_they_are_asked_for(self) -> None:
+        text = "import sys, tautline\nassert not {'pandas', 'matplotlib'} & set(sys.modules)"
+        subprocess.run([sys.executable, "-c", text], check=True, timeout=60)
+
+
+class Functions(Case):
+    def test_a_campaign_answers_goes_on_and_is_a_table(self) -> None:
+        spec, out = self.folder / "spec.toml", self.folder / "out"
+        spec.write_text(SPEC.format(runs=6))
+        answer = tl.campaign(spec, out, worst=0)
+        self.assertEqual((answer.runs, answer.laws[0].violated["of"] if "of" in answer.laws[0].violated else 6), (6, 6))
+        self.assertEqual(answer.to_dict(), json.loads((out / "campaign.json").read_text()))
+        self.assertEqual(len(answer.to_pandas()), 6)
+        before = (out / "results.parquet").read_bytes()
+        self.assertEqual(tl.campaign(spec, out, worst=0).to_dict(), answer.to_dict())
+        self.assertEqual((out / "results.parquet").read_bytes(), before)
+
+    def test_a_campaign_knows_what_flew_it(self) -> None:
+        spec, out = self.folder / "spec.toml", self.folder / "out"
+        spec.write_text(SPEC.format(runs=2))
+        tl.campaign(spec, out, worst=0)
+        import hashlib
+
+        from tautline import _native
+
+        holder = hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
+        self.assertEqual(json.loads((out / "manifest.json").read_text())["tool"]["sha256"], holder)
+
+    def test_laws_are_compared(self) -> None:
+        answer = tl.compare(short(), ["edge-tension", "laplacian"], runs=3, html=self.folder / "c.html")
+        self.assertEqual(answer.laws.to_pandas()["name"].tolist(), ["edge-tension", "laplacian"])
+        self.assertEqual((answer.runs, answer["runs"]), (3, 3))
+        self.assertTrue((self.folder / "c.html").exists())
+        self.refuses(tl.Error, "exists", lambda: tl.compare(short(), ["laplacian"], runs=1, html=self.folder / "c.html"))
+        of_text = tl.compare(tl.Scenario.from_toml(short().to_toml()), ["laplacian"], runs=1)
+        self.assertEqual(of_text.laws[0].name, "laplacian")
+
+    def test_a_margin_is_found(self) -> None:
+        found = tl.margin("pentagon", "time.duration_s", 2, 60, scan=2, halvings=1)
+        self.assertEqual(found.key, "time.duration_s")
+        self.assertFalse(found.probes[0].get("holds", False))
+
+    def test_an_attack_is_searched(self) -> None:
+        found = tl.attack(short(), start=0.1, flights=6, vary={"sensing.latency_s": (0.0, 0.1)})
+        self.assertEqual(found["scenario"], json.loads(json.dumps(found.to_dict()))["scenario"])
+
+    def test_what_is_known_before_the_first_step(self) -> None:
+        found = tl.check("pentagon")
+        self.assertAlmostEqual(found.certified_m, 2.055307, places=6)
+        self.assertTrue(found.is_good)
+        refused = tl.check("pentagon-collinear")
+        self.assertFalse(refused.is_good)
+        self.assertIn("start-on-line", [warning.code for warning in refused.warnings])
+        self.assertEqual(found.to_dict()["vehicles"], found.vehicles)
+
+    def test_scenarios_are_listed_and_built(self) -> None:
+        self.assertIn("pentagon", tl.scenarios())
+        s = tl.Scenario("pentagon", set={"start.positions_m.2.x": 9.2, "law.kind": "displacement", "graph": {"kind": "star"}})
+        self.assertEqual((s.law, len(s), s.links.shape), ("displacement", 5, (4, 2)))
+        self.assertEqual(tl.Scenario.from_toml(s.to_toml()).sha256, s.sha256)
+        file = self.folder / "s.toml"
+        file.write_text(s.to_toml())
+        self.assertEqual(tl.Scenario(file).sha256, s.sha256)
+        self.assertEqual(tl.fly(s, set={"time.duration_s": 2.0}).scenario.duration_s, 2.0)
+
+    @unittest.skipUnless(os.environ.get("TAUTLINE_LONG"), "minutes: set TAUTLINE_LONG")
+    def test_the_papers_claims_are_judged(self) -> None:
+        self.assertTrue(tl.validate(self.folder / "validate").is_good)
+
+
+class Recordings(Case):
+    def test_exports_read_back_to_the_last_bit(self) -> None:
+        f = tl.fly(short(), record=self.folder / "run.mcap")
+        for format in ("csv", "parquet", "npz", "mcap"):
+            file = self.folder / f"copy.{format}"
+            tl.export(self.folder / "run.mcap", file)
+            t, p = tl.read(file).to_numpy()
+            np.testing.assert_array_equal(p, f.positions, format)
+            np.testing.assert_array_equal(t, f.t, format)
+        self.refuses(tl.Error, "exists", lambda: tl.export(self.folder / "run.mcap", self.folder / "copy.csv"))
+        tl.export(self.folder / "run.mcap", self.folder / "copy.csv", force=True)
+        self.refuses(tl.Error, "does not tell a format", lambda: tl.export(self.folder / "run.mcap", self.folder / "a.xyz"))
+
+    def test_a_rate_interpolates_and_never_across_a_gap(self) -> None:
+        file = self.folder / "a.csv"
+        rows = [f"{0.1 * k:.1f},a,{k},0,0" for k in range(21) if not 8 < k < 13]
+        file.write_text("t,id,x,y,z\n" + "\n".join(rows) + "\n")
+        t, p = tl.read(file).to_numpy(hz=100)
+        known = ~np.isnan(p[:, 0, 0])
+        np.testing.assert_allclose(p[known, 0, 0], 10 * t[known], atol=1e-9)
+        self.assertFalse(known[(t > 0.81) & (t < 1.29)].any())
+        self.assertTrue(known[(t < 0.8) | (t > 1.31)].all())
+        self.assertTrue((~np.isnan(tl.read(file).to_numpy(hz=100, max_gap_s=1.0)[1])).all())
+
+    def test_curves_are_evaluated_and_have_no_rows(self) -> None:
+        folder = self.folder / "figures"
+        folder.mkdir()
+        head = "duration," + ",".join(f"{axis}^{k}" for axis in ("x", "y", "z", "yaw") for k in range(8))
+        for name, x in (("cf1", 0.0), ("cf2", 5.0)):
+            piece = [2.0, x, 1.0, 0.5, *[0.0] * 5, *[0.0] * 24]
+            (folder / f"{name}.csv").write_text(head + "\n" + ",".join(map(str, piece)) + "\n")
+        recording = tl.read(folder)
+        self.assertTrue(recording.has_curves)
+        t, p = recording.to_numpy(hz=10)
+        np.testing.assert_allclose(p[:, 0, 0], t + 0.5 * t**2, atol=1e-12)
+        np.testing.assert_allclose(p[:, 1, 0], 5.0 + t + 0.5 * t**2, atol=1e-12)
+        self.refuses(tl.Error, "hz=", lambda: recording.to_numpy())
+        self.refuses(tl.Error, "no rows", lambda: recording.to_pandas())
+        self.assertEqual(recording.audit(delta=1.0).verdict, "PROVED CLEAR")
+        for hz, says in ((-1, "positive"), (float("nan"), "positive"), (1e12, "lower rate")):
+            self.refuses(tl.Error, says, lambda hz=hz: recording.to_numpy(hz=hz))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,45 @@
+"""The session that says what the package is: every statement of it runs as printed in docs/python.md."""
+
+import os
+import re
+
+from shared import ROOT, Case, passing
+
+PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+
+
+class Session(Case):
+    def test_every_block_of_python_on_the_page_runs_as_printed(self) -> None:
+        blocks = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+        self.assertGreater(len(blocks), 8)
+        t, p = passing()
+        names = {"t": t, "p": p}
+        self.addCleanup(os.chdir, os.getcwd())
+        os.chdir(self.folder)
+        for number, block in enumerate(blocks, 1):
+            with self.subTest(block=number):
+                exec(compile(block, f"docs/python.md, block {number}", "exec"), names)
+
+    def test_the_adoption_session(self) -> None:
+        self.addCleanup(os.chdir, os.getcwd())
+        os.chdir(self.folder)
+        (self.folder / "spec.toml").write_text('scenario = "pentagon"\nruns = 4\n[set]\ntime.duration_s = 2.0\n[vary]\n"start.jitter_m" = { uniform = [0.0, 0.2] }\n')
+        import numpy as np, tautline as tl  # noqa: E401
+        t, p = passing()
+        a = tl.audit(t, p, delta=1.5)
+        a.verdict, a.separation_m, a.closest[0].pair, a.violations.to_pandas(), a.to_dict(), a.to_html("a.html")
+        with self.assertRaises(tl.ViolationError):
+            a.raise_for_violation()
+        s = tl.Scenario("pentagon", set={"time.duration_s": 60}); f = tl.fly(s, record="run.mcap"); f.t, f.positions, f.velocities, f.report  # noqa: E702
+        class Springs(tl.Law):
+            def __init__(self, slots): self.slots = slots  # noqa: E704
+            def control(self, obs, out): out[:] = self.slots - obs.positions - 2 * obs.velocities  # noqa: E704
+        tl.fly(s, law=Springs(s.slots_m))
+        u = np.zeros((len(s), 3))
+        sim = tl.Simulation(s); sim.step(u); sim.positions, sim.separation_m  # noqa: E702
+        self.assertGreater(tl.check(s).certified_m, 2.0)
+        t, p = tl.read("run.mcap").to_numpy(hz=50)
+        self.assertEqual(p.shape, (60 * 50 + 1, 5, 3))
+        self.assertEqual(tl.campaign("spec.toml").runs, 4)
+        self.assertTrue(f.passed)
+        self.assertTrue((self.folder / "a.html").read_text().startswith("<!DOCTYPE html>"))

@@ -1,0 +1,186 @@
+"""Wrong input from Python: the right class of exception with the message of the command line, and never an abort."""
+
+import unittest
+
+import numpy as np
+import tautline as tl
+from shared import Case, Springs, passing, short
+
+
+class Arrays(Case):
+    def test_what_is_no_array_of_doubles_is_a_type_error(self) -> None:
+        t, p = passing()
+        record = np.zeros(p.size, dtype=[("a", "u1"), ("b", "f8")])["b"].reshape(p.shape)
+        for says, times, positions in (
+            ("not of float32", t, p.astype(np.float32)),
+            ("not of int64", t, p.astype(np.int64)),
+            ("not of int64", np.arange(len(t)), p),
+            ("not of complex128", t, p.astype(complex)),
+            ("not of object", t, p.astype(object)),
+            ("not of >f8", t, p.astype(">f8")),
+            ("not aligned", t, record),
+            ("not list", t, p.tolist()),
+            ("not list", t.tolist(), p),
+            ("masked", t, np.ma.masked_array(p)),
+            ("needed beside the times", t, None),
+            ("not int", 3, None),
+        ):
+            self.refuses(TypeError, says, lambda times=times, positions=positions: tl.audit(times, positions, delta=1.0))
+
+    def test_wrong_shapes_say_what_is_needed(self) -> None:
+        t, p = passing()
+        for says, times, positions in (
+            ("(T, N, 3) or (T, N, 2) is needed, not of shape (1200,)", t, p.ravel()),
+            ("the last axis is x, y and z", t, p[:, :, :1]),
+            ("the last axis is x, y and z", t, np.zeros((len(t), 4, 4))),
+            ("for 100 times; the first axis is time: give .swapaxes(0, 1)", t, p.swapaxes(0, 1)),
+            ("for 5 times", t[:5], p),
+            ("(T,) is needed, not of shape (100, 1)", t[:, None], p),
+            ("holds nothing to judge", t[:0], p[:0]),
+            ("holds nothing to judge", t, p[:, :0]),
+            ("1 vehicle to judge, and nothing to keep apart", t, p[:, :1]),
+        ):
+            self.refuses(tl.Error, says, lambda times=times, positions=positions: tl.audit(times, positions, delta=1.0))
+        self.refuses(tl.Error, "velocities: they are of shape", lambda: tl.audit(t, p, delta=1.0, velocities=p[1:]))
+        self.refuses(tl.Error, "names: 2 for 4 vehicles", lambda: tl.audit(t, p, delta=1.0, names=["a", "b"]))
+        self.refuses(tl.Error, "the same name", lambda: tl.audit(t, p, delta=1.0, names=["a", "b", "a", "c"]))
+
+    def test_numbers_in_odd_places_are_named_by_their_place(self) -> None:
+        t, p = passing()
+
+        def changed(array: np.ndarray, place: object, value: float) -> np.ndarray:
+            copy = array.copy()
+            copy[place] = value
+            return copy
+
+        for says, times, positions in (
+            ("positions[10, 1]: it holds NaN", t, changed(p, (10, 1, 0), np.nan)),
+            ("positions[10, 1]: it holds inf", t, changed(p, (10, 1, 2), np.inf)),
+            ("t[7]: it is NaN", changed(t, 7, np.nan), p),
+            ("t[7]: it is inf", changed(t, 7, np.inf), p),
+            ("t[7]: time is repeated: 0.6000000000000001 s", changed(t, 7, t[6]), p),
+            ("t[1]: time runs backwards", t[::-1], p),
+            ("not a finite number below 1e70", t, 1e300 * p),
+        ):
+            self.refuses(tl.Error, says, lambda times=times, positions=positions: tl.audit(times, positions, delta=1.0))
+        velocities = changed(np.zeros_like(p), (3, 0, 1), np.nan)
+        self.refuses(tl.Error, "velocities[3, 0]: it holds NaN", lambda: tl.audit(t, p, delta=1.0, velocities=velocities))
+
+    def test_wrong_questions_get_the_command_lines_answer(self) -> None:
+        t, p = passing()
+        for says, asked in (
+            ("there is no delta", {}),
+            ("delta must be above 0", {"delta": -1}),
+            ("delta must be above 0", {"delta": float("nan")}),
+            ("[possible values: linear, hold, polynomial, bounded]", {"delta": 1, "motion": "spline"}),
+            ("with --max-accel A", {"delta": 1, "motion": "bounded"}),
+            ("--max-accel says nothing", {"delta": 1, "max_accel": 2.0}),
+            ("the window from 1.0 s to 0.5 s", {"delta": 1, "from_s": 1, "to_s": 0.5}),
+            ("no vehicle zz", {"delta": 1, "ids": ["zz"]}),
+            ("4 vehicles to judge, not 5", {"delta": 1, "expect_vehicles": 5}),
+        ):
+            self.refuses(tl.Error, says, lambda asked=asked: tl.audit(t, p, **asked))
+        self.refuses(TypeError, "delta: a number is needed, not str", lambda: tl.audit(t, p, delta="1"))
+        self.refuses(TypeError, "a number is needed, not bool", lambda: tl.audit(t, p, delta=True))
+        self.refuses(TypeError, "says how a file is read", lambda: tl.audit(t, p, delta=1, fps=30))
+        self.refuses(TypeError, "unexpected keyword", lambda: tl.audit("a.csv", delta=1, bogus=1))
+
+    def test_many_vehicles_are_judged_and_not_refused(self) -> None:
+        side = 300
+        p = np.zeros((2, side * side, 2))
+        p[:, :, 0], p[:, :, 1] = 3.0 * (np.arange(side * side) % side), 3.0 * (np.arange(side * side) // side)
+        self.assertEqual(tl.audit(np.array([0.0, 1.0]), p, delta=1.0).separation_m, 3.0)
+
+
+class Files(Case):
+    def test_missing_files_are_file_not_found(self) -> None:
+        t, p = passing()
+        for do in (
+            lambda: tl.audit("none.csv", delta=1),
+            lambda: tl.audit(t, p, delta=1, obstacles="none.toml"),
+            lambda: tl.read("none.mcap"),
+            lambda: tl.export("none.mcap", self.folder / "a.csv"),
+            lambda: tl.Scenario("none.toml"),
+            lambda: tl.fly(self.folder / "none"),
+            lambda: tl.campaign("none.toml"),
+        ):
+            self.refuses(FileNotFoundError, "No such file", do)
+
+    def test_what_is_wrong_in_a_file_is_said_with_its_place(self) -> None:
+        file = self.folder / "a.csv"
+        file.write_text("t,id,x,y,z\n0,a,0,0,0\n0,b,1,0,x\n")
+        self.refuses(tl.Error, "line 3", lambda: tl.audit(file, delta=0.5))
+        self.refuses(tl.Error, "line 3", lambda: tl.read(file))
+        file.write_bytes(b"\x00\x01\x02" * 100)
+        self.refuses(tl.Error, "a.csv", lambda: tl.read(file))
+        self.refuses(TypeError, "a path is needed, not int", lambda: tl.read(3))
+        self.refuses(TypeError, "a path is needed, not bytes", lambda: tl.read(b"a.csv"))
+        self.refuses(tl.Error, "none is given", lambda: tl.read([]))
+
+    def test_what_cannot_be_written_is_an_os_error(self) -> None:
+        self.refuses(OSError, "cannot write", lambda: tl.fly(short(), record=self.folder / "none" / "run.mcap"))
+        t, p = passing()
+        self.refuses(OSError, "cannot write", lambda: tl.audit(t, p, delta=1).to_html(self.folder / "none" / "a.html"))
+
+
+class Scenarios(Case):
+    def test_a_wrong_scenario_says_place_value_and_remedy(self) -> None:
+        for says, do in (
+            ("did you mean `pentagon`?", lambda: tl.Scenario("pentagn")),
+            ("--set:1:11: invalid type", lambda: tl.Scenario(set={"time.dt_s": "x"})),
+            ("is not a key of an override", lambda: tl.Scenario(set={"a b": 1})),
+            ("unknown key `nope`", lambda: tl.Scenario(set={"law.nope": 1})),
+            ("TOML:1:1: unknown key `x`", lambda: tl.Scenario.from_toml("x = 3")),
+            ("neither a built-in scenario nor a file", lambda: tl.Scenario("-")),
+            ("neither a built-in scenario nor a file", lambda: tl.Scenario("")),
+            ("there is no law named `nope`", lambda: tl.compare("pentagon", ["nope"])),
+            ("--from and --to", lambda: tl.margin("pentagon", "time.control_hz", 5, 5)),
+        ):
+            self.refuses(tl.Error, says, do)
+        self.refuses(TypeError, "a name or a path is needed, not int", lambda: tl.Scenario(3))
+        self.refuses(TypeError, "a value of TOML is needed, not set", lambda: tl.Scenario(set={"name": {1}}))
+
+    def test_a_million_vehicles_too_many_are_an_error(self) -> None:
+        text = 'name = "many"\n[swarm]\ncount = 1000000000000\n[start]\nshape = "line"\nspacing_m = 3.0\n'
+        text += '[formation]\nshape = "circle"\nradius_m = 5.0\n[law]\nkind = "displacement"\ndelta_m = 1.0\n[time]\nduration_s = 1.0\n'
+        with self.assertRaises(tl.Error):
+            tl.Scenario.from_toml(text)
+
+
+class Simulations(Case):
+    def test_wrong_steps_fly_nothing(self) -> None:
+        sim = tl.Simulation(short())
+        u = np.zeros((5, 3))
+        for kind, says, do in (
+            (TypeError, "not list", lambda: sim.step(u.tolist())),
+            (TypeError, "not of float32", lambda: sim.step(u.astype(np.float32))),
+            (tl.Error, "of shape (5, 3) are needed, not (4, 3)", lambda: sim.step(u[:4])),
+            (tl.Error, "not (5, 1)", lambda: sim.step(u[:, :1])),
+            (tl.Error, "not of shape (15,)", lambda: sim.step(u.ravel())),
+            (tl.Error, "step 1: the command for vehicle 3 is not a finite number", lambda: sim.step(np.where(np.arange(5)[:, None] == 2, np.nan, u))),
+            (tl.Error, "steps: 0 were asked for", lambda: sim.step(steps=0)),
+            (TypeError, "a whole number is needed, not float", lambda: sim.step(steps=1.5)),
+        ):
+            self.refuses(kind, says, do)
+        self.assertEqual(sim.steps, 0)
+        sim.step(u[:, :2])
+        self.assertEqual(sim.steps, 1)
+
+    def test_a_flight_that_has_ended_is_not_stepped(self) -> None:
+        sim = tl.Simulation(short())
+        sim.step(steps=10_000)
+        self.assertEqual((sim.ending, sim.t), ("completed", 2.0))
+        self.refuses(tl.Error, "the flight has ended (completed)", sim.step)
+
+    def test_what_is_no_law_is_a_type_error(self) -> None:
+        self.refuses(TypeError, "int has no method control", lambda: tl.fly(short(), law=3))
+        self.refuses(TypeError, "str has no method control", lambda: tl.Simulation(short(), law="orca"))
+
+        class Named(Springs):
+            name = "edge-tension"
+
+        self.refuses(tl.Error, "the name of the scenario's own law", lambda: tl.fly(short(), law=Named()))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,177 @@
+//! Latitude, longitude and height become metres around an origin.
+
+use std::fs;
+
+use tautline::read::{ReadError, ReadOptions};
+
+use crate::messages::{Message, SEC, cdr, mcap_of, read_bytes};
+use crate::recording::Whole;
+
+/// Two units in the last place of a coordinate around the Earth's centre.
+const ROUNDING_M: f64 = 2e-9;
+
+const ORIGIN: [f64; 3] = [47.397_742, 8.545_594, 488.0];
+
+/// Places, and where PROJ 9 (`+proj=topocentric` behind `+proj=cart`) has them from [`ORIGIN`].
+const KNOWN: [([f64; 3], [f64; 3]); 4] = [
+    (ORIGIN, [0.0, 0.0, 0.0]),
+    ([47.398_742, 8.547_594, 508.5], [150.988_644_194_237_08, 111.189_420_765_010_33, 20.497_245_891_892_348]),
+    ([47.3, 8.9, 400.0], [26_804.962_226_687_625, -10_806.380_650_633_424, -153.386_212_090_752_45]),
+    ([-33.0, 151.0, 10.0], [3_262_982.205_143_963, 808_222.016_473_88, -11_783_142.139_647_465]),
+];
+
+fn read(text: &str, options: &ReadOptions) -> Result<Whole, ReadError> {
+    read_bytes("gps.csv", text.as_bytes(), options)
+}
+
+fn whole(text: &str) -> Whole {
+    read(text, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}\n{}", error.help()))
+}
+
+fn table(header: &str) -> String {
+    let rows = KNOWN.iter().enumerate().map(|(k, ([lat, lon, alt], _))| format!("{k},a,{lat},{lon},{alt}\n"));
+    format!("{header}\n{}", rows.collect::<String>())
+}
+
+fn is_known(found: &Whole) {
+    assert_eq!(found.items.len(), KNOWN.len());
+    for ((_, _, position), (place, expected)) in found.samples().iter().zip(KNOWN) {
+        let off = position.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 2.0 * ROUNDING_M, "{place:?}: {position:?} is off by {off} m");
+    }
+}
+
+#[test]
+fn places_of_tables_agree_with_proj() {
+    for header in [
+        "t,id,lat,lon,alt",
+        "t,id,Latitude,Longitude,Altitude",
+        "t,id,latitude [deg],lng,height (m)",
+        "t,id,gps_lat,gps_lon,gps_alt",
+        "t,id,lat_deg,lon_deg,alt_m",
+    ] {
+        let found = whole(&table(header));
+        is_known(&found);
+        let note = "east, north and up of 47.397742,8.545594,488.0 on WGS 84";
+        assert!(found.notes.iter().any(|said| said.contains(note)), "{:?}", found.notes);
+    }
+    let mut named = ReadOptions::default();
+    for (role, name) in [("lat", "phi"), ("lon", "lambda"), ("alt", "h")] {
+        assert!(named.columns.set(role, name));
+    }
+    is_known(&read(&table("t,id,phi,lambda,h"), &named).expect("read"));
+}
+
+#[test]
+fn wide_tables_and_other_units_say_the_same() {
+    let [(a, _), (b, expected)] = [KNOWN[0], KNOWN[1]];
+    let wide = format!(
+        "t,cf1.lat,cf1.lon,cf1.alt,cf2.lat,cf2.lon,cf2.alt\n0,{},{},{},{},{},{}\n",
+        a[0], a[1], a[2], b[0], b[1], b[2]
+    );
+    let found = whole(&wide);
+    assert_eq!((found.vehicles.clone(), found.samples()[0].2), (vec!["cf1".to_owned(), "cf2".to_owned()], [0.0; 3]));
+    let at = found.samples()[1].2;
+    let other = format!(
+        "t,id,lat [rad],lon [rad],alt [ft]\n0,a,{:?},{:?},{:?}\n0,b,{:?},{:?},{:?}\n",
+        a[0].to_radians(),
+        a[1].to_radians(),
+        a[2] / 0.3048,
+        b[0].to_radians(),
+        b[1].to_radians(),
+        b[2] / 0.3048
+    );
+    let turned = whole(&other).samples()[1].2;
+    for axis in 0..3 {
+        assert!((at[axis] - expected[axis]).abs() < 2.0 * ROUNDING_M, "{at:?}");
+        assert!((turned[axis] - expected[axis]).abs() < 5.0 * ROUNDING_M, "{turned:?}");
+    }
+}
+
+#[test]
+fn the_origin_can_be_given_and_metres_go_before_degrees() {
+    let origin = ReadOptions { origin: Some(KNOWN[1].0), ..ReadOptions::default() };
+    assert_eq!(read(&table("t,id,lat,lon,alt"), &origin).expect("read").samples()[1].2, [0.0; 3]);
+    let both = whole("t,id,x,y,z,lat,lon\n0,a,1,2,3,47,8\n");
+    assert_eq!(both.samples(), [(0.0, "a", [1.0, 2.0, 3.0])]);
+    assert!(both.notes.iter().any(|note| note == "columns not used: lat, lon"), "{:?}", both.notes);
+    let needless = read("t,id,x,y,z\n0,a,1,2,3\n", &origin).expect_err("refused");
+    assert_eq!(needless.help(), "leave --origin away");
+}
+
+#[test]
+fn who_is_not_seen_has_no_place_and_heights_may_be_missing_altogether() {
+    let found = whole("t,id,lat,lon,alt\n0,a,,,\n1,a,47,8,400\n");
+    assert_eq!(found.samples(), [(1.0, "a", [0.0; 3])]);
+    let flat = whole("t,id,lat,lon\n0,a,47,8\n");
+    assert_eq!(flat.samples(), [(0.0, "a", [0.0; 3])]);
+    assert!(flat.notes.iter().any(|note| note.contains("no column for the height")), "{:?}", flat.notes);
+}
+
+#[test]
+fn what_is_no_place_is_refused_where_it_is() {
+    for (row, said) in [
+        ("0,a,91,8,400", "line 2: `91.0` is no latitude"),
+        ("0,a,473977420,85455940,488", "`473977420.0` is no latitude"),
+        ("0,a,47,361,400", "`361.0` is no longitude"),
+        ("0,a,nan,8,400", "line 2: column `lat` holds `nan`"),
+        ("0,a,47,8,", "line 2: column `alt` is empty"),
+    ] {
+        let error = read(&format!("t,id,lat,lon,alt\n{row}\n"), &ReadOptions::default()).expect_err(said);
+        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
+    }
+    let scaled = ReadOptions { scale: 0.1, ..ReadOptions::default() };
+    assert!(read(&table("t,id,lat,lon,alt"), &scaled).expect_err("refused").help().contains("--scale"));
+    assert!(
+        read(&table("t,id,lat [grad],lon,alt"), &ReadOptions::default())
+            .expect_err("refused")
+            .to_string()
+            .contains("`grad`")
+    );
+}
+
+#[test]
+fn files_of_one_vehicle_each_are_measured_from_one_origin() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, ([lat, lon, alt], _)) in ["a.csv", "b.csv"].iter().zip(KNOWN) {
+        fs::write(folder.path().join(name), format!("t,lat,lon,alt\n0,{lat},{lon},{alt}\n")).expect("written");
+    }
+    let error = Whole::read(folder.path(), &ReadOptions::default()).expect_err("refused");
+    assert!(error.help().contains("--origin 47.397742,8.545594,488.0"), "{error}\n{}", error.help());
+    let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
+    let found = Whole::read(folder.path(), &origin).expect("read");
+    assert!((found.samples()[1].2[0] - KNOWN[1].1[0]).abs() < 2.0 * ROUNDING_M, "{:?}", found.samples());
+}
+
+/// A fix at a time \[s\]: status -1 is none.
+fn fix(second: i32, status: i8, [latitude, longitude, height]: [f64; 3]) -> Vec<u8> {
+    let position = ((latitude, longitude, height), [0.0; 9], 2_u8);
+    cdr(&(((SEC + second, 0), "gps"), (status, 1_u16), position), second % 2 == 0)
+}
+
+#[test]
+fn fixes_of_satellites_are_read_and_none_where_there_is_none() {
+    let kind = "sensor_msgs/msg/NavSatFix";
+    let nan = f64::NAN;
+    let mut messages: Vec<_> =
+        (0..).zip(KNOWN).map(|(k, (place, _))| ("/r1/fix", kind, "cdr", 1, fix(k, 0, place))).collect();
+    messages.insert(0, ("/r1/fix", kind, "cdr", 1, fix(-2, -1, [nan; 3])));
+    messages.insert(1, ("/r1/fix", kind, "cdr", 1, fix(-1, 0, [47.0, 8.0, nan])));
+    let found = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect("read");
+    assert_eq!(found.vehicles, ["/r1/fix"]);
+    is_known(&found);
+    messages.push(("/r1/fix", kind, "cdr", 1, fix(9, 0, [nan, 8.0, 1.0])));
+    let refused = |messages: &[Message], options: &ReadOptions| {
+        read_bytes("gps.mcap", &mcap_of(messages), options).expect_err("refused")
+    };
+    let error = refused(&messages, &ReadOptions::default()).to_string();
+    assert!(error.contains("message 7 on topic `/r1/fix`") && error.contains("not finite"), "{error}");
+    let error = refused(&messages[..2], &ReadOptions::default()).to_string();
+    assert!(error.contains("no message of its topics with positions has one"), "{error}");
+    let pose =
+        ("/r2/pose", "geometry_msgs/msg/PoseStamped", "cdr", 1, cdr(&(((SEC, 0), "map"), ([0.0; 3], [0.0; 4])), true));
+    let error = refused(&[messages[2].clone(), pose.clone()], &ReadOptions::default()).to_string();
+    assert!(error.contains("`WGS 84`") && error.contains("`map`"), "{error}");
+    let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
+    assert_eq!(refused(&[pose], &origin).help(), "leave --origin away");
+}
