@@ -195,7 +195,7 @@ fn forces_that_are_bounded_stop_only_so_much_speed() {
     ] {
         let flight = meeting(law.clone(), speed_m_s);
         assert_eq!(flight.audit.status, expected, "{law:?} at {speed_m_s} m/s");
-        assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![Void::CommandLimited]));
+        assert_eq!((flight.certificate.certified_m, flight.certificate.void[0]), (None, Void::CommandLimited));
     }
     let unbounded = meeting(potential(None), 10.0);
     assert_eq!(unbounded.audit.status, Status::Clear);

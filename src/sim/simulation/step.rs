@@ -23,6 +23,10 @@ struct Fineness {
     is_overlong: bool,
 }
 
+/// Product of a part of a step and the fastest rate that the law has anywhere on its way above which it is refused: where it
+/// began, the law was slower by [`TimeSpec::max_rate_dt`]; a part that is stable for what it lands in is no leap.
+const MAX_RATE_DT_ON_THE_WAY: f64 = 1.0;
+
 impl Simulation {
     /// Flies one step, in halves where it is refused.
     pub(super) fn advance(&mut self, step: u64) -> Result<(), Ending> {
@@ -72,7 +76,7 @@ impl Simulation {
             }
             self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();
-            let (is_refused, most_rate_per_s) = self.refuses(seconds(part), rate_per_s);
+            let (is_refused, on_the_way_per_s) = self.refuses(seconds(part), rate_per_s);
             if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
                 self.motion.restore(&self.state);
                 self.controller.link.forget_after(self.time_s);
@@ -83,8 +87,9 @@ impl Simulation {
             if bend_m > MAX_BEND_M {
                 return Err(Breakdown::Bent { step, bend_m }.into());
             }
-            let is_honest = seconds(part) * most_rate_per_s <= TimeSpec::DEFAULT_MAX_RATE_DT;
-            fineness.is_overlong |= (is_refused || !is_honest) && self.follows_the_law();
+            let [begun, way] = [rate_per_s.min(on_the_way_per_s), on_the_way_per_s].map(|rate| seconds(part) * rate);
+            let is_honest = begun <= TimeSpec::DEFAULT_MAX_RATE_DT && way <= MAX_RATE_DT_ON_THE_WAY;
+            fineness.is_overlong |= !is_honest && self.follows_the_law();
             flown += part;
             let from_s = self.time_s;
             if flown == whole {
@@ -125,13 +130,13 @@ impl Simulation {
         let Some(barrier_m) = law.barrier_m().filter(|_| motion.holds_commands()) else {
             return (judge.refuses(law, links, state, path, next), at_start_per_s);
         };
-        let (room_m, most) = (judge.room_m, scenario.time.max_rate_dt.min(TimeSpec::DEFAULT_MAX_RATE_DT));
+        let (room_m, most) = (judge.room_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
         let rate = |nearest_m: f64, moved_m: f64| rate_per_s(law, scenario, (nearest_m, room_m - moved_m));
         let enough =
             |nearest_m: f64, moved_m: f64| nearest_m > barrier_m && rate(nearest_m, moved_m) * length_s <= most;
         let (nearest_m, moved_m) = judge.nearest_over((law, links), (state, path, next), enough);
         let most_rate_per_s = rate(nearest_m, moved_m);
-        let is_too_fast = most_rate_per_s * length_s > scenario.time.max_rate_dt;
+        let is_too_fast = most_rate_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
         (is_too_fast || judge.refuses(law, links, state, path, next), most_rate_per_s)
     }
 
