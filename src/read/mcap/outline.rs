@@ -156,7 +156,7 @@ impl Outline {
                 return Err(twice(first, topic, &quoted(name)));
             }
             let (first, schema) = *robots.entry(namespace(topic)).or_insert((topic, &told.schema));
-            if *schema != told.schema {
+            if *schema != told.schema || (first != topic && (is_asked_for(first) || is_asked_for(topic))) {
                 let robot = namespace(topic);
                 return Err(twice(
                     first,
@@ -230,4 +230,22 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
         return Err(Fault::content(problem, remedy));
     }
     Ok(())
+}
+
+/// Whether the name of a topic says that it tells where a vehicle is to be, and not where it is.
+fn is_asked_for(topic: &str) -> bool {
+    const WORDS: [&str; 9] = ["cmd", "command", "desired", "goal", "planned", "ref", "reference", "setpoint", "target"];
+    let leaf = topic.rsplit('/').next().unwrap_or(topic);
+    leaf.split(|c: char| !c.is_ascii_alphanumeric()).any(|word| WORDS.contains(&word.to_ascii_lowercase().as_str()))
+}
+
+#[cfg(test)]
+mod asked_tests {
+    use super::is_asked_for;
+
+    #[test]
+    fn a_goal_is_no_vehicle_and_a_vehicle_no_goal() {
+        assert!(["/cf1/goal_pose", "/cf1/cmd_pose", "/uav/Setpoint", "/uav/pose_ref"].into_iter().all(is_asked_for));
+        assert!(!["/cf1/pose", "/drones/goalkeeper", "/target/pose", "/cf2"].into_iter().any(is_asked_for));
+    }
 }

@@ -82,6 +82,13 @@ impl Poses {
             let local = self.plan.earth.filter(|_| seen.frame == EARTH);
             return local.map_or(Ok(seen.position), |local| local.place(seen.position)).map(Some);
         };
+        if wanted == EARTH {
+            let problem = format!("{EARTH} is no frame of metres: places in it are latitudes and longitudes");
+            return Err(Fault::content(
+                problem,
+                "leave --frame out, or name a frame of poses; --topic says which topics are read",
+            ));
+        }
         if *wanted == seen.frame {
             return Ok(Some(seen.position));
         }
