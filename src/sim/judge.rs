@@ -174,13 +174,15 @@ impl Judge {
 
     /// Whether the move from `start` to `end` takes more than half of some pair's clearance above the law's barrier, or of what
     /// a vehicle has beyond an obstacle's clearance where the law keeps clear of obstacles.
-    pub(super) fn refuses(&mut self, law: &dyn Law, links: &Graph, start: &Swarm, path: &Path, end: &Swarm) -> bool {
+    pub(super) fn refuses(
+        &mut self,
+        (law, links): (&dyn Law, &Graph),
+        (start, path, end): (&Swarm, &Path, &Swarm),
+        moved_m: f64,
+    ) -> bool {
         let Some(barrier_m) = law.barrier_m() else { return false };
         let start = &start.positions_m;
         let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
-        let moved_m = instants()
-            .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
-            .fold(0.0, f64::max);
         if moved_m > 0.5 * self.room_m && law.keeps_clear_of_obstacles() && self.nears_an_obstacle(start, path, end) {
             return true;
         }
@@ -203,22 +205,20 @@ impl Judge {
         self.near.pairs().iter().copied().any(loses_half)
     }
 
-    /// The smallest separation of any pair that the law joins or senses over the move from `start` to `end`, in the judge's
-    /// lengths; or a bound of it from below that is `enough`. Behind it how far the swarm moved at most \[m\].
+    /// The smallest separation of any pair that the law joins or senses over the move from `start` to `end`, on which no vehicle
+    /// moves farther than `moved_m`, in the judge's lengths; or a bound of it from below that is `enough`.
     pub(super) fn nearest_over(
         &mut self,
         (law, links): (&dyn Law, &Graph),
         (start, path, end): (&Swarm, &Path, &Swarm),
-        enough: impl Fn(f64, f64) -> bool,
-    ) -> (f64, f64) {
+        moved_m: f64,
+        enough: impl Fn(f64) -> bool,
+    ) -> f64 {
         let start = &start.positions_m;
         let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
-        let moved_m = instants()
-            .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
-            .fold(0.0, f64::max);
         let least_m = self.nearest_m - self.metric.most_scaled(2.0 * moved_m);
-        if enough(least_m, moved_m) {
-            return (least_m, moved_m);
+        if enough(least_m) {
+            return least_m;
         }
         let metric = self.metric;
         let swept_m = |(i, j): (usize, usize)| {
@@ -227,14 +227,13 @@ impl Judge {
             let passes = instants().map(apart).map(|to| swept_separation_m(std::mem::replace(&mut from, to), to));
             passes.fold(f64::INFINITY, f64::min)
         };
-        let nearest_m = if law.sensing_range_m().is_none() {
+        if law.sensing_range_m().is_none() {
             links.edges().map(swept_m).fold(f64::INFINITY, f64::min)
         } else {
             let ratio = metric.ratio().max(1.0 / metric.ratio());
             self.near.update(start, metric.longest_m(self.nearest_m.max(0.0)) + 4.0 * ratio * moved_m);
             self.near.pairs().iter().copied().map(swept_m).fold(f64::INFINITY, f64::min)
-        };
-        (nearest_m, moved_m)
+        }
     }
 
     fn nears_an_obstacle(&self, start: &Rows, path: &Path, end: &Swarm) -> bool {
@@ -296,6 +295,16 @@ impl Judge {
             bounces: self.bounces,
         }
     }
+}
+
+/// How far any vehicle gets from where it is at `start`, on its way to `end` \[m\].
+pub(super) fn longest_move_m(start: &Swarm, path: &Path, end: &Swarm) -> f64 {
+    let start = &start.positions_m;
+    path.passed()
+        .map(|(_, rows)| rows)
+        .chain([&end.positions_m])
+        .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
+        .fold(0.0, f64::max)
 }
 
 /// Positions in the lengths that the judge is told: the same where these are metres.

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M};
+use super::super::judge::longest_move_m;
 use super::Simulation;
 use crate::feedback::Feedback as _;
 use crate::law::{Law, Void};
@@ -126,18 +127,18 @@ impl Simulation {
     /// its start where the law has no barrier.
     fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
         let Self { controller: Controller { law, links, .. }, judge, state, path, next, scenario, motion, .. } = self;
-        let law = law.as_ref();
-        let Some(barrier_m) = law.barrier_m().filter(|_| motion.holds_commands()) else {
-            return (judge.refuses(law, links, state, path, next), at_start_per_s);
-        };
-        let (room_m, most) = (judge.room_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
-        let rate = |nearest_m: f64, moved_m: f64| rate_per_s(law, scenario, (nearest_m, room_m - moved_m));
-        let enough =
-            |nearest_m: f64, moved_m: f64| nearest_m > barrier_m && rate(nearest_m, moved_m) * length_s <= most;
-        let (nearest_m, moved_m) = judge.nearest_over((law, links), (state, path, next), enough);
-        let most_rate_per_s = rate(nearest_m, moved_m);
-        let is_too_fast = most_rate_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
-        (is_too_fast || judge.refuses(law, links, state, path, next), most_rate_per_s)
+        let (of, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
+        let Some(barrier_m) = law.barrier_m() else { return (false, at_start_per_s) };
+        let moved_m = longest_move_m(state, path, next);
+        if !motion.holds_commands() {
+            return (judge.refuses(of, moves, moved_m), at_start_per_s);
+        }
+        let (room_m, most) = (judge.room_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
+        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, room_m));
+        let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
+        let on_the_way_per_s = rate(judge.nearest_over(of, moves, moved_m, enough));
+        let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
+        (is_too_fast || judge.refuses(of, moves, moved_m), on_the_way_per_s)
     }
 
     /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
