@@ -183,6 +183,9 @@ impl From<RecordedError> for Failure {
                 "judge obstacles by --delta or --radius, and ellipsoids without them"
             }
             RecordedError::Obstacle(_) => "mend the file of obstacles",
+            RecordedError::TwoClocks { .. } => {
+                "set a clock right with --offset NAME=SECONDS, or judge vehicles of one clock with --ids, or a time with --from"
+            }
             RecordedError::Unnamed { .. }
             | RecordedError::TimeNotIncreasing { .. }
             | RecordedError::OutOfOrder { .. }

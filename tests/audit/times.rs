@@ -115,3 +115,21 @@ fn a_straight_flight_far_from_the_origin_needs_no_acceleration() {
         assert!(asked(&odd, bounded(4.9)).contradiction.is_some(), "{with_velocity}");
     }
 }
+
+#[test]
+fn vehicles_on_two_clocks_are_refused_and_not_called_clear() {
+    const UNIX_S: f64 = 1.7e9;
+    // Alpha and charlie by one clock, bravo at the same time by another.
+    let bravo = [10.0, 11.0, 12.0].map(|t| seen(1, t, [0.0, 1.0, 0.0]));
+    let others =
+        [0.0, 1.0, 2.0].map(|t| [seen(0, UNIX_S + t, [0.0; 3]), seen(2, UNIX_S + t, [0.0, 9.0, 0.0])]).concat();
+    let items = [&bravo[..], &others].concat();
+    let refused = audit(&names(3), &items, Settings::delta(2.0)).expect_err("bravo is on another clock");
+    let RecordedError::TwoClocks { first, second, days } = refused else { panic!("{refused}") };
+    assert_eq!((first.as_str(), second.as_str(), days), ("bravo", "alpha", 19_675));
+    let only = Settings { only: Some(["alpha", "charlie"].map(str::to_owned).into()), ..Settings::delta(2.0) };
+    assert_eq!(audit(&names(3), &items, only).expect("a verdict").status, Status::Clear);
+    let set = VehicleSettings { offset_s: UNIX_S - 10.0, ..VehicleSettings::default() };
+    let right = Settings { vehicles: [("bravo".to_owned(), set)].into(), ..Settings::delta(2.0) };
+    assert_eq!(audit(&names(3), &items, right).map(|outcome| outcome.status), Ok(Status::Violation));
+}

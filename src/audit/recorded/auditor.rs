@@ -18,6 +18,10 @@ use crate::track::Item;
 const SEGMENTS: usize = 16;
 /// Fewest items between two windows.
 const FEWEST_ITEMS: usize = 48;
+/// Vehicles that are first seen farther apart in time than this \[s\] are not on one clock: nobody would ever be there with
+/// the other, and nothing would be judged of both.
+const ONE_CLOCK_S: f64 = 30.0 * DAY_S;
+const DAY_S: f64 = 86_400.0;
 /// Names that an error lists.
 const NAMES_LISTED: usize = 12;
 
@@ -232,13 +236,15 @@ impl TrackAuditor {
     /// The verdict over everything judged.
     ///
     /// # Errors
-    /// [`RecordedError::UnknownVehicle`] where the settings name a vehicle that the recording does not have.
+    /// [`RecordedError::UnknownVehicle`] where the settings name a vehicle that the recording does not have,
+    /// [`RecordedError::TwoClocks`] where two vehicles are first seen more than a month apart.
     pub fn finish(mut self) -> Result<Outcome, RecordedError> {
         self.check_names()?;
         let end_s = self.vehicles.iter().map(Vehicle::known_s).fold(self.done_s, f64::max);
         if end_s.is_finite() {
             self.judge_until(end_s);
         }
+        self.check_clocks()?;
         let presence: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.presence).collect();
         let there = || presence.iter().flatten();
         let span_s = there().map(|there| (there.from_s, there.to_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -298,6 +304,20 @@ impl TrackAuditor {
             swept,
             parry,
         })
+    }
+
+    fn check_clocks(&self) -> Result<(), RecordedError> {
+        let begins = self.vehicles.iter().filter_map(|vehicle| Some((vehicle.presence?.from_s, vehicle)));
+        let first = begins.clone().reduce(|a, b| if b.0 < a.0 { b } else { a });
+        let last = begins.reduce(|a, b| if b.0 > a.0 { b } else { a });
+        let Some(((from_s, first), (to_s, last))) =
+            first.zip(last).filter(|(first, last)| last.0 - first.0 > ONE_CLOCK_S)
+        else {
+            return Ok(());
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+        let days = ((to_s - from_s) / DAY_S) as u64;
+        Err(RecordedError::TwoClocks { first: first.name.clone(), second: last.name.clone(), days })
     }
 
     fn check_names(&self) -> Result<(), RecordedError> {

@@ -81,6 +81,16 @@ pub enum RecordedError {
         /// The time \[s\].
         time_s: f64,
     },
+    /// Vehicles whose times cannot be of one clock.
+    #[error("vehicles {first} and {second} are first seen {days} days apart, which is no flight by one clock")]
+    TwoClocks {
+        /// The one that is seen first.
+        first: String,
+        /// The one that is seen last.
+        second: String,
+        /// How long after it \[days\].
+        days: u64,
+    },
     /// A sample or a curve that is none: a number that is not finite or too large, no coefficients.
     #[error("vehicle {vehicle} at {time_s:?} s: {what}")]
     Item {
