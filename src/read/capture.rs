@@ -1,6 +1,6 @@
 //! What the tables of motion capture share: rows below a head of several lines, a vehicle in several markers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::str;
 
 use nalgebra::Vector3;
@@ -20,13 +20,16 @@ pub(super) enum When {
     Frames(f64),
 }
 
+/// A vehicle, with the columns x, y and z of its markers.
+pub(super) type Marked = (String, Vec<[usize; 3]>);
+
 /// What stands in the columns of a table.
 pub(super) struct Capture {
     /// The line of the first row, from 1.
     pub(super) first_line: u64,
     pub(super) when: When,
     /// Vehicles, each with the columns x, y and z of its markers: its place is the middle of these.
-    pub(super) vehicles: Vec<(String, Vec<[usize; 3]>)>,
+    pub(super) vehicles: Vec<Marked>,
     /// The length of a unit \[m\].
     pub(super) metres: f64,
     /// Whether y is up, and z towards the one who looks along it.
@@ -34,11 +37,16 @@ pub(super) struct Capture {
     pub(super) notes: Vec<String>,
 }
 
-/// Groups the columns of markers by what is before the colon of their names: these are on one vehicle.
-pub(super) fn by_subject(markers: Vec<(String, [usize; 3])>) -> Vec<(String, Vec<[usize; 3]>)> {
-    let mut vehicles: Vec<(String, Vec<[usize; 3]>)> = Vec::new();
-    let mut known = BTreeMap::new();
+/// Groups the columns of markers by what is before the colon of their names: these are on one vehicle. Two markers of one
+/// name are refused: their middle would be where neither is.
+pub(super) fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marked>, Fault> {
+    let mut vehicles: Vec<Marked> = Vec::new();
+    let (mut known, mut names) = (BTreeMap::new(), BTreeSet::new());
     for (name, columns) in markers {
+        if !names.insert(name.clone()) {
+            let problem = format!("two markers are called {}", quoted(&name));
+            return Err(Fault::content(problem, "give each a name of its own, and export it again"));
+        }
         let subject = name.split(':').next().unwrap_or_default().to_owned();
         let at = *known.entry(subject.clone()).or_insert(vehicles.len());
         if at == vehicles.len() {
@@ -46,11 +54,21 @@ pub(super) fn by_subject(markers: Vec<(String, [usize; 3])>) -> Vec<(String, Vec
         }
         vehicles[at].1.push(columns);
     }
-    vehicles
+    Ok(vehicles)
+}
+
+/// Names that are not read, a few of them by name.
+pub(super) fn note_of_others<'a>(why: &str, others: impl Iterator<Item = &'a str>) -> Option<String> {
+    const LISTED: usize = 8;
+    let others: BTreeSet<_> = others.collect();
+    let more = others.len().saturating_sub(LISTED);
+    let listed = others.iter().take(LISTED).copied().collect::<Vec<_>>().join(", ");
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!others.is_empty()).then(|| format!("not read, {why}: {listed}{more}"))
 }
 
 /// Which vehicles are the middle of several markers.
-pub(super) fn note_of_markers(vehicles: &[(String, Vec<[usize; 3]>)]) -> Option<String> {
+pub(super) fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
     let several = vehicles.iter().filter(|(_, markers)| markers.len() > 1);
     let several: Vec<_> = several.map(|(name, markers)| format!("{name} ({})", markers.len())).collect();
     let what = "the middle of markers, where all of them are seen, is the place of";

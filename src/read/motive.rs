@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use super::capture::{self, Capture, When, by_subject, note_of_markers};
+use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_others};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -78,10 +78,11 @@ impl Head {
         let time = self.axes.iter().position(|name| name.starts_with("Time"));
         let time = time.ok_or_else(|| Fault::content("there is no column of time", EXPORT))?;
         let bodies = self.positions("Rigid Body");
-        let vehicles = if bodies.is_empty() {
-            by_subject(self.positions("Marker"))
-        } else {
+        let has_bodies = !bodies.is_empty();
+        let vehicles = if has_bodies {
             bodies.into_iter().map(|(name, columns)| (name, vec![columns])).collect()
+        } else {
+            by_subject(self.positions("Marker"))?
         };
         if vehicles.is_empty() {
             return Err(Fault::content("it has neither the position of a rigid body nor of a labelled marker", EXPORT));
@@ -94,11 +95,9 @@ impl Head {
         let mut notes = vec!["axes of Motive, y up, are turned: x, -z, y".to_owned()];
         notes.extend(note_of_markers(&vehicles));
         let is_read = |name: &str| known.contains(name.split(':').next().unwrap_or_default());
-        let others = self.names.iter().skip(2).filter(|name| !name.is_empty() && !is_read(name));
-        let others: BTreeSet<_> = others.collect();
-        if !others.is_empty() {
-            notes.push(format!("not read, being neither rigid bodies nor labelled markers: {} names", others.len()));
-        }
+        let others = self.names.iter().skip(2).map(String::as_str).filter(|name| !name.is_empty() && !is_read(name));
+        let why = if has_bodies { "being no rigid bodies" } else { "being no labelled markers" };
+        notes.extend(note_of_others(why, others));
         Ok(Capture { first_line: self.first_line, when: When::Column(time), vehicles, metres, y_up: true, notes })
     }
 

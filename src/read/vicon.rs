@@ -12,7 +12,7 @@
 //! Objects have translations (`TX`, `TY`, `TZ`) beside their rotations; where some section has these, it is read, else the
 //! trajectories of markers.
 
-use super::capture::{self, Capture, When, by_subject, note_of_markers};
+use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_others};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -61,8 +61,19 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         let problem = format!("it has neither objects nor trajectories, but {}", sections.join(", "));
         return Err(Fault::content(problem, "export the trajectories of markers, or the objects of Tracker").into());
     };
-    let capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
+    let mut capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
+    let read = |name: &str| capture.vehicles.iter().any(|(vehicle, _)| vehicle == subject(name));
+    let others = heads.iter().filter(|other| other.first_line != head.first_line).flat_map(|other| &other.names);
+    let others =
+        others.map(|name| subject(name)).filter(|name| !name.is_empty() && !name.starts_with('*') && !read(name));
+    let note = note_of_others(&format!("beside those of the section {}", head.section), others);
+    capture.notes.extend(note);
     capture::open(source, capture, options)
+}
+
+/// Whose a marker is.
+fn subject(name: &str) -> &str {
+    name.split(':').next().unwrap_or_default()
 }
 
 /// The heads of all sections: behind a blank line, or at the begin.
@@ -104,7 +115,7 @@ impl Head {
         let markers = self.markers(if is_objects { ["TX", "TY", "TZ"] } else { ["X", "Y", "Z"] });
         let metres = self.metres(&markers)?;
         let parts = markers.len();
-        let vehicles = by_subject(markers);
+        let vehicles = by_subject(markers)?;
         if vehicles.is_empty() {
             return Err(Fault::content(
                 "it names no marker and no object",

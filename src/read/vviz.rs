@@ -90,8 +90,12 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         )
         .into());
     }
-    let axes = "axes of graphics are turned: x right, y forward, z up";
-    Ok(Curves::recording(vehicles, vec![axes.to_owned()]))
+    let mut notes = vec!["axes of graphics are turned: x right, y forward, z up".to_owned()];
+    let still: Vec<_> = vehicles.iter().filter(|(_, items)| items.is_empty()).map(|(name, _)| quoted(name)).collect();
+    if !still.is_empty() {
+        notes.push(format!("not judged, for the show does not say when they are at their homes: {}", still.join(", ")));
+    }
+    Ok(Curves::recording(vehicles, notes))
 }
 
 fn parse(bytes: &[u8]) -> Result<Show, ReadError> {

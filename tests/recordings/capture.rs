@@ -50,6 +50,18 @@ fn shows_of_vviz_begin_at_home_and_move_from_sample_to_sample() {
 }
 
 #[test]
+fn a_drone_of_vviz_without_a_way_is_named() {
+    let still = VVIZ.replace(r#"{"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}"#, "");
+    let found = whole(&still);
+    assert_eq!(found.samples().len(), 3);
+    assert!(
+        found.notes.iter().any(|note| note.starts_with("not judged") && note.ends_with("`B`")),
+        "{:?}",
+        found.notes
+    );
+}
+
+#[test]
 fn shows_of_vviz_are_refused_where_they_are_wrong() {
     refused(
         VVIZ,
@@ -141,6 +153,8 @@ fn takes_of_motive_are_refused_where_they_are_wrong() {
     );
     let twice = MOTIVE.replace(",cf2", ",cf1");
     assert!(read(&twice).expect_err("twice").to_string().contains("two rigid bodies are called `cf1`"));
+    let markers = MOTIVE.replace("Rigid Body Marker", "Body").replace("Rigid Body", "Marker").replace(",cf2", ",cf1");
+    assert!(read(&markers).expect_err("twice").to_string().contains("two markers are called `cf1`"));
     let none = MOTIVE.replace(",Position", ",Place");
     assert!(read(&none).expect_err("none").to_string().contains("neither the position of a rigid body"));
     let scaled = ReadOptions { scale: 0.1, ..ReadOptions::default() };
@@ -173,7 +187,10 @@ fn exports_of_vicon_are_read_by_object_or_by_the_middle_of_markers() {
         [(0.005, "cf1", [1.0, 2.0, 0.5]), (0.005, "cf2", [-0.001, -0.002, -0.004]), (0.01, "cf1", [1.0, 2.0, 0.5])];
     assert_eq!(found.samples(), expected);
     // Where both are there, objects go before markers.
-    assert_eq!(whole(&format!("{NEXUS}\n{TRACKER}")).samples(), expected);
+    let both = whole(&format!("{NEXUS}\n{TRACKER}"));
+    assert_eq!(both.samples(), expected);
+    let note = "not read, beside those of the section Objects: Force, ball";
+    assert!(both.notes.iter().any(|said| said == note), "{:?}", both.notes);
 }
 
 #[test]
@@ -183,6 +200,7 @@ fn exports_of_vicon_are_refused_where_they_are_wrong() {
         &[
             ("Trajectories\n100", "Trajectories\n0", "the rate of Trajectories is `0`"),
             ("\n,,mm", "\n,,stone", "some of its places are in `stone` and some in `mm`"),
+            ("cf1:back", "cf1:front", "two markers are called `cf1:front`"),
             ("Trajectories\n", "Joints\n", "neither objects nor trajectories"),
             ("110", "inf", "line 15: column `3` holds `inf`"),
             ("110", "", "line 15: column `3` is empty"),
