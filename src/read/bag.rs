@@ -33,6 +33,8 @@ struct Bag {
     storage_identifier: String,
     relative_file_paths: Vec<String>,
     #[serde(default)]
+    message_count: u64,
+    #[serde(default)]
     compression_mode: Option<String>,
     #[serde(default)]
     compression_format: Option<String>,
@@ -53,6 +55,10 @@ pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, Re
     refuse_others(folder, &files)?;
     let packed = |path: &PathBuf| {
         let mut source = Source::file(path);
+        if path.exists() && !path.is_file() {
+            let fault = Fault::content("the bag lists this file, and it is none", REINDEX);
+            return Err(ReadError::new(path, fault));
+        }
         let (mut begin, mut bytes) =
             (File::open(path).map_err(|error| ReadError::new(path, missing(error)))?, Vec::new());
         begin
@@ -64,7 +70,7 @@ pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, Re
         Ok(source)
     };
     let files = files.iter().map(packed).collect::<Result<_, ReadError>>()?;
-    mcap::open_bag(&Source::file(folder), files, options)
+    mcap::open_bag(&Source::file(folder), files, bag.message_count, options)
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {

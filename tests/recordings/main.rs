@@ -16,4 +16,5 @@ mod own;
 mod parquet;
 mod refusals;
 mod ros;
+mod told_apart;
 mod vehicles;

@@ -160,7 +160,20 @@ fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
     };
     let foreign = |folder: &Path| fs::write(folder.join("split_1.mcap.zstd"), "no bag").expect("written");
     let other = |folder: &Path| drop(fs::copy(folder.join("split_1.mcap.zstd"), folder.join("split_2.mcap")));
-    let cases: [(Spoil, &str, &str); 11] = [
+    let cases: [(Spoil, &str, &str); 13] = [
+        (
+            Box::new(text("message_count: 21", "message_count: 22")),
+            "its files have 21 messages, and metadata.yaml counts 22",
+            "copy",
+        ),
+        (
+            Box::new(|folder: &Path| {
+                let split = folder.join("split_1.mcap.zstd");
+                fs::remove_file(&split).and_then(|()| fs::create_dir(&split)).expect("a folder in its place");
+            }),
+            "the bag lists this file, and it is none",
+            "copy",
+        ),
         (
             Box::new(remove("split_1.mcap.zstd")),
             "split_1.mcap.zstd: the bag lists this file, and it is not there",

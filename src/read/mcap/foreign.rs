@@ -12,8 +12,7 @@ use super::splits::Splits;
 use crate::record::mcap::topic::Part;
 
 /// Opens a recording in some files that follow each other; `whole` is what is called so.
-pub(super) fn open(whole: &Source, files: Vec<Source>, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let mut splits = Splits::new(files, options);
+pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {
     let plan = Plan::of(&mut splits, options)?;
     let none = plan.none();
     let about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);

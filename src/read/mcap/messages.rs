@@ -8,6 +8,9 @@ pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, S
 /// The frame of positions on the Earth: latitude and longitude \[degrees\], and height \[m\].
 pub(super) const EARTH: &str = "WGS 84";
 
+/// The schema of these positions.
+pub(super) const FIXES: &str = "sensor_msgs/msg/NavSatFix";
+
 /// The quaternion that turns nothing.
 pub(super) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 

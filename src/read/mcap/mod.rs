@@ -37,10 +37,16 @@ use super::order::Recording;
 use super::source::Source;
 use crate::record::mcap::topic::{Part, TopicReader};
 use crate::record::{ReadFault, RecordError};
+use splits::Splits;
 
-/// Opens the files of a ROS 2 bag, which follow each other.
-pub(super) fn open_bag(folder: &Source, files: Vec<Source>, options: &ReadOptions) -> Result<Recording, ReadError> {
-    foreign::open(folder, files, options)
+/// Opens the files of a ROS 2 bag, which follow each other and have at least so many messages.
+pub(super) fn open_bag(
+    folder: &Source,
+    files: Vec<Source>,
+    messages: u64,
+    options: &ReadOptions,
+) -> Result<Recording, ReadError> {
+    foreign::open(folder, Splits::new(files, messages, options), options)
 }
 
 /// Opens a recording, going by the first schema that is known.
@@ -51,7 +57,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             Part::Schema("tautline_msgs/msg/Swarm") => return run::open(source, options),
             Part::Schema(name) if name == exported::TRACKS.schema_name => return exported::open(source, options),
             Part::Schema(name) if schemas::reader_of(name).is_some() => {
-                return foreign::open(source, vec![source.clone()], options);
+                return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
             }
             _ => {}
         }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::super::error::{Fault, Place, ReadError, quoted};
-use super::messages::{EARTH, Seen, What, Who};
+use super::messages::{EARTH, FIXES, Seen, What, Who};
 use super::rigid::Placed;
 use super::schemas::reader_of_topic;
 use super::splits::Splits;
@@ -27,6 +27,10 @@ pub(super) struct Told {
     child: Option<String>,
     /// Whether the topic itself is a vehicle.
     is_vehicle: bool,
+    /// How many poses its lists have, where vehicles are known by their place in a list.
+    listed: usize,
+    /// Its first position on the Earth, in degrees and metres.
+    first_fix: Option<Vector3<f64>>,
 }
 
 /// What a first look at all messages finds.
@@ -40,8 +44,8 @@ pub(super) struct Outline {
     transforms: BTreeSet<String>,
     /// Topics with a message that says its time.
     pub(super) stamped: BTreeSet<String>,
-    /// The first position on the Earth, in degrees and metres.
-    pub(super) first_fix: Option<Vector3<f64>>,
+    /// Topics with positions on the Earth, in the order of their first ones.
+    fixed: Vec<String>,
 }
 
 /// Whether a topic holds transforms that never change.
@@ -77,12 +81,35 @@ impl Outline {
         let (mut outline, mut number) = (Self::default(), 0);
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
-            for seen in seen_in(&message, &mut number)? {
-                outline.learn(&message, seen).map_err(|fault| fault.at(place(number, &message)))?;
-            }
-            Ok(())
+            let all = seen_in(&message, &mut number)?;
+            let listed = all.iter().filter(|seen| matches!(seen.who, Who::Listed(_))).count();
+            let learnt = outline
+                .count(&message, listed)
+                .and_then(|()| all.into_iter().try_for_each(|seen| outline.learn(&message, seen)));
+            learnt.map_err(|fault| fault.at(place(number, &message)))
         })?;
         Ok(outline)
+    }
+
+    /// Takes note of how many poses a list has. One that is shorter or longer than those before does not say whose pose came or
+    /// went; an empty one says that nobody is seen.
+    fn count(&mut self, message: &Message<'_>, listed: usize) -> Result<(), Fault> {
+        if listed == 0 {
+            return Ok(());
+        }
+        let told = self.topics.entry(message.of.topic.clone()).or_default();
+        if told.listed != 0 && told.listed != listed {
+            let problem = format!(
+                "it lists {listed} poses, and those before {}: places in a list are then no vehicles",
+                told.listed
+            );
+            return Err(Fault::content(
+                problem,
+                "record a pose for every vehicle in every list, or messages that name them",
+            ));
+        }
+        told.listed = listed;
+        Ok(())
     }
 
     fn learn(&mut self, message: &Message<'_>, seen: Seen) -> Result<(), Fault> {
@@ -97,11 +124,16 @@ impl Outline {
             }
             return self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, still);
         }
-        if seen.frame == EARTH && self.first_fix.is_none() {
-            self.first_fix = Some(seen.position);
+        if seen.frame == EARTH && message.of.schema != FIXES {
+            let problem = format!("its frame is called {}, as that of latitudes and longitudes is", quoted(EARTH));
+            return Err(Fault::content(problem, "give the frame another name"));
         }
         let told = self.topics.entry(topic.clone()).or_default();
         told.schema.clone_from(&message.of.schema);
+        if seen.frame == EARTH && told.first_fix.is_none() {
+            told.first_fix = Some(seen.position);
+            self.fixed.push(topic.clone());
+        }
         if !told.frames.contains(&seen.frame) {
             told.frames.insert(seen.frame);
         }
@@ -124,6 +156,11 @@ impl Outline {
         let around = topic.rmatch_indices('/').map(|(at, _)| &topic[..at]).take(DEEPEST).chain([""]);
         let mut nearest = around.filter_map(|space| self.trees.get_key_value(space));
         nearest.next().map(|(space, tree)| (space.as_str(), tree))
+    }
+
+    /// The first position on the Earth of topics that are read, in degrees and metres.
+    pub(super) fn first_fix(&self, reads: impl Fn(&str) -> bool) -> Option<Vector3<f64>> {
+        self.fixed.iter().filter(|topic| reads(topic)).find_map(|topic| self.topics.get(topic)?.first_fix)
     }
 
     /// Names of all topics with positions, those of transforms last.
@@ -218,9 +255,11 @@ impl Cover<'_> {
 /// Refuses positions of several robots, by whom they are told, in frames of the same name that each robot has of its own, as
 /// a rule.
 pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
-    let is_own = |frame: &str| frame.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom");
+    let has_odom = |frame: &str| frame.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom");
+    // Autopilots count local positions from where each was switched on, and call the frame `map`.
+    let is_own = |teller: &str, frame: &str| has_odom(frame) || teller.contains("local_position");
     let mut known: BTreeMap<&str, &str> = BTreeMap::new();
-    for (teller, frame) in given.filter(|(_, frame)| is_own(frame)) {
+    for (teller, frame) in given.filter(|(teller, frame)| is_own(teller, frame)) {
         let Some(first) = known.insert(frame, teller).filter(|first| *first != teller) else { continue };
         let (first, teller, shown) = (quoted(first), quoted(teller), quoted(frame));
         let problem = format!(
@@ -240,12 +279,21 @@ fn is_asked_for(topic: &str) -> bool {
 }
 
 #[cfg(test)]
-mod asked_tests {
-    use super::is_asked_for;
+mod tests {
+    use super::*;
 
     #[test]
     fn a_goal_is_no_vehicle_and_a_vehicle_no_goal() {
         assert!(["/cf1/goal_pose", "/cf1/cmd_pose", "/uav/Setpoint", "/uav/pose_ref"].into_iter().all(is_asked_for));
         assert!(!["/cf1/pose", "/drones/goalkeeper", "/target/pose", "/cf2"].into_iter().any(is_asked_for));
+    }
+
+    #[test]
+    fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
+        let refused = |given: &[(&'static str, &'static str)]| refuse_own_frames(given.iter().copied()).is_err();
+        assert!(refused(&[("/r1/pose", "odom"), ("/r2/pose", "odom")]));
+        assert!(refused(&[("/uav1/mavros/local_position/pose", "map"), ("/uav2/mavros/local_position/pose", "map")]));
+        assert!(!refused(&[("/r1/pose", "map"), ("/r2/pose", "map")]));
+        assert!(!refused(&[("/r1/pose", "r1/odom"), ("/r2/pose", "r2/odom")]));
     }
 }

@@ -50,7 +50,9 @@ impl Plan {
     /// Looks at all messages and decides what is read of them.
     pub(super) fn of(splits: &mut Splits, options: &ReadOptions) -> Result<Self, ReadError> {
         let outline = Outline::of(splits)?;
-        let origin = options.origin.map(Vector3::from).or(outline.first_fix).filter(|_| outline.first_fix.is_some());
+        let is_read = |topic: &str| options.topics.is_empty() || options.topics.iter().any(|of| of == topic);
+        let first_fix = outline.first_fix(is_read);
+        let origin = options.origin.map(Vector3::from).or(first_fix).filter(|_| first_fix.is_some());
         let mut plan = Self {
             topics: options.topics.clone(),
             wanted: options.frame.clone(),
@@ -60,7 +62,7 @@ impl Plan {
             notes: Vec::new(),
             outline,
         };
-        if options.origin.is_some() && plan.outline.first_fix.is_none() {
+        if options.origin.is_some() && first_fix.is_none() {
             return Err(Fault::content("it has no place on the Earth", "leave --origin away").into());
         }
         plan.check()?;

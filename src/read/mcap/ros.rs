@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::messages::{EARTH, Reader, Seen, What, Who, nanoseconds};
+use super::messages::{EARTH, FIXES, Reader, Seen, What, Who, nanoseconds};
 use crate::record::mcap::topic::{CDR, decode};
 
 /// What reads the messages of a schema, where they hold positions.
@@ -31,7 +31,7 @@ pub(super) fn reader_of(schema: &str) -> Option<Reader> {
             let (header, child, pose): (Header, String, Pose) = decoded(encoding, bytes)?;
             Ok(vec![Seen { what: What::Odometry(child), ..header.seen(Who::Topic, pose) }])
         },
-        "sensor_msgs/msg/NavSatFix" => |encoding, bytes| decoded(encoding, bytes).map(Fix::seen),
+        FIXES => |encoding, bytes| decoded(encoding, bytes).map(Fix::seen),
         "geometry_msgs/msg/TransformStamped" => {
             |encoding, bytes| decoded(encoding, bytes).map(|transform: Transform| vec![transform.seen()])
         }

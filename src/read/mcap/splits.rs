@@ -1,6 +1,6 @@
 //! The files of a recording of others, one after the other.
 
-use super::super::error::ReadError;
+use super::super::error::{Fault, ReadError};
 use super::super::options::ReadOptions;
 use super::super::source::Source;
 use crate::record::mcap::topic::{Part, TopicReader};
@@ -13,13 +13,15 @@ pub(super) struct Splits {
     /// The current file, and what it is read from.
     open: Option<(TopicReader, Source)>,
     options: ReadOptions,
+    /// Fewest messages that they have by what is said of them.
+    least_messages: u64,
     /// What is to be said of files that were not closed.
     pub(super) notes: Vec<String>,
 }
 
 impl Splits {
-    pub(super) fn new(files: Vec<Source>, options: &ReadOptions) -> Self {
-        Self { files, next: 0, open: None, options: options.clone(), notes: Vec::new() }
+    pub(super) fn new(files: Vec<Source>, least_messages: u64, options: &ReadOptions) -> Self {
+        Self { files, next: 0, open: None, options: options.clone(), least_messages, notes: Vec::new() }
     }
 
     /// Starts again with the first file.
@@ -54,14 +56,24 @@ impl Splits {
         Ok((topics, source))
     }
 
-    /// Takes every part, from the first one on, and starts again.
+    /// Takes every part, from the first one on, and starts again. Fewer messages than there should be are an error.
     pub(super) fn visit_all(
         &mut self,
         mut take: impl FnMut(Part<'_>) -> Result<(), ReadError>,
     ) -> Result<(), ReadError> {
         self.rewind();
-        while self.visit(&mut take)? {}
+        let mut messages = 0;
+        let mut counted = |part: Part<'_>| {
+            messages += u64::from(matches!(part, Part::Message(_)));
+            take(part)
+        };
+        while self.visit(&mut counted)? {}
         self.rewind();
+        if messages < self.least_messages {
+            let problem =
+                format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
+            return Err(Fault::content(problem, "copy the whole folder again").into());
+        }
         Ok(())
     }
 }

@@ -26,6 +26,8 @@ struct Edge {
     parent: String,
     /// Where it stands still.
     still: Option<Placed>,
+    /// Whether it is said to move.
+    moves: bool,
     /// Whether it is said to stand still in several places, or to move as well.
     torn: bool,
     /// Where it was at some times \[ns\], once these are needed.
@@ -72,7 +74,8 @@ impl Tree {
     /// Learns what a frame lies in, and where it stands still there.
     pub(super) fn learn(&mut self, child: &str, parent: &str, still: Option<Placed>) -> Result<(), Fault> {
         let Some(known) = self.edges.get_mut(child) else {
-            let edge = Edge { parent: parent.to_owned(), still, torn: false, samples: Vec::new() };
+            let edge =
+                Edge { parent: parent.to_owned(), still, moves: still.is_none(), torn: false, samples: Vec::new() };
             self.edges.insert(child.to_owned(), edge);
             return Ok(());
         };
@@ -82,18 +85,28 @@ impl Tree {
             let remedy = "a frame has one parent: record robots under namespaces of their own";
             return Err(Fault::content(problem, remedy));
         }
+        known.moves |= still.is_none();
         known.torn |= known.still != still;
         Ok(())
     }
 
-    /// Whether a frame moves in its parent.
+    /// Whether a frame moves in its parent, also one that is said to stand still there as well.
     pub(super) fn moves(&self, frame: &str) -> bool {
-        self.edges.get(frame).is_some_and(|edge| edge.still.is_none())
+        self.edges.get(frame).is_some_and(|edge| edge.moves)
+    }
+
+    /// Refuses a frame that is in several places at once.
+    fn check(&self, frame: &str) -> Result<(), Fault> {
+        if self.edges.get(frame).is_none_or(|edge| !edge.torn) {
+            return Ok(());
+        }
+        let problem = format!("frame {} stands still in more than one place, or moves as well", quoted(frame));
+        Err(Fault::content(problem, "record again, with one publisher of each transform"))
     }
 
     /// Frames that stand still in their parents.
     pub(super) fn still(&self) -> impl Iterator<Item = &str> {
-        self.edges.iter().filter(|(_, edge)| edge.still.is_some()).map(|(frame, _)| frame.as_str())
+        self.edges.iter().filter(|(_, edge)| !edge.moves).map(|(frame, _)| frame.as_str())
     }
 
     /// All frames that have a parent.
@@ -140,9 +153,10 @@ impl Tree {
         let body = |(frame, way): (&&str, &Vec<&str>)| {
             let at = way.iter().position(|frame| self.moves(frame))?;
             let [driver, carrier] = [way[at], way[at + 1]].map(str::to_owned);
-            Some(Body { frame: (*frame).to_owned(), driver, carrier })
+            let body = Body { frame: (*frame).to_owned(), driver, carrier };
+            Some(way[..=at].iter().try_for_each(|frame| self.check(frame)).map(|()| body))
         };
-        Ok(vehicles.filter_map(body).collect())
+        vehicles.filter_map(body).collect()
     }
 
     /// The transforms from a frame into another; none where they have nothing in common.
@@ -206,10 +220,7 @@ impl Tree {
 
     fn place(&self, frame: &str, time_ns: i64) -> Result<Option<Known>, Fault> {
         let Some(edge) = self.edges.get(frame) else { return Ok(None) };
-        if edge.torn {
-            let problem = format!("frame {} stands still in more than one place, or moves as well", quoted(frame));
-            return Err(Fault::content(problem, "record again, with one publisher of each transform"));
-        }
+        self.check(frame)?;
         match &edge.still {
             Some(placed) => Ok(Some(Known { transform: placed.rigid()?, guessed: false })),
             None => Ok(rigid::at(&edge.samples, time_ns)),
