@@ -3,6 +3,7 @@
 //!
 //! Nothing here judges, flies or reads: `tautline` does, and this crate translates.
 
+#![allow(rustdoc::broken_intra_doc_links, reason = "a comment is a docstring of Python, where [m] is a unit")]
 #![expect(clippy::needless_pass_by_value, reason = "Python gives what it hands over")]
 
 mod arrays;
