@@ -34,9 +34,11 @@ pub struct NetworkSpec {
     pub rate_hz: Option<f64>,
     /// What a vehicle takes for the present state of another of which it has an old message.
     #[serde(skip_serializing_if = "is_default")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = Missing::default())))]
     pub missing: Missing,
     /// How a vehicle knows whoever is near, with or without a link.
     #[serde(skip_serializing_if = "is_default")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = NearBy::default())))]
     pub near: NearBy,
     /// Links that are down for a while. Needs `rate_hz`.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -33,7 +33,7 @@ pub(super) struct TimeTable {
     max_halvings: u32,
     /// Largest product of a step and the law's fastest rate at the present state; a step that is longer is flown in halves.
     #[serde(default = "TimeTable::default_max_rate_dt", skip_serializing_if = "TimeTable::is_default_max_rate_dt")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_MAX_RATE_DT, "exclusiveMinimum" = 0)))]
     max_rate_dt: f64,
     /// How often the law is asked in Hz, at most once a step, where vehicles hold each command in between as a real
     /// controller makes them do. Unless given, commands of points stand for continuous control, and quadrotors are given 100 a
