@@ -6,6 +6,7 @@ mod envelope;
 mod findings;
 mod flown;
 mod recorded;
+mod recorded_curves;
 mod scenes;
 mod times;
 mod told;

@@ -3,6 +3,7 @@
 #[path = "../support/flight.rs"]
 mod flight;
 
+mod built_ins;
 mod displacement;
 mod ideal_plant;
 mod imperfections;
@@ -18,9 +19,12 @@ mod reach;
 mod reference_flights;
 mod rivals;
 mod safety;
+mod scenario_bytes;
 mod scenario_files;
+mod schema;
 mod shapes;
 mod simulation;
 mod steps;
+mod symmetry;
 mod unicycles;
 mod wind;

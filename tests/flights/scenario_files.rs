@@ -2,13 +2,12 @@
 
 use std::fs;
 
-use proptest::prelude::*;
 use tautline::formation::Formation;
-use tautline::scenario::{self, Override, PlantSpec, Precision, Scenario, ScenarioError, Source, Space, builtin};
+use tautline::scenario::{Override, PlantSpec, Precision, Scenario, ScenarioError, Source, Space, builtin};
 use tautline::swarm::{Rows, Swarm, separation};
 
 /// A minimal flight that is right: what the wrong ones below are changed from.
-const RIGHT: &str = r#"name = "pair"
+pub(crate) const RIGHT: &str = r#"name = "pair"
 [start]
 positions_m = [
     [0.0, 0.0],
@@ -27,11 +26,11 @@ duration_s = 1.0
 /// Bits of the first coordinate that seed 1 gives for a half extent of 8 m.
 const GOLDEN_RANDOM_X: u64 = 13_833_077_504_487_939_064;
 
-fn read(text: &str) -> Result<Scenario, ScenarioError> {
+pub(crate) fn read(text: &str) -> Result<Scenario, ScenarioError> {
     Scenario::read(&Source::Text { name: "test.toml".to_owned(), text: text.to_owned() }, &[])
 }
 
-fn read_builtin(name: &str, sets: &[&str]) -> Result<Scenario, ScenarioError> {
+pub(crate) fn read_builtin(name: &str, sets: &[&str]) -> Result<Scenario, ScenarioError> {
     let overrides = sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>()?;
     Scenario::read(&Source::Builtin(name.to_owned()), &overrides)
 }
@@ -425,220 +424,5 @@ fn a_scenario_broken_in_code_is_refused_and_never_panics() {
         assert!(scenario.validate().is_err(), "break {number}");
         // Still text, and still no panic.
         let _ = read(&scenario.resolved_toml());
-    }
-}
-
-/// Positions and velocities at `time_s` under p'' = a22 v + u by the classical Runge-Kutta method, and the smallest
-/// separation at the steps on the way.
-fn integrate(scenario: &Scenario, time_s: f64, steps: u32) -> (Swarm, f64) {
-    let mut law = scenario.law().expect("a validated scenario has a law");
-    let mut control = Rows::zeros(scenario.count());
-    let mut slope = |swarm: &Swarm| {
-        law.command(&scenario.observation(swarm), &mut control).expect("no collision");
-        Swarm {
-            positions_m: swarm.velocities_m_s.clone(),
-            velocities_m_s: &control + &swarm.velocities_m_s * scenario.a22_per_s,
-        }
-    };
-    let along = |from: &Swarm, slope: &Swarm, by: f64| Swarm {
-        positions_m: &from.positions_m + &slope.positions_m * by,
-        velocities_m_s: &from.velocities_m_s + &slope.velocities_m_s * by,
-    };
-    let h = time_s / f64::from(steps);
-    let mut swarm = scenario.start.clone();
-    let mut smallest_m = f64::INFINITY;
-    for _ in 0..steps {
-        let k1 = slope(&swarm);
-        let k2 = slope(&along(&swarm, &k1, h / 2.0));
-        let k3 = slope(&along(&swarm, &k2, h / 2.0));
-        let k4 = slope(&along(&swarm, &k3, h));
-        for (k, by) in [(k1, h / 6.0), (k2, h / 3.0), (k3, h / 3.0), (k4, h / 6.0)] {
-            swarm = along(&swarm, &k, by);
-        }
-        for j in 1..swarm.count() {
-            smallest_m = (0..j).map(|i| separation(&swarm.positions_m, i, j)).fold(smallest_m, f64::min);
-        }
-    }
-    (swarm, smallest_m)
-}
-
-/// The reference table gives this many digits.
-const TABLE_TOLERANCE: f64 = 1e-7;
-
-#[test]
-fn the_built_in_pentagon_is_the_reference_pentagon() {
-    let scenario = read_builtin("pentagon", &[]).expect("a built-in");
-    let mut law = scenario.law().expect("a law");
-    let mut control = Rows::zeros(5);
-    law.command(&scenario.observation(&scenario.start), &mut control).expect("no collision");
-    assert!((control[(0, 0)] - 0.860_843_123).abs() < TABLE_TOLERANCE);
-    assert!((control[(0, 1)] + 0.021_225_585).abs() < TABLE_TOLERANCE);
-    assert!((law.energy(&scenario.observation(&scenario.start)).unwrap_or(0.0) - 3.656_742_96).abs() < TABLE_TOLERANCE);
-
-    let (swarm, smallest_m) = integrate(&scenario, 10.0, 4000);
-    assert!((swarm.positions_m[(0, 0)] - 4.318_055_1).abs() < TABLE_TOLERANCE, "{}", swarm.positions_m);
-    assert!((swarm.positions_m[(0, 1)] + 1.043_487_6).abs() < TABLE_TOLERANCE, "{}", swarm.positions_m);
-    // The smallest separation lies between two steps: 1e-5 m is what a quarter of a step misses.
-    assert!((smallest_m - 2.460_353).abs() < 1e-5, "{smallest_m}");
-}
-
-#[test]
-fn the_other_built_ins_are_their_reference_cases() {
-    let circle = read_builtin("circle", &[]).expect("a built-in");
-    let energy = circle.law().expect("a law").energy(&circle.observation(&circle.start)).unwrap_or(0.0);
-    assert!((energy - 4.479_772_16).abs() < TABLE_TOLERANCE, "{energy}");
-    let (_, smallest_m) = integrate(&circle, 10.0, 4000);
-    assert!((smallest_m - 1.238_135).abs() < 1e-5, "{smallest_m}");
-
-    let laplacian = read_builtin("pentagon-laplacian", &[]).expect("a built-in");
-    let (_, smallest_m) = integrate(&laplacian, 10.0, 4000);
-    assert!((smallest_m - 1.5327).abs() < 1e-4, "{smallest_m}");
-
-    let collinear = read_builtin("pentagon-collinear", &[]).expect("a built-in");
-    let (swarm, smallest_m) = integrate(&collinear, 10.0, 4000);
-    assert!((smallest_m - 2.458_145).abs() < 1e-5, "{smallest_m}");
-    assert!(swarm.positions_m.column(1).iter().all(|&y| y == 0.0), "nothing leaves the line");
-}
-
-#[test]
-fn every_built_in_is_right_explains_itself_and_carries_its_name() {
-    for builtin in builtin::all() {
-        let scenario = read_builtin(builtin.name, &[]).expect(builtin.name);
-        assert_eq!(scenario.name, builtin.name);
-        assert!(builtin.toml.starts_with("# "), "{}", builtin.name);
-        assert!(!builtin.summary.is_empty() && !builtin.summary.contains('\n'));
-    }
-    assert_eq!(builtin::all()[0].name, "pentagon", "the default comes first");
-}
-
-#[test]
-fn the_schema_describes_every_key_and_refuses_null() {
-    let schema = scenario::schema();
-    let text = schema.to_string();
-    for key in ["delta_m", "hull_radius_m", "max_halvings", "min_separation_m", "points_m", "disagreement_m_s", "edges"]
-    {
-        assert!(text.contains(&format!("\"{key}\":")), "{key}");
-    }
-    assert!(text.contains("\"default\":0.004166666666666667") && text.contains("\"const\":\"edge-tension\""));
-    assert!(!text.contains("null") && !text.contains("\\["), "{schema:#}");
-    assert_eq!(schema["required"], serde_json::json!(["start", "formation", "law", "time"]));
-    assert!(described(&schema["properties"]));
-    assert!(schema["$defs"].as_object().is_some_and(|defs| defs.values().all(|def| described(&def["properties"]))));
-}
-
-#[test]
-fn the_schema_bounds_a_number_where_the_reader_does() {
-    let schema = scenario::schema();
-    let mut bounded = 0;
-    for (table, place) in schema["properties"].as_object().expect("tables") {
-        let Some(of) = place["$ref"].as_str().filter(|_| place["deprecated"] != true) else { continue };
-        let definition = schema.pointer(of.trim_start_matches('#')).expect("a definition");
-        let listed = ["oneOf", "anyOf"].iter().filter_map(|of| definition[of].as_array()).flatten();
-        for alternative in listed.chain([&serde_json::json!({})]) {
-            let keys = |of: &str| -> Vec<(String, serde_json::Value)> {
-                let maps = [definition, alternative].map(|of_table| of_table[of].as_object().cloned());
-                maps.into_iter().flatten().flatten().collect()
-            };
-            let required = |key: &str| {
-                let lists = [definition, alternative].map(|of| of["required"].as_array().cloned());
-                lists.into_iter().flatten().flatten().any(|needed| needed == key)
-            };
-            let properties = keys("properties");
-            // Files are looked for, and lists read, before numbers are.
-            let is_read_first = |(key, value): &(String, serde_json::Value)| {
-                value["const"] == "file" || (required(key) && value["type"] == "array")
-            };
-            if properties.iter().any(is_read_first) {
-                continue;
-            }
-            let of_numbers: Vec<_> = properties.iter().filter(|(_, value)| value["type"] == "number").collect();
-            for (key, property) in &of_numbers {
-                let others = properties
-                    .iter()
-                    .filter(|(other, value)| other != key && (required(other) || value["const"].is_string()));
-                let others = others.map(|(other, value)| match value["const"].as_str() {
-                    Some(choice) => format!(", {other} = \"{choice}\""),
-                    None if value["type"] == "string" => format!(", {other} = \"A\""),
-                    None => format!(", {other} = 3.0"),
-                });
-                let mut others: String = others.collect();
-                if table == "start" && !others.contains("shape") {
-                    others += ", shape = \"line\", spacing_m = 4.0";
-                }
-                if table == "formation" && !others.contains("shape") {
-                    others += ", shape = \"circle\", radius_m = 4.0";
-                }
-                let refuses = |number: &str| {
-                    let start = "start={shape=\"line\", spacing_m=4}".to_owned();
-                    let set = format!("{table}={{{key} = {number}{others}}}");
-                    let sets = ["swarm.count=5".to_owned(), start, set];
-                    let sets =
-                        sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>().expect("TOML");
-                    let source = Source::Text { name: "f".to_owned(), text: RIGHT.to_owned() };
-                    let said = Scenario::read(&source, &sets).err().map(|error| error.message().to_owned());
-                    said.is_some_and(|said| said.contains(&format!(" is {number}")))
-                };
-                let (minimum, above) = (&property["minimum"], &property["exclusiveMinimum"]);
-                assert_eq!(refuses("-1"), minimum == 0 || above == 0, "{table}.{key}{others}");
-                assert_eq!(refuses("0"), above == 0, "{table}.{key}{others}");
-                bounded += usize::from(minimum == 0 || above == 0);
-            }
-        }
-    }
-    assert!(bounded > 20, "{bounded} numbers are bounded");
-    assert_eq!(schema["$defs"]["PerVehicle"]["anyOf"][0]["exclusiveMinimum"], 0);
-    assert_eq!(schema["not"]["required"], serde_json::json!(["arrival", "judge"]));
-}
-
-/// Whether every key of a table has a description.
-fn described(properties: &serde_json::Value) -> bool {
-    properties.as_object().is_none_or(|keys| keys.values().all(|key| key["description"].is_string()))
-}
-
-proptest! {
-    #[test]
-    fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        let text = String::from_utf8_lossy(&bytes).into_owned();
-        if let Err(error) = read(&text) {
-            prop_assert!(!error.to_string().is_empty());
-        }
-        let _ = Override::parse(&text).map(|set| read_builtin("pentagon", &[set.text()]));
-    }
-
-    #[test]
-    fn no_change_of_a_built_in_makes_the_reader_panic(
-        which in 0..4_usize,
-        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..9_usize, "[-\\[\\]{}=.,\"0-9a-z\n]{0,6}"), 1..6),
-    ) {
-        let mut text: Vec<char> = builtin::all()[which].toml.chars().collect();
-        for (at, cut, insert) in edits {
-            let at = at.index(text.len() + 1);
-            text.splice(at..(at + cut).min(text.len()), insert.chars());
-        }
-        let text: String = text.into_iter().collect();
-        match read(&text) {
-            Ok(scenario) => prop_assert_eq!(read(&scenario.resolved_toml()), Ok(scenario)),
-            Err(error) => prop_assert!(!error.to_string().is_empty()),
-        }
-    }
-
-    #[test]
-    fn no_override_makes_the_reader_panic(
-        key in prop::sample::select(vec![
-            "name", "swarm.count", "swarm.mass_kg", "start.positions_m.2", "start.positions_m.2.x", "start.shape",
-            "start.velocities_m_s", "start.jitter_m", "formation.shape", "formation", "law.kind", "law.delta_m",
-            "graph.kind", "graph.edges", "time.dt_s", "time.duration_s", "arrival.hold_s", "nothing.at.all",
-        ]),
-        value in prop_oneof![
-            any::<f64>().prop_map(|x| format!("{x:?}")),
-            any::<i64>().prop_map(|x| x.to_string()),
-            "[a-z]{1,9}",
-            Just("[[1,2],[3,4],[5,6],[7,8],[9,10]]".to_owned()),
-            Just("{kind=\"edges\",edges=[[1,2]]}".to_owned()),
-        ],
-    ) {
-        if let Err(error) = read_builtin("pentagon", &[&format!("{key}={value}")]) {
-            prop_assert!(!error.to_string().is_empty());
-        }
     }
 }

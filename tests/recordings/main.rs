@@ -13,6 +13,7 @@ mod exports;
 mod formats;
 mod messages;
 mod own;
+mod own_channels;
 mod parquet;
 mod refusals;
 mod ros;

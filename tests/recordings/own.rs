@@ -6,21 +6,21 @@ use std::path::{Path, PathBuf};
 use mcap::records::op;
 use proptest::prelude::*;
 use tautline::record::mcap::{Entry, FLUSH_BYTES, FLUSH_PERIOD_S, Header, McapRecorder, McapRecording};
-use tautline::record::{Channel, Event, OwnedSample, ReadFault, RecordError, Sink, StateHash};
+use tautline::record::{Event, OwnedSample, ReadFault, RecordError, Sink, StateHash};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 use tempfile::TempDir;
 
 const RECORD_HZ: f64 = 60.0;
 
 /// A made-up run with every kind of event, numbers that use all bits, and samples with and without a summary.
-struct Run {
+pub(crate) struct Run {
     header: Header,
-    samples: Vec<OwnedSample>,
-    events: Vec<Event>,
+    pub(crate) samples: Vec<OwnedSample>,
+    pub(crate) events: Vec<Event>,
 }
 
 impl Run {
-    fn new(vehicles: usize, samples: usize) -> Self {
+    pub(crate) fn new(vehicles: usize, samples: usize) -> Self {
         let header = Header::new("made-up", "name = \"made-up\" # ünïcode\n", vehicles, 2.0);
         let samples = (0..samples).map(|k| sample(vehicles, k)).collect();
         let pair = Pair::new(2, 1);
@@ -77,13 +77,13 @@ fn folder() -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-fn recorded(run: &Run) -> Vec<u8> {
+pub(crate) fn recorded(run: &Run) -> Vec<u8> {
     let (_folder, path) = folder();
     run.record(&path, |_| ()).expect("recorded");
     fs::read(&path).expect("readable")
 }
 
-fn read(bytes: &[u8]) -> Result<(Header, Vec<OwnedSample>, Vec<Event>, bool), RecordError> {
+pub(crate) fn read(bytes: &[u8]) -> Result<(Header, Vec<OwnedSample>, Vec<Event>, bool), RecordError> {
     let (_folder, path) = folder();
     fs::write(&path, bytes).expect("writable");
     let recording = McapRecording::open(&path)?;
@@ -92,14 +92,14 @@ fn read(bytes: &[u8]) -> Result<(Header, Vec<OwnedSample>, Vec<Event>, bool), Re
     Ok((header, samples, events, complete))
 }
 
-fn fault(bytes: &[u8]) -> ReadFault {
+pub(crate) fn fault(bytes: &[u8]) -> ReadFault {
     match read(bytes) {
         Err(RecordError::Read { fault, .. }) => fault,
         other => panic!("expected a fault, got {other:?}"),
     }
 }
 
-fn hash(samples: &[OwnedSample]) -> String {
+pub(crate) fn hash(samples: &[OwnedSample]) -> String {
     let mut hash = StateHash::new();
     for sample in samples {
         hash.observe(&sample.as_sample());
@@ -133,57 +133,6 @@ fn what_is_read_back_has_the_same_bits_as_what_was_recorded() {
     let mut changed = samples;
     changed[149].control[(4, 2)] = changed[149].control[(4, 2)].next_up();
     assert_ne!(hash(&changed), hash(&run.samples), "one bit of the last control goes unnoticed");
-}
-
-/// A channel of a made-up sensor that measures `columns` of every vehicle.
-fn channel(name: &str, columns: &[&str], vehicles: usize, seed: f64) -> Channel {
-    let values = (0..vehicles * columns.len()).map(|k| (seed + k as f64).sin() / 3.0).collect();
-    Channel { values, ..Channel::new(name, columns) }
-}
-
-#[test]
-fn channels_come_back_bit_for_bit_whichever_they_are() {
-    let mut run = Run::new(5, 150);
-    for (k, sample) in run.samples.iter_mut().enumerate() {
-        let mut odour = channel("odour", &["rose_mol_m3", "tar_mol_m3"], 5, k as f64);
-        odour.values[..3].copy_from_slice(&[-0.0, f64::MIN_POSITIVE / 4.0, f64::INFINITY]);
-        let mood = channel("mood", &["mood"], 5, -(k as f64));
-        sample.channels = match k % 4 {
-            0 => Vec::new(),
-            1 => vec![odour],
-            2 => vec![mood, odour],
-            _ => vec![odour, channel("nothing", &[], 5, 0.0), mood],
-        };
-    }
-    let bytes = recorded(&run);
-    let (_, samples, events, complete) = read(&bytes).expect("read back");
-    assert!(complete);
-    assert_eq!((&samples, &events), (&run.samples, &run.events));
-    let bits = |samples: &[OwnedSample]| {
-        let values = samples.iter().flat_map(|sample| &sample.channels).flat_map(|channel| &channel.values);
-        values.map(|x| x.to_bits()).collect::<Vec<_>>()
-    };
-    assert_eq!(bits(&samples), bits(&run.samples));
-    assert_eq!(hash(&samples), hash(&Run::new(5, 150).samples), "the hash is of the states");
-
-    let mut odours = 0;
-    for message in mcap::MessageStream::new(&bytes).expect("an MCAP file") {
-        let message = message.expect("a message");
-        if message.channel.topic == "/vehicles/odour" {
-            let schema = message.channel.schema.as_ref().expect("a schema");
-            assert_eq!((schema.name.as_str(), schema.encoding.as_str()), ("tautline_msgs/msg/Channel", "ros2msg"));
-            odours += 1;
-        }
-    }
-    assert_eq!(odours, samples.iter().filter(|sample| !sample.channels.is_empty()).count());
-}
-
-#[test]
-fn a_channel_with_another_number_of_values_is_refused() {
-    let mut run = Run::new(5, 3);
-    run.samples[2].channels = vec![channel("odour", &["rose_mol_m3", "tar_mol_m3"], 4, 0.0)];
-    let reason = "it has 8 numbers, which is not 2 for each of 5 vehicles".to_owned();
-    assert_eq!(fault(&recorded(&run)), ReadFault::Message { topic: "/vehicles/odour".to_owned(), reason });
 }
 
 #[test]
