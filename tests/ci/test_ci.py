@@ -48,7 +48,7 @@ class InFolder(unittest.TestCase):
         if not list(PACKED.glob("*.tar.gz")):
             done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, PACKED, folder=self.folder)
             self.assertEqual(done.returncode, 0, done.stderr)
-        shutil.copytree(PACKED, self.folder / "dist")
+        shutil.copytree(PACKED, self.folder / "dist", dirs_exist_ok=True)
         return self.folder / "dist" / f"tautline-{VERSION}-{TARGET}.tar.gz"
 
     def install(self):
