@@ -6,6 +6,8 @@ use tautline::track::{Clock, Item, Sample, Tracks};
 
 /// Items that are made at a time, about: few enough to stay near the processor.
 const BATCH: usize = 4096;
+/// Vehicles that a note names at most.
+const MOST_NAMED: usize = 8;
 
 /// Positions, and velocities where there are any, of N vehicles at T instants.
 #[derive(Clone)]
@@ -90,6 +92,24 @@ fn vector(of: &ArrayView3<'_, f64>, instant: usize, vehicle: usize) -> [f64; 3] 
 /// Whether it is NaN in every axis.
 fn is_unseen(of: &ArrayView3<'_, f64>, instant: usize, vehicle: usize) -> bool {
     (0..of.shape()[2]).all(|axis| of[(instant, vehicle, axis)].is_nan())
+}
+
+/// Who is never seen, and who is not there from the first instant to the last, a sentence each.
+pub(crate) fn notes_of_absence(positions_m: ArrayView3<'_, f64>, names: &[String]) -> Vec<String> {
+    let (instants, vehicles) = (positions_m.shape()[0], positions_m.shape()[1]);
+    let is_seen = |instant, vehicle| !is_unseen(&positions_m, instant, vehicle);
+    let is_late = |vehicle: &usize| instants > 0 && !(is_seen(0, *vehicle) && is_seen(instants - 1, *vehicle));
+    let (there, never): (Vec<_>, Vec<_>) =
+        (0..vehicles).filter(is_late).partition(|&vehicle| (0..instants).any(|instant| is_seen(instant, vehicle)));
+    let note = |who: &[usize], what: &str| {
+        let shown: Vec<_> = who.iter().take(MOST_NAMED).map(|&vehicle| format!("`{}`", names[vehicle])).collect();
+        let more = who.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (!who.is_empty()).then(|| format!("{}{more} {what}", shown.join(", ")))
+    };
+    let never = note(&never, "are NaN at every instant: nothing is said of them");
+    let there = note(&there, "are not seen from the first instant to the last: they are judged while they are there");
+    never.into_iter().chain(there).collect()
 }
 
 impl Tracks for Arrays<'_> {

@@ -7,11 +7,11 @@ use numpy::ndarray::{Ix1, Ix3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use tautline::audit::recorded::{self, Settings};
-use tautline::cli::{self, Held};
+use tautline::cli::{self, Held, OwnRecording};
 use tautline::report::recorded::RecordedReport;
 use tautline::track::Tracks as _;
 
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, notes_of_absence};
 use crate::errors::{Raised, broken, wrong};
 use crate::numbers::{borrowed, shown};
 use crate::work::away;
@@ -23,6 +23,10 @@ fn judged(report: &RecordedReport) -> PyResult<Judged> {
     let json = serde_json::to_string(report).map_err(|error| broken(&error.to_string()))?;
     Ok((report.verdict(), report.headline(), report.text(), json))
 }
+
+/// What a flight said of itself beside its instants: as the recording of it would.
+#[pyclass(frozen, module = "tautline._native")]
+pub(crate) struct Seen(pub(crate) OwnRecording);
 
 /// The arrays that are judged.
 struct Given<'py> {
@@ -70,7 +74,7 @@ impl<'py> Given<'py> {
 
 /// Judges arrays of positions as the words of `tautline audit` ask.
 #[pyfunction]
-#[pyo3(signature = (words, command, times, positions, velocities, names))]
+#[pyo3(signature = (words, command, times, positions, velocities, names, seen))]
 pub(crate) fn audit<'py>(
     py: Python<'py>,
     words: Vec<String>,
@@ -79,6 +83,7 @@ pub(crate) fn audit<'py>(
     positions: Option<&Bound<'py, PyAny>>,
     velocities: Option<&Bound<'py, PyAny>>,
     names: Vec<String>,
+    seen: Option<&Seen>,
 ) -> PyResult<Judged> {
     let interrupted = Arc::default();
     let (Some(times), Some(positions)) = (times, positions) else {
@@ -92,11 +97,12 @@ pub(crate) fn audit<'py>(
     let (times, positions) = (given.times.as_array(), given.positions.as_array());
     let velocities = given.velocities.as_ref().map(PyReadonlyArray3::as_array);
     let is_plane = positions.shape()[2] == 2;
-    let notes: Vec<String> =
-        is_plane.then(|| "positions have two columns: z is taken as 0".to_owned()).into_iter().collect();
+    let plane = is_plane.then(|| "positions have two columns: z is taken as 0".to_owned());
+    let notes: Vec<String> = plane.into_iter().chain(notes_of_absence(positions, &names)).collect();
     let arrays = Arrays::new(times, positions, velocities, &names, &notes);
+    let own = seen.map(|seen| &seen.0);
     let work = || {
-        let held = Held { command, open: &|| Ok(Box::new(arrays.clone())) };
+        let held = Held { command, own, open: &|| Ok(Box::new(arrays.clone())) };
         cli::judge(&words, Some(&held), &interrupted)
     };
     let report = away(py, &interrupted, work)?;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray3};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use tautline::cli::{Film, RunHistory, flight_page};
+use tautline::cli::{Film, RunHistory, Witness, flight_page};
 use tautline::preflight::Preflight;
 use tautline::record::mcap::{Header, McapRecorder};
 use tautline::record::{Event, RecordError, Sample, Sink};
@@ -14,11 +14,12 @@ use tautline::report::Report;
 use tautline::run::run_with;
 use tautline::sim::{Breakdown, Ending, Parts, SimError};
 
+use crate::audit::Seen;
 use crate::errors::{Raised as _, broken, wrong};
 use crate::law::PythonLaw;
 use crate::numbers::{by_row, cube};
 use crate::scenario::Scenario;
-use crate::work::{Signals, here};
+use crate::work::{Signals, flying};
 
 /// The samples of a flight, in memory.
 #[derive(Default)]
@@ -68,10 +69,11 @@ pub(crate) struct Flown {
     velocities: Py<PyArray3<f64>>,
     commands: Py<PyArray3<f64>>,
     separations_m: Py<PyArray1<f64>>,
+    seen: Py<Seen>,
 }
 
 impl Flown {
-    fn new(py: Python<'_>, report: &Report, samples: Samples) -> PyResult<Self> {
+    fn new(py: Python<'_>, report: &Report, samples: Samples, witness: Witness) -> PyResult<Self> {
         let shape = [samples.times_s.len(), samples.vehicles, 3];
         Ok(Self {
             passed: report.verdict.pass,
@@ -83,6 +85,7 @@ impl Flown {
             velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
             commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
             separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
+            seen: Py::new(py, Seen(witness.finish()))?,
         })
     }
 }
@@ -133,7 +136,7 @@ pub(crate) fn fly(
     let raising = law.as_ref().map(PythonLaw::raising);
     let samples = Samples { is_kept: keep, vehicles: scenario.count(), ..Samples::default() };
     let mut signals = Signals::new();
-    let flown = here(py, || -> Result<_, SimError> {
+    let flown = flying(py, || -> Result<_, SimError> {
         let preflight = match &law {
             Some(law) => Preflight::under(scenario, law),
             None => Preflight::of(scenario)?,
@@ -147,20 +150,20 @@ pub(crate) fn fly(
             McapRecorder::create(path, &header)
         });
         let page = html.is_some().then(|| (RunHistory::new().scaled_by(scenario.metric()), Film::new()));
-        let mut sinks = (samples, Beside { recording: recording.transpose()?, page });
+        let mut sinks = (samples, (Witness::of(scenario), Beside { recording: recording.transpose()?, page }));
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
-        let (samples, Beside { recording, page }) = sinks;
+        let (samples, (witness, Beside { recording, page })) = sinks;
         let closed = recording.map_or(Ok(()), McapRecorder::finish);
         let (report, ending) = flown?;
         closed?;
         let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));
-        Ok((report, ending, samples, page))
+        Ok((report, ending, (samples, witness), page))
     })?;
     if let Some(raised) = signals.raised.or_else(|| raising.as_ref()?.take()) {
         return Err(raised);
     }
-    let (report, ending, samples, page) = flown.map_err(SimError::raised)?;
+    let (report, ending, (samples, witness), page) = flown.map_err(SimError::raised)?;
     if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), Some(_)) = (&ending, &raising) {
         return Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")));
     }
@@ -168,5 +171,5 @@ pub(crate) fn fly(
         tautline::report::write_atomically(&path, page.as_bytes())
             .map_err(|error| PyOSError::new_err(error.to_string()))?;
     }
-    Flown::new(py, &report, samples)
+    Flown::new(py, &report, samples, witness)
 }

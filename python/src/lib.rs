@@ -25,7 +25,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::audit::{audit, audit_in_rust};
+    use super::audit::{Seen, audit, audit_in_rust};
     #[pymodule_export]
     use super::errors::Error;
     #[pymodule_export]
@@ -45,6 +45,7 @@ mod _native {
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyAnyMethods as _;
+        crate::work::at_home();
         let origin: std::path::PathBuf = module.getattr("__spec__")?.getattr("origin")?.extract()?;
         tautline::campaign::Program::is_in(origin);
         Ok(())

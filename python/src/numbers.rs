@@ -18,17 +18,17 @@ pub(crate) fn borrowed<'py, D: Dimension>(
     what: &str,
     axes: &str,
 ) -> PyResult<PyReadonlyArray<'py, f64, D>> {
-    if given.hasattr("mask")? {
-        return Err(wrong_type(format!(
-            "{what}: a masked array says nothing of what it hides; give it as .filled(numpy.nan)"
-        )));
-    }
     let Ok(array) = given.cast::<PyUntypedArray>() else {
         let kind = given.get_type().qualname()?;
         return Err(wrong_type(format!(
             "{what}: a NumPy array is needed, not {kind}; give numpy.asarray(..., dtype=float)"
         )));
     };
+    if given.hasattr("mask")? {
+        return Err(wrong_type(format!(
+            "{what}: a masked array says nothing of what it hides; give it as .filled(numpy.nan)"
+        )));
+    }
     if !array.dtype().is_equiv_to(&dtype::<f64>(given.py())) {
         let kind = array.dtype();
         return Err(wrong_type(format!(

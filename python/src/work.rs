@@ -2,12 +2,14 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
+use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::errors::broken;
 
@@ -15,6 +17,9 @@ use crate::errors::broken;
 const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 /// Stack of a thread that works: as much as a program's own has on most systems \[bytes\].
 const STACK: usize = 8 << 20;
+
+static HOME: OnceLock<u32> = OnceLock::new();
+static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 /// Does work in a thread of its own, without the interpreter's lock. Ctrl-C sets `interrupted`, which the work is to look at,
 /// and is raised once it has come to its end.
@@ -52,6 +57,35 @@ pub(crate) fn away<T: Send>(
 /// Does work in this thread, without the interpreter's lock.
 pub(crate) fn here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| broken(&words(panic.as_ref())))
+}
+
+/// Flies in this thread, without the interpreter's lock. Threads that large swarms share are gone in a process that was forked:
+/// there it gets some of its own.
+pub(crate) fn flying<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let at_home = *HOME.get_or_init(process::id);
+    if at_home == process::id() {
+        return here(py, work);
+    }
+    here(py, || own_pool().map(|pool| pool.install(work)))?.map_err(|error| broken(&error.to_string()))
+}
+
+/// Takes note of the process that the package was imported in.
+pub(crate) fn at_home() {
+    HOME.get_or_init(process::id);
+}
+
+/// The threads of this process, which was forked.
+fn own_pool() -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
+    let mut pools = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    match &*pools {
+        Some((process, pool)) if *process == process::id() => Ok(Arc::clone(pool)),
+        _ => {
+            let pool = Arc::new(ThreadPoolBuilder::new().build()?);
+            // That of the process before has no threads here that could be waited for.
+            std::mem::forget(pools.replace((process::id(), Arc::clone(&pool))));
+            Ok(pool)
+        }
+    }
 }
 
 /// What a panic said.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from . import _display, _native
 from ._native import Error
 from ._tables import Findings
-from ._words import PathLike, number, numbers, of_each, options, path, paths, reading, with_files
+from ._words import PathLike, by_name, listed, number, numbers, of_each, options, path, paths, reading, with_files
 
 Judged = tuple[str, str, str, str]
 
@@ -24,6 +26,9 @@ class ViolationError(Error):
     def __init__(self, judgement: Audit) -> None:
         super().__init__(judgement.headline)
         self.audit = judgement
+
+    def __reduce__(self) -> tuple[type[ViolationError], tuple[Audit]]:
+        return ViolationError, (self.audit,)
 
 
 class Audit:
@@ -36,10 +41,14 @@ class Audit:
     #: The summary that the command line prints.
     text: str
 
-    def __init__(self, judged: Judged, again: Callable[[str], Judged]) -> None:
+    def __init__(self, judged: Judged, again: Callable[..., Judged]) -> None:
         self.verdict, self.headline, self.text, self._json = judged
-        self._report: dict[str, Any] = json.loads(self._json)
         self._again = again
+
+    @functools.cached_property
+    def _report(self) -> dict[str, Any]:
+        report: dict[str, Any] = json.loads(self._json)
+        return report
 
     @property
     def status(self) -> str:
@@ -123,15 +132,26 @@ class Audit:
     def to_html(self, file: PathLike) -> None:
         """Writes the report for people, with figures. The recording is judged again for them.
 
-        Raises :class:`Error` where it has changed since, ``OSError`` where the file cannot be written.
+        Raises :class:`Error` where it has changed since, and leaves the file as it is; ``OSError`` where it cannot be written.
         """
-        if self._again(path(file, "file"))[3] != self._json:
-            raise Error("the recording is not what it was when it was judged: audit it again")
+        changed = "the recording is not what it was when it was judged: audit it again"
+        page = path(file, "file")
+        # At first without a page: that of another verdict must not take the place of this one's.
+        if self._again()[3] != self._json:
+            raise Error(changed)
+        if self._again(f"--html={page}")[3] != self._json:
+            raise Error(f"{changed}; {page} is of what it has become")
 
     def raise_for_violation(self, allow_undecided: bool = False) -> None:
         """Raises :class:`ViolationError` unless it is clear: of a violation, and of what cannot be told unless that is allowed."""
         if not (self.is_clear or (allow_undecided and self.status == "undecided")):
             raise ViolationError(self)
+
+    def __bool__(self) -> bool:
+        raise TypeError("an audit is neither true nor false: ask is_clear, or call raise_for_violation()")
+
+    def __reduce__(self) -> tuple[Callable[..., Audit], tuple[Judged]]:
+        return elsewhere, ((self.verdict, self.headline, self.text, self._json),)
 
     def __repr__(self) -> str:
         return f"<Audit {self.headline}>"
@@ -145,9 +165,9 @@ class Audit:
         rows = [
             ("finding", self.headline.partition(": ")[2]),
             ("vehicles judged", str(self._report["judged"])),
-            ("violations", str(len(self.violations))),
-            ("undecided", str(len(self.undecided))),
-            ("gaps", str(len(self.gaps))),
+            ("violations", str(len(self._report["violations"]))),
+            ("undecided", str(len(self._report["undecided"]))),
+            ("gaps", str(len(self._report["gaps"]))),
         ]
         drawing = _display.bars(
             [" ".join(near["who"]) for near in closest],
@@ -180,13 +200,14 @@ def audit(
     offset: Mapping[str, float] | None = None,
     expect_vehicles: int | None = None,
     max_gap: float | None = None,
+    _seen: _native.Seen | None = None,
     **read_as: Any,
 ) -> Audit:
     """Judges positions over time, of arrays or of a recording of any format.
 
     ``tl.audit(t, positions, delta=1.5)``: ``t`` (T,) times [s], ``positions`` (T, N, 3) or (T, N, 2) [m], both float64 in any
     order of memory; they are borrowed, not copied, and must not be written to until this returns. NaN in every axis: the
-    vehicle was not seen. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
+    vehicle was not seen; ``notes`` names whoever was not seen from the first instant to the last. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
 
     ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
     it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``scale``, ``dimensions``, ``column``, ``start``, ``axis_order``,
@@ -203,6 +224,9 @@ def audit(
     Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
     wrong with the input. docs/audit.md says what each verdict means.
     """
+    asked = inspect.signature(reading).parameters
+    if unknown := [word for word in read_as if word not in asked]:
+        raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
     words = ["audit"]
     words += [] if delta is None else [f"--delta={number(delta, 'delta')}"]
     words += options(motion=motion, expect_vehicles=expect_vehicles)
@@ -212,16 +236,20 @@ def audit(
     files = {"obstacles": obstacles, "fence": fence, "config": None if config is False else config}
     given = [path(file, what) for what, file in files.items() if file is not None]
     words += [f"--{what}={path(file, what)}" for what, file in files.items() if file is not None]
-    words += [f"--limit={what}={number(most, 'limit')}" for what, most in (limit or {}).items()]
+    words += [f"--limit={what}={number(most, 'limit')}" for what, most in by_name(limit, "limit").items()]
     for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap)):
         words += [] if value is None else [f"--{option}={number(value, option)}"]
-    words += [f"--ids={quoted(name)}" for name in ids or ()]
-    words += [f"--offset={name}={number(seconds, 'offset')}" for name, seconds in (offset or {}).items()]
+    if ids is not None:
+        judged = listed(ids, "ids")
+        if not judged:
+            raise Error("ids: nobody is named; leave it out to judge everybody")
+        words += [f"--ids={quoted(name)}" for name in judged]
+    words += [f"--offset={name}={number(seconds, 'offset')}" for name, seconds in by_name(offset, "offset").items()]
     if positions is None:
         return of_files(words + reading(**read_as), t, given, velocities is not None or names is not None)
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
-    return with_files(given, lambda: of_arrays(words, t, positions, velocities, names))
+    return with_files(given, lambda: of_arrays(words, t, positions, velocities, names, _seen))
 
 
 def of_files(words: list[str], t: object, beside: list[str], has_more: bool) -> Audit:
@@ -234,24 +262,35 @@ def of_files(words: list[str], t: object, beside: list[str], has_more: bool) -> 
 
     def judged(*more: str) -> Judged:
         ask = [*words, *more, "--", *files]
-        return with_files(inputs, lambda: _native.audit(ask, "", None, None, None, []))
+        return with_files(inputs, lambda: _native.audit(ask, "", None, None, None, [], None))
 
-    return Audit(judged(), lambda file: judged(f"--html={file}"))
+    return Audit(judged(), judged)
 
 
-def of_arrays(words: list[str], t: Any, positions: Any, velocities: Any, names: Sequence[str] | None) -> Audit:
+def of_arrays(
+    words: list[str], t: Any, positions: Any, velocities: Any, names: Sequence[str] | None, seen: _native.Seen | None = None
+) -> Audit:
     if isinstance(t, (str, os.PathLike)):
         raise TypeError("t: times are needed beside positions, or a path alone")
     count = positions.shape[1] if isinstance(positions, np.ndarray) and positions.ndim == 3 else 0
-    called = [str(number) for number in range(1, count + 1)] if names is None else [str(name) for name in names]
+    called = [str(number) for number in range(1, count + 1)] if names is None else listed(names, "names")
     if len(set(called)) < len(called):
         raise Error("names: two vehicles have the same name")
     command = " ".join(["tautline.audit(t, positions)", "#", *words[1:]]) if words[1:] else "tautline.audit(t, positions)"
 
     def judged(*more: str) -> Judged:
-        return _native.audit([*words, *more, "arrays"], command, t, positions, velocities, called)
+        return _native.audit([*words, *more, "arrays"], command, t, positions, velocities, called, seen)
 
-    return Audit(judged(), lambda file: judged(f"--html={file}"))
+    return Audit(judged(), judged)
+
+
+def elsewhere(judged: Judged) -> Audit:
+    """A judgement that was made in another process, or before."""
+
+    def again(*more: str) -> Judged:
+        raise Error("what was judged is not at hand here: write the page where it was judged")
+
+    return Audit(judged, again)
 
 
 def quoted(name: str) -> str:

@@ -56,4 +56,4 @@ def campaign(
     words += [] if until_width is None else [f"--until-width={number(until_width, 'until_width')}"]
     words += [] if until_decided is None else [f"--until-decided={number(until_decided, 'until_decided')}"]
     is_good, text = with_files([file], lambda: _native.call([*words, "--", file]))
-    return Campaign(is_good, text, folder)
+    return Campaign(is_good, text, folder.absolute())

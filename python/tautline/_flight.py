@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from . import _display, _native
 from ._audit import Audit, audit
-from ._law import Law
+from ._law import Law, check_law
+from ._native import Error
 from ._scenario import Scenario, scenario_of
 from ._tables import frame
 from ._words import PathLike, path
@@ -46,6 +48,7 @@ class Flight:
         self.report: dict[str, Any] = json.loads(flown.report)
         self.t, self.positions, self.velocities = flown.t, flown.positions, flown.velocities
         self.commands, self.separations_m = flown.commands, flown.separations_m
+        self._seen = flown.seen
 
     @property
     def status(self) -> str:
@@ -74,9 +77,9 @@ class Flight:
         return frame(columns)
 
     def audit(self, **asked: Any) -> Audit:
-        """Judges the recorded instants with other questions, as :func:`tautline.audit`; what lies between them was judged by the
-        flight itself, and this says what it assumes of it. ``delta`` is the scenario's unless given."""
-        return audit(self.t, self.positions, **{"delta": self.scenario.delta_m, **asked})
+        """Judges the recorded instants with other questions, as :func:`tautline.audit` judges the flight's recording: what the flight
+        saw between them counts, and delta, ellipsoids and obstacles are the scenario's unless others are asked about."""
+        return audit(self.t, self.positions, _seen=self._seen, **asked)
 
     def plot(self) -> Figure:
         """Ways from above and the smallest distance over time, with delta. Imports matplotlib."""
@@ -94,6 +97,9 @@ class Flight:
         beside.set(xlabel="t [s]", ylabel="distance [m]", title=self.headline.partition(":")[0])
         beside.legend()
         return figure
+
+    def __bool__(self) -> bool:
+        raise TypeError("a flight is neither true nor false: ask passed, or status")
 
     def __repr__(self) -> str:
         return f"<Flight {self.headline}>"
@@ -133,7 +139,24 @@ def fly(
     Raises :class:`Error` for a scenario that is wrong and for a law that writes what is no number; what a law raises is raised again.
     """
     what = scenario_of(scenario, set)
+    check_law(law)
+    check_outputs(what, {"record": record, "html": html})
     record_to = None if record is None else path(record, "record")
     page = None if html is None else path(html, "html")
     command = f"tautline.fly({what!r})" if law is None else f"tautline.fly({what!r}, law={type(law).__name__}(...))"
     return Flight(what, _native.fly(what._native, law, record_to, page, command, keep))
+
+
+def check_outputs(scenario: Scenario, outputs: Mapping[str, PathLike | None]) -> None:
+    """Refuses files that would replace the scenario or each other, and those that have no folder to be in, before an hour of flight."""
+    taken = {os.path.realpath(file): "the scenario" for file in scenario.files}
+    for what, file in outputs.items():
+        if file is None:
+            continue
+        place = os.path.realpath(path(file, what))
+        if place in taken:
+            raise Error(f"{what}: {os.fspath(file)} would overwrite {taken[place]}; write another file")
+        taken[place] = what
+        folder = os.path.dirname(place)
+        if not os.path.isdir(folder):
+            raise FileNotFoundError(f"{what}: there is no folder {folder} to write {os.path.basename(place)} into")

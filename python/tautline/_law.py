@@ -38,3 +38,11 @@ class Law:
         more (:class:`tautline.Observation`). What is raised here ends the flight and is raised by what flew it.
         """
         raise NotImplementedError("write control(self, obs, out) of your law")
+
+
+def check_law(law: object) -> None:
+    """Refuses the class of a law in the place of a law, and names that are none."""
+    if isinstance(law, type):
+        raise TypeError(f"law: a law is needed, not the class {law.__name__}: make one, {law.__name__}(...)")
+    if not isinstance(name := getattr(law, "name", None), (str, type(None))):
+        raise TypeError(f"name: the law's name is a string, not {type(name).__name__}")

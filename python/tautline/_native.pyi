@@ -10,6 +10,7 @@ __all__ = [
     "Flown",
     "Observation",
     "Scenario",
+    "Seen",
     "Simulation",
     "audit",
     "audit_in_rust",
@@ -145,6 +146,12 @@ class Flown:
     def commands(self) -> NDArray[np.float64]: ...
     @property
     def separations_m(self) -> NDArray[np.float64]: ...
+    @property
+    def seen(self) -> Seen: ...
+
+@final
+class Seen:
+    """What a flight said of itself beside its instants."""
 
 @final
 class Columns:
@@ -180,6 +187,7 @@ def audit(
     positions: Any | None,
     velocities: Any | None,
     names: Sequence[str],
+    seen: Seen | None,
 ) -> tuple[str, str, str, str]: ...
 def audit_in_rust(times: NDArray[np.float64], positions: NDArray[np.float64], delta_m: float) -> tuple[float, float]: ...
 def call(words: Sequence[str]) -> tuple[bool, str]: ...

@@ -6,13 +6,14 @@ import json
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
-from . import _native
+from . import _display, _native
 from ._scenario import Scenario, scenario_of
-from ._tables import Finding, Findings
-from ._words import PathLike, number, options, path, paths, reading, with_files
+from ._tables import Finding, Findings, cell
+from ._words import PathLike, by_name, files, flags, listed, number, options, path, paths, reading, with_files
 
 
 class Answer(Finding):
@@ -28,6 +29,9 @@ class Answer(Finding):
         """Whether the command line would end with exit code 0: judged and good."""
         return self._is_good
 
+    def __bool__(self) -> bool:
+        raise TypeError("an answer is neither true nor false: ask is_good")
+
     def __getattr__(self, key: str) -> Any:
         value = super().__getattr__(key)
         is_rows = isinstance(value, list) and value and all(isinstance(row, dict) for row in value)
@@ -39,6 +43,12 @@ class Answer(Finding):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {'good' if self.is_good else 'bad'}: {', '.join(self)}>"
+
+    def _repr_html_(self) -> str:
+        plain = [(key, cell(value)) for key, value in self.items() if not isinstance(value, (list, dict))]
+        tables = [(key, value) for key in self if isinstance(value := getattr(self, key), Findings)]
+        shown = "".join(f"<h4>{escape(key)}</h4>{value._repr_html_()}" for key, value in tables)
+        return _display.card("good" if self.is_good else "bad", type(self).__name__, plain) + shown
 
 
 def export(
@@ -56,12 +66,12 @@ def export(
     that exists is overwritten with ``force``. ``read_as`` is as in :func:`tautline.audit`. Raises as :func:`tautline.read`, and ``OSError`` where the file
     cannot be written.
     """
-    files = paths(recording, "recording")
+    recordings = paths(recording, "recording")
     format = read_as.pop("format", None)
-    words = ["export", f"--output={path(output, 'output')}", *options(format=to, force=force, input_format=format)]
+    words = ["export", f"--output={path(output, 'output')}", *options(format=to, input_format=format), *flags(force=force)]
     words += [] if sample_hz is None else [f"--sample-hz={number(sample_hz, 'sample_hz')}"]
-    words += [*reading(**read_as), "--", *files]
-    with_files(files, lambda: _native.call(words))
+    words += [*reading(**read_as), "--", *recordings]
+    with_files(recordings, lambda: _native.call(words))
 
 
 def asked(command: str, scenario: Scenario | PathLike, set: Mapping[str, Any] | None, words: list[str]) -> Answer:
@@ -88,8 +98,8 @@ def compare(
     Laws are kinds or names of tables ``[laws.NAME]``; all that the scenario has unless given. Files that exist are overwritten
     with ``force``.
     """
-    words = options(runs=runs, seed=seed, csv=csv, latex=latex, html=html, force=force, threads=threads)
-    words += [] if laws is None else [f"--laws={','.join(laws)}"]
+    words = options(runs=runs, seed=seed, threads=threads) + files(csv=csv, latex=latex, html=html) + flags(force=force)
+    words += [] if laws is None else [f"--laws={','.join(listed(laws, 'laws'))}"]
     return asked("compare", scenario, set, words)
 
 
@@ -114,8 +124,8 @@ def margin(
     """How much of one key a verdict (``pass``, ``clear``, ``reached``) survives: the two values between ``start`` and ``stop`` between which it
     turns. docs/margins.md says more."""
     words = [f"--key={key}", f"--from={number(start, 'start')}", f"--to={number(stop, 'stop')}"]
-    words += options(runs=runs, seed=seed, verdict=verdict, scan=scan, halvings=halvings, log=log)
-    words += options(csv=csv, html=html, force=force, threads=threads)
+    words += options(runs=runs, seed=seed, verdict=verdict, scan=scan, halvings=halvings, threads=threads)
+    words += files(csv=csv, html=html) + flags(log=log, force=force)
     return asked("margin", scenario, set, words)
 
 
@@ -140,8 +150,11 @@ def attack(
     """Searches for the worst start (up to ``start`` [m] from the scenario's), velocity (``velocity`` [m/s]) or keys (``vary``, with bounds). What
     it does not find is no proof. docs/attack.md says more."""
     words = options(start=start, velocity=velocity, apart=apart, flights=flights, seeds=seeds, method=method, seed=seed)
-    words += [f"--vary={key}={number(low, key)}..{number(high, key)}" for key, (low, high) in (vary or {}).items()]
-    words += options(out=out, csv=csv, html=html, force=force, threads=threads)
+    for key, bounds in by_name(vary, "vary").items():
+        if not isinstance(bounds, (list, tuple)) or len(bounds) != 2:
+            raise TypeError(f"vary: {key} needs a lower and an upper bound, not {bounds!r}")
+        words.append(f"--vary={key}={number(bounds[0], key)}..{number(bounds[1], key)}")
+    words += options(threads=threads) + files(out=out, csv=csv, html=html) + flags(force=force)
     return asked("attack", scenario, set, words)
 
 
@@ -149,4 +162,4 @@ def validate(out: PathLike | None = None, *, force: bool = False, threads: int |
     """Reproduces the paper and judges its claims and ours; figures and a page are left in the folder ``out`` where one is given."""
     with tempfile.TemporaryDirectory() as folder:
         at = Path(folder) / "validate" if out is None else Path(os.fspath(out))
-        return Answer(*_native.call(["validate", "--json", f"--out={at}", *options(force=force, threads=threads)]))
+        return Answer(*_native.call(["validate", "--json", f"--out={at}", *options(threads=threads), *flags(force=force)]))

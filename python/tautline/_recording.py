@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _native
+from . import _display, _native
 from ._audit import Audit, audit
 from ._native import Error
 from ._tables import frame
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 #: An interval longer than so many usual ones is a gap, as the judge has it.
 GAP_OVER_USUAL = 1.5
-#: Most numbers that are made of a recording at a rate.
-MOST_NUMBERS = 2**31
+#: Most numbers that are made of a recording: 2 GiB.
+MOST_NUMBERS = 2**28
 
 
 class Recording:
@@ -62,6 +62,8 @@ class Recording:
 
         Raises :class:`Error` for curves without ``hz``, and for a rate that is not positive or gives too many numbers.
         """
+        if max_gap_s is not None and not max_gap_s >= 0:
+            raise Error(f"max_gap_s is {max_gap_s}; give a time of 0 s or more")
         if hz is None:
             return self._as_recorded()
         if isinstance(hz, bool) or not isinstance(hz, (int, float, np.integer, np.floating)):
@@ -88,6 +90,9 @@ class Recording:
             raise Error("the recording has curves: say how often they are sampled with hz=")
         columns = self._columns
         t, instant = np.unique(columns.t, return_inverse=True)
+        if len(t) * 3 * len(self.vehicles) > MOST_NUMBERS:
+            count = f"{len(t)} instants of {len(self.vehicles)} vehicles, most of which were not seen then"
+            raise Error(f"vehicles have clocks of their own: that would be {count}; give hz=")
         positions = np.full((len(t), len(self.vehicles), 3), np.nan)
         positions[instant, columns.vehicle] = columns.position
         return t, positions
@@ -141,6 +146,20 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.vehicles)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def _repr_html_(self) -> str:
+        t = [*self._columns.t[:1], *self._columns.t[-1:], *self._columns.piece_span.ravel()]
+        rows = [
+            ("vehicles", str(len(self))),
+            ("samples", str(len(self._columns.t))),
+            ("pieces of curves", str(len(self._columns.piece_vehicle))),
+            ("time", f"{min(t):.6g} s to {max(t):.6g} s" if t else "-"),
+            *(("note", note) for note in self.notes),
+        ]
+        return _display.card("open", ", ".join(self._files), rows)
 
     def __repr__(self) -> str:
         kind = f"{len(self._columns.piece_vehicle)} pieces of curves" if self.has_curves else f"{len(self._columns.t)} samples"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from . import _display, _native
 from ._native import Error
 from ._tables import Findings
-from ._words import PathLike, with_files
+from ._words import PathLike, by_name, with_files
 
 
 class Scenario:
@@ -48,8 +48,21 @@ class Scenario:
 
     def _read(self, source: str, is_text: bool, set: Mapping[str, Any] | None, files: list[str]) -> None:
         self._source, self._is_text = source, is_text
-        self._sets = [f"{key}={value_as_toml(value)}" for key, value in (set or {}).items()]
+        self._sets = [f"{key}={value_as_toml(value)}" for key, value in by_name(set, "set").items()]
         self._native = with_files(files, lambda: _native.Scenario(source, is_text, self._sets))
+        #: The files that it was read from.
+        self.files: tuple[str, ...] = tuple(files)
+
+    def _check_unchanged(self) -> None:
+        """Raises where the file that it was read from says something else by now, or is gone: commands would read that one."""
+        if not self.files:
+            return
+        now = with_files(self.files, lambda: _native.Scenario(self._source, self._is_text, self._sets))
+        if now.sha256 != self.sha256:
+            raise Error(f"{self._source} has changed since it was read: make a new Scenario of it")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return restored, (self._source, self._is_text, self._sets, self.files, self.sha256)
 
     @property
     def name(self) -> str:
@@ -124,14 +137,19 @@ class Scenario:
     @contextlib.contextmanager
     def _words(self) -> Iterator[list[str]]:
         """What names it on the command line; a text is a file meanwhile."""
+        self._check_unchanged()
         sets = [f"--set={text}" for text in self._sets]
         if not self._is_text:
             yield [*sets, "--", self._source]
             return
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / f"{self.name}.toml"
-            file.write_text(self._source, encoding="utf-8")
-            yield [*sets, "--", str(file)]
+        # Where Python runs, because paths in the text count from there; and not named by the file.
+        handle, file = tempfile.mkstemp(prefix=".tautline-", suffix=".toml", dir=".", text=False)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as out:
+                out.write(self._source)
+            yield [f"--set=name={value_as_toml(self.name)}", *sets, "--", os.path.join(".", os.path.basename(file))]
+        finally:
+            os.unlink(file)
 
 
 def scenario_of(given: Scenario | PathLike, set: Mapping[str, Any] | None = None) -> Scenario:
@@ -140,11 +158,19 @@ def scenario_of(given: Scenario | PathLike, set: Mapping[str, Any] | None = None
         return Scenario(given, set=set)
     if not set:
         return given
-    sets = [f"{key}={value_as_toml(value)}" for key, value in set.items()]
-    changed = Scenario.__new__(Scenario)
-    changed._source, changed._is_text, changed._sets = given._source, given._is_text, given._sets + sets
-    changed._native = _native.Scenario(changed._source, changed._is_text, changed._sets)
-    return changed
+    given._check_unchanged()
+    sets = [f"{key}={value_as_toml(value)}" for key, value in by_name(set, "set").items()]
+    return restored(given._source, given._is_text, given._sets + sets, given.files)
+
+
+def restored(source: str, is_text: bool, sets: list[str], files: tuple[str, ...], sha256: str | None = None) -> Scenario:
+    """A scenario by what it was read from; where a hash is given it must be that one."""
+    scenario = Scenario.__new__(Scenario)
+    scenario._source, scenario._is_text, scenario._sets, scenario.files = source, is_text, sets, files
+    scenario._native = with_files(files, lambda: _native.Scenario(source, is_text, sets))
+    if sha256 not in (None, scenario.sha256):
+        raise Error(f"{source} is not what it was when the scenario was made")
+    return scenario
 
 
 def value_as_toml(value: Any) -> str:
@@ -192,6 +218,9 @@ class Check:
         """Everything that ``tautline check --json`` prints."""
         found: dict[str, Any] = json.loads(self._json)
         return found
+
+    def __bool__(self) -> bool:
+        raise TypeError("a check is neither true nor false: ask is_good")
 
     def __getattr__(self, key: str) -> Any:
         if key.startswith("_") or key not in self._found:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _native
-from ._law import Law
+from . import _display, _native
+from ._law import Law, check_law
 from ._native import Error
 from ._scenario import Scenario, scenario_of
 from ._tables import Finding, Findings
@@ -30,6 +30,7 @@ class Simulation:
         self, scenario: Scenario | PathLike = "pentagon", *, law: Law | None = None, set: Mapping[str, Any] | None = None
     ) -> None:
         self.scenario = scenario_of(scenario, set)
+        check_law(law)
         self._native = _native.Simulation(self.scenario._native, law)
 
     def step(self, u: NDArray[np.float64] | None = None, steps: int = 1) -> None:
@@ -118,12 +119,30 @@ class Simulation:
     def copy(self, noise_seed: int | None = None) -> Simulation:
         """A simulation that goes on from here by itself with the same bits; with a seed, all that is drawn from now on is drawn from
         it. A law in Python is the same object in both."""
+        if noise_seed is not None and not (isinstance(noise_seed, (int, np.integer)) and 0 <= noise_seed < 2**64):
+            raise Error(f"noise_seed is {noise_seed!r}; give a whole number from 0 on, below 2^64")
         other = Simulation.__new__(Simulation)
         other.scenario, other._native = self.scenario, self._native.copy(noise_seed)
         return other
 
+    def __copy__(self) -> Simulation:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Simulation:
+        return self.copy()
+
     def __len__(self) -> int:
         return len(self.scenario)
+
+    def _repr_html_(self) -> str:
+        status, closest = self.status, self.closest
+        rows = [
+            ("time", f"{self.t:g} s of {self.scenario.duration_s:g} s"),
+            ("ending", self.ending or "under way"),
+            ("smallest distance so far", "-" if closest is None else f"{closest.separation_m:.6g} m at {closest.time_s:.4g} s"),
+        ]
+        tone = {"clear": "open", "violation": "bad"}.get(status, "open")
+        return _display.card(tone, f"{self.scenario.name}: {status} so far", rows)
 
     def __repr__(self) -> str:
         return f"<Simulation {self.scenario.name} at {self.t:g} s: {self.ending or 'under way'}>"

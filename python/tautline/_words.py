@@ -19,7 +19,10 @@ def number(value: object, what: str) -> str:
     """A number in digits that read back to the same bits."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise TypeError(f"{what}: a number is needed, not {type(value).__name__}")
-    return repr(float(value))
+    try:
+        return repr(float(value))
+    except OverflowError:
+        raise Error(f"{what}: the number is too large") from None
 
 
 def numbers(value: Iterable[object], what: str) -> str:
@@ -36,25 +39,56 @@ def of_each(option: str, value: object, what: str) -> list[str]:
     return [f"{option}={number(value, what)}"]
 
 
+def word(name: str) -> str:
+    """An option as the command line spells it."""
+    return "--" + name.replace("_", "-")
+
+
 def option(name: str, value: Any) -> list[str]:
-    """``--name=value``, or nothing of None and False; a word alone of True; once for each of a list."""
-    word = "--" + name.replace("_", "-")
-    if value is None or value is False:
+    """``--name=value``, or nothing of None; once for each of a list."""
+    if value is None:
         return []
-    if value is True:
-        return [word]
     if isinstance(value, (list, tuple)):
         return [part for each in value for part in option(name, each)]
-    if isinstance(value, os.PathLike):
-        return [f"{word}={os.fspath(value)}"]
-    if isinstance(value, (int, str)):
-        return [f"{word}={value}"]
-    return [f"{word}={number(value, name)}"]
+    if isinstance(value, str):
+        return [f"{word(name)}={value}"]
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
+        return [f"{word(name)}={int(value)}"]
+    return [f"{word(name)}={number(value, name)}"]
 
 
 def options(**given: Any) -> list[str]:
     """Each as :func:`option`."""
-    return [word for name, value in given.items() for word in option(name, value)]
+    return [part for name, value in given.items() for part in option(name, value)]
+
+
+def flags(**given: Any) -> list[str]:
+    """``--name`` of each that is true."""
+    for name, value in given.items():
+        if not isinstance(value, (bool, np.bool_)):
+            raise TypeError(f"{name}: True or False is needed, not {type(value).__name__}")
+    return [word(name) for name, value in given.items() if value]
+
+
+def files(**given: PathLike | None) -> list[str]:
+    """``--name=path`` of each that is given."""
+    return [f"{word(name)}={path(value, name)}" for name, value in given.items() if value is not None]
+
+
+def by_name(value: object, what: str) -> Mapping[Any, Any]:
+    """A dictionary, empty of None."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{what}: a dictionary is needed, not {type(value).__name__}")
+    return value
+
+
+def listed(value: object, what: str) -> list[str]:
+    """Names: of a list, and not the letters of one."""
+    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
+        raise TypeError(f"{what}: a list of names is needed, not {type(value).__name__}")
+    return [str(name) for name in value]
 
 
 def path(value: object, what: str) -> str:
@@ -110,10 +144,9 @@ def reading(
         dimensions=dimensions,
         axis_order=axis_order,
         frame=frame,
-        topic=list(topic) if isinstance(topic, (list, tuple)) else topic,
-        join=join,
-        allow_unfinished=allow_unfinished,
+        topic=topic,
     )
+    words += flags(join=join, allow_unfinished=allow_unfinished)
     words += [] if origin is None else [f"--origin={numbers(origin, 'origin')}"]
-    words += [f"--column={role}={name}" for role, name in (column or {}).items()]
-    return words + [f"--start={name}={numbers(place, 'start')}" for name, place in (start or {}).items()]
+    words += [f"--column={role}={name}" for role, name in by_name(column, "column").items()]
+    return words + [f"--start={name}={numbers(place, 'start')}" for name, place in by_name(start, "start").items()]

@@ -6,11 +6,13 @@ use std::sync::atomic::AtomicBool;
 use clap::Parser as _;
 
 use super::audit::{Recorded, judge_recorded};
+use super::audit_config::configured;
 use super::audits::one;
 use super::caller::by_program;
 use super::command::{Arguments, Command, obey, quiet_guarded_panics};
 use super::console::Console;
 use super::diagnostic::{Exit, Failure};
+use super::own::OwnRecording;
 use crate::read::{ReadError, Recording};
 use crate::report::recorded::RecordedReport;
 use crate::track::Tracks;
@@ -38,6 +40,9 @@ pub struct Refusal {
 pub struct Held<'a> {
     /// How the program would ask again, for a person to read.
     pub command: &'a str,
+    /// What it says of itself, where it is a flight of ours: as of our recordings, what the run saw between the instants binds, and
+    /// its limits and obstacles are asked about where the words ask nothing.
+    pub own: Option<&'a OwnRecording>,
     /// Opens the motion, each time from its beginning.
     pub open: &'a dyn Fn() -> Result<Box<dyn Tracks<Error = ReadError> + 'a>, ReadError>,
 }
@@ -87,8 +92,11 @@ pub fn judge(
     let work = || match held {
         None => Ok(one(arguments, console)?.report),
         Some(held) => {
+            // Beside what a program holds there is no folder to find settings in.
+            let arguments = if arguments.config.is_some() { configured(arguments)? } else { arguments };
             arguments.check_outputs()?;
-            let recorded = Recorded { own: None, own_limit_m: None, command: held.command.to_owned(), open: held.open };
+            let command = held.command.to_owned();
+            let recorded = Recorded { own: held.own.cloned(), own_limit_m: None, command, open: held.open };
             judge_recorded(&arguments, recorded, console)
         }
     };

@@ -59,6 +59,7 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 pub use call::{Answer, Held, Refusal, call, judge, open};
+pub use own::{OwnRecording, Witness};
 pub use pictures::flight_page;
 
 pub use crate::figures::RunHistory;

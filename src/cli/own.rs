@@ -9,15 +9,16 @@ use super::Failure;
 use super::own_obstacles::OwnObstacles;
 use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::mcap::{Entry, McapRecording};
-use crate::record::{Event, OwnedSample};
+use crate::record::{Event, OwnedSample, RecordError, Sample, Sink};
 use crate::scenario::{self, Scenario};
 use crate::swarm::{ClosestApproach, Pair, row};
 
 /// Scaled distance at which two equal ellipsoids touch.
 const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 
-/// A recording of ours.
-pub(super) struct OwnRecording {
+/// What a flight of ours says of itself beside positions.
+#[derive(Clone, Debug)]
+pub struct OwnRecording {
     /// Its safety distance \[m\]; the scaled distance at which two of its ellipsoids touch where it has these.
     pub(super) delta_m: f64,
     /// Half axes of what had to stay empty around a vehicle \[m\], where that was no ball. Distances are lengths over them then, in
@@ -46,54 +47,14 @@ impl OwnRecording {
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
         let scenario = Scenario::read(&source, &[]).ok();
-        let is_straight = scenario.as_ref().is_some_and(|scenario| scenario.engine().is_some());
-        let ellipsoid_m = scenario.as_ref().and_then(Scenario::half_axes_m).map(|axes| Vector3::from(axes) * scale);
-        // What the run told is of lengths in which its delta is the width of an ellipsoid.
-        let told_scale = if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS / header.delta_m } else { scale };
-        let mut own = Self {
-            delta_m: header.delta_m * told_scale,
-            ellipsoid_m,
-            told: Vec::new(),
-            violations: Vec::new(),
-            has_every_step: is_straight,
-            most_steps: 0,
-            other_law: None,
-            obstacles: scenario.as_ref().map(|scenario| OwnObstacles::of(scenario, scale)).unwrap_or_default(),
-        };
-        let mut before: Option<OwnedSample> = None;
-        let mut near = Near::default();
+        let mut witness = Witness::new(scenario.as_ref(), header.delta_m, scale);
         for entry in recording {
             match entry.ok()? {
-                Entry::Sample(mut sample) => {
-                    sample.swarm.positions_m *= scale;
-                    let last = before.as_ref().unwrap_or(&sample);
-                    own.most_steps = own.most_steps.max(sample.step.saturating_sub(last.step));
-                    let told =
-                        sample.separation.and_then(|closest| told(last, &sample, closest, (told_scale, ellipsoid_m)));
-                    own.told.extend(told.map(|told| Told { others_m: own.delta_m, ..told }));
-                    own.violations.extend(near.pass(&sample));
-                    before = Some(sample);
-                }
-                Entry::Event(Event::StepRefined { .. }) => own.has_every_step = false,
-                Entry::Event(Event::ViolationBegan { pair, time_s }) => near.begin(pair, time_s, before.as_ref()),
-                Entry::Event(Event::ViolationEnded { pair, time_s, min_m }) => {
-                    near.end(pair, time_s, min_m * told_scale, own.delta_m, before.as_ref());
-                }
-                Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
-                Entry::Event(event) => own.obstacles.note(&event, scale),
+                Entry::Sample(sample) => witness.note_sample(sample),
+                Entry::Event(event) => witness.note_event(event),
             }
         }
-        own.violations.append(&mut near.ended);
-        if let Some(last) = &before {
-            own.violations.extend(near.lasting(last, (own.delta_m, ellipsoid_m), &own.told));
-        }
-        own.has_every_step &= own.most_steps <= 1;
-        if own.has_every_step {
-            own.told.clear();
-            own.violations.clear();
-            own.obstacles.forget_what_was_seen();
-        }
-        Some(own)
+        Some(witness.finish())
     }
 
     /// Refuses other lengths than those in which it says what happened between its samples: that would be lost.
@@ -124,6 +85,100 @@ impl OwnRecording {
         });
         let law = self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"));
         law.into_iter().chain(between)
+    }
+}
+
+/// Watches a flight of ours, sample by sample, for what a judge of its samples alone cannot know.
+#[derive(Debug)]
+pub struct Witness {
+    own: OwnRecording,
+    /// What lengths are multiplied by, and those that the flight tells.
+    scale: f64,
+    told_scale: f64,
+    before: Option<OwnedSample>,
+    near: Near,
+}
+
+impl Witness {
+    /// For a flight of this scenario.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self::new(Some(scenario), scenario.delta_m, 1.0)
+    }
+
+    fn new(scenario: Option<&Scenario>, delta_m: f64, scale: f64) -> Self {
+        let ellipsoid_m = scenario.and_then(Scenario::half_axes_m).map(|axes| Vector3::from(axes) * scale);
+        // What the run told is of lengths in which its delta is the width of an ellipsoid.
+        let told_scale = if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS / delta_m } else { scale };
+        let own = OwnRecording {
+            delta_m: delta_m * told_scale,
+            ellipsoid_m,
+            told: Vec::new(),
+            violations: Vec::new(),
+            has_every_step: scenario.is_some_and(|scenario| scenario.engine().is_some()),
+            most_steps: 0,
+            other_law: None,
+            obstacles: scenario.map(|scenario| OwnObstacles::of(scenario, scale)).unwrap_or_default(),
+        };
+        Self { own, scale, told_scale, before: None, near: Near::default() }
+    }
+
+    fn note_sample(&mut self, mut sample: OwnedSample) {
+        let own = &mut self.own;
+        sample.swarm.positions_m *= self.scale;
+        let last = self.before.as_ref().unwrap_or(&sample);
+        own.most_steps = own.most_steps.max(sample.step.saturating_sub(last.step));
+        let lengths = (self.told_scale, own.ellipsoid_m);
+        let told = sample.separation.and_then(|closest| told(last, &sample, closest, lengths));
+        own.told.extend(told.map(|told| Told { others_m: own.delta_m, ..told }));
+        own.violations.extend(self.near.pass(&sample));
+        self.before = Some(sample);
+    }
+
+    fn note_event(&mut self, event: Event) {
+        let (own, before) = (&mut self.own, self.before.as_ref());
+        match event {
+            Event::StepRefined { .. } => own.has_every_step = false,
+            Event::ViolationBegan { pair, time_s } => self.near.begin(pair, time_s, before),
+            Event::ViolationEnded { pair, time_s, min_m } => {
+                self.near.end(pair, time_s, min_m * self.told_scale, own.delta_m, before);
+            }
+            Event::OtherLaw { name, .. } => own.other_law = Some(name),
+            event => own.obstacles.note(&event, self.scale),
+        }
+    }
+
+    /// What the flight says of itself, once it is over.
+    #[must_use]
+    pub fn finish(self) -> OwnRecording {
+        let Self { mut own, before, mut near, .. } = self;
+        own.violations.append(&mut near.ended);
+        if let Some(last) = &before {
+            own.violations.extend(near.lasting(last, (own.delta_m, own.ellipsoid_m), &own.told));
+        }
+        own.has_every_step &= own.most_steps <= 1;
+        if own.has_every_step {
+            own.told.clear();
+            own.violations.clear();
+            own.obstacles.forget_what_was_seen();
+        }
+        own
+    }
+}
+
+impl Sink for Witness {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.note_sample(sample.into());
+        Ok(())
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        self.note_event(event.clone());
+        Ok(())
+    }
+
+    fn looks_at_steps(&self) -> bool {
+        false
     }
 }
 
@@ -162,7 +217,7 @@ fn around(heights: [f64; 2]) -> [f64; 2] {
 }
 
 /// Pairs that are too close, as far as a recording has been read.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Near {
     /// Since when \[s\], and how high the higher of the two was at samples since \[m\].
     since: BTreeMap<Pair, (f64, [f64; 2])>,

@@ -7,7 +7,7 @@ use crate::scenario::Scenario;
 use crate::sim;
 
 /// Obstacles of a recording, and the times that the run saw a vehicle too near to one of them.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct OwnObstacles {
     /// As its scenario has them.
     pub(super) obstacles: Vec<Obstacle>,

@@ -7,6 +7,7 @@ use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A file could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -51,8 +52,10 @@ pub fn write_atomically_with<T, E: From<ArtefactError>>(
     let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "it names no file"));
     let mut temporary = OsString::from(".");
     temporary.push(target.file_name().ok_or_else(no_name)?);
-    // Two processes may write the same file; the later one wins, whole.
-    temporary.push(format!(".{}.partial", std::process::id()));
+    // Two processes, or threads, may write the same file; the later one wins, whole.
+    static WRITTEN: AtomicU64 = AtomicU64::new(0);
+    let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
+    temporary.push(format!(".{}.{number}.partial", std::process::id()));
     let temporary = target.with_file_name(temporary);
     let written = File::create(&temporary).map_err(error).and_then(|mut file| {
         let written = write(&mut file)?;
