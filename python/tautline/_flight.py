@@ -159,4 +159,4 @@ def check_outputs(scenario: Scenario, outputs: Mapping[str, PathLike | None]) ->
         taken[place] = what
         folder = os.path.dirname(place)
         if not os.path.isdir(folder):
-            raise FileNotFoundError(f"{what}: there is no folder {folder} to write {os.path.basename(place)} into")
+            raise OSError(f"{what}: cannot write {os.fspath(file)}: there is no folder {folder}")

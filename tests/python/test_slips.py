@@ -135,7 +135,7 @@ class Kept(Case):
         same = self.folder / "x"
         self.refuses(tl.Error, "would overwrite record", lambda: tl.fly(short(), record=same, html=same))
         nowhere = self.folder / "none" / "x.html"
-        self.refuses(FileNotFoundError, "there is no folder", lambda: tl.fly(short(), html=nowhere))
+        self.refuses(OSError, "there is no folder", lambda: tl.fly(short(), html=nowhere))
 
     def test_threads_write_the_same_page_whole(self) -> None:
         page, failed = self.folder / "same.html", []
