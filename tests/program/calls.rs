@@ -94,7 +94,7 @@ fn motion_that_a_program_holds_is_judged_as_a_recording_of_it() {
     let file = folder.path().join("passing.csv");
     std::fs::write(&file, "t,id,x,y,z\n0,alpha,-5,0,0\n0,bravo,5,1,0\n1,alpha,5,0,0\n1,bravo,-5,1,0\n")
         .expect("written");
-    let held = Held { command: "audit(...)", open: &|| Ok(Box::new(Passing::new())) };
+    let held = Held { command: "audit(...)", own: None, open: &|| Ok(Box::new(Passing::new())) };
     let page = folder.path().join("page.html");
     let asked = [words("audit --delta 2 --html"), vec![page.display().to_string(), "arrays".to_owned()]].concat();
     let ours = cli::judge(&asked, Some(&held), &Arc::default()).expect("judged");
@@ -109,7 +109,7 @@ fn motion_that_a_program_holds_is_judged_as_a_recording_of_it() {
 #[test]
 fn what_calls_ends_the_work() {
     let interrupted = Arc::new(AtomicBool::new(true));
-    let held = Held { command: "", open: &|| Ok(Box::new(Passing::new())) };
+    let held = Held { command: "", own: None, open: &|| Ok(Box::new(Passing::new())) };
     let refusal = cli::judge(&words("audit --delta 2 arrays"), Some(&held), &interrupted).expect_err("ended");
     assert_eq!(refusal.message, "interrupted");
     let compared =
