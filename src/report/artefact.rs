@@ -9,6 +9,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Files that this process began to write: a part of their names until they are whole.
+static WRITTEN: AtomicU64 = AtomicU64::new(0);
+
 /// A file could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}")]
@@ -53,7 +56,6 @@ pub fn write_atomically_with<T, E: From<ArtefactError>>(
     let mut temporary = OsString::from(".");
     temporary.push(target.file_name().ok_or_else(no_name)?);
     // Two processes, or threads, may write the same file; the later one wins, whole.
-    static WRITTEN: AtomicU64 = AtomicU64::new(0);
     let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
     temporary.push(format!(".{}.{number}.partial", std::process::id()));
     let temporary = target.with_file_name(temporary);
