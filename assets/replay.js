@@ -4,14 +4,14 @@
 (() => {
 /** @typedef {{kind: string, who: number[], thing: number | null, from_s: number, to_s: number, at_s: number, said: string}} Moment */
 /** @typedef {{name: string, radius_m: number | null, solid: string, rims: string, opacity: number, path: number[][]}} Thing */
-/** @typedef {{vehicles: string[], radius_m: (number | null)[], shell_m: number[] | null, times_s: string, middle_m: number[], origin_m: number[],
-    half_m: number[], cell_m: number, points: number, starts: string, steps: string, near_s: string, near_m: string, near_who: string, unit: string,
-    status: string, whole: boolean, moments: Moment[], things: Thing[], ground: string, square_m: number, links: string, tension: boolean,
+/** @typedef {{vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: string, middle_m: number[], origin_m: number[], look_m: number[],
+    half_m: number[], cell_m: number, points: number, starts: string, steps: string, breaks: string, near_s: string, near_who: string, holds: boolean,
+    nearest: [number, string][], verdicts: [number, boolean, string][], decimals: number, moments: Moment[], things: Thing[], ground: string, square_m: number, links: string, tension: boolean,
     delta_m: number, formations: {from_s: number, slots: string}[], axis_m: number, axes: number | null, reference: number | null}} Data */
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
 /** @typedef {{made: WebGLProgram, at: Object<string, WebGLUniformLocation>}} Program */
 
-const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, NAMED = 64, UNKNOWN_M = 0.1, SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
+const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, NAMED = 64, SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
 const WHOLE = new Set(["path", "paint", "row", "next", "points", "kind", "stride", "newest", "axis", "mark"]);
 const LIGHT = { paper: 0xeceff3, ink: 0x1b222b, grid: 0xcbd2da, shell: 0x5c7fa3, thing: 0x8a6d3b, alarm: 0xd40014,
   push: 0xd96b00, rest: 0xa6aeb7, pull: 0x125fc4, vehicles: [0x0072b2, 0xd55e00, 0x00936c, 0xb85f95, 0x9a7600, 0x7d858e] };
@@ -32,8 +32,8 @@ const upTo = (sorted, value) => {
   }
   return low;
 };
-/** A distance with three decimals, rounded down. @param {number} metres */
-const atLeast = metres => (Number(metres.toFixed(3)) > metres ? metres - 0.0005 : metres).toFixed(3);
+/** The last that begins no later than a time. @template {[number, ...any]} T @param {T[]} list @param {number} t @returns {T | undefined} */
+const under = (list, t) => list[upTo(list.map(one => one[0]), t) - 1];
 /** @param {string} tag @param {Object<string, string>} attributes @param {(Node | string)[]} inside @returns {any} */
 const make = (tag, attributes, ...inside) => {
   const element = document.createElement(tag);
@@ -52,31 +52,30 @@ const shader = name => {
 /** Draws a flight and lets it be steered. @param {HTMLElement} root @param {Data} data */
 const play = (root, data) => {
   const count = data.vehicles.length, half = data.half_m, reach = Math.hypot(...half);
-  const radius = data.radius_m.map(metres => metres ?? UNKNOWN_M), moments = data.moments.sort((a, b) => a.at_s - b.at_s);
-  const times = new Float64Array(bytes(data.times_s)), nearS = new Float64Array(bytes(data.near_s)), nearM = new Float64Array(bytes(data.near_m)), nearWho = new Uint16Array(bytes(data.near_who));
+  const { radius_m: radius, moments } = data, least_m = Math.min(...radius);
+  const times = new Float64Array(bytes(data.times_s)), nearS = new Float64Array(bytes(data.near_s)), nearWho = new Uint16Array(bytes(data.near_who));
   const first = times[0], last = times[times.length - 1];
-  /** The closest of all up to each. @type {number[]} */
-  const least = [];
-  nearM.forEach((metres, k) => least.push(k > 0 && nearM[least[k - 1]] <= metres ? least[k - 1] : k));
-  // Four numbers a point and instant, the last 1 where it is there; the time has a column of its own.
+  // Four numbers a point and instant, the last 0 where it is not there, another after each break; the time has a column of its own.
   const wide = data.points + 1, path = new Float32Array(times.length * wide * 4);
   {
-    const cells = Array.from(new Int32Array(bytes(data.starts))), steps = new Int16Array(bytes(data.steps));
-    for (let row = 0, step = 0, to = 0; row < times.length; row++) {
+    const cells = Array.from(new Int32Array(bytes(data.starts))), steps = new Int16Array(bytes(data.steps)), breaks = new Uint16Array(bytes(data.breaks));
+    const stay = new Float32Array(data.points).fill(1);
+    for (let row = 0, step = 0, to = 0, broken = 0; row < times.length; row++) {
       for (let k = 0; k < data.points; k++, step += 3, to += 4) {
-        const there = steps[step] !== ABSENT;
+        const there = steps[step] !== ABSENT, breaking = breaks[broken] === row && breaks[broken + 1] === k;
+        if (breaking) broken += 2; if (breaking || !there) stay[k]++;
         for (let axis = 0; axis < 3; axis++) {
           if (there) cells[3 * k + axis] += steps[step + axis];
           path[to + axis] = cells[3 * k + axis] * data.cell_m + (data.middle_m[axis] - data.origin_m[axis]);
         }
-        path[to + 3] = there ? 1 : 0;
+        path[to + 3] = there ? stay[k] : 0;
       }
       path[to] = times[row] - first; to += 4;
     }
   }
 
   // What is seen and touched.
-  const canvas = /** @type {HTMLCanvasElement} */ (make("canvas", { class: "replay-view", tabindex: "0", role: "img", "aria-label": "The flight in space. W, A, S and D turn it, Page Up and Page Down approach, Space plays, arrows step, C goes to the closest approach, V to the next violation, F shows everything." }));
+  const canvas = /** @type {HTMLCanvasElement} */ (make("canvas", { class: "replay-view", tabindex: "0", role: "img", "aria-label": "The flight in space. W, A, S and D turn it, Page Up and Page Down approach, Space plays, arrows step." }));
   const gl = /** @type {WebGL2RenderingContext} */ (canvas.getContext("webgl2", { alpha: false, antialias: true }));
   if (!gl) throw new Error("This browser does not draw WebGL 2: there is no replay. Pictures and figures are below.");
   const names = /** @type {HTMLCanvasElement} */ (make("canvas", { class: "replay-names", "aria-hidden": "true" }));
@@ -88,13 +87,11 @@ const play = (root, data) => {
   scrub.oninput = () => go(Number(scrub.value));
   const speeds = make("select", { "aria-label": "Speed" }, ...SPEEDS.map(x => make("option", { value: `${x}` }, "× " + x)));
   speeds.value = String(SPEEDS.find(x => (last - first) / x <= 30) ?? 64);
-  const has = (/** @type {string} */ kind) => moments.some(moment => moment.kind === kind);
-  const jumps = [button("Show all", "F", () => { home(); ask(); })];
-  if (has("undecided")) jumps.unshift(button("Next undecided", "U", () => jump("undecided", 1)));
-  if (has("violation")) jumps.unshift(button("Previous violation", "Shift+V", () => jump("violation", -1)), button("Next violation", "V", () => jump("violation", 1)));
-  if (has("closest")) jumps.unshift(button("Closest approach", "C", () => jump("closest", 1)));
+  const jumps = /** @type {[string, string, string, number][]} */ ([["Closest approach", "C", "closest", 1], ["Previous violation", "Shift+V", "violation", -1], ["Next violation", "V", "violation", 1], ["Next undecided", "U", "undecided", 1]])
+    .filter(([,, kind]) => moments.some(moment => moment.kind === kind)).map(([text, keys, kind, way]) => button(text, keys, () => jump(kind, way)));
+  jumps.push(button("Show all", "F", () => { home(); ask(); }));
   /** @type {Object<string, boolean>} */
-  const shows = { shells: !!data.shell_m, links: !!data.links, trails: true, slots: data.axes !== null, names: true };
+  const shows = { shells: !!data.shell_m, links: !!data.links, trails: !data.holds, slots: data.axes !== null, names: true };
   const layers = Object.keys(shows).filter(name => shows[name]).map(name => {
     const box = make("input", { type: "checkbox", checked: "" });
     box.onchange = () => { shows[name] = box.checked; ask(); };
@@ -113,24 +110,29 @@ const play = (root, data) => {
   const tell = (/** @type {Moment | null} */ moment) => { saying = moment; write(said, moment?.said ?? ""); };
   const ask = () => { if (!queued && !gone) queued = requestAnimationFrame(frame); };
   const toggle = () => {
-    playing = !playing;
-    if (playing && t >= last) t = first;
+    playing = !playing; if (playing && t >= last) t = first;
     write(start, playing ? "Pause" : "Play"); before = frames = passed = spent = 0; tell(null); ask();
   };
-  const go = (/** @type {number} */ to) => {
-    if (playing) toggle(); t = clamp(to, first, last); tell(null); ask();
-  };
+  const go = (/** @type {number} */ to) => { if (playing) toggle(); t = clamp(to, first, last); tell(null); ask(); };
   /** To the next moment of a kind, or the one before; round and round. @param {string} kind @param {number} way */
   const jump = (kind, way) => {
     const all = moments.filter(moment => moment.kind === kind), at = saying ? all.indexOf(saying) : -1, here = upTo(all.map(moment => moment.at_s), t);
     if (!all.length) return;
     const next = at >= 0 ? at + way : way > 0 ? here : here - 1, moment = all[(next + all.length) % all.length];
     go(moment.at_s); tell(moment);
+    // Who it is comes into view.
+    seek();
+    const [a, b = a] = moment.who.map(place).filter(at => at[3]);
+    if (!a) return;
+    target = [0, 1, 2].map(axis => (a[axis] + b[axis]) / 2);
+    distance = Math.min(distance, 40 * (Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) + least_m));
   };
   const frame = (/** @type {number} */ now) => {
     queued = 0; if (gone) return;
     if (playing) {
-      if (before) { passed += now - before; frames++; t += (now - before) / 1000 * Number(speeds.value); }
+      if (before) { passed += now - before; frames++; t += Math.min((now - before) / 1000, 0.1) * Number(speeds.value); }
+      // A page that was hidden goes on from where it was.
+      if (now - before > 1000) passed = frames = spent = 0;
       before = now;
       if (passed > 500) {
         [root.dataset.fps, root.dataset.scriptMs] = [(1000 * frames / passed).toFixed(0), (spent / frames).toFixed(2)];
@@ -145,10 +147,10 @@ const play = (root, data) => {
   };
 
   // The camera: turned around a place.
-  let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0];
+  let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0], kept = { yaw, pitch, distance, target };
   /** From where all of the flight is seen, its longer side across and a level one from above. */
   const home = () => {
-    [yaw, pitch, target, distance] = [half[0] < half[1] ? -0.35 : -1.22, half[2] < 0.3 * Math.max(half[0], half[1]) ? 0.8 : 0.45, [0, 0, 0], 0];
+    [yaw, pitch, target, distance] = [half[0] < half[1] ? -0.35 : -1.22, half[2] < 0.3 * Math.max(half[0], half[1]) ? 0.8 : 0.45, data.look_m, 0];
     const { right, up, back } = axes(), across = canvas.clientWidth / canvas.clientHeight || 1;
     for (let k = 0; k < 8; k++) {
       const [x, y, z] = [right, up, back].map(axis => axis.reduce((sum, part, at) => sum + part * half[at] * (k >> at & 1 ? 1 : -1), 0));
@@ -160,11 +162,10 @@ const play = (root, data) => {
     return { right: [-sy, cy, 0], up: [-sp * cy, -sp * sy, cp], back, eye: back.map((x, k) => target[k] + x * distance) };
   };
   const turn = (/** @type {number} */ by, /** @type {number} */ lift) => { yaw += by; pitch = clamp(pitch + lift, -1.55, 1.55); ask(); };
-  const zoom = (/** @type {number} */ by) => { distance = clamp(distance * by, reach * 0.01, reach * 20); ask(); };
+  const zoom = (/** @type {number} */ by) => { distance = clamp(distance * by, Math.min(reach * 0.01, 4 * least_m), reach * 20); ask(); };
   const pan = (/** @type {number} */ dx, /** @type {number} */ dy) => {
     const { right, up } = axes(), metres = 2 * TANGENT * distance / canvas.clientHeight;
-    target = target.map((x, k) => x - (right[k] * dx - up[k] * dy) * metres);
-    ask();
+    target = target.map((x, k) => x - (right[k] * dx - up[k] * dy) * metres); ask();
   };
   /** @type {Map<number, number[]>} */
   const fingers = new Map();
@@ -173,8 +174,8 @@ const play = (root, data) => {
     return [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, Math.hypot(a[0] - b[0], a[1] - b[1]) || 1];
   };
   canvas.onpointerdown = event => {
-    fingers.set(event.pointerId, [event.clientX, event.clientY]);
-    canvas.setPointerCapture(event.pointerId);
+    if (!fingers.size) kept = { yaw, pitch, distance, target };
+    fingers.set(event.pointerId, [event.clientX, event.clientY]); canvas.setPointerCapture(event.pointerId);
   };
   canvas.onpointermove = event => {
     const from = fingers.get(event.pointerId), old = fingers.size === 2 ? grip() : null;
@@ -185,7 +186,9 @@ const play = (root, data) => {
       const now = grip(); zoom(old[2] / now[2]); pan(now[0] - old[0], now[1] - old[1]);
     } else if (event.buttons & 2 || event.shiftKey) pan(dx, dy); else turn(-dx * by, dy * by);
   };
-  canvas.onpointerup = canvas.onpointercancel = event => fingers.delete(event.pointerId);
+  canvas.onpointerup = event => fingers.delete(event.pointerId);
+  // A finger that scrolls the page has turned nothing.
+  canvas.onpointercancel = event => { fingers.delete(event.pointerId); ({ yaw, pitch, distance, target } = kept); ask(); };
   canvas.oncontextmenu = event => event.preventDefault();
   // A wheel over a picture that nobody has touched scrolls the page.
   canvas.addEventListener("wheel", event => {
@@ -217,7 +220,7 @@ const play = (root, data) => {
     }
     ["from", "to", "pair", "radius"].forEach((name, k) => gl.bindAttribLocation(made, k, name));
     gl.linkProgram(made);
-    if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error("The replay cannot be drawn here. " + (gl.getProgramInfoLog(made) ?? ""));
+    if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error("The replay cannot be drawn here. ");
     /** @type {Object<string, WebGLUniformLocation>} */
     const at = {};
     for (let k = gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS); k-- > 0;) {
@@ -266,10 +269,14 @@ const play = (root, data) => {
     if (of.width !== across || of.height !== high) [of.width, of.height] = [across, high];
     return across && high ? ratio : 0;
   };
+  const seek = () => {
+    row = clamp(upTo(times, t) - 1, 0, times.length - 1); next = Math.min(row + 1, times.length - 1);
+    part = next > row && !data.holds ? clamp((t - times[row]) / (times[next] - times[row]), 0, 1) : 0;
+  };
   /** Where a vehicle is, and whether. @param {number} k */
   const place = k => {
     const [a, b] = [(row * wide + k) * 4, (next * wide + k) * 4];
-    return [0, 1, 2].map(axis => path[a + axis] + (path[b + axis] - path[a + axis]) * part).concat(part > 0 ? path[a + 3] * path[b + 3] : path[a + 3]);
+    return [0, 1, 2].map(axis => path[a + axis] + (path[b + axis] - path[a + axis]) * part).concat(path[a + 3] && (part <= 0 || path[a + 3] === path[b + 3]) ? 1 : 0);
   };
   /** Where an obstacle is. @param {number[][]} way */
   const whereabouts = way => {
@@ -292,8 +299,7 @@ const play = (root, data) => {
   const draw = () => {
     const ratio = fit(canvas); if (!ratio || gone) return;
     const size = [canvas.width, canvas.height], { right, up, back, eye } = axes(), lens = [TANGENT * size[0] / size[1], TANGENT, distance * 0.02, distance + reach * 12];
-    row = clamp(upTo(times, t) - 1, 0, times.length - 1); next = Math.min(row + 1, times.length - 1);
-    part = next > row ? clamp((t - times[row]) / (times[next] - times[row]), 0, 1) : 0;
+    seek();
     const wrong = moments.filter(moment => moment.kind === "violation" && moment.from_s <= t && t <= moment.to_s), who = new Set(wrong.flatMap(moment => moment.who));
     if ([...who].join() !== painted) {
       painted = [...who].join();
@@ -331,21 +337,18 @@ const play = (root, data) => {
     const solids = (/** @type {boolean} */ opaque) => things.forEach((thing, k) => {
       const colour = near.has(k) ? colours.alarm : colours.thing, offset = whereabouts(thing.path);
       if (thing.radius_m !== null && opaque) {
-        use(ball, { fixedAt: [...offset, thing.radius_m], fixedPaint: rgba(colour) });
-        quads(null, 1);
+        use(ball, { fixedAt: [...offset, thing.radius_m], fixedPaint: rgba(colour) }); quads(null, 1);
       } else if (thing.opacity === 1 === opaque) {
         use(solid, { offset, tint: rgba(colour, thing.opacity) });
         gl.bindVertexArray(thing.solid.vao); gl.drawArrays(gl.TRIANGLES, 0, thing.solid.count);
-        use(line, { offset, kind: 0, width: 1.4 * ratio, tint: rgba(colour, Math.min(2 * thing.opacity, 1)) });
-        quads(thing.rims);
+        use(line, { offset, kind: 0, width: 1.4 * ratio, tint: rgba(colour, Math.min(2 * thing.opacity, 1)) }); quads(thing.rims);
       }
     });
 
     gl.depthMask(true); gl.disable(gl.BLEND); gl.enable(gl.SAMPLE_ALPHA_TO_COVERAGE);
     use(ball, { least: 2 * ratio }); quads(bodies); solids(true);
     gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE); gl.enable(gl.BLEND); gl.depthMask(false);
-    use(line, { kind: 0, width: ratio, tint: rgba(colours.grid) });
-    quads(ground);
+    use(line, { kind: 0, width: ratio, tint: rgba(colours.grid) }); quads(ground);
     if (shows.trails) {
       let stride = 1;
       while (row / stride > clamp(Math.floor(TRAIL_PIECES / count), 2, 400)) stride *= 2;
@@ -356,17 +359,15 @@ const play = (root, data) => {
     set({ kind: 1, width: clamp(2.2 - many / 200, 1, 2.2) * ratio, delta: data.tension ? data.delta_m : -1, tint: [0, 0, 0, 0], push: rgba(colours.push), pull: rgba(colours.pull), rest: rgba(colours.rest, clamp(36 / many, 0.08, 0.9)) });
     if (shows.links) quads(links);
     // The two nearest by the judge, and every two that are too near.
-    const k = upTo(nearS, t), nearest = k > 0 && (k >= nearS.length || t - nearS[k - 1] < nearS[k] - t) ? k - 1 : k;
-    const closest = [nearWho[2 * nearest], nearWho[2 * nearest + 1]].filter(vehicle => vehicle < count);
+    const k = 2 * upTo(nearS, t) - 2, closest = [nearWho[k], nearWho[k + 1]].filter(vehicle => vehicle < count);
     for (const [two, colour, width] of /** @type {[number[][], number, number][]} */ ([[[closest], colours.ink, 2.6], [wrong.map(moment => moment.who), colours.alarm, 5]])) {
       set({ tint: rgba(colour), width: width * ratio });
-      refill(pairs, Float32Array.from(two.filter(pair => pair.length === 2).flatMap(pair => [...pair, 0])));
-      quads(pairs);
+      refill(pairs, Float32Array.from(two.filter(pair => pair.length === 2).flatMap(pair => [...pair, 0]))); quads(pairs);
     }
     if (shows.slots && data.axes !== null) {
       // Axes that jump from one instant to the next do not pass between.
       const jumps = [...path.subarray((row * wide + data.axes + 1) * 4, (row * wide + data.axes + 4) * 4)].some((x, at) => Math.abs(x - path[(next * wide + (data.axes ?? 0) + 1) * 4 + at]) > 0.4 * data.axis_m);
-      use(mark, { axis: data.axes, mark: 0, part: jumps ? 0 : part, length_m: data.axis_m, size_m: 1.45 * Math.min(...radius), least: 4 * ratio, stroke: 0.8 * ratio, tint: [0, 0, 0, count < 200 ? 0.85 : 0.45] });
+      use(mark, { axis: data.axes, mark: 0, part: jumps ? 0 : part, length_m: data.axis_m, size_m: 1.45 * least_m, least: 4 * ratio, stroke: 0.8 * ratio, tint: [0, 0, 0, count < 200 ? 0.85 : 0.45] });
       quads(slots);
     }
     if (data.reference !== null) {
@@ -376,12 +377,8 @@ const play = (root, data) => {
     solids(false);
     // Shells of one colour look the same in any order.
     if (data.shell_m) {
-      use(ball, { shell: data.shell_m, fixedPaint: rgba(colours.shell, 0.6) });
-      if (shows.shells) quads(bodies);
-      for (const at of [...who].map(place).filter(at => at[3])) {
-        set({ fixedAt: at, fixedPaint: rgba(colours.alarm, 0.85) });
-        quads(null, 1);
-      }
+      use(ball, { shell: data.shell_m, fixedPaint: rgba(colours.shell, 0.6) }); if (shows.shells) quads(bodies);
+      for (const at of [...who].map(place).filter(at => at[3])) { set({ fixedAt: at, fixedPaint: rgba(colours.alarm, 0.85) }); quads(null, 1); }
     }
     gl.depthMask(true);
 
@@ -398,17 +395,15 @@ const play = (root, data) => {
         pen.strokeText(data.vehicles[vehicle], px, py); pen.fillText(data.vehicles[vehicle], px, py);
       }
     }
-    const begun = (/** @type {string} */ kind) => moments.filter(moment => moment.kind === kind && moment.from_s <= t).length;
-    const bad = begun("violation"), best = least[upTo(nearS, t) - 1], pair = [0, 1].map(side => data.vehicles[nearWho[2 * best + side]]).filter(name => name);
-    const verdict = wrong.length ? "violation" : bad ? `${bad}${data.whole ? "" : " or more"} violation${bad > 1 || !data.whole ? "s" : ""} so far` : data.status === "undecided" || begun("undecided") || !data.whole ? "undecided" : "no violation so far";
-    write(state, `${verdict}${best === undefined ? "" : ` · nearest so far ${atLeast(nearM[best])} ${data.unit}${pair.length === 2 ? ", " + pair.join(" and ") : ""}`} · squares of ${data.square_m} m`);
-    state.classList.toggle("replay-alarm", wrong.length > 0);
-    write(clock, `${t.toFixed(2)} s`);
+    const [, alarm, verdict] = under(data.verdicts, t) ?? [0, false, ""], time = t.toFixed(data.decimals);
+    write(state, [verdict, under(data.nearest, t)?.[1], `squares of ${data.square_m} m`].filter(words => words).join(" · "));
+    state.classList.toggle("replay-alarm", alarm);
+    write(clock, time + " s");
     scrub.value = String(t);
-    scrub.setAttribute("aria-valuetext", `${t.toFixed(2)} of ${last.toFixed(2)} seconds`);
+    scrub.setAttribute("aria-valuetext", `${time} of ${last.toFixed(data.decimals)} seconds`);
     head.style.left = `${100 * (t - first) / (last - first || 1)}%`;
   };
-  canvas.addEventListener("webglcontextlost", () => { gone = true; write(said, "The graphics were lost: load the page again."); });
+  canvas.addEventListener("webglcontextlost", () => { if (!gone) lose(root, "The graphics were lost, and the replay with them."); });
   dark.addEventListener("change", themed);
   const sized = new ResizeObserver(draw);
   sized.observe(stage); home(); themed();
@@ -430,17 +425,23 @@ const open = (/** @type {HTMLElement} */ root) => {
   const old = live;
   live = null; old?.end();
   if (old && old.root !== root) offer(old.root);
-  root.querySelector(".replay-start")?.remove();
+  root.querySelectorAll(".replay-start, .replay-none").forEach(old => old.remove());
   try {
     live = play(root, JSON.parse(root.querySelector("script")?.textContent ?? ""));
     Object.assign(root, { player: live });
   } catch (error) {
-    root.prepend(make("p", { class: "replay-none" }, error instanceof Error ? error.message : String(error)));
+    none(root, error instanceof Error ? error.message : String(error));
   }
   root.dataset.state = live ? "ready" : "none";
 };
+const none = (/** @type {HTMLElement} */ root, /** @type {string} */ why) => root.prepend(make("p", { class: "replay-none" }, why));
+/** The replay that draws ends, and can be begun again. @param {HTMLElement} root @param {string} why */
+const lose = (root, why) => {
+  live?.end(); live = null;
+  offer(root); none(root, why); root.dataset.state = "none";
+};
 const offer = (/** @type {HTMLElement} */ root) => {
-  const start = make("button", { type: "button", class: "replay-start" }, "Replay this flight");
+  const start = make("button", { type: "button", class: "replay-start", "aria-label": "Replay this flight: " + (root.dataset.label ?? "") }, "Replay this flight");
   start.onclick = () => { open(root); root.querySelector("canvas")?.focus(); };
   root.prepend(start);
 };

@@ -9,7 +9,7 @@ vec4 clipped(vec3 p) { float n = lens.z, f = lens.w; return vec4(p.xy / lens.xy,
 uniform sampler2D path, paint; uniform int row, next; uniform float part; uniform int points;
 vec4 place(int k) {
   vec4 a = texelFetch(path, ivec2(k, row), 0), b = texelFetch(path, ivec2(k, next), 0);
-  return vec4(mix(a.xyz, b.xyz, part), part <= 0. ? a.w : a.w * b.w);
+  return vec4(mix(a.xyz, b.xyz, part), part <= 0. || a.w == b.w ? a.w : 0.);
 }
 const vec4 NOWHERE = vec4(2, 2, 2, 1);
 @ BALL VERTEX
@@ -78,7 +78,7 @@ void main() {
     b = piece == 0 ? place(k) : texelFetch(path, ivec2(k, max(old + stride, 0)), 0);
     float age = now - texelFetch(path, ivec2(textureSize(path, 0).x - 1, max(old, 0)), 0).x;
     colour = vec4(texelFetch(paint, ivec2(k, 0), 0).rgb, .16 + .74 * max(0., 1. - age / fading));
-    if (old < 0) a.w = 0.;
+    if (old < 0 || a.w != b.w) a.w = 0.;
   }
   vec3 p = seen(a.xyz), q = seen(b.xyz);
   float n = lens.z;

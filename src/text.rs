@@ -58,6 +58,15 @@ pub(crate) fn metres(number: f64) -> String {
     if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { format!("{number:.3}") } else { format!("{number:.1e}") }
 }
 
+/// Words without what turns the order of letters around, which foreign names may hold: it would turn what follows them.
+pub(crate) fn in_order(words: &str) -> String {
+    const TURNS: [char; 12] = [
+        '\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
+        '\u{2067}', '\u{2068}', '\u{2069}',
+    ];
+    words.replace(TURNS, "\u{fffd}")
+}
+
 /// A time with its unit.
 pub(crate) fn seconds(time_s: f64) -> String {
     format!("{} s", fixed(time_s, 2))

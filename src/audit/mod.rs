@@ -50,6 +50,7 @@ mod polynomial;
 pub mod recorded;
 mod results;
 mod segment;
+mod slices;
 mod sweep;
 
 pub use auditor::Auditor;
@@ -59,4 +60,5 @@ pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{
     Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
 };
+pub use slices::{Slice, Slices};
 pub use sweep::swept_separation_m;

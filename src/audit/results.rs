@@ -81,11 +81,19 @@ pub(super) struct Results {
     pub(super) ledger: Ledger<ObjectPair>,
     pub(super) closest: ClosestPairs,
     pub(super) obstacles: ClosestPairs,
+    /// What the recording itself told of how close two came.
+    pub(super) told: Vec<Approach>,
     /// Segments of pairs that were swept.
     pub(super) swept: u64,
 }
 
 impl Results {
+    /// Enters what the recording itself told.
+    pub(super) fn enter(&mut self, told: Approach) {
+        self.closest.offer(told);
+        self.told.push(told);
+    }
+
     /// The table that an approach belongs to.
     pub(super) fn table(&mut self, pair: ObjectPair) -> &mut ClosestPairs {
         match pair {

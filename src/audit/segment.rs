@@ -106,6 +106,20 @@ impl Segment {
         Self { from_s, to_s, from, to, grounded: Some(false), curve: Some(Arc::new(curve)) }
     }
 
+    /// The part of it within an interval that it meets; a curve is left whole.
+    pub(super) fn within(&self, over: Interval) -> Self {
+        let (from_s, to_s) = (self.from_s.max(over.from_s), self.to_s.min(over.to_s));
+        if self.curve.is_some() || self.to_s <= self.from_s || (from_s, to_s) == (self.from_s, self.to_s) {
+            return self.clone();
+        }
+        let at = |time_s: f64| match time_s {
+            _ if time_s == self.from_s => self.from,
+            _ if time_s == self.to_s => self.to,
+            _ => self.position(time_s),
+        };
+        Self { from_s, to_s, from: at(from_s), to: at(to_s), grounded: self.grounded, curve: None }
+    }
+
     /// Whether the vehicle is at two places at one instant.
     pub(super) fn jumps(&self) -> bool {
         self.to_s <= self.from_s && self.from != self.to

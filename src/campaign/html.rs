@@ -132,7 +132,7 @@ impl Summary {
                 section("Repeat it", &[page::command(page.command), page::command(page.spec)]),
             ],
         }
-        .render_with_replays()
+        .render()
     }
 
     fn shares_table(&self) -> Markup {

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::open::Open;
+use crate::audit::Slice;
 use crate::audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
 use crate::figures::{self, Encounter, Figure};
 use crate::report::recorded::interval;
@@ -37,13 +38,22 @@ pub(super) fn figures(
     if let Some(nearest) = pairs.first() {
         drawn.push(figures::encounters(&pairs, "encounters", "Distances of the closest pairs"));
         drawn.push(figures::closest_approach(nearest, "Closest approach from above"));
-        let smallest = outcome.smallest.iter().map(|found| found.map(|found| (found.time_s, found.certain_m())));
-        drawn.push(figures::smallest(&smallest.collect::<Vec<_>>(), nearest, "Smallest distance of all"));
+        drawn.push(figures::smallest(&over_time(&outcome.smallest), nearest, "Smallest distance of all"));
     }
     if !obstacles.is_empty() {
         drawn.push(figures::encounters(&obstacles, "obstacles", "Distances from the closest obstacles"));
     }
     Ok(drawn)
+}
+
+/// When the closest of all was how near, and none where nothing is known of a time in between.
+fn over_time(slices: &[Slice]) -> Vec<Option<(f64, f64)>> {
+    let ends = std::iter::once(None).chain(slices.iter().map(|slice| Some(slice.to_s)));
+    let points = slices.iter().zip(ends).flat_map(|(slice, end_s)| {
+        let gap = end_s.is_some_and(|end_s| end_s < slice.from_s).then_some(None);
+        gap.into_iter().chain([Some((slice.closest.time_s, slice.closest.certain_m()))])
+    });
+    points.collect()
 }
 
 /// What a figure shows of two who came close.

@@ -5,25 +5,24 @@ use std::collections::BTreeMap;
 use super::Failure;
 use super::encounters;
 use super::open::Open;
-use crate::audit::recorded::{Gap, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
+use crate::audit::Slices;
+use crate::audit::recorded::{Motion, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
 use crate::figures::Figure;
-use crate::replay::{Film, MOST_INSTANTS, Nearest, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
+use crate::replay::{Film, Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
 use crate::report::recorded::RecordedReport;
-use crate::swarm::ClosestApproach;
 use crate::track::Item;
 
 /// Most times of a recording that are kept while it is judged.
 const MOST_TIMES: usize = 1 << 20;
 /// Instants a second at which known curves are drawn \[Hz\].
 const CURVE_HZ: f64 = 30.0;
-/// Most gaps whose ends are shown to the instant.
-const MOST_GAPS: usize = 200;
 
 /// When a recording says something, as it is read.
 #[derive(Default)]
 pub(super) struct Instants {
     times_s: Vec<f64>,
-    items: usize,
+    /// Different times.
+    seen: usize,
     has_curves: bool,
 }
 
@@ -34,10 +33,10 @@ impl Instants {
             names.iter().enumerate().filter_map(|(k, name)| Some((k, settings.vehicles.get(name)?.offset_s))).collect();
         for item in items {
             let time_s = item.time_s() + offsets.get(&item.vehicle()).copied().unwrap_or(0.0);
-            self.items += 1;
             self.has_curves |= matches!(item, Item::Piece(_));
             if self.times_s.last() != Some(&time_s) {
                 self.times_s.push(time_s);
+                self.seen += 1;
             }
             if self.times_s.len() > MOST_TIMES {
                 let mut k = 0_usize;
@@ -76,23 +75,12 @@ pub(super) fn of_recording(
     instants: Instants,
 ) -> Result<(Result<Replay, NoReplay>, Vec<Figure>), Failure> {
     let moments = report.moments();
-    let gaps = outcome.gaps.iter().take(MOST_GAPS).map(|gap: &Gap| {
-        let at_s = f64::midpoint(gap.from_s, gap.to_s);
-        Span { from_s: gap.from_s, to_s: gap.to_s, at_s }
-    });
-    let spans: Vec<_> = moments.iter().map(|moment| moment.span).chain(gaps).collect();
-    let samples = instants.items;
+    let spans: Vec<_> = moments.iter().filter(|of| of.kind != Kind::Unseen).map(|moment| moment.span).collect();
+    let seen = instants.seen;
     let mut places = Places::new(settings, outcome, instants.shown(outcome, &spans));
     let figures = encounters::figures(open, settings, outcome, &mut places)?;
-    let mut near = Nearest::default();
-    for found in &outcome.smallest {
-        match found.and_then(|found| Some((found.pair.vehicles()?, found))) {
-            Some((pair, of)) => {
-                near.take(ClosestApproach { pair, separation_m: of.certain_m(), time_s: of.time_s });
-            }
-            None => near.break_off(),
-        }
-    }
+    let mut near = Slices::default();
+    outcome.smallest.iter().for_each(|slice| near.take(*slice));
     let half = |delta_m: f64| [0.5 * delta_m; 3];
     let ellipsoid =
         settings.ellipsoid_m.map(|axes_m| (axes_m * (0.5 * settings.delta_m.unwrap_or(TOUCHING_ELLIPSOIDS))).into());
@@ -103,7 +91,9 @@ pub(super) fn of_recording(
         plan: None,
         obstacles: settings.obstacles.clone(),
     };
+    let gaps = places.gaps().iter().map(|gap| (gap.vehicle, [gap.from_s, gap.to_s])).collect();
     let (times_s, positions_m) = places.finish();
-    let film = Film::of(times_s, positions_m, near, samples).keeping(spans);
+    let holds = settings.motion == Some(Motion::Hold);
+    let film = Film::of(times_s, positions_m, near, seen).with_gaps(gaps).holding(holds);
     Ok((Replay::new(&stage, &film, &moments, report.judgement(), PAGE_BYTES), figures))
 }

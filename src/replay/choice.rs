@@ -1,6 +1,7 @@
 //! Which instants of a flight are kept.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// Most instants of a replay: a texture of every graphics card has so many rows.
 pub const MOST_INSTANTS: usize = 2000;
@@ -22,8 +23,9 @@ pub struct Span {
 
 /// Indices of at most `most` (at least 2) instants, given in order of time \[s\], in ascending order.
 ///
-/// Kept are the first and the last; two on either side of the worst time of each span; all within spans and two on either
-/// side, one span after the other as long as they take no more than three quarters; and every k-th of all.
+/// Kept are the first and the last; those at or on either side of the worst time of each span; two on either side of it; all
+/// within spans and two on either side, one span after the other as long as they take no more than three quarters; and every
+/// k-th of all.
 #[must_use]
 pub fn chosen(times_s: &[f64], spans: &[Span], most: usize) -> Vec<usize> {
     let (count, most) = (times_s.len(), most.max(2));
@@ -43,20 +45,28 @@ pub fn chosen(times_s: &[f64], spans: &[Span], most: usize) -> Vec<usize> {
 pub(super) fn around(times_s: &[f64], spans: &[Span], room: usize) -> BTreeSet<usize> {
     let count = times_s.len();
     let mut kept: BTreeSet<_> = count.checked_sub(1).into_iter().flat_map(|last| [0, last]).collect();
-    let beside = |from_s: f64, to_s: f64| {
-        let first = times_s.partition_point(|&time_s| time_s < from_s).saturating_sub(BESIDE);
-        let end = times_s.partition_point(|&time_s| time_s <= to_s) + BESIDE;
-        first..end.min(count)
+    let within = |from_s: f64, to_s: f64, beside: usize| {
+        let first = times_s.partition_point(|&time_s| time_s < from_s);
+        let end = times_s.partition_point(|&time_s| time_s <= to_s);
+        first.saturating_sub(beside)..(end + beside).min(count)
     };
-    let worst = spans.iter().map(|span| beside(span.at_s, span.at_s));
-    let whole = spans.iter().map(|span| beside(span.from_s, span.to_s));
-    for instants in worst.chain(whole) {
+    let at = spans.iter().map(|span| around_worst(times_s, span));
+    let beside = spans.iter().map(|span| within(span.at_s, span.at_s, BESIDE));
+    let whole = spans.iter().map(|span| within(span.from_s, span.to_s, BESIDE));
+    for instants in at.chain(beside).chain(whole) {
         let more = instants.clone().filter(|k| !kept.contains(k)).count();
         if kept.len() + more <= room {
             kept.extend(instants);
         }
     }
     kept
+}
+
+/// The instant at which a span is at its worst, or those on either side of it.
+pub(super) fn around_worst(times_s: &[f64], span: &Span) -> Range<usize> {
+    let first = times_s.partition_point(|&time_s| time_s < span.at_s);
+    let end = times_s.partition_point(|&time_s| time_s <= span.at_s);
+    if first < end { first..end } else { first.saturating_sub(1)..(end + 1).min(times_s.len()) }
 }
 
 #[cfg(test)]
@@ -85,6 +95,16 @@ mod tests {
             let widest = kept.windows(2).map(|two| two[1] - two[0]).max().unwrap_or(1);
             prop_assert!(widest <= 1 + count.div_ceil((most / 4).max(1)));
         }
+    }
+
+    #[test]
+    fn the_worst_time_of_each_comes_before_the_neighbours_of_any() {
+        let times: Vec<f64> = (0..10_000).map(f64::from).collect();
+        let at = |k: u32| f64::from(60 * k) + f64::from(k % 2) * 0.5;
+        let spans: Vec<_> = (0..150).map(|k| span(at(k) - 20.0, at(k) + 20.0)).collect();
+        let kept = chosen(&times, &spans, 320);
+        let missing = spans.iter().filter(|span| around_worst(&times, span).any(|k| !kept.contains(&k))).count();
+        assert_eq!(missing, 0, "one or two for each of 150 fit into three quarters of 320");
     }
 
     #[test]

@@ -9,8 +9,6 @@ use crate::swarm::row;
 
 /// Least half of an edge \[m\].
 const LEAST_M: f64 = 1e-6;
-/// Radius of a vehicle of which nothing is known \[m\].
-pub(super) const UNKNOWN_RADIUS_M: f64 = 0.1;
 
 /// A box around a flight, with the shells and with the obstacles that are not far larger than it.
 #[derive(Clone, Copy, Debug)]
@@ -30,8 +28,7 @@ impl Extent {
         if low.x > high.x {
             (low, high) = (Vector3::zeros(), Vector3::zeros());
         }
-        let radii =
-            shown.iter().map(|&vehicle| stage.radius_m.get(vehicle).copied().flatten().unwrap_or(UNKNOWN_RADIUS_M));
+        let radii = shown.iter().map(|&vehicle| stage.drawn_radius_m(vehicle));
         let around_m = radii.chain(stage.shell_m.into_iter().flatten()).fold(LEAST_M, f64::max);
         (low, high) = (low.add_scalar(-around_m), high.add_scalar(around_m));
         let (size_m, middle) = ((high - low).norm(), 0.5 * (low + high));

@@ -1,8 +1,7 @@
 //! Motion as it is taken, in bounded memory.
 
 use super::choice::{Span, around};
-use super::nearest::Nearest;
-use crate::audit::recorded::ObjectPair;
+use crate::audit::{Approach, ObjectPair, Slice, Slices};
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::swarm::{ClosestApproach, Rows};
 
@@ -23,16 +22,20 @@ pub struct Film {
     pub(super) times_s: Vec<f64>,
     /// N x 3 each \[m\]; NaN for a vehicle that is not there.
     pub(super) positions_m: Vec<Rows>,
-    pub(super) nearest: Nearest,
+    pub(super) nearest: Slices,
+    /// When the last instant was taken \[s\].
+    taken_s: Option<f64>,
+    /// Vehicles that were not there from one time \[s\] to another.
+    pub(super) gaps: Vec<(usize, [f64; 2])>,
+    /// Whether vehicles rest between two instants, and do not move straight.
+    pub(super) holds: bool,
     /// What changes the target, and legs and slots with it.
     pub(super) events: Vec<Event>,
     /// Samples taken.
     pub(super) samples: usize,
     /// The number of each instant that is kept, from 0, and one in how many stays whatever happened.
-    numbers: Vec<usize>,
+    pub(super) numbers: Vec<usize>,
     every: usize,
-    /// Times whose instants stay, beside those of moments.
-    pub(super) spans: Vec<Span>,
     violations: Vec<(ObjectPair, Span)>,
     budget_bytes: Option<usize>,
 }
@@ -47,15 +50,21 @@ impl Film {
     /// Of instants that are known, `samples` in the recording: N x 3 positions \[m\] at each time \[s\], NaN for a vehicle that
     /// is not there.
     #[must_use]
-    pub fn of(times_s: Vec<f64>, positions_m: Vec<Rows>, nearest: Nearest, samples: usize) -> Self {
+    pub fn of(times_s: Vec<f64>, positions_m: Vec<Rows>, nearest: Slices, samples: usize) -> Self {
         let numbers = (0..times_s.len()).collect();
         Self { times_s, positions_m, nearest, samples, numbers, ..Self::default() }
     }
 
-    /// The same, with times whose instants are not to be thinned out.
+    /// The same, of vehicles that were not there from one time \[s\] to another.
     #[must_use]
-    pub fn keeping(self, spans: Vec<Span>) -> Self {
-        Self { spans, ..self }
+    pub fn with_gaps(self, gaps: Vec<(usize, [f64; 2])>) -> Self {
+        Self { gaps, ..self }
+    }
+
+    /// The same, of vehicles that rest between two instants.
+    #[must_use]
+    pub fn holding(self, holds: bool) -> Self {
+        Self { holds, ..self }
     }
 
     #[cfg(test)]
@@ -72,8 +81,11 @@ impl Film {
         self.samples += 1;
         self.times_s.push(time_s);
         self.positions_m.push(positions_m.clone());
-        if let Some(closest) = closest {
-            self.nearest.take(closest);
+        let from_s = self.taken_s.replace(time_s).unwrap_or(time_s);
+        if let Some(ClosestApproach { pair, separation_m, time_s: at_s }) = closest {
+            let (pair, lower_m, upper_m) = (ObjectPair::Vehicles(pair), separation_m, separation_m);
+            let closest = Approach { pair, lower_m, upper_m, time_s: at_s, limit_m: 0.0 };
+            self.nearest.take(Slice { from_s, to_s: time_s, closest });
         }
         let bytes = positions_m.len() * size_of::<f64>() * self.times_s.len();
         if bytes > self.budget_bytes.unwrap_or(BUDGET_BYTES) && self.times_s.len() > FEWEST {
@@ -101,7 +113,7 @@ impl Film {
         let closest = self.nearest.closest().map(|closest| closest.time_s);
         let closest = closest.map(|at_s| Span { from_s: at_s, to_s: at_s, at_s });
         let spans = closest.into_iter().chain(self.violations.iter().map(|(_, span)| *span));
-        let spans: Vec<_> = spans.chain(self.spans.iter().copied()).collect();
+        let spans: Vec<_> = spans.collect();
         let mut kept = around(&self.times_s, &spans, self.times_s.len() / 4);
         let one_in = self.every.max(1);
         kept.extend((0..self.numbers.len()).filter(|&k| self.numbers[k].is_multiple_of(one_in)));

@@ -7,6 +7,8 @@
 //! Packed positions are for the eye. They are rounded to a grid ([`Replay::rounding_m`]) and thinned; every distance, time and
 //! verdict that is shown is the judge's own. The same flight gives the same bytes.
 
+mod bytes;
+mod cast;
 mod chart;
 mod choice;
 mod data;
@@ -20,17 +22,19 @@ mod nearest;
 mod stage;
 mod targets;
 mod things;
+mod verdict;
 mod words;
 
+pub use cast::MOST_VEHICLES;
 pub use chart::Chart;
 pub use choice::{MOST_INSTANTS, Span, chosen};
-pub use data::{Judged, MOST_VEHICLES, Replay};
+pub use data::{Judged, Replay};
 pub use error::NoReplay;
 pub use film::Film;
 pub use moment::{Kind, Moment};
 pub use motion::Motion;
-pub use nearest::{Nearest, Slice};
 pub use stage::Stage;
+pub use words::{LONGEST_NAME, cut};
 
 /// Room for the replays of a page \[bytes\].
 pub const PAGE_BYTES: usize = 1_000_000;

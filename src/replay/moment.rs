@@ -11,6 +11,8 @@ pub enum Kind {
     Violation,
     /// It cannot be told.
     Undecided,
+    /// A vehicle was not seen, so that it cannot be told.
+    Unseen,
 }
 
 impl Kind {
@@ -19,7 +21,7 @@ impl Kind {
         match self {
             Self::Closest => "closest",
             Self::Violation => "violation",
-            Self::Undecided => "undecided",
+            Self::Undecided | Self::Unseen => "undecided",
         }
     }
 }
@@ -35,6 +37,8 @@ pub struct Moment {
     pub obstacle: Option<usize>,
     /// When it began and ended, and when it was at its worst \[s\].
     pub span: Span,
+    /// It in a few words, while it lasts.
+    pub brief: String,
     /// All of it in a sentence, with distance and time as the judge says them.
     pub said: String,
 }

@@ -20,7 +20,19 @@ pub struct Stage {
     pub obstacles: Vec<Obstacle>,
 }
 
+/// Radius of a vehicle of which nothing is known, at most \[m\].
+const UNKNOWN_RADIUS_M: f64 = 0.1;
+
 impl Stage {
+    /// What a vehicle of unknown radius is drawn with \[m\]: two that keep their distance do not touch.
+    pub(super) fn unknown_radius_m(&self) -> f64 {
+        self.shell_m.into_iter().flatten().fold(UNKNOWN_RADIUS_M, f64::min)
+    }
+
+    pub(super) fn drawn_radius_m(&self, vehicle: usize) -> f64 {
+        self.radius_m.get(vehicle).copied().flatten().unwrap_or_else(|| self.unknown_radius_m())
+    }
+
     /// That of a scenario, with its obstacles as they are judged. What is told in the course of the flight is for
     /// [`Film`](super::Film) to note.
     #[must_use]

@@ -6,12 +6,12 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 use super::*;
-use crate::audit::{Obstacle, Shape, Status};
+use crate::audit::{Approach, ObjectPair, Obstacle, Shape, Slice, Slices};
 use crate::record::{OwnedSample, Sink as _};
 use crate::scenario::{Scenario, Source};
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm, set_row};
 
-const JUDGED: Judged = Judged { status: Status::Clear, limit: Some(1.0), unit: "m" };
+const JUDGED: Judged = Judged { is_else_known: true, limit: Some(1.0), unit: "m" };
 
 fn stage(vehicles: usize) -> Stage {
     Stage {
@@ -38,7 +38,14 @@ fn film(vehicles: usize, samples: usize) -> Film {
 
 fn violation(vehicle: usize, from_s: f64, to_s: f64) -> Moment {
     let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
-    Moment { kind: Kind::Violation, vehicles: vec![vehicle], obstacle: None, span, said: "too near".to_owned() }
+    Moment {
+        kind: Kind::Violation,
+        vehicles: vec![vehicle],
+        obstacle: None,
+        span,
+        brief: "near".to_owned(),
+        said: "too near".to_owned(),
+    }
 }
 
 fn packed(stage: &Stage, film: &Film, moments: &[Moment], room_bytes: usize) -> (Replay, Value) {
@@ -59,10 +66,22 @@ fn a_short_flight_is_there_whole() {
     assert_eq!((replay.instants(), replay.vehicles(), replay.moments()), ([100, 100], [3, 3], [1, 1]));
     let times: Vec<f64> = (0..100).map(|k| 0.1 * f64::from(k)).collect();
     assert_eq!(doubles(&data["times_s"]), times);
-    assert_eq!(doubles(&data["near_m"]), [2.0; 100]);
+    // The first slice is the first instant alone.
+    assert_eq!(doubles(&data["near_s"]), [&[0.0, 0.0][..], &times[1..99]].concat());
+    assert_eq!(data["nearest"], serde_json::json!([[0.0, "nearest so far 2.000 m, 1 and 2"]]));
+    let verdicts = data["verdicts"].as_array().expect("verdicts");
+    let said: Vec<_> = verdicts.iter().map(|told| (&told[1], told[2].as_str().expect("words"))).collect();
+    assert_eq!(
+        said,
+        [
+            (&Value::from(false), "no violation so far"),
+            (&Value::from(true), "violation: near"),
+            (&Value::from(false), "1 violation so far")
+        ]
+    );
+    assert_eq!((replay.inexact(), replay.unknown_radius(), replay.obstacles_off_m()), (0, None, 0.0));
     assert_eq!(data["moments"][0]["who"], serde_json::json!([2]));
     assert!(data["rounding_m"].as_f64() == Some(replay.rounding_m()) && replay.rounding_m() < 1e-5);
-    assert!(data["whole"] == true && data["status"] == "clear");
     assert_eq!(packed(&stage(3), &film(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES).0, replay, "the same bytes");
 }
 
@@ -97,11 +116,11 @@ fn of_a_hundred_thousand_vehicles_those_that_matter_are_drawn() {
 #[test]
 fn one_vehicle_one_sample_and_nobody() {
     let (replay, data) = packed(&stage(1), &film(1, 1), &[], PAGE_BYTES);
-    assert_eq!((replay.instants(), doubles(&data["near_m"]).len()), ([1, 1], 0));
+    assert_eq!((replay.instants(), doubles(&data["near_s"]).len()), ([1, 1], 0));
     assert_eq!(Replay::new(&stage(2), &Film::new(), &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
-    let nowhere = Film::of(vec![0.0], vec![Rows::repeat(2, f64::NAN)], Nearest::default(), 1);
+    let nowhere = Film::of(vec![0.0], vec![Rows::repeat(2, f64::NAN)], Slices::default(), 1);
     assert_eq!(Replay::new(&stage(2), &nowhere, &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
-    let far = Film::of(vec![0.5], vec![Rows::repeat(1, 2e9)], Nearest::default(), 1);
+    let far = Film::of(vec![0.5], vec![Rows::repeat(1, 2e9)], Slices::default(), 1);
     let refused = Replay::new(&stage(1), &far, &[], JUDGED, PAGE_BYTES).expect_err("too far");
     assert_eq!(refused.to_string(), "vehicle 1 is beyond 1e9 m at 0.5 s");
 }
@@ -111,7 +130,7 @@ fn who_is_not_there_for_a_time_is_not_packed() {
     let at = |x: f64| Rows::from_row_slice(&[x, 0.0, 0.0, x, 5.0, 0.0]);
     let mut gone = at(1.0);
     gone.row_mut(1).fill(f64::NAN);
-    let film = Film::of(vec![0.0, 1.0, 2.0], vec![at(0.0), gone, at(2.0)], Nearest::default(), 3);
+    let film = Film::of(vec![0.0, 1.0, 2.0], vec![at(0.0), gone, at(2.0)], Slices::default(), 3);
     let (_, data) = packed(&stage(2), &film, &[], PAGE_BYTES);
     let steps = BASE64.decode(data["steps"].as_str().expect("base64")).expect("base64");
     let along_x: Vec<_> = steps.chunks_exact(6).map(|step| i16::from_le_bytes([step[0], step[1]])).collect();
@@ -198,4 +217,98 @@ fn slots_links_and_reference_of_a_scenario_go_with_the_flight() {
         let slot = point(5) + along(0) + along(1) + along(2);
         assert!((slot - point(vehicle)).norm() < 1e-5, "{vehicle}: {slot} and {}", point(vehicle));
     }
+}
+
+/// Two instants of vehicles on a line, 2 m apart.
+fn two_instants(vehicles: usize) -> Film {
+    let at = |x: f64| Rows::from_fn(vehicles, |i, axis| if axis == 0 { x + 2.0 * i as f64 } else { 0.0 });
+    Film::of(vec![0.0, 10.0], vec![at(0.0), at(1.0)], Slices::default(), 2)
+}
+
+#[test]
+fn who_was_away_between_two_instants_that_are_kept_does_not_fly_across() {
+    let gaps = vec![(1, [3.0, 5.0]), (1, [6.0, 7.0]), (7, [1.0, 2.0]), (2, [4.0, 11.0])];
+    let (_, data) = packed(&stage(3), &two_instants(3).with_gaps(gaps), &[], PAGE_BYTES);
+    let bytes = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64");
+    assert_eq!(bytes, [1, 0, 1, 0], "at instant 1 vehicle 1");
+    assert_eq!(data["holds"], false);
+    // Where there is no room for that, it is not there.
+    let many = (0..200).map(|vehicle| (vehicle, [3.0, 5.0])).collect();
+    let (_, data) = packed(&stage(200), &two_instants(200).with_gaps(many), &[], 15_000);
+    let breaks = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64").len() / 4;
+    let steps = BASE64.decode(data["steps"].as_str().expect("base64")).expect("base64");
+    let absent = steps.chunks_exact(6).filter(|step| step[..2] == i16::MIN.to_le_bytes()).count();
+    assert!(absent > 0 && breaks + absent == data["vehicles"].as_array().map_or(0, Vec::len), "{breaks} and {absent}");
+}
+
+#[test]
+fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
+    let vehicles = 1000;
+    let mut film = Film::new();
+    for k in 0..600_u32 {
+        let at = Rows::from_fn(vehicles, |i, axis| if axis == 0 { f64::from(k) * 0.01 } else { 3.0 * i as f64 });
+        film.take(f64::from(k), &at, None);
+    }
+    let moments: Vec<_> = (0..150).map(|k| violation(k, 4.0 * k as f64 - 3.0, 4.0 * k as f64 + 3.0)).collect();
+    let (replay, data) = packed(&stage(vehicles), &film, &moments, PAGE_BYTES);
+    let times = doubles(&data["times_s"]);
+    let missing = moments.iter().filter(|of| !times.contains(&of.span.at_s.max(0.0))).count();
+    assert_eq!((missing, replay.inexact()), (0, 0), "{:?} and {:?}", replay.instants(), replay.vehicles());
+    // Those that are not listed have theirs as long as there is room, and where there is none it is said.
+    let at = |k: u32| 0.2 * f64::from(k);
+    let moments: Vec<_> = (0..300).map(|k| violation(0, at(k), at(k))).collect();
+    let longer = self::film(2, 4000);
+    let (replay, _) = packed(&stage(2), &longer, &moments, PAGE_BYTES);
+    assert_eq!((replay.moments(), replay.inexact()), ([200, 300], 0), "{:?}", replay.instants());
+    let (replay, _) = packed(&stage(2), &longer, &moments, 36_000);
+    assert!(replay.inexact() > 0, "{:?}", replay.instants());
+}
+
+#[test]
+fn of_those_that_were_not_asked_for_nobody_is_drawn() {
+    let mut at = Rows::repeat(5000, f64::NAN);
+    [7, 4321].into_iter().for_each(|k| set_row(&mut at, k, Vector3::zeros()));
+    let film = Film::of(vec![0.0, 1.0], vec![at.clone(), at], Slices::default(), 2);
+    let (replay, data) = packed(&stage(5000), &film, &[], PAGE_BYTES);
+    assert_eq!((replay.vehicles(), &data["vehicles"]), ([2, 2], &serde_json::json!(["8", "4322"])));
+}
+
+#[test]
+fn far_from_others_drawing_is_precise_where_the_weightiest_finding_is() {
+    let at = |x: f64| Rows::from_row_slice(&[5e5 + x, 4e6, 0.0, 5e5, 4e6, 0.0, 0.0, 0.0, 0.0]);
+    let film = Film::of(vec![0.0, 1.0], vec![at(1.0), at(0.35)], Slices::default(), 2);
+    let (replay, data) = packed(&stage(3), &film, &[violation(0, 1.0, 1.0)], PAGE_BYTES);
+    let numbers = |key: &str| serde_json::from_value::<Vec<f64>>(data[key].clone()).expect("numbers");
+    assert_eq!(numbers("origin_m"), [5e5 + 0.35, 4e6, 0.0]);
+    assert!(replay.rounding_m() > 0.2, "what is far away is rounded to single precision: {}", replay.rounding_m());
+    assert!(packed(&stage(2), &two_instants(2), &[], PAGE_BYTES).0.rounding_m() < 1e-3);
+}
+
+#[test]
+fn a_size_that_nobody_knows_is_made_up_so_that_nobody_touches_and_it_is_said() {
+    let unknown = |half_m: f64| Stage { radius_m: vec![None, Some(0.3)], shell_m: Some([half_m; 3]), ..stage(2) };
+    for (half_m, drawn_m) in [(0.025, 0.025), (1.0, 0.1)] {
+        let (replay, data) = packed(&unknown(half_m), &two_instants(2), &[], PAGE_BYTES);
+        assert_eq!(data["radius_m"], serde_json::json!([drawn_m, 0.3]));
+        assert_eq!(replay.unknown_radius(), Some((1, drawn_m)));
+    }
+}
+
+#[test]
+fn findings_lie_within_the_flight_and_the_nearest_stops_at_a_gap() {
+    let pair = ObjectPair::Vehicles(Pair::new(0, 1));
+    let slice = |from_s: f64, to_s: f64| {
+        let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };
+        Slice { from_s, to_s, closest }
+    };
+    let mut near = Slices::default();
+    [slice(0.0, 3.0), slice(5.0, 10.0)].into_iter().for_each(|slice| near.take(slice));
+    let mut film = two_instants(2);
+    film.nearest = near;
+    let (_, data) = packed(&stage(2), &film, &[violation(0, -5.0, 50.0)], PAGE_BYTES);
+    let moment = &data["moments"][0];
+    assert_eq!((&moment["from_s"], &moment["to_s"]), (&Value::from(0.0), &Value::from(10.0)));
+    assert_eq!(doubles(&data["near_s"]), [0.0, 3.0_f64.next_up(), 5.0]);
+    let who = BASE64.decode(data["near_who"].as_str().expect("base64")).expect("base64");
+    assert_eq!(who, [0, 0, 1, 0, 255, 255, 255, 255, 0, 0, 1, 0]);
 }

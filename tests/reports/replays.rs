@@ -90,10 +90,16 @@ fn a_replay_draws_and_jumps_to_what_the_judge_found() {
     let said = text(&found["closest"]["said"]);
     assert!(said.contains(&least) && said.ends_with(&format!("vehicles 4-5 at {at}")), "{said}: {least}");
     assert_eq!(found["closest"]["clock"], at.as_str());
-    assert!(text(&found["closest"]["state"]).starts_with("violation · nearest so far 1.532 m, 4 and 5"), "{found}");
+    assert!(
+        text(&found["closest"]["state"]).starts_with("violation: 4-5 come to 1.533 m (limit 2.000) · nearest so far"),
+        "{found}"
+    );
     assert!(found["reds"].as_u64() > Some(20), "who is too near is red: {found}");
     assert!(text(&found["violation"]["said"]).starts_with("Violation: vehicles 4-5 came to 1.533 m (δ 2.000) at"));
-    assert!(text(&found["end"]["state"]).starts_with("1 violation so far"), "{found}");
+    assert!(
+        text(&found["end"]["state"]).starts_with("1 violation so far · nearest so far 1.532 m, 4 and 5 · "),
+        "{found}"
+    );
     assert_eq!((text(&found["end"]["clock"]), text(&found["end"]["said"])), ("10.00 s", ""));
     assert_eq!(found["steps"], "0.03 s", "two samples of 60 a second");
 }
@@ -235,5 +241,110 @@ fn names_are_text_and_vehicles_that_are_not_there_are_not_drawn() {
     assert!(said.is_empty(), "{said:?}");
     assert_eq!(found["there"], serde_json::json!([[1, 1], [1, 0], [1, 0], [1, 1]]), "{found}");
     assert_eq!((&found["images"], &found["ran"]), (&Value::from(0), &Value::from(0)));
-    assert!(text(&found["state"]).starts_with("undecided · nearest so far 5.000 m, <img src=x"), "{found}");
+    assert!(
+        text(&found["state"]).starts_with("undecided so far · nearest known so far 5.000 m, <img src=x"),
+        "{found}"
+    );
+}
+
+/// Steers an audit's page to some times, and gives what it says at each.
+fn states(folder: &Path, page: &Path, times_s: &[f64]) -> Vec<String> {
+    let script = format!(
+        "const scrub = doc.querySelector('input[type=range]');
+         return {times_s:?}.map(t => {{ scrub.value = t; scrub.oninput(); root.player.draw(); return doc.querySelector('.replay-state').textContent; }});"
+    );
+    let (found, said) = steer(folder, page, DESKTOP, &script);
+    assert!(said.is_empty(), "{said:?}");
+    let squares = |state: &Value| text(state).rsplit_once(" · squares").map(|(state, _)| state.to_owned());
+    found.as_array().expect("states").iter().map(|state| squares(state).expect("squares at the end")).collect()
+}
+
+fn audited(folder: &Path, table: &str, more: &[&str]) -> PathBuf {
+    fs::write(folder.join("said.csv"), table).expect("written");
+    left(folder, &[&["audit", "said.csv", "--quiet", "--html", "said.html"], more].concat(), "said.html")
+}
+
+#[test]
+fn at_no_time_is_more_said_than_the_judge_knows_by_then() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut gap, mut leap) = ("t,id,x,y,z\n".to_owned(), "t,id,x,y,z\n".to_owned());
+    for t in 0..=20_i32 {
+        let _ = writeln!(gap, "{t},a,0,0,0\n{t},c,{},0,0", f64::from((t - 14).abs()) + 0.25);
+        let _ = if (4..8).contains(&t) { Ok(()) } else { writeln!(gap, "{t},b,0,50,0") };
+        let _ = writeln!(leap, "{t},a,0,0,0\n{t},b,{},0,0", if t == 20 { 0.25 } else { 20.0 });
+    }
+    let page = audited(folder.path(), &gap, &["--delta", "1"]);
+    let found = states(folder.path(), &page, &[2.0, 5.0, 10.0, 14.0, 20.0]);
+    let expected = [
+        "no violation so far · nearest known so far at most 12.250 m",
+        "undecided: b is not seen · nearest known so far at most 9.250 m",
+        "undecided so far · nearest known so far at most 4.250 m",
+        "violation: a and c come to 0.250 m (limit 1.000) · nearest known so far 0.250 m, a and c",
+        "1 violation so far, not all is known · nearest known so far 0.250 m, a and c",
+    ];
+    assert_eq!(found, expected);
+    let page = audited(folder.path(), &leap, &["--delta", "1"]);
+    let found = states(folder.path(), &page, &[19.0, 19.5, 19.98, 20.0]);
+    let expected = [
+        "no violation so far · nearest so far at most 20.000 m",
+        "no violation so far · nearest so far at most 20.000 m",
+        "violation: a and b come to 0.250 m (limit 1.000) · nearest so far at most 20.000 m",
+        "violation: a and b come to 0.250 m (limit 1.000) · nearest so far 0.250 m, a and b",
+    ];
+    assert_eq!(found, expected);
+    // Between two samples of a bounded acceleration a distance is at least something.
+    let bounds = ["--delta", "1", "--motion", "bounded", "--max-accel", "300"];
+    let found = states(folder.path(), &audited(folder.path(), &leap, &bounds), &[10.5]);
+    assert!(
+        found[0].starts_with("undecided: a and b may come too near · nearest known so far at least 0.000 m"),
+        "{found:?}"
+    );
+    // Of single vehicles alone nothing is said of distances.
+    let found = states(folder.path(), &audited(folder.path(), &leap, &["--limit", "speed=5"]), &[5.0, 19.5]);
+    assert_eq!(found, ["no violation so far", "violation: b: speed 19.750 m/s (limit 5.000 m/s)"]);
+}
+
+/// What a run recorded itself of the time between its samples counts in its audit.
+#[test]
+fn the_nearest_of_an_audited_run_is_that_of_the_verdict() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sets = ["--set", "time.duration_s=10", "--set", "time.record_hz=1", "--set", "arrival.hold_s=2"];
+    flown(folder.path(), &[&["pentagon-laplacian"], &sets[..]].concat());
+    let page = left(folder.path(), &["audit", "run", "--quiet", "--html", "run.html"], "run.html");
+    let found = states(folder.path(), &page, &[10.0]);
+    let (said, verdict) = (&found[0], fs::read_to_string(&page).expect("a page"));
+    assert!(verdict.contains("came to 1.533 m (limit 2.000 m)") || verdict.contains("came to 1.532"), "the verdict");
+    assert!(said.contains("so far 1.532 m, 4 and 5"), "{said}");
+}
+
+#[test]
+fn a_lost_picture_a_hidden_page_and_a_finger_that_scrolls_leave_nothing_wrong() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=9"]);
+    let (found, said) = steer(
+        folder.path(),
+        &page,
+        DESKTOP,
+        "const view = doc.querySelector('.replay-view'), picture = () => { root.player.draw(); return view.toDataURL(); };
+         const point = (name, at) => view.dispatchEvent(new win.PointerEvent('pointer' + name, { pointerId: 1, clientX: at, clientY: at }));
+         view.setPointerCapture = () => {};
+         const still = picture(); point('down', 100); point('move', 160); const turned = picture(); point('cancel', 160);
+         const touch = [still !== turned, still === picture()];
+         view.dispatchEvent(new win.Event('webglcontextlost'));
+         const lost = { state: root.dataset.state, none: doc.querySelector('.replay-none').textContent, panel: doc.querySelectorAll('.replay-panel').length };
+         const start = doc.querySelector('.replay-start'); lost.label = start.getAttribute('aria-label');
+         let next = () => {}; win.requestAnimationFrame = draw => { next = draw; return 1; };
+         start.click();
+         doc.querySelector('.replay-play').click();
+         [1000, 1020, 9020].forEach(now => next(now));
+         const clock = doc.querySelector('.replay-clock').textContent;
+         return { touch, clock, lost, again: root.dataset.state, left: doc.querySelectorAll('.replay-none, .replay-start').length };",
+    );
+    assert!(said.is_empty(), "{said:?}");
+    assert_eq!(found["touch"], serde_json::json!([true, true]), "{found}");
+    assert_eq!(found["clock"], "0.06 s", "at half speed; eight hidden seconds are a tenth of one");
+    let lost = &found["lost"];
+    assert_eq!((text(&lost["state"]), &lost["panel"]), ("none", &Value::from(0)), "{found}");
+    assert!(text(&lost["none"]).starts_with("The graphics were lost") && text(&lost["label"]).ends_with("pentagon"));
+    assert_eq!((text(&found["again"]), &found["left"]), ("ready", &Value::from(0)), "{found}");
 }

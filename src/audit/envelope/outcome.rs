@@ -56,6 +56,13 @@ impl EnvelopeOutcome {
         self.limits.iter().any(|limit| limit.status == Status::Violation)
     }
 
+    /// Whether everything is known of every limit but for what it lists as undecided.
+    #[must_use]
+    pub fn is_else_known(&self) -> bool {
+        let is_listed = |limit: &LimitOutcome| limit.status != Status::Undecided || !limit.undecided.is_empty();
+        self.limits.iter().all(|limit| limit.unknown.is_empty() && is_listed(limit))
+    }
+
     /// Whether every limit is known to be kept, or nothing is asked.
     #[must_use]
     pub fn is_kept(&self) -> bool {

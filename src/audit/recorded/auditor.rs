@@ -61,6 +61,13 @@ pub fn audit(names: &[String], items: &[Item], settings: Settings) -> Result<Out
     auditor.finish()
 }
 
+/// What is known of a vehicle that is judged.
+fn counted(vehicles: &[Vehicle], settings: &Settings, vehicle: usize) -> Option<Counted> {
+    let of = vehicles.get(vehicle).filter(|of| of.asked_for)?;
+    let offset_s = settings.vehicles.get(&of.name).map_or(0.0, |of| of.offset_s);
+    Some(Counted { radius_m: of.radius_m.unwrap_or(0.0), offset_s })
+}
+
 impl TrackAuditor {
     /// An auditor with settings.
     ///
@@ -201,7 +208,10 @@ impl TrackAuditor {
             self.windows.judge(&self.vehicles, window, &mut self.results);
         }
         if let Some(smallest) = &mut self.smallest {
-            smallest.follow(&self.vehicles, window);
+            let (told, settings, vehicles) = (&self.told, &self.settings, &self.vehicles);
+            smallest.follow(vehicles, window, |drawn| {
+                told.nearest_of(drawn, settings, |vehicle| counted(vehicles, settings, vehicle))
+            });
         }
         for vehicle in &mut self.vehicles {
             self.segments += vehicle.forget(to_s) as u64;
@@ -271,22 +281,20 @@ impl TrackAuditor {
         }
         let envelope = envelope.unwrap_or_default();
         self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
-        let counts = |vehicle: usize| {
-            let of = self.vehicles.get(vehicle).filter(|of| of.asked_for)?;
-            let offset_s = self.settings.vehicles.get(&of.name).map_or(0.0, |of| of.offset_s);
-            Some(Counted { radius_m: of.radius_m.unwrap_or(0.0), offset_s })
-        };
-        self.told.correct(&mut self.results, &self.settings, self.vehicles.len(), counts);
-        let Results { ledger, closest, obstacles, swept } = self.results;
+        let counts = |vehicle: usize| counted(&self.vehicles, &self.settings, vehicle);
+        let all_listed = self.told.correct(&mut self.results, &self.settings, self.vehicles.len(), counts);
+        let Results { ledger, closest, obstacles, told, swept } = self.results;
         let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
         let decided = looked_at && ledger.is_decided() && is_gapless && contradiction.is_none();
         let parry = ledger.parry;
+        let of_pairs = looked_at && all_listed && parry.disagreements == 0 && contradiction.is_none();
         let (violations, undecided) = ledger.into_lists();
         Ok(Outcome {
             status: Status::new(
                 !violations.is_empty() || envelope.is_exceeded(),
                 (decided || !separates) && envelope.is_kept(),
             ),
+            is_else_known: (of_pairs || !separates) && envelope.is_else_known(),
             separation: separates.then(|| Status::new(!violations.is_empty(), decided)),
             envelope,
             max_gaps_s: self.vehicles.iter().map(|vehicle| vehicle.max_gap_s).collect(),
@@ -295,7 +303,7 @@ impl TrackAuditor {
             span_s,
             closest: closest.kept,
             obstacles: obstacles.kept,
-            smallest: self.smallest.map(|smallest| smallest.approaches).unwrap_or_default(),
+            smallest: self.smallest.filter(|_| separates).map_or_else(Vec::new, |smallest| smallest.finish(&told)),
             violations,
             undecided,
             gaps: self.gaps,

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::audit::envelope::EnvelopeOutcome;
 use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
+use crate::audit::slices::Slice;
 use crate::swarm::{ClosestApproach, Pair};
 
 /// A time during which a vehicle was not seen.
@@ -111,9 +112,9 @@ pub struct Outcome {
     pub closest: Vec<Approach>,
     /// The ten closest approaches to obstacles, likewise.
     pub obstacles: Vec<Approach>,
-    /// The closest approach of all pairs of vehicles in one slice of time after the other, about a sample long, and `None`
-    /// where no two are there; of a long recording that of several. Empty unless it was asked for.
-    pub smallest: Vec<Option<Approach>>,
+    /// The closest approach of all pairs of vehicles in one slice of time after the other, about a sample long, of a long
+    /// recording longer, where two are there. Empty unless it was asked for.
+    pub smallest: Vec<Slice>,
     /// Every violation, in order of time.
     pub violations: Vec<Violation<ObjectPair>>,
     /// Every time that could not be decided, in order of time.
@@ -123,6 +124,8 @@ pub struct Outcome {
     pub gaps: Vec<Gap>,
     /// The largest contradiction to the assumed bound on acceleration, if there is one: then nothing is proved clear.
     pub contradiction: Option<Contradiction>,
+    /// Whether everything is known but for the lists above.
+    pub is_else_known: bool,
     /// Segments of motion that were judged, over all vehicles.
     pub segments: u64,
     /// Segments of pairs (and of vehicles and obstacles) that were swept; all others were proved, by bounds on where

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::error::RecordedError;
-use super::outcome::Outcome;
+use super::outcome::{Gap, Outcome};
 use super::settings::Settings;
 use super::vehicle::Vehicle;
 use crate::swarm::{Rows, set_row};
@@ -20,6 +20,7 @@ pub struct Places {
     /// The axes of the ellipsoid, which motion is counted in.
     scale: Vector3<f64>,
     positions_m: Vec<Rows>,
+    gaps: Vec<Gap>,
 }
 
 impl Places {
@@ -34,6 +35,7 @@ impl Places {
             done: vec![0; vehicles.len()],
             vehicles,
             times_s,
+            gaps: Vec::new(),
             scale: settings.ellipsoid_m.unwrap_or(Vector3::repeat(1.0)),
         }
     }
@@ -46,7 +48,8 @@ impl Places {
         for item in items {
             let index = item.vehicle();
             let Some(vehicle) = self.vehicles.get_mut(index).filter(|vehicle| vehicle.asked_for) else { continue };
-            vehicle.take(item)?;
+            let gap = vehicle.take(item)?;
+            self.gaps.extend(gap);
             for segment in vehicle.segments.drain(..) {
                 let done = &mut self.done[index];
                 *done += self.times_s[*done..].partition_point(|&time_s| time_s < segment.from_s);
@@ -62,6 +65,12 @@ impl Places {
             }
         }
         Ok(())
+    }
+
+    /// When vehicles were not seen for a while.
+    #[must_use]
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
     }
 
     /// Radius of each vehicle \[m\], as it is judged; none where it is not known.
@@ -98,6 +107,8 @@ mod tests {
         let asked = vec![0.0, 0.5, 2.0, 3.0, 6.5, 8.0, 9.0];
         let mut places = Places::new(&settings, &outcome, asked.clone());
         items.chunks(3).for_each(|items| places.push(items).expect("right"));
+        let gaps: Vec<_> = places.gaps().iter().map(|gap| (gap.vehicle, gap.from_s, gap.to_s)).collect();
+        assert_eq!(gaps, [(0, 2.0, 6.0), (1, 2.25, 6.25)]);
         let (times_s, positions_m) = places.finish();
         assert_eq!(times_s, asked);
         let x = |vehicle: usize| positions_m.iter().map(|at| at[(vehicle, 0)]).collect::<Vec<_>>();

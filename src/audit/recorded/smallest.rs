@@ -5,10 +5,11 @@ use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::audit::outcome::Approach;
 use crate::audit::results::Results;
+use crate::audit::slices::{Slice, Slices};
 use crate::audit::sweep::Interval;
 
-/// Approaches that are kept, at most; beyond, neighbours become one.
-const MOST_APPROACHES: usize = 4096;
+/// Slices that are kept, at most.
+const MOST_KEPT: usize = 4096;
 /// Slices of a window, at most.
 const MOST_SLICES: usize = 256;
 
@@ -16,30 +17,88 @@ const MOST_SLICES: usize = 256;
 #[derive(Clone, Debug)]
 pub(super) struct Smallest {
     windows: Windows,
-    pub(super) approaches: Vec<Option<Approach>>,
+    slices: Slices,
 }
 
 impl Smallest {
     pub(super) fn new(settings: &Settings) -> Self {
-        Self { windows: Windows::new(settings.limits(), &[]), approaches: Vec::new() }
+        Self { windows: Windows::new(settings.limits(), &[]), slices: Slices::new(MOST_KEPT) }
     }
 
-    /// Looks at a window, in as many slices as a vehicle has segments in it.
-    pub(super) fn follow(&mut self, vehicles: &[Vehicle], window: Interval) {
-        let segments = vehicles.iter().map(|vehicle| vehicle.segments.len()).max().unwrap_or(0);
-        let slices = segments.clamp(1, MOST_SLICES);
-        let at = |slice: usize| window.at(slice as f64 / slices as f64);
-        for slice in 0..slices {
-            let mut results = Results::default();
-            let over = Interval { from_s: at(slice), to_s: at(slice + 1) };
-            self.windows.judge(vehicles, over, &mut results);
-            self.approaches.push(results.closest.kept.first().copied());
+    /// Looks at a window, in slices between the samples of a vehicle that has many in it. `nearest` says which of those that were
+    /// drawn closest, the closest first, counts.
+    pub(super) fn follow(
+        &mut self,
+        vehicles: &[Vehicle],
+        window: Interval,
+        nearest: impl Fn(&[Approach]) -> Option<Approach>,
+    ) {
+        let mut parts: Option<Vec<Vehicle>> = None;
+        for two in ends(vehicles, window).windows(2) {
+            let over = Interval { from_s: two[0], to_s: two[1] };
+            let mut drawn = self.closest(vehicles, over);
+            // Straight segments are judged whole: what they come to outside of the slice is of another.
+            if drawn.first().is_some_and(|of| of.time_s < over.from_s || over.to_s < of.time_s) {
+                let parts = parts.get_or_insert_with(|| vehicles.to_vec());
+                for (part, vehicle) in parts.iter_mut().zip(vehicles) {
+                    let begin = vehicle.segments.partition_point(|segment| segment.to_s < over.from_s);
+                    let rest = vehicle.segments[begin..].iter().take_while(|segment| segment.from_s <= over.to_s);
+                    part.segments = rest.map(|segment| segment.within(over)).collect();
+                }
+                drawn = self.closest(parts, over);
+            }
+            if let Some(closest) = nearest(&drawn) {
+                self.slices.take(Slice { from_s: over.from_s, to_s: over.to_s, closest });
+            }
         }
-        while self.approaches.len() > MOST_APPROACHES {
-            let nearest = |few: &[Option<Approach>]| {
-                few.iter().copied().flatten().reduce(|a, b| if b.lower_m < a.lower_m { b } else { a })
-            };
-            self.approaches = self.approaches.chunks(2).map(nearest).collect();
-        }
+    }
+
+    fn closest(&mut self, vehicles: &[Vehicle], over: Interval) -> Vec<Approach> {
+        let mut results = Results::default();
+        self.windows.judge(vehicles, over, &mut results);
+        results.closest.kept
+    }
+
+    /// The slices, with what the recording itself told.
+    pub(super) fn finish(mut self, told: &[Approach]) -> Vec<Slice> {
+        told.iter().for_each(|closest| self.slices.enter(*closest));
+        self.slices.finish(MOST_KEPT)
+    }
+}
+
+/// Where slices of a window begin and end \[s\].
+fn ends(vehicles: &[Vehicle], window: Interval) -> Vec<f64> {
+    let segments = vehicles.iter().map(|vehicle| &vehicle.segments[..]).max_by_key(|segments| segments.len());
+    let within = |time_s: &f64| window.from_s < *time_s && *time_s < window.to_s;
+    let mut samples: Vec<_> = segments.unwrap_or_default().iter().map(|segment| segment.to_s).filter(within).collect();
+    samples.dedup();
+    let stride = samples.len().div_ceil(MOST_SLICES).max(1);
+    let inner = samples.into_iter().step_by(stride);
+    [window.from_s].into_iter().chain(inner).chain([window.to_s]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use crate::audit::recorded::{Settings, TrackAuditor};
+    use crate::track::{Item, Sample};
+
+    /// Two on a line, 20 m apart but for the last sample.
+    #[test]
+    fn a_slice_knows_nothing_of_what_comes_after_it() {
+        let at = |vehicle: usize, time_s: f64, x: f64| {
+            let position_m = Vector3::new(x, 0.0, 0.0);
+            Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
+        };
+        let x = |k: u32| if k == 20 { 0.25 } else { 20.0 };
+        let items: Vec<_> = (0..=20).flat_map(|k| [at(0, f64::from(k), 0.0), at(1, f64::from(k), x(k))]).collect();
+        let mut auditor = TrackAuditor::new(Settings::delta(1.0)).expect("settings").with_smallest();
+        auditor.push(&["a".to_owned(), "b".to_owned()], &items).expect("right");
+        let found: Vec<_> = auditor.finish().expect("judged").smallest;
+        let ends: Vec<_> = found.iter().map(|of| of.to_s).collect();
+        assert_eq!(ends, (1..=20).map(f64::from).collect::<Vec<_>>());
+        assert!(found[..19].iter().all(|of| of.closest.lower_m == 20.0 && of.closest.time_s <= of.to_s), "{found:?}");
+        assert_eq!((found[19].closest.lower_m, found[19].closest.time_s), (0.25, 20.0));
     }
 }

@@ -125,14 +125,37 @@ impl AllTold {
         self.violations.push(told);
     }
 
-    /// Whether what was drawn between two instants comes closer than anybody did, in metres. What is so at an instant itself
+    /// What says that drawn between two instants they come closer than anybody did, in metres. What is so at an instant itself
     /// no word of the recording takes back.
-    fn refutes(&self, pair: ObjectPair, [from_s, to_s]: [f64; 2], later_s: f64, drawn_m: f64) -> bool {
+    fn refuter(&self, pair: ObjectPair, [from_s, to_s]: [f64; 2], later_s: f64, drawn_m: f64) -> Option<&Told> {
         let rounding_s = if later_s == 0.0 { 0.0 } else { 8.0 * f64::EPSILON * (from_s.abs() + later_s.abs()) };
         let (from_s, to_s) = (from_s - later_s - rounding_s, to_s - later_s + rounding_s);
         let within = self.closest.get(self.closest.partition_point(|told| told.to_s <= to_s));
         let refutes = |told: &Told| told.from_s < from_s && drawn_m < told.closest.separation_m * (1.0 - ROUNDING);
-        pair.vehicles().is_some() && within.is_some_and(refutes)
+        within.filter(|told| pair.vehicles().is_some() && refutes(told))
+    }
+
+    /// The first of these that were drawn, the closest first, that nobody refutes; where all are, a bound from what was told.
+    pub(super) fn nearest_of(
+        &self,
+        drawn: &[Approach],
+        settings: &Settings,
+        counts: impl Fn(usize) -> Option<Counted>,
+    ) -> Option<Approach> {
+        let first = drawn.first()?;
+        if self.closest.is_empty() {
+            return Some(*first);
+        }
+        let question = Question::new(settings, counts);
+        let refuter = |of: &Approach| {
+            let later_s = question.later_s(of.pair.vehicles()?)?;
+            self.refuter(of.pair, [of.time_s; 2], later_s, of.lower_m * question.longest_m)
+        };
+        let bound = |told: &Told| {
+            let (lower_m, _) = question.scaled(told.closest.separation_m, 0.0);
+            Approach { lower_m, upper_m: f64::INFINITY, ..*first }
+        };
+        drawn.iter().copied().find(|of| refuter(of).is_none()).or_else(|| refuter(first).map(bound))
     }
 
     /// The closest of a pair that was told within a time, and when that was: known where they were the closest of all.
@@ -143,18 +166,18 @@ impl AllTold {
     }
 
     /// Puts what was told in the place of what was drawn: leaves out what nobody did, enters who came closest of those that
-    /// are asked for, in the time that is asked for, and leaves open what neither says.
+    /// are asked for, in the time that is asked for, and leaves open what neither says. Whether all that is open is listed.
     pub(super) fn correct(
         &self,
         results: &mut Results,
         settings: &Settings,
         vehicles: usize,
         counts: impl Fn(usize) -> Option<Counted>,
-    ) {
+    ) -> bool {
         let question = Question::new(settings, counts);
         let refuted = |pair: ObjectPair, span_s, drawn: f64| {
             let later_s = pair.vehicles().and_then(|pair| question.later_s(pair));
-            later_s.is_some_and(|later_s| self.refutes(pair, span_s, later_s, drawn * question.longest_m))
+            later_s.is_some_and(|later_s| self.refuter(pair, span_s, later_s, drawn * question.longest_m).is_some())
         };
         results.closest.retain(|kept| !refuted(kept.pair, [kept.time_s; 2], kept.lower_m));
         results.ledger.retain_violations(|v| !refuted(v.pair, [v.from_s, v.to_s], v.min_m));
@@ -175,18 +198,17 @@ impl AllTold {
         for told in self.closest.iter().filter(|told| !told_too(told)) {
             Self::enter_closest(told, &question, results);
         }
-        if results.ledger.violations.is_empty() {
-            self.leave_others_open(vehicles, &question, results);
-        }
+        self.leave_others_open(vehicles, &question, results)
     }
 
-    /// Leaves open what lines say of other pairs where they are unlike what was told of one; of the first pairs, if many.
+    /// Leaves open what lines say of other pairs where they are unlike what was told of one; of the first pairs, if many, and
+    /// not beside a violation. Whether all that is open is listed.
     fn leave_others_open<F: Fn(usize) -> Option<Counted>>(
         &self,
         vehicles: usize,
         question: &Question<F>,
         results: &mut Results,
-    ) {
+    ) -> bool {
         let counted: Vec<_> = (0..vehicles).filter_map(&question.counts).collect();
         let radii = || counted.iter().map(|of| of.radius_m);
         let (small_m, large_m) = (radii().fold(f64::INFINITY, f64::min), radii().fold(0.0, f64::max));
@@ -195,8 +217,8 @@ impl AllTold {
         let least = |told: &Told| question.scaled(told.closest.separation_m.max(told.others_m), 0.0).0;
         let is_odd = |told: &&Told| question.contradicts(told, smallest) && !(one_clock && least(told) >= largest);
         let odd: Vec<_> = self.closest.iter().filter(is_odd).collect();
-        if odd.is_empty() {
-            return;
+        if odd.is_empty() || !results.ledger.violations.is_empty() {
+            return odd.is_empty();
         }
         let pairs = (0..vehicles).flat_map(|i| (i + 1..vehicles).map(move |j| Pair::new(i, j)));
         let mut left_open = 0;
@@ -215,9 +237,10 @@ impl AllTold {
             }
             left_open += usize::from(!open.is_empty());
             if left_open == KEPT {
-                return;
+                return false;
             }
         }
+        true
     }
 
     /// Enters the closest approach of all between two instants. Where its bounds say less than a straight line that agrees
@@ -239,7 +262,7 @@ impl AllTold {
             return;
         }
         let (pair, limit_m, time_s) = (asked.pair, asked.limit, at_s + later_s);
-        results.closest.offer(Approach { pair, lower_m, upper_m, time_s, limit_m });
+        results.enter(Approach { pair, lower_m, upper_m, time_s, limit_m });
         if upper_m < limit_m {
             asked.violate(asked.over, upper_m, time_s, results);
         } else {
@@ -264,7 +287,7 @@ impl AllTold {
         let nearest_m = seen.map_or(f64::INFINITY, |(nearest_m, _)| nearest_m / question.shortest_m);
         let upper_m = if is_whole { of_all_m } else { nearest_m.min(below_m.next_down()) };
         let time_s = seen.map_or(f64::midpoint(from_s, to_s), |(_, at_s)| at_s + later_s);
-        results.closest.offer(Approach { pair, lower_m, upper_m, time_s, limit_m });
+        results.enter(Approach { pair, lower_m, upper_m, time_s, limit_m });
         if limit_m >= below_m {
             // What is drawn of the same time is a part of the same violation.
             let (mut from_s, mut to_s) = (from_s, to_s);

@@ -52,8 +52,13 @@ impl Timeline {
                 return;
             }
         };
-        let mut closest =
-            outcome.smallest.iter().flatten().chain(outcome.closest.first()).filter_map(approach).collect::<Vec<_>>();
+        let mut closest = outcome
+            .smallest
+            .iter()
+            .map(|slice| &slice.closest)
+            .chain(outcome.closest.first())
+            .filter_map(approach)
+            .collect::<Vec<_>>();
         closest.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let mut closest = closest.into_iter().peekable();
         let mut so_far = None;

@@ -11,6 +11,7 @@ pub use maud::{Markup, Render};
 pub use replay::{Start, no_replay, replay};
 
 use crate::figures::Figure;
+use crate::text::in_order;
 
 const STYLE: &str = include_str!("style.css");
 /// Nothing may be loaded; what may run is named by its hash, where anything may.
@@ -136,7 +137,7 @@ impl Page {
                 }
             }
         };
-        page.into_string()
+        in_order(&page.into_string())
     }
 }
 

@@ -98,17 +98,39 @@ pub fn no_replay(why: &str) -> Markup {
 /// What of it is true and what is for the eye.
 fn note(replay: &Replay) -> String {
     let [kept, samples] = replay.instants();
-    let motion = format!(
-        "Positions are rounded by at most {} m and drawn straight between {kept} instants of {}. Distances, times and verdicts are the \
-         judge's. ",
-        metres(replay.rounding_m()),
-        counted(samples as u64, "sample", "samples")
-    );
+    let of_all = if kept < samples { format!(" of {samples}") } else { String::new() };
+    let motion = match (replay.holds(), samples) {
+        (_, 0 | 1) => "of one instant".to_owned(),
+        (true, _) => format!("at rest between {kept} instants{of_all}"),
+        (false, _) => format!("drawn straight between {kept} instants{of_all}"),
+    };
     let some = |[shown, all]: [usize; 2], what: &str| {
         if shown < all { format!("{shown} of {all} {what} are here. ") } else { String::new() }
     };
-    let (vehicles, moments) = (some(replay.vehicles(), "vehicles"), some(replay.moments(), "findings"));
-    format!("{motion}{vehicles}{moments}Everything is in this page: nothing is loaded.")
+    let said = [
+        format!(
+            "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are the judge's. ",
+            metres(replay.rounding_m())
+        ),
+        some(replay.vehicles(), "vehicles"),
+        some(replay.moments(), "findings"),
+        match replay.inexact() {
+            0 => String::new(),
+            count => format!(
+                "The very instant of {} is not drawn, or not all of whom it is on. ",
+                counted(count as u64, "finding", "findings")
+            ),
+        },
+        replay.unknown_radius().map_or(String::new(), |(count, radius_m)| {
+            format!("The size of {} is made up, {} m. ", counted(count as u64, "vehicle", "vehicles"), metres(radius_m))
+        }),
+        if replay.obstacles_off_m() > 0.0 {
+            format!("Moving obstacles are drawn at most {} m off their ways. ", metres(replay.obstacles_off_m()))
+        } else {
+            String::new()
+        },
+    ];
+    said.concat() + "Everything is in this page: nothing is loaded."
 }
 
 #[cfg(test)]

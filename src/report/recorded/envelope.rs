@@ -142,6 +142,16 @@ impl OfLimit {
         self.undecided.iter().map(|of| self.words(of, "against")).chain(unknown)
     }
 
+    /// A violation or a time that is undecided, in a sentence.
+    pub(super) fn in_words(&self, of: &OfVehicle<Exceeding>, is_violation: bool) -> String {
+        self.words(of, if is_violation { "beyond" } else { "against" })
+    }
+
+    /// The same in a few words.
+    pub(super) fn in_short(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>) -> String {
+        format!("{vehicle}: {} {} (limit {})", self.called(), self.value(finding), self.asked())
+    }
+
     fn words(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>, how: &str) -> String {
         format!(
             "{vehicle}: {} {} by {} s, {how} the limit of {} from {} s to {} s",

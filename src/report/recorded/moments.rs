@@ -1,61 +1,110 @@
-//! What a replay of a recording jumps to.
+//! What a replay of a recording jumps to, and what it says over time.
 
-use super::named::OfPair;
+use super::named::{OfPair, OfVehicle};
 use super::report::RecordedReport;
 use super::words::interval;
 use crate::audit::envelope::Exceeding;
-use crate::audit::recorded::{Approach, ObjectPair};
+use crate::audit::recorded::{Approach, Gap, ObjectPair};
 use crate::audit::{Undecided, Violation};
-use crate::replay::{Judged, Kind, Moment, Span};
+use crate::replay::{Judged, Kind, LONGEST_NAME, Moment, Span, cut};
+use crate::text::{exact, metres_below};
 
 impl RecordedReport {
-    /// The closest approach, every violation and every time that cannot be decided, the weightiest first, with the judge's
-    /// distances and times; behind them those of single vehicles.
+    /// The closest approach, every violation, every time that cannot be decided and every gap, the weightiest first, with the
+    /// judge's distances and times.
     #[must_use]
     pub fn moments(&self) -> Vec<Moment> {
         let over = |of: &Violation<ObjectPair>| of.min_m - of.limit_m;
-        let mut violations: Vec<_> = self.violations.iter().collect();
+        let mut violations: Vec<_> = self.violations.iter().map(OfPair::short).collect();
         violations.sort_by(|a, b| over(&a.finding).total_cmp(&over(&b.finding)));
-        let closest = self.closest.first().into_iter().map(|of| self.closest_moment(of));
-        let violations = violations.into_iter().map(|of: &OfPair<Violation<ObjectPair>>| {
-            let Violation { pair, from_s, to_s, min_at_s, .. } = of.finding;
-            moment(Kind::Violation, pair, Span { from_s, to_s, at_s: min_at_s }, format!("Violation: {}", of.words()))
-        });
-        let undecided = self.undecided.iter().map(|of: &OfPair<Undecided<ObjectPair>>| {
-            let Undecided { pair, from_s, to_s, .. } = of.finding;
-            let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
-            moment(Kind::Undecided, pair, span, format!("Undecided: {}", of.words()))
-        });
-        let limits = self.limits.iter().flat_map(|limit| {
-            let violations = limit.violations.iter().zip(limit.violations_in_words()).map(|of| (Kind::Violation, of));
-            let undecided = limit.undecided.iter().zip(limit.undecided_in_words()).map(|of| (Kind::Undecided, of));
-            violations.chain(undecided).map(|(kind, (of, said))| {
-                let Exceeding { vehicle, from_s, to_s, at_s, .. } = of.finding;
-                Moment { kind, vehicles: vec![vehicle], obstacle: None, span: Span { from_s, to_s, at_s }, said }
-            })
-        });
-        closest.chain(violations).chain(undecided).chain(limits).collect()
+        let closest = self.closest.first().or(self.obstacles.closest.first());
+        let closest = closest.map(|of| self.closest_moment(&of.short()));
+        let violations = violations.iter().map(|of| self.violation(of));
+        let undecided = self.undecided.iter().map(|of| undecided(&of.short()));
+        let gaps = self.gaps.iter().map(|of| unseen(&of.short()));
+        let of_limits = self.moments_of_limits();
+        let (beyond, open): (Vec<_>, Vec<_>) = of_limits.into_iter().partition(|of| of.kind == Kind::Violation);
+        closest.into_iter().chain(violations).chain(beyond).chain(undecided).chain(open).chain(gaps).collect()
     }
 
-    /// The verdict, and what distances of two vehicles are held against.
+    /// What is known of all, and what distances of two vehicles are held against.
     #[must_use]
     pub fn judgement(&self) -> Judged {
         let unit = if self.measure == "metres" { "m" } else { "ellipsoids" };
-        Judged { status: self.status, limit: self.separation.delta_m, unit }
+        Judged { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit }
     }
 
     fn closest_moment(&self, OfPair { who: [first, second], finding }: &OfPair<Approach>) -> Moment {
         let &Approach { pair, lower_m, upper_m, time_s, .. } = finding;
         let (apart, unit) = (interval(lower_m, upper_m), self.judgement().unit);
         let said = format!("Closest approach: {apart} {unit}, {first} and {second} at {time_s:.3} s");
-        moment(Kind::Closest, pair, Span { from_s: time_s, to_s: time_s, at_s: time_s }, said)
+        let span = Span { from_s: time_s, to_s: time_s, at_s: time_s };
+        moment(Kind::Closest, pair, span, [String::new(), said])
+    }
+
+    fn violation(&self, of: &OfPair<Violation<ObjectPair>>) -> Moment {
+        let Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = of.finding;
+        let ([first, second], unit) = (&of.who, self.judgement().unit);
+        let (least, limit) = (metres_below(min_m, limit_m), exact(limit_m));
+        let brief = format!("{first} and {second} come to {least} {unit} (limit {limit})");
+        let span = Span { from_s, to_s, at_s: min_at_s };
+        moment(Kind::Violation, pair, span, [brief, format!("Violation: {}", of.words())])
+    }
+
+    fn moments_of_limits(&self) -> Vec<Moment> {
+        let of_limit = |limit: &super::envelope::OfLimit| {
+            let named = |kind: Kind| {
+                move |of: &OfVehicle<Exceeding>| {
+                    let (of, Exceeding { vehicle, from_s, to_s, at_s, .. }) = (of.short(), of.finding);
+                    let (brief, said) = (limit.in_short(&of), limit.in_words(&of, kind == Kind::Violation));
+                    Moment {
+                        kind,
+                        vehicles: vec![vehicle],
+                        obstacle: None,
+                        span: Span { from_s, to_s, at_s },
+                        brief,
+                        said,
+                    }
+                }
+            };
+            let violations = limit.violations.iter().map(named(Kind::Violation));
+            violations.chain(limit.undecided.iter().map(named(Kind::Undecided))).collect::<Vec<_>>()
+        };
+        self.limits.iter().flat_map(of_limit).collect()
     }
 }
 
-fn moment(kind: Kind, pair: ObjectPair, span: Span, said: String) -> Moment {
+fn undecided(of: &OfPair<Undecided<ObjectPair>>) -> Moment {
+    let Undecided { pair, from_s, to_s, .. } = of.finding;
+    let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
+    let brief = format!("{} and {} may come too near", of.who[0], of.who[1]);
+    moment(Kind::Undecided, pair, span, [brief, format!("Undecided: {}", of.words())])
+}
+
+fn unseen(of: &OfVehicle<Gap>) -> Moment {
+    let Gap { vehicle, from_s, to_s, .. } = of.finding;
+    let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
+    let (brief, said) = (format!("{} is not seen", of.vehicle), format!("Undecided: {}", of.words()));
+    Moment { kind: Kind::Unseen, vehicles: vec![vehicle], obstacle: None, span, brief, said }
+}
+
+fn moment(kind: Kind, pair: ObjectPair, span: Span, [brief, said]: [String; 2]) -> Moment {
     let (vehicles, obstacle) = match pair {
         ObjectPair::Vehicles(pair) => (vec![pair.first(), pair.second()], None),
         ObjectPair::Obstacle { vehicle, obstacle } => (vec![vehicle], Some(obstacle)),
     };
-    Moment { kind, vehicles, obstacle, span, said }
+    Moment { kind, vehicles, obstacle, span, brief, said }
+}
+
+impl<T: Clone> OfPair<T> {
+    /// With names that are no longer than a replay shows.
+    fn short(&self) -> Self {
+        Self { who: self.who.each_ref().map(|name| cut(name, LONGEST_NAME)), finding: self.finding.clone() }
+    }
+}
+
+impl<T: Clone> OfVehicle<T> {
+    fn short(&self) -> Self {
+        Self { vehicle: cut(&self.vehicle, LONGEST_NAME), finding: self.finding.clone() }
+    }
 }

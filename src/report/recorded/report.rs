@@ -105,6 +105,9 @@ pub struct RecordedReport {
     /// Whether it was asked how close two came, and not single vehicles alone.
     #[serde(skip)]
     pub(super) separation_asked: bool,
+    /// Whether everything is known but for what is listed.
+    #[serde(skip)]
+    pub(super) is_else_known: bool,
 }
 
 /// Obstacles and who came close to them.
@@ -179,6 +182,7 @@ impl RecordedReport {
             violations,
             limits,
             separation_asked: outcome.separation.is_some(),
+            is_else_known: outcome.is_else_known,
             gaps: outcome
                 .gaps
                 .iter()

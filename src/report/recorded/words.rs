@@ -10,7 +10,7 @@ use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};
-use crate::text::{at_least, at_most, counted, exact, fixed, metres_below, seconds};
+use crate::text::{at_least, at_most, counted, exact, fixed, in_order, metres_below, seconds};
 
 /// Violations that are listed in words, and on the page.
 const LISTED_IN_WORDS: usize = 10;
@@ -232,9 +232,9 @@ impl RecordedReport {
     }
 }
 
-/// Words with foreign names in them, on one line whatever the names hold.
+/// Words with foreign names in them, on one line and in the order of reading whatever the names hold.
 fn one_line(words: &str) -> String {
-    words.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+    in_order(words).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
 /// The first of some lines, and how many more there are.
@@ -275,7 +275,7 @@ impl OfPair<Undecided<ObjectPair>> {
 }
 
 impl OfVehicle<Gap> {
-    fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         format!("{} was not seen from {}", self.vehicle, span(self.finding.from_s, self.finding.to_s))
     }
 }
