@@ -21,7 +21,7 @@ pub struct Slice {
 /// Beyond so many, neighbours become one, and all slices are about as wide; the closest of all is never lost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slices {
-    slices: Vec<Slice>,
+    all: Vec<Slice>,
     most: usize,
     /// Widest slice that two neighbours become \[s\].
     width_s: f64,
@@ -50,7 +50,7 @@ impl Slices {
     /// None yet, and at most so many, at least two.
     #[must_use]
     pub fn new(most: usize) -> Self {
-        Self { slices: Vec::new(), most: most.max(2), width_s: 0.0 }
+        Self { all: Vec::new(), most: most.max(2), width_s: 0.0 }
     }
 
     /// Takes the next one, which begins no earlier than the last one ended; what is no number is passed over.
@@ -59,11 +59,11 @@ impl Slices {
         if !numbers.iter().all(|number| number.is_finite()) {
             return;
         }
-        match self.slices.last_mut() {
+        match self.all.last_mut() {
             Some(last) if last.joins(&next, self.width_s) => *last = last.and(next),
-            _ => self.slices.push(next),
+            _ => self.all.push(next),
         }
-        if self.slices.len() > self.most {
+        if self.all.len() > self.most {
             self.thin(self.most / 2);
         }
     }
@@ -71,26 +71,26 @@ impl Slices {
     /// Enters an approach at its time, in the slice that holds it or as one of no width.
     pub fn enter(&mut self, closest: Approach) {
         let at_s = closest.time_s;
-        let place = self.slices.partition_point(|slice| slice.to_s < at_s);
-        match self.slices.get_mut(place) {
+        let place = self.all.partition_point(|slice| slice.to_s < at_s);
+        match self.all.get_mut(place) {
             Some(slice) if slice.from_s <= at_s => slice.closest = nearer(slice.closest, closest),
-            _ => self.slices.insert(place, Slice { from_s: at_s, to_s: at_s, closest }),
+            _ => self.all.insert(place, Slice { from_s: at_s, to_s: at_s, closest }),
         }
     }
 
     fn thin(&mut self, most: usize) {
-        let (Some(first), Some(last)) = (self.slices.first(), self.slices.last()) else { return };
+        let (Some(first), Some(last)) = (self.all.first(), self.all.last()) else { return };
         self.width_s = self.width_s.max((last.to_s - first.from_s) / most as f64);
         loop {
             let mut wider: Vec<Slice> = Vec::new();
-            for next in self.slices.drain(..) {
+            for next in self.all.drain(..) {
                 match wider.last_mut() {
                     Some(last) if last.joins(&next, self.width_s) => *last = last.and(next),
                     _ => wider.push(next),
                 }
             }
-            self.slices = wider;
-            if self.slices.len() <= most {
+            self.all = wider;
+            if self.all.len() <= most {
                 return;
             }
             self.width_s *= 2.0;
@@ -100,16 +100,16 @@ impl Slices {
     /// At most so many, at least one, in order of time.
     #[must_use]
     pub fn finish(mut self, most: usize) -> Vec<Slice> {
-        if self.slices.len() > most.max(1) {
+        if self.all.len() > most.max(1) {
             self.thin(most.max(1));
         }
-        self.slices
+        self.all
     }
 
     /// The closest of all.
     #[must_use]
     pub fn closest(&self) -> Option<Approach> {
-        self.slices.iter().map(|slice| slice.closest).reduce(nearer)
+        self.all.iter().map(|slice| slice.closest).reduce(nearer)
     }
 }
 
@@ -163,7 +163,7 @@ mod tests {
     fn many_gaps_are_bounded_too() {
         let mut slices = Slices::new(100);
         (0..10_000).map(|k| 2 * k).for_each(|k| slices.take(slice(k)));
-        assert!(slices.slices.len() <= 100 && slices.finish(7).len() <= 7);
+        assert!(slices.all.len() <= 100 && slices.finish(7).len() <= 7);
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! A replay as a page holds it.
 
-use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::bytes::{base64_bytes, base64_of, doubles, singles};
@@ -20,7 +19,6 @@ use super::things::{POINT_BYTES, Thing};
 use super::verdict::{self, Told};
 use super::words::{LONGEST_NAME, LONGEST_SENTENCE, cut};
 use crate::audit::{Obstacle, Shape};
-use crate::swarm::row;
 
 /// Most findings.
 const MOST_MOMENTS: usize = 200;
@@ -143,10 +141,7 @@ impl Replay {
         let listed = &moments[..moments.len().min(MOST_MOMENTS)];
         let shown = shown(film, &present, listed, room_bytes);
         let place = |vehicle: usize| shown.binary_search(&vehicle).ok();
-        let mut plan = stage.plan.clone();
-        if let Some(plan) = &mut plan {
-            film.events.iter().for_each(|event| plan.note(event));
-        }
+        let plan = film.noted(stage.plan.clone());
         let (targets, guides) = targets::of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
         let near = film.nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
         let [near_s, near_who] = nearest::pairs(&near, end_s, place);
@@ -202,15 +197,11 @@ impl Replay {
         let even = film.even();
         let times_s: Vec<_> = even.iter().map(|&k| film.times_s[k]).collect();
         let kept: Vec<_> = chosen(&times_s, &spans, most.min(MOST_INSTANTS)).into_iter().map(|k| even[k]).collect();
-        let mut instants: Vec<Vec<_>> = kept
-            .iter()
-            .map(|&k| {
-                let (time_s, positions_m) = (film.times_s[k], &film.positions_m[k]);
-                let there = |at: Vector3<f64>| at.iter().all(|x| x.is_finite()).then_some(at);
-                let vehicles = shown.iter().map(|&vehicle| there(row(positions_m, vehicle)));
-                vehicles.chain(guides.at(plan.as_ref(), time_s, positions_m)).collect()
-            })
-            .collect();
+        let place_at = |&k: &usize| {
+            let guides = guides.at(plan.as_ref(), film.times_s[k], &film.positions_m[k]);
+            film.places(k, &shown).chain(guides).collect::<Vec<_>>()
+        };
+        let mut instants: Vec<_> = kept.iter().map(place_at).collect();
         let times_s: Vec<_> = kept.iter().map(|&k| film.times_s[k]).collect();
         let mut breaks = breaks(film, &times_s, place);
         for [instant, vehicle] in breaks.split_off(breaks.len().min(most_breaks)) {
@@ -229,11 +220,8 @@ impl Replay {
         if json.len() > room_bytes {
             return Err(no_room);
         }
-        let is_exact = |of: &&Moment| {
-            of.kind == Kind::Unseen
-                || (is_kept(film, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some()))
-        };
-        let made_up = shown.iter().filter(|&&k| stage.radius_m.get(k).copied().flatten().is_none()).count();
+        let is_drawn = |of: &Moment| is_kept(film, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
+        let is_exact = |of: &&Moment| of.kind == Kind::Unseen || is_drawn(of);
         Ok(Self {
             chart: Chart::of(&near, &moments, judged.limit, [begin_s, end_s]),
             json,
@@ -243,7 +231,7 @@ impl Replay {
             moments: [listed.len(), moments.len()],
             holds: film.holds,
             inexact: moments.len() - moments.iter().filter(is_exact).count(),
-            unknown_radius: (made_up > 0).then(|| (made_up, stage.unknown_radius_m())),
+            unknown_radius: stage.unknown_radii(&shown),
             obstacles_off_m,
         })
     }
@@ -363,7 +351,7 @@ fn is_kept(film: &Film, kept: &[usize], span: &Span) -> bool {
 
 /// Decimals of times that tell a hundredth of a flight from the next, at least two.
 fn decimals(span_s: f64) -> usize {
-    (2..9).find(|&decimals| span_s * 10_f64.powi(decimals) >= 100.0).map_or(9, |decimals| decimals as usize)
+    (2..9_u8).find(|&decimals| span_s * 10_f64.powi(i32::from(decimals)) >= 100.0).map_or(9, usize::from)
 }
 
 /// As JSON that may stand within a page: `<` is written by its number.

@@ -1,9 +1,12 @@
 //! Motion as it is taken, in bounded memory.
 
+use nalgebra::Vector3;
+
 use super::choice::{Span, around};
 use crate::audit::{Approach, ObjectPair, Slice, Slices};
+use crate::plan::Plan;
 use crate::record::{Event, RecordError, Sample, Sink};
-use crate::swarm::{ClosestApproach, Rows};
+use crate::swarm::{ClosestApproach, Rows, row};
 
 /// Memory for positions \[bytes\]; beyond, every second instant is dropped.
 const BUDGET_BYTES: usize = 64 << 20;
@@ -118,6 +121,20 @@ impl Film {
         let one_in = self.every.max(1);
         kept.extend((0..self.numbers.len()).filter(|&k| self.numbers[k].is_multiple_of(one_in)));
         kept.into_iter().collect()
+    }
+
+    /// A plan with what was told in the course of the flight.
+    pub(super) fn noted(&self, mut plan: Option<Plan>) -> Option<Plan> {
+        if let Some(plan) = &mut plan {
+            self.events.iter().for_each(|event| plan.note(event));
+        }
+        plan
+    }
+
+    /// Where some vehicles are at an instant \[m\], those that are there.
+    pub(super) fn places(&self, instant: usize, vehicles: &[usize]) -> impl Iterator<Item = Option<Vector3<f64>>> {
+        let there = |at: Vector3<f64>| at.iter().all(|x| x.is_finite()).then_some(at);
+        vehicles.iter().map(move |&vehicle| there(row(&self.positions_m[instant], vehicle)))
     }
 
     fn begin(&mut self, whose: ObjectPair, time_s: f64) {

@@ -29,6 +29,13 @@ impl Stage {
         self.shell_m.into_iter().flatten().fold(UNKNOWN_RADIUS_M, f64::min)
     }
 
+    /// How many of these vehicles have no known radius, where there are any, and what they are drawn with \[m\].
+    pub(super) fn unknown_radii(&self, vehicles: &[usize]) -> Option<(usize, f64)> {
+        let unknown =
+            vehicles.iter().filter(|&&vehicle| self.radius_m.get(vehicle).copied().flatten().is_none()).count();
+        (unknown > 0).then(|| (unknown, self.unknown_radius_m()))
+    }
+
     pub(super) fn drawn_radius_m(&self, vehicle: usize) -> f64 {
         self.radius_m.get(vehicle).copied().flatten().unwrap_or_else(|| self.unknown_radius_m())
     }

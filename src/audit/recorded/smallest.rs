@@ -61,7 +61,9 @@ impl Smallest {
 
     /// The slices, with what the recording itself told.
     pub(super) fn finish(mut self, told: &[Approach]) -> Vec<Slice> {
-        told.iter().for_each(|closest| self.slices.enter(*closest));
+        for closest in told {
+            self.slices.enter(*closest);
+        }
         self.slices.finish(MOST_KEPT)
     }
 }

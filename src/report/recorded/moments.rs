@@ -108,3 +108,20 @@ impl<T: Clone> OfVehicle<T> {
         Self { vehicle: cut(&self.vehicle, LONGEST_NAME), finding: self.finding.clone() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::Pair;
+    use crate::text::in_order;
+
+    #[test]
+    fn a_long_name_costs_no_distance_and_no_time_and_none_turns_what_follows() {
+        let pair = ObjectPair::Vehicles(Pair::new(0, 1));
+        let finding = Violation { pair, from_s: 1.0, to_s: 2.0, min_m: 0.25, min_at_s: 1.5, limit_m: 1.0 };
+        let of = OfPair { who: ["ü".repeat(5000), "drone \u{202e}b".to_owned()], finding };
+        let said = in_order(&of.short().words());
+        let expected = "… and drone \u{fffd}b: 0.250 at 1.500 s, below 1.000 from 1.000 s to 2.000 s";
+        assert!(said.ends_with(expected) && said.chars().count() < 120, "{said}");
+    }
+}
