@@ -48,7 +48,10 @@ impl Smallest {
                 drawn = self.closest(parts, over);
             }
             if let Some(closest) = nearest(&drawn) {
-                self.slices.take(Slice { from_s: over.from_s, to_s: over.to_s, closest });
+                // Where no two are there for longer it is known of an instant.
+                let known = vehicles.iter().filter(|vehicle| is_there(vehicle, over)).nth(1).is_some();
+                let [from_s, to_s] = if known { [over.from_s, over.to_s] } else { [closest.time_s; 2] };
+                self.slices.take(Slice { from_s, to_s, closest });
             }
         }
     }
@@ -72,35 +75,55 @@ impl Smallest {
 fn ends(vehicles: &[Vehicle], window: Interval) -> Vec<f64> {
     let segments = vehicles.iter().map(|vehicle| &vehicle.segments[..]).max_by_key(|segments| segments.len());
     let within = |time_s: &f64| window.from_s < *time_s && *time_s < window.to_s;
-    let mut samples: Vec<_> = segments.unwrap_or_default().iter().map(|segment| segment.to_s).filter(within).collect();
+    let all = segments.unwrap_or_default().iter().flat_map(|segment| [segment.from_s, segment.to_s]);
+    let mut samples: Vec<_> = all.filter(within).collect();
     samples.dedup();
     let stride = samples.len().div_ceil(MOST_SLICES).max(1);
     let inner = samples.into_iter().step_by(stride);
     [window.from_s].into_iter().chain(inner).chain([window.to_s]).collect()
 }
 
+/// Whether a vehicle is there within a time, and not at its ends alone.
+fn is_there(vehicle: &Vehicle, over: Interval) -> bool {
+    let begin = vehicle.segments.partition_point(|segment| segment.to_s <= over.from_s);
+    vehicle.segments[begin..].first().is_some_and(|segment| segment.from_s < over.to_s)
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
 
-    use crate::audit::recorded::{Settings, TrackAuditor};
+    use super::*;
+    use crate::audit::recorded::TrackAuditor;
     use crate::track::{Item, Sample};
 
-    /// Two on a line, 20 m apart but for the last sample.
-    #[test]
-    fn a_slice_knows_nothing_of_what_comes_after_it() {
+    /// The slices of two on a line at these times \[s\], so far apart \[m\].
+    fn slices(times_s: &[u32], apart_m: impl Fn(u32) -> f64) -> Vec<Slice> {
         let at = |vehicle: usize, time_s: f64, x: f64| {
             let position_m = Vector3::new(x, 0.0, 0.0);
             Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
         };
-        let x = |k: u32| if k == 20 { 0.25 } else { 20.0 };
-        let items: Vec<_> = (0..=20).flat_map(|k| [at(0, f64::from(k), 0.0), at(1, f64::from(k), x(k))]).collect();
+        let both = |&k: &u32| [at(0, f64::from(k), 0.0), at(1, f64::from(k), apart_m(k))];
+        let items: Vec<_> = times_s.iter().flat_map(both).collect();
         let mut auditor = TrackAuditor::new(Settings::delta(1.0)).expect("settings").with_smallest();
         auditor.push(&["a".to_owned(), "b".to_owned()], &items).expect("right");
-        let found: Vec<_> = auditor.finish().expect("judged").smallest;
+        auditor.finish().expect("judged").smallest
+    }
+
+    #[test]
+    fn a_slice_knows_nothing_of_what_comes_after_it() {
+        let found = slices(&(0..=20).collect::<Vec<_>>(), |k| if k == 20 { 0.25 } else { 20.0 });
         let ends: Vec<_> = found.iter().map(|of| of.to_s).collect();
         assert_eq!(ends, (1..=20).map(f64::from).collect::<Vec<_>>());
         assert!(found[..19].iter().all(|of| of.closest.lower_m == 20.0 && of.closest.time_s <= of.to_s), "{found:?}");
         assert_eq!((found[19].closest.lower_m, found[19].closest.time_s), (0.25, 20.0));
+    }
+
+    #[test]
+    fn of_a_gap_there_is_no_slice() {
+        let found = slices(&[0, 1, 2, 3, 8, 9, 10], |k| f64::from(k) + 2.0);
+        let wide: Vec<_> = found.iter().filter(|of| of.from_s < of.to_s).map(|of| (of.from_s, of.to_s)).collect();
+        assert_eq!(wide, [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (8.0, 9.0), (9.0, 10.0)]);
+        assert!(found.iter().all(|of| !(3.1..8.0).contains(&of.to_s)), "{found:?}");
     }
 }
