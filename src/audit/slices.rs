@@ -169,8 +169,12 @@ mod tests {
     #[test]
     fn what_is_entered_counts_in_its_slice_or_has_one_of_its_own() {
         let mut slices = Slices::new(10);
-        [slice(0), slice(5)].into_iter().for_each(|of| slices.take(of));
-        [approach(0.25, 0.1), approach(3.0, 0.2), approach(9.0, 9.0)].into_iter().for_each(|of| slices.enter(of));
+        for of in [slice(0), slice(5)] {
+            slices.take(of);
+        }
+        for of in [approach(0.25, 0.1), approach(3.0, 0.2), approach(9.0, 9.0)] {
+            slices.enter(of);
+        }
         let found: Vec<_> = slices.finish(10).iter().map(|of| (of.from_s, of.to_s, of.closest.lower_m)).collect();
         assert_eq!(found, [(0.0, 1.0, 0.1), (3.0, 3.0, 0.2), (5.0, 6.0, 7.0), (9.0, 9.0, 9.0)]);
         let mut none = Slices::new(10);

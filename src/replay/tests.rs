@@ -267,7 +267,9 @@ fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
 #[test]
 fn of_those_that_were_not_asked_for_nobody_is_drawn() {
     let mut at = Rows::repeat(5000, f64::NAN);
-    [7, 4321].into_iter().for_each(|k| set_row(&mut at, k, Vector3::zeros()));
+    for k in [7, 4321] {
+        set_row(&mut at, k, Vector3::zeros());
+    }
     let film = Film::of(vec![0.0, 1.0], vec![at.clone(), at], Slices::default(), 2);
     let (replay, data) = packed(&stage(5000), &film, &[], PAGE_BYTES);
     assert_eq!((replay.vehicles(), &data["vehicles"]), ([2, 2], &serde_json::json!(["8", "4322"])));
@@ -302,7 +304,9 @@ fn findings_lie_within_the_flight_and_the_nearest_stops_at_a_gap() {
         Slice { from_s, to_s, closest }
     };
     let mut near = Slices::default();
-    [slice(0.0, 3.0), slice(5.0, 10.0)].into_iter().for_each(|slice| near.take(slice));
+    for slice in [slice(0.0, 3.0), slice(5.0, 10.0)] {
+        near.take(slice);
+    }
     let mut film = two_instants(2);
     film.nearest = near;
     let (_, data) = packed(&stage(2), &film, &[violation(0, -5.0, 50.0)], PAGE_BYTES);
