@@ -74,6 +74,7 @@ impl<'py> Given<'py> {
 
 /// Judges arrays of positions as the words of `tautline audit` ask.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
 #[pyo3(signature = (words, command, times, positions, velocities, names, seen))]
 pub(crate) fn audit<'py>(
     py: Python<'py>,
