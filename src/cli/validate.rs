@@ -1,12 +1,9 @@
 //! `tautline validate`: judge every claim of ours and of the paper.
 
-use std::panic::resume_unwind;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 use clap::Args;
 
-use super::caller;
 use super::console::{self, Console};
 use super::folder::OutFolder;
 use super::pictures::{svg_files, write_files};
@@ -48,15 +45,7 @@ pub(super) fn validate(arguments: &ValidateArguments) -> Result<Exit, Failure> {
     let _lock = folder.open(arguments.force)?;
     let threads = threads(arguments.threads.map_or(0, usize::from))?;
     let bar = console.progress(validate::work(), "validate".to_owned());
-    let interrupted = caller::interruption();
-    let progress = |units| {
-        bar.inc(units);
-        if interrupted.as_ref().is_some_and(|interrupted| interrupted.load(Ordering::Relaxed)) {
-            // Nothing is said of claims that were not all tried: the program that called gets control back, and no answer.
-            resume_unwind(Box::new("interrupted"));
-        }
-    };
-    let validation = threads.install(|| validate::validate(&progress));
+    let validation = threads.install(|| validate::validate(&|units| bar.inc(units)));
     bar.finish_and_clear();
 
     let json = validation.to_json().map_err(|error| Failure::machine(format!("cannot write the result: {error}")))?;
