@@ -171,10 +171,10 @@ impl ClearanceAuditor {
         &self.results.obstacles.kept
     }
 
-    /// Whether a vehicle has been nearer to an obstacle than its clearance.
+    /// Times that a vehicle was nearer to an obstacle than its clearance so far, in the order in which they were found.
     #[must_use]
-    pub fn is_violated(&self) -> bool {
-        !self.results.ledger.violations.is_empty()
+    pub fn violations(&self) -> &[Violation<ObjectPair>] {
+        &self.results.ledger.violations
     }
 
     /// The verdict over everything judged.

@@ -10,7 +10,7 @@ use super::console::{self, Console};
 use super::open::Open;
 use super::own::OwnRecording;
 use super::replays::{self, Instants};
-use crate::audit::recorded::{Outcome, RecordedError, TrackAuditor};
+use crate::audit::recorded::{Outcome, Presence, RecordedError, TrackAuditor};
 use crate::read;
 use crate::report::recorded::{Clock, RecordedReport, Source};
 use crate::report::write_atomically;
@@ -19,11 +19,14 @@ use crate::track::Item;
 /// Items that are read before the first is judged: usual intervals are learnt from them.
 const OPENING: usize = 65_536;
 
+/// Vehicles that are never there with another and have a note of their own, at most.
+const MOST_ALONE: usize = 3;
+
 /// Judges one recording and says so, with a page where one is asked for.
 pub(super) fn judge(arguments: &AuditArguments, console: Console) -> Result<RecordedReport, Failure> {
     let options = arguments.reading.options(arguments.format)?;
     let recorded = Recorded {
-        own: arguments.reading.own(arguments.format, options.scale),
+        own: arguments.reading.own(arguments.format, options.scale)?,
         own_limit_m: read::own_limit_m(&arguments.reading.recording, &options),
         command: console::command_line(caller::words().iter().map(String::as_str)),
         open: &|| arguments.reading.open(&options),
@@ -101,6 +104,14 @@ pub(super) fn judge_recorded(
     notes.extend(own_obstacles.map(|own| {
         let names: Vec<_> = own.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
         format!("the obstacles are the recording's own: {}", names.join(", "))
+    }));
+    notes.extend(outcome.alone.iter().take(MOST_ALONE).filter_map(|&vehicle| {
+        let Presence { from_s, to_s } = outcome.presence[vehicle]?;
+        let name = outcome.name(vehicle);
+        Some(format!(
+            "{name}, there from {from_s:?} s to {to_s:?} s, is never there with another: nothing is said of it (--offset \
+             {name}=SECONDS sets a wrong clock right)"
+        ))
     }));
     notes.extend(arguments.asked_by.clone());
     for note in &notes {

@@ -115,19 +115,21 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     }
     let exported = exported?;
     let console = Console { data_on_stdout: false, quiet: arguments.quiet };
-    let own = arguments.reading.own(arguments.input_format, reading.scale).filter(|own| !own.has_every_step);
-    let lost = own.map(|own| {
-        let file = path.display();
-        format!(
-            "up to {} steps were flown between two samples: what the run saw between them is not in {file}",
-            own.most_steps
-        )
-    });
+    let file = path.display();
+    let lost = match arguments.reading.own(arguments.input_format, reading.scale) {
+        Ok(own) => own.filter(|own| !own.has_every_step).map(|own| {
+            let steps = own.most_steps;
+            format!(
+                "up to {steps} steps were flown between two samples: what the run saw between them is not in {file}"
+            )
+        }),
+        Err(unread) => Some(format!("{}; what the run saw between two samples is not in {file}", unread.said.message)),
+    };
     for note in exported.notes.iter().chain(&lost) {
         console.warn(&format!("note: {note}"));
     }
     let vehicles =
         if exported.vehicles == 1 { "1 vehicle".to_owned() } else { format!("{} vehicles", exported.vehicles) };
-    console.say(&format!("{}: {} samples of {vehicles}", path.display(), exported.samples));
+    console.say(&format!("{file}: {} samples of {vehicles}", exported.samples));
     Ok(Exit::Good)
 }

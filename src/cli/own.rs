@@ -39,22 +39,33 @@ pub struct OwnRecording {
 }
 
 impl OwnRecording {
-    /// Reads it; `None` where the file is none of ours, or is damaged, which reading its positions tells better. `scale` is
-    /// what its lengths are multiplied by.
-    pub(super) fn read(path: &Path, scale: f64) -> Option<Self> {
-        let recording = path.is_file().then(|| McapRecording::open(path).ok()).flatten()?;
+    /// Reads it; `None` where the file is none of ours. Where it is damaged, what it says up to there; reading its positions
+    /// tells better what is wrong with it. `scale` is what its lengths are multiplied by.
+    ///
+    /// # Errors
+    /// [`Failure`] where its scenario cannot be read: nobody knows then what was flown past, or in which lengths it tells.
+    pub(super) fn read(path: &Path, scale: f64) -> Result<Option<Self>, Failure> {
+        let Some(recording) = path.is_file().then(|| McapRecording::open(path).ok()).flatten() else { return Ok(None) };
         let header = recording.header();
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
-        let scenario = Scenario::read(&source, &[]).ok();
-        let mut witness = Witness::new(scenario.as_ref(), header.delta_m, scale);
-        for entry in recording {
-            match entry.ok()? {
+        let scenario = Scenario::read(&source, &[]).map_err(|error| {
+            let why = error.to_string();
+            let why = why.lines().next().unwrap_or_default();
+            let message =
+                format!("{} was flown by another tautline: its scenario cannot be read: {why}", path.display());
+            let help =
+                "audit it with the tautline that flew it, or export it as CSV and say how close vehicles may come";
+            Failure::input(message, help)
+        })?;
+        let mut witness = Witness::new(&scenario, header.delta_m, scale);
+        for entry in recording.map_while(Result::ok) {
+            match entry {
                 Entry::Sample(sample) => witness.note_sample(sample),
                 Entry::Event(event) => witness.note_event(event),
             }
         }
-        Some(witness.finish())
+        Ok(Some(witness.finish()))
     }
 
     /// Refuses other lengths than those in which it says what happened between its samples: that would be lost.
@@ -103,11 +114,11 @@ impl Witness {
     /// For a flight of this scenario.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
-        Self::new(Some(scenario), scenario.delta_m, 1.0)
+        Self::new(scenario, scenario.delta_m, 1.0)
     }
 
-    fn new(scenario: Option<&Scenario>, delta_m: f64, scale: f64) -> Self {
-        let ellipsoid_m = scenario.and_then(Scenario::half_axes_m).map(|axes| Vector3::from(axes) * scale);
+    fn new(scenario: &Scenario, delta_m: f64, scale: f64) -> Self {
+        let ellipsoid_m = scenario.half_axes_m().map(|axes| Vector3::from(axes) * scale);
         // What the run told is of lengths in which its delta is the width of an ellipsoid.
         let told_scale = if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS / delta_m } else { scale };
         let own = OwnRecording {
@@ -115,10 +126,10 @@ impl Witness {
             ellipsoid_m,
             told: Vec::new(),
             violations: Vec::new(),
-            has_every_step: scenario.is_some_and(|scenario| scenario.engine().is_some()),
+            has_every_step: scenario.engine().is_some(),
             most_steps: 0,
             other_law: None,
-            obstacles: scenario.map(|scenario| OwnObstacles::of(scenario, scale)).unwrap_or_default(),
+            obstacles: OwnObstacles::of(scenario, scale),
         };
         Self { own, scale, told_scale, before: None, near: Near::default() }
     }
@@ -142,6 +153,9 @@ impl Witness {
             Event::ViolationBegan { pair, time_s } => self.near.begin(pair, time_s, before),
             Event::ViolationEnded { pair, time_s, min_m } => {
                 self.near.end(pair, time_s, min_m * self.told_scale, own.delta_m, before);
+            }
+            Event::Approach { pair, time_s, separation_m } => {
+                self.near.approach(pair, (separation_m * self.told_scale, time_s));
             }
             Event::OtherLaw { name, .. } => own.other_law = Some(name),
             event => own.obstacles.note(&event, self.scale),
@@ -221,6 +235,8 @@ fn around(heights: [f64; 2]) -> [f64; 2] {
 struct Near {
     /// Since when \[s\], and how high the higher of the two was at samples since \[m\].
     since: BTreeMap<Pair, (f64, [f64; 2])>,
+    /// The closest that they came \[m\] and when \[s\], where that was told.
+    closest: BTreeMap<Pair, (f64, f64)>,
     /// Those that ended after the last sample.
     ended: Vec<ToldViolation>,
 }
@@ -229,18 +245,26 @@ impl Near {
     fn begin(&mut self, pair: Pair, time_s: f64, before: Option<&OwnedSample>) {
         let height_m = before.map_or([f64::INFINITY, f64::NEG_INFINITY], |sample| [height(sample, pair); 2]);
         self.since.insert(pair, (time_s, height_m));
+        self.closest.remove(&pair);
+    }
+
+    /// Takes the closest that a pair came \[m\], and when \[s\].
+    fn approach(&mut self, pair: Pair, closest: (f64, f64)) {
+        self.closest.insert(pair, closest);
     }
 
     fn end(&mut self, pair: Pair, to_s: f64, min_m: f64, limit_m: f64, before: Option<&OwnedSample>) {
         if !self.since.contains_key(&pair) {
             self.begin(pair, to_s, before);
         }
+        let min_at_s = self.closest.remove(&pair).filter(|(told_m, _)| *told_m == min_m).map(|(_, at_s)| at_s);
         self.ended.extend(self.since.remove(&pair).map(|(from_s, height_m)| ToldViolation {
             pair,
             from_s,
             to_s,
             least_m: min_m,
             min_m,
+            min_at_s,
             limit_m,
             height_m,
         }));
@@ -257,22 +281,28 @@ impl Near {
         std::mem::take(&mut self.ended)
     }
 
-    /// Those that last to the last sample, which the recording does not tell the smallest distance of: nobody came closer
-    /// than it says of all, and at the last sample they are as far apart as it says.
+    /// Those that last to the last sample. Where the recording does not tell their smallest distance, nobody came closer than it
+    /// says of all, and at the last sample they are as far apart as it says.
     fn lasting(
-        self,
+        mut self,
         last: &OwnedSample,
         (limit_m, axes_m): (f64, Option<Vector3<f64>>),
         all: &[Told],
     ) -> Vec<ToldViolation> {
-        let told = self.since.into_iter().filter_map(|(pair, (from_s, height_m))| {
+        let told = std::mem::take(&mut self.since).into_iter().filter_map(|(pair, (from_s, height_m))| {
             let to_s = last.time_s;
+            if let Some(&(min_m, at_s)) = self.closest.get(&pair).filter(|(min_m, _)| *min_m < limit_m) {
+                let (least_m, min_at_s) = (min_m, Some(at_s));
+                return Some(ToldViolation { pair, from_s, to_s, least_m, min_m, min_at_s, limit_m, height_m });
+            }
             let within = all.iter().filter(|told| told.to_s >= from_s).map(|told| told.closest);
             let least_m = within.clone().map(|of_all| of_all.separation_m).fold(f64::INFINITY, f64::min);
             let own = within.filter(|of_all| of_all.pair == pair && of_all.time_s >= from_s);
-            let min_m = own.map(|own| own.separation_m).fold(apart(last, pair, axes_m)?.norm(), f64::min);
-            let min_m = min_m.min(limit_m.next_down());
-            Some(ToldViolation { pair, from_s, to_s, least_m: least_m.min(min_m), min_m, limit_m, height_m })
+            let at_last = (apart(last, pair, axes_m)?.norm(), to_s);
+            let known = own.map(|own| (own.separation_m, own.time_s)).chain([at_last]);
+            let (min_m, at_s) = known.min_by(|a, b| a.0.total_cmp(&b.0))?;
+            let (min_m, min_at_s) = (min_m.min(limit_m.next_down()), Some(at_s));
+            Some(ToldViolation { pair, from_s, to_s, least_m: least_m.min(min_m), min_m, min_at_s, limit_m, height_m })
         });
         told.collect()
     }

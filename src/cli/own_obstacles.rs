@@ -1,7 +1,7 @@
 //! What a recording of `tautline run` says of the obstacles that were flown past.
 
 use crate::audit::recorded::{Approach, ObjectPair, Outcome, Settings};
-use crate::audit::{Obstacle, Status, Undecided, Violation};
+use crate::audit::{Obstacle, Undecided, Violation};
 use crate::record::Event;
 use crate::scenario::Scenario;
 use crate::sim;
@@ -62,6 +62,14 @@ impl OwnObstacles {
         self.closest.clear();
     }
 
+    /// The closest that the run saw in a part of a violation \[m\], and when \[s\].
+    fn deepest(&self, told: &Violation<ObjectPair>, offset_s: f64, [from_s, to_s]: [f64; 2]) -> Option<(f64, f64)> {
+        let known = self.closest.iter().filter(|known| known.pair == told.pair);
+        let known = known.map(|known| (known.lower_m, known.time_s + offset_s));
+        let within = known.filter(|(near_m, at_s)| *near_m < told.limit_m && (from_s..=to_s).contains(at_s));
+        within.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
     /// Adds to what was found in a recording what the run saw between its samples: a violation, or a time that cannot be
     /// told where heights count and are not known; and how close vehicles came.
     pub(super) fn bind(&self, outcome: &mut Outcome, settings: &Settings) {
@@ -71,51 +79,46 @@ impl OwnObstacles {
             outcome.presence.get(vehicle).copied().flatten()?;
             Some(settings.vehicles.get(&outcome.name(vehicle)).map_or(0.0, |of| of.offset_s))
         };
+        if outcome.separation.is_none() {
+            return;
+        }
         for told in &self.told {
             let Some(offset_s) = offset_s(outcome, told.pair) else { continue };
             let (from_s, to_s) = ((told.from_s + offset_s).max(first_s), (told.to_s + offset_s).min(last_s));
-            let is_found =
-                |found: &Violation<ObjectPair>| found.pair == told.pair && found.from_s <= to_s && from_s <= found.to_s;
-            if from_s > to_s || outcome.violations.iter().any(is_found) {
+            if from_s > to_s {
                 continue;
             }
-            let &Violation { pair, min_m, limit_m, .. } = told;
+            let &Violation { pair, limit_m, .. } = told;
+            let lasts =
+                |found: &Violation<ObjectPair>| found.pair == pair && found.from_s <= to_s && from_s <= found.to_s;
             if settings.above_m.is_some() {
-                let (lower_m, upper_m, rate_hz) = (min_m, f64::INFINITY, None);
-                outcome.undecided.push(Undecided { pair, from_s, to_s, lower_m, upper_m, limit_m, rate_hz });
-                if outcome.status == Status::Clear {
-                    outcome.status = Status::Undecided;
+                if !outcome.violations.iter().any(lasts) {
+                    let (lower_m, upper_m, rate_hz) = (told.min_m, f64::INFINITY, None);
+                    outcome.leave_open(Undecided { pair, from_s, to_s, lower_m, upper_m, limit_m, rate_hz });
                 }
                 continue;
             }
-            outcome.violations.push(Violation { from_s, to_s, min_at_s: f64::midpoint(from_s, to_s), ..*told });
-            outcome.status = Status::Violation;
+            let drawn =
+                outcome.violations.iter().filter(|found| lasts(found)).map(|found| (found.min_m, found.min_at_s));
+            let drawn = drawn.min_by(|a, b| a.0.total_cmp(&b.0));
+            let is_whole = (from_s, to_s) == (told.from_s + offset_s, told.to_s + offset_s);
+            let (min_m, min_at_s) = match (self.deepest(told, offset_s, [from_s, to_s]), drawn) {
+                (Some(deepest), _) => deepest,
+                (None, drawn) if is_whole => (told.min_m, drawn.map_or(to_s, |(_, at_s)| at_s)),
+                (None, Some((drawn_m, at_s))) => (drawn_m.min(limit_m.next_down()), at_s),
+                (None, None) => (limit_m.next_down(), from_s),
+            };
+            outcome.violations.retain(|found| !lasts(found));
+            outcome.violate(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m });
         }
         for told in self.closest.iter().filter(|_| settings.above_m.is_none()) {
             let Some(offset_s) = offset_s(outcome, told.pair) else { continue };
             let time_s = told.time_s + offset_s;
             if (first_s..=last_s).contains(&time_s) {
-                offer(Approach { time_s, ..*told }, outcome);
+                outcome.offer_past_obstacle(Approach { time_s, ..*told });
             }
         }
         outcome.violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.pair.cmp(&b.pair)));
-        outcome.obstacles.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m));
-    }
-}
-
-/// Takes the closest approach of a vehicle to an obstacle, where it is closer than was found: in the list, and in the
-/// violation that lasts then.
-fn offer(told: Approach, outcome: &mut Outcome) {
-    match outcome.obstacles.iter_mut().find(|known| known.pair == told.pair) {
-        Some(known) if known.lower_m > told.lower_m => *known = told,
-        Some(_) => {}
-        None => outcome.obstacles.push(told),
-    }
-    let lasts = |found: &&mut Violation<ObjectPair>| {
-        found.pair == told.pair && (found.from_s..=found.to_s).contains(&told.time_s) && told.lower_m <= found.min_m
-    };
-    if let Some(found) = outcome.violations.iter_mut().find(lasts) {
-        (found.min_m, found.min_at_s) = (told.lower_m, told.time_s);
     }
 }
 
@@ -124,8 +127,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::audit::Shape;
     use crate::audit::recorded::audit;
+    use crate::audit::{Shape, Status};
     use crate::track::{Item, Sample};
 
     const BALL: ObjectPair = ObjectPair::Obstacle { vehicle: 0, obstacle: 0 };
@@ -167,10 +170,35 @@ mod tests {
         let outcome = judged(&seen(), Settings::default());
         let [found] = outcome.violations[..] else { panic!("{outcome:?}") };
         assert_eq!((outcome.status, found.pair, found.from_s, found.to_s), (Status::Violation, BALL, 4.0, 6.0));
+        assert_eq!(outcome.separation, Some(Status::Violation));
         assert_eq!((found.min_m, found.min_at_s, outcome.obstacles[0].lower_m), (0.1, 5.5, 0.1));
         let mut every_step = seen();
         every_step.forget_what_was_seen();
         assert_eq!(judged(&every_step, Settings::default()).status, Status::Clear, "nothing is between its samples");
+    }
+
+    #[test]
+    fn of_a_part_no_more_is_said_than_is_known_of_it() {
+        let window =
+            |from_s: f64, to_s: f64| Settings { from_s: Some(from_s), to_s: Some(to_s), ..Settings::default() };
+        for ((from_s, to_s), expected) in [
+            ((0.0, 5.0), (4.0, 5.0, 0.5_f64.next_down(), 4.0)),
+            ((5.0, 10.0), (5.0, 6.0, 0.1, 5.5)),
+            ((5.6, 10.0), (5.6, 6.0, 0.5_f64.next_down(), 5.6)),
+        ] {
+            let [found] = judged(&seen(), window(from_s, to_s)).violations[..] else { panic!("{from_s} {to_s}") };
+            assert_eq!((found.from_s, found.to_s, found.min_m, found.min_at_s), expected);
+        }
+    }
+
+    #[test]
+    fn what_the_run_saw_takes_the_place_of_what_is_drawn_of_it() {
+        let mut outcome = judged(&seen(), Settings::default());
+        let drawn = Violation { from_s: 5.75, to_s: 6.0, min_m: 0.4, min_at_s: 5.9, ..outcome.violations[0] };
+        outcome.violations = vec![drawn, Violation { from_s: 7.0, to_s: 8.0, ..drawn }];
+        seen().bind(&mut outcome, &Settings::default());
+        let found: Vec<_> = outcome.violations.iter().map(|v| (v.from_s, v.to_s, v.min_m, v.min_at_s)).collect();
+        assert_eq!(found, [(4.0, 6.0, 0.1, 5.5), (7.0, 8.0, 0.4, 5.9)]);
     }
 
     #[test]
@@ -181,5 +209,6 @@ mod tests {
         assert_eq!(judged(&seen(), other).status, Status::Clear);
         let heights = judged(&seen(), Settings { above_m: Some(0.5), ..Settings::default() });
         assert_eq!((heights.status, heights.undecided.len()), (Status::Undecided, 1));
+        assert_eq!(heights.separation, Some(Status::Undecided));
     }
 }

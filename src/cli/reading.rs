@@ -95,9 +95,12 @@ impl ReadArguments {
     }
 
     /// What the recording says of itself, where it is ours.
-    pub(super) fn own(&self, format: Option<Format>, scale: f64) -> Option<OwnRecording> {
+    ///
+    /// # Errors
+    /// As [`OwnRecording::read`].
+    pub(super) fn own(&self, format: Option<Format>, scale: f64) -> Result<Option<OwnRecording>, Failure> {
         let may_be_ours = self.more.is_empty() && format.is_none_or(|format| format == Format::Mcap);
-        may_be_ours.then(|| OwnRecording::read(&self.recording, scale)).flatten()
+        if may_be_ours { OwnRecording::read(&self.recording, scale) } else { Ok(None) }
     }
 
     /// All files.

@@ -196,6 +196,16 @@ pub enum Event {
         /// Smallest separation within \[m\].
         min_m: f64,
     },
+    /// The closest that two came while they were closer than delta. Told before that ends, and at the end of the run where it
+    /// has not.
+    Approach {
+        /// The pair.
+        pair: Pair,
+        /// When \[s\].
+        time_s: f64,
+        /// How close \[m\].
+        separation_m: f64,
+    },
     /// A vehicle came nearer to an obstacle than its clearance.
     ObstacleViolationBegan {
         /// The vehicle, from 0.
@@ -216,7 +226,8 @@ pub enum Event {
         /// Smallest distance from its surface within \[m\], below zero within.
         min_m: f64,
     },
-    /// The closest that a vehicle came to an obstacle in the whole flight, of those with the least room. Told at its end.
+    /// The closest that a vehicle came to an obstacle: while it was nearer than its clearance, told before that ends, and of those
+    /// with the least room in the whole flight, told at its end.
     ObstacleApproach {
         /// The vehicle, from 0.
         vehicle: usize,
@@ -326,6 +337,7 @@ impl Event {
         match *self {
             Self::ViolationBegan { time_s, .. }
             | Self::ViolationEnded { time_s, .. }
+            | Self::Approach { time_s, .. }
             | Self::ObstacleViolationBegan { time_s, .. }
             | Self::ObstacleViolationEnded { time_s, .. }
             | Self::ObstacleApproach { time_s, .. }

@@ -134,8 +134,9 @@ impl Judge {
                     events.push(Event::ObstacleViolationBegan { vehicle, obstacle, time_s });
                 }
             }
-            for &Violation { pair, to_s: time_s, min_m, .. } in ended {
+            for ended @ &Violation { pair, to_s: time_s, min_m, .. } in ended {
                 if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
+                    events.extend(deepest_past_obstacle(ended));
                     events.push(Event::ObstacleViolationEnded { vehicle, obstacle, time_s, min_m });
                 }
             }
@@ -148,8 +149,8 @@ impl Judge {
         let pairs = self.auditor.closest().map(|closest| closest.separation_m - self.delta_m);
         let obstacles = self.clearance.as_ref().and_then(|clearance| clearance.closest().first());
         let beyond = obstacles.map(|approach| approach.upper_m - approach.limit_m);
-        let is_violated =
-            !self.auditor.violations().is_empty() || self.clearance.as_ref().is_some_and(ClearanceAuditor::is_violated);
+        let mut past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
+        let is_violated = !self.auditor.violations().is_empty() || past_obstacles.next().is_some();
         let least_m = pairs.into_iter().chain(beyond).reduce(f64::min)?;
         // Rounding never moves a distance across its limit.
         Some(if is_violated { least_m.min(-f64::MIN_POSITIVE) } else { least_m.max(0.0) })
@@ -158,6 +159,13 @@ impl Judge {
     /// The closest that two vehicles came so far.
     pub(super) fn least_separation(&self) -> Option<ClosestApproach> {
         self.auditor.closest()
+    }
+
+    /// The closest approaches of violations that last to an instant.
+    pub(super) fn lasting(&self, time_s: f64) -> impl Iterator<Item = Event> + '_ {
+        let pairs = self.auditor.violations().iter().filter(move |violation| violation.to_s == time_s).map(deepest);
+        let past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
+        pairs.chain(past_obstacles.filter(move |violation| violation.to_s == time_s).filter_map(deepest_past_obstacle))
     }
 
     /// Who came closest to which obstacle so far.
@@ -321,6 +329,22 @@ fn is_open(distance_m: f64, nearer_m: f64, limit_m: f64) -> bool {
     distance_m >= limit_m && distance_m - nearer_m < limit_m
 }
 
+/// The closest that a pair came in a violation.
+fn deepest(violation: &Violation) -> Event {
+    Event::Approach { pair: violation.pair, time_s: violation.min_at_s, separation_m: violation.min_m }
+}
+
+/// As [`deepest`], of a vehicle and an obstacle.
+fn deepest_past_obstacle(violation: &Violation<ObjectPair>) -> Option<Event> {
+    match violation.pair {
+        ObjectPair::Obstacle { vehicle, obstacle } => {
+            let (time_s, distance_m) = (violation.min_at_s, violation.min_m);
+            Some(Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m })
+        }
+        ObjectPair::Vehicles(_) => None,
+    }
+}
+
 /// Keeps what the judge found in a sweep.
 fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest_m: &mut f64, events: &mut Vec<Event>) {
     if let Some(new) = finding.closest {
@@ -332,6 +356,7 @@ fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest
     }
     for violation in finding.ended {
         let &Violation { pair, to_s, min_m, .. } = violation;
+        events.push(deepest(violation));
         events.push(Event::ViolationEnded { pair, time_s: to_s, min_m });
     }
 }

@@ -200,6 +200,7 @@ impl Simulation {
     fn end_on(&mut self, flown: Result<(), Ending>) {
         if let Err(ending) = flown {
             self.sample_is_due |= ending != Ending::Completed && self.judge.closest.is_some();
+            self.events.extend(self.judge.lasting(self.time_s));
             self.events.extend(self.judge.closest_to_obstacles());
             self.ending = Some(ending);
         }

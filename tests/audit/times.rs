@@ -133,3 +133,25 @@ fn vehicles_on_two_clocks_are_refused_and_not_called_clear() {
     let right = Settings { vehicles: [("bravo".to_owned(), set)].into(), ..Settings::delta(2.0) };
     assert_eq!(audit(&names(3), &items, right).map(|outcome| outcome.status), Ok(Status::Violation));
 }
+
+#[test]
+fn one_that_is_never_there_with_another_is_named() {
+    let later = |begin_s: f64| [seen(2, begin_s, [50.0, 0.0, 0.0]), seen(2, begin_s + 1.0, [50.0, 0.0, 0.0])];
+    let judged = |begin_s: f64, only: Option<&[&str]>| {
+        let mut items = [&beside(0.0)[..], &later(begin_s)].concat();
+        items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        let only = only.map(|names| names.iter().map(|&name| name.to_owned()).collect());
+        audit(&names(3), &items, Settings { only, ..Settings::delta(0.5) }).expect("judged")
+    };
+    let end_s = beside(0.0).last().expect("an item").time_s();
+    for (begin_s, only, alone) in [
+        (3600.0, None, &[2][..]),
+        (3600.0, Some(&["alpha", "bravo"][..]), &[]),
+        // For an instant is long enough.
+        (end_s, None, &[]),
+        (-3600.0, None, &[2]),
+    ] {
+        let outcome = judged(begin_s, only);
+        assert_eq!((outcome.status, &outcome.alone[..]), (Status::Clear, alone), "{begin_s} {only:?}");
+    }
+}

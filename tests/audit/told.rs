@@ -20,7 +20,8 @@ fn told(separation_m: f64, time_s: f64) -> Told {
 
 /// Two that were 1.5 m apart, and all along below 2 m.
 fn near(pair: Pair) -> ToldViolation {
-    ToldViolation { pair, from_s: 0.3, to_s: 0.9, least_m: 1.5, min_m: 1.5, limit_m: 2.0, height_m: [0.0, 0.0] }
+    let (least_m, min_m, min_at_s) = (1.5, 1.5, None);
+    ToldViolation { pair, from_s: 0.3, to_s: 0.9, least_m, min_m, min_at_s, limit_m: 2.0, height_m: [0.0, 0.0] }
 }
 
 fn judged(items: &[Item], told: Told, settings: Settings) -> Outcome {
@@ -75,7 +76,7 @@ fn what_a_recording_says_of_the_time_between_its_samples_goes_before_what_is_dra
         (2.0, [0.4, 0.6], Status::Violation, Some([0.4, 0.6])),
         (1.8, [0.4, 0.6], Status::Undecided, None),
         (1.4, [0.4, 0.6], Status::Clear, None),
-        (1.8, [0.0, 1.0], Status::Violation, Some([0.6, 0.6])),
+        (1.8, [0.0, 1.0], Status::Violation, Some([0.9, 0.9])),
         (3.0, [0.0, 1.0], Status::Violation, Some([0.3, 0.9])),
         (2.0, [0.92, 0.95], Status::Clear, None),
     ];
@@ -249,7 +250,7 @@ fn the_closest_of_all_says_when_and_how_near_two_were_of_whom_a_violation_is_tol
         ([0.4, 0.6], [0.4, 0.6], [1.5, 0.5]),
         ([0.4, 0.5], [0.4, 0.5], [1.5, 0.5]),
         ([0.5, 0.6], [0.5, 0.6], [1.5, 0.5]),
-        ([0.625, 0.75], [0.625, 0.75], [below_m, 0.6875]),
+        ([0.625, 0.75], [0.625, 0.75], [below_m, 0.625]),
     ] {
         let found = outcome(window, own).violations;
         let [found] = found[..] else { panic!("{window:?}: {found:?}") };
@@ -300,4 +301,30 @@ fn a_told_violation_is_of_its_pair_and_time_and_takes_no_other_away() {
     let found: Vec<_> = outcome.violations.iter().map(|v| (v.pair, v.from_s)).collect();
     assert_eq!(found[..3], [(of(0, 1), 0.0), (of(0, 2), 0.0), (of(1, 2), 0.0)]);
     assert_eq!(found[3..], [(of(0, 1), 0.3)]);
+}
+
+#[test]
+fn when_two_were_closest_is_as_told_and_known_in_the_end_where_it_is_not() {
+    let known = |min_at_s: Option<f64>, window: [f64; 2]| {
+        let [from_s, to_s] = window.map(Some);
+        let mut auditor = TrackAuditor::new(Settings { from_s, to_s, ..Settings::delta(2.0) }).expect("settings");
+        auditor = auditor.with_smallest();
+        auditor.tell_violation(ToldViolation { min_at_s, ..near(Pair::new(0, 1)) });
+        auditor.push(&names(2), &pass(3.0)).expect("items");
+        let outcome = auditor.finish().expect("an outcome");
+        let nearest = outcome.smallest.iter().map(|slice| slice.closest);
+        let nearest = nearest.min_by(|a, b| a.lower_m.total_cmp(&b.lower_m)).expect("a slice");
+        let [found] = outcome.violations[..] else { panic!("{outcome:?}") };
+        (found.min_m, found.min_at_s, nearest.upper_m, nearest.time_s)
+    };
+    let just_below = 2.0_f64.next_down();
+    for (min_at_s, window, expected) in [
+        (Some(0.4), [0.0, 1.0], (1.5, 0.4, 1.5, 0.4)),
+        (Some(0.4), [0.0, 0.5], (1.5, 0.4, 1.5, 0.4)),
+        (Some(0.4), [0.5, 1.0], (just_below, 0.5, just_below, 0.5)),
+        (None, [0.0, 1.0], (1.5, 0.9, 1.5, 0.9)),
+        (None, [0.0, 0.5], (just_below, 0.3, just_below, 0.3)),
+    ] {
+        assert_eq!(known(min_at_s, window), expected, "{min_at_s:?} {window:?}");
+    }
 }

@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use tautline::record::mcap::{Header, McapRecorder};
+use tautline::record::{Sample, Sink as _};
+use tautline::swarm::{Rows, Swarm};
 use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
@@ -110,4 +113,55 @@ fn a_violation_that_lasts_to_the_end_binds_before_it() {
     let before = audit(folder.path(), &["--from", &late_s, "--to", &later_s]);
     assert_eq!(before.exit, Some(1), "{before:?}");
     assert!(before.out.contains("came to just below 2.000 m"), "{before:?}");
+}
+
+#[test]
+fn a_run_whose_scenario_cannot_be_read_is_not_judged_without_what_it_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let header = Header::new("newer", "name = \"newer\"\n[law]\ndelta_n = 1.0\n", 2, 1.0);
+    let mut recorder = McapRecorder::create(&folder.path().join("newer.mcap"), &header).expect("made");
+    for time_s in [0.0, 1.0] {
+        let swarm = Swarm::at_rest(Rows::from_fn(2, |i, axis| if axis == 0 { 9.0 * i as f64 } else { 0.0 }));
+        let control = Rows::zeros(2);
+        let step = if time_s == 0.0 { 0 } else { 240 };
+        let sample = Sample::new(time_s, step, &swarm, &control);
+        recorder.sample(&sample).expect("recorded");
+    }
+    recorder.finish().expect("closed");
+    let judged = ran_by(TAUTLINE, folder.path(), &["audit", "newer.mcap", "--delta", "1"]);
+    assert!(judged.exit == Some(2) && judged.err.contains("its scenario cannot be read: "), "{judged:?}");
+    assert!(judged.err.contains("delta_n") && judged.err.contains("export it as CSV"), "{judged:?}");
+    let exported = ran_by(TAUTLINE, folder.path(), &["export", "newer.mcap", "-o", "drawn.csv"]);
+    assert_eq!(exported.exit, Some(0), "{exported:?}");
+    assert!(exported.err.contains("what the run saw between two samples is not in drawn.csv"), "{exported:?}");
+}
+
+#[test]
+fn what_a_run_saw_of_an_obstacle_between_its_samples_is_said_in_every_word() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenario = "start.positions_m = [[0, 0], [0, 40]]\nformation = { shape = \"line\", spacing_m = 6.0 }\n\
+                    law = { kind = \"laplacian\", delta_m = 1.0 }\ntime = { duration_s = 12.0, record_hz = 1.0 }\n\
+                    [[obstacle]]\nname = \"ball\"\nball = { radius_m = 1.0 }\nat_m = [-3.9, 26.0, 0.0]\nclearance_m = 1.9\n";
+    std::fs::write(folder.path().join("past.toml"), scenario).expect("a file");
+    let flown =
+        ran_by(TAUTLINE, folder.path(), &["run", "past.toml", "--out", "coarse", "--no-snapshots", "--no-figures"]);
+    assert_eq!(flown.exit, Some(1), "{flown:?}");
+    let report = std::fs::read_to_string(folder.path().join("coarse/report.json")).expect("a report");
+    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    let [true_m, true_s] = ["min_m", "min_at_s"].map(|key| report["obstacles"]["violations"][0][key].as_f64());
+    let judged = audit(folder.path(), &["--json", "--junit", "found.xml"]);
+    let whole = json(&judged);
+    assert_eq!((&whole["status"], &whole["audit"]["status"]), (&"violation".into(), &"violation".into()));
+    let found = &whole["violations"][0];
+    assert_eq!((found["min_m"].as_f64(), found["min_at_s"].as_f64()), (true_m, true_s), "{found}");
+    let words = audit(folder.path(), &[]);
+    assert!(words.out.starts_with("VIOLATION: 1 and ball came to "), "{words:?}");
+    let cases = std::fs::read_to_string(folder.path().join("found.xml")).expect("cases");
+    assert!(!cases.contains("<testcase name=\"separation\" classname=\"tautline.audit\"/>"), "{cases}");
+    // Before it was at its closest no more is known than that it was too near.
+    let [from_s, at_s] = [found["from_s"].as_f64().expect("a time"), true_s.expect("a time")];
+    let part = audit(folder.path(), &["--to", &format!("{}", f64::midpoint(from_s, at_s))]);
+    assert!(part.out.starts_with("VIOLATION: 1 and ball came to just below 1.9"), "{part:?}");
+    let open = audit(folder.path(), &["--to", &format!("{at_s}"), "--above", "-100", "--json"]);
+    assert_eq!(json(&open)["audit"]["status"], "undecided");
 }

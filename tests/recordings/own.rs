@@ -31,6 +31,7 @@ impl Run {
             Event::HullsHit { pair, time_s: 0.27, closing_m_s: 1.25 },
             Event::OtherLaw { time_s: 0.0, name: "springs".to_owned() },
             Event::LegBegan { leg: 2, time_s: 0.3 },
+            Event::Approach { pair, time_s: 0.4, separation_m: 1.5327 },
             Event::ViolationEnded { pair, time_s: 0.5, min_m: 1.5327 },
             Event::EndedEarly { time_s: 0.75, reason: "the law is undefined".to_owned() },
         ];
@@ -175,7 +176,7 @@ fn the_messages_are_those_of_the_mcap_crate_s_own_reader() {
         }
         *topics.entry(message.channel.topic.clone()).or_insert(0) += 1;
     }
-    let expected = [("/events", 8), ("/scenario", 1), ("/summary", 90), ("/swarm", 90)];
+    let expected = [("/events", 9), ("/scenario", 1), ("/summary", 90), ("/swarm", 90)];
     assert_eq!(topics, expected.map(|(topic, count)| (topic.to_owned(), count)).into());
     assert!(mcap::Summary::read(&bytes).expect("a readable index").is_some());
 }

@@ -1,7 +1,7 @@
 //! The audit of a recording, as it is read.
 
 use super::error::RecordedError;
-use super::outcome::{Gap, Outcome, Presence, Told, ToldViolation};
+use super::outcome::{Gap, Outcome, Presence, Told, ToldViolation, alone};
 use super::rates::Rates;
 use super::settings::{LARGEST, Settings};
 use super::smallest::Smallest;
@@ -285,6 +285,7 @@ impl TrackAuditor {
         let all_listed = self.told.correct(&mut self.results, &self.settings, self.vehicles.len(), counts);
         let Results { ledger, closest, obstacles, told, swept } = self.results;
         let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
+        let alone = if obstructed || !separates { Vec::new() } else { alone(&presence) };
         let decided = looked_at && ledger.is_decided() && is_gapless && contradiction.is_none();
         let parry = ledger.parry;
         let of_pairs = looked_at && all_listed && parry.disagreements == 0 && contradiction.is_none();
@@ -307,6 +308,7 @@ impl TrackAuditor {
             violations,
             undecided,
             gaps: self.gaps,
+            alone,
             contradiction,
             segments: self.segments,
             swept,

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::audit::envelope::EnvelopeOutcome;
 use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
+use crate::audit::results::KEPT;
 use crate::audit::slices::Slice;
 use crate::swarm::{ClosestApproach, Pair};
 
@@ -30,12 +31,30 @@ impl Gap {
 }
 
 /// When a vehicle is there.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Presence {
     /// First seen \[s\].
     pub from_s: f64,
     /// Last seen \[s\].
     pub to_s: f64,
+}
+
+/// Vehicles that are never there together with another: when nobody else was, nothing is judged.
+pub(super) fn alone(presence: &[Option<Presence>]) -> Vec<usize> {
+    let there = presence.iter().enumerate().filter_map(|(vehicle, there)| Some((there.as_ref()?, vehicle)));
+    let mut there: Vec<_> = there.collect();
+    there.sort_by(|(a, _), (b, _)| a.from_s.total_cmp(&b.from_s));
+    let mut last_s = f64::NEG_INFINITY;
+    let mut alone = Vec::new();
+    for (place, &(of, vehicle)) in there.iter().enumerate() {
+        let next_s = there.get(place + 1).map_or(f64::INFINITY, |(next, _)| next.from_s);
+        if last_s < of.from_s && of.to_s < next_s {
+            alone.push(vehicle);
+        }
+        last_s = last_s.max(of.to_s);
+    }
+    alone.sort_unstable();
+    alone
 }
 
 /// What a recording itself says of the time between two of its instants: the closest that any two of its vehicles came.
@@ -68,6 +87,8 @@ pub struct ToldViolation {
     pub least_m: f64,
     /// It is at most this \[m\], mostly the same.
     pub min_m: f64,
+    /// When they were as near as that \[s\], where it is told.
+    pub min_at_s: Option<f64>,
     /// What they were nearer than all along \[m\].
     pub limit_m: f64,
     /// Smallest and largest height of the higher of them at the instants around it \[m\].
@@ -122,6 +143,9 @@ pub struct Outcome {
     /// Every gap in which somebody else was there or an obstacle in the way (any gap where single vehicles are asked about), in
     /// order of time: what happened is not known.
     pub gaps: Vec<Gap>,
+    /// Vehicles that are never there together with another, where they are to keep apart from nothing else: a wrong clock would
+    /// look like that.
+    pub alone: Vec<usize>,
     /// The largest contradiction to the assumed bound on acceleration, if there is one: then nothing is proved clear.
     pub contradiction: Option<Contradiction>,
     /// Whether everything is known but for the lists above.
@@ -136,6 +160,32 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Adds a violation by two that keep a distance.
+    pub(crate) fn violate(&mut self, violation: Violation<ObjectPair>) {
+        self.violations.push(violation);
+        self.status = Status::Violation;
+        self.separation = Some(Status::Violation);
+    }
+
+    /// Adds a time of two that keep a distance that cannot be decided.
+    pub(crate) fn leave_open(&mut self, undecided: Undecided<ObjectPair>) {
+        self.undecided.push(undecided);
+        let at_best = |status| if status == Status::Clear { Status::Undecided } else { status };
+        self.status = at_best(self.status);
+        self.separation = self.separation.map(at_best);
+    }
+
+    /// Takes how close a vehicle came to an obstacle, where that is closer than was found.
+    pub(crate) fn offer_past_obstacle(&mut self, told: Approach) {
+        match self.obstacles.iter_mut().find(|known| known.pair == told.pair) {
+            Some(known) if known.lower_m > told.lower_m => *known = told,
+            Some(_) => {}
+            None => self.obstacles.push(told),
+        }
+        self.obstacles.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m));
+        self.obstacles.truncate(KEPT);
+    }
+
     /// The name of a vehicle: its number from 1 where there is no name.
     #[must_use]
     pub fn name(&self, vehicle: usize) -> String {

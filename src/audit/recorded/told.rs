@@ -271,7 +271,7 @@ impl AllTold {
     }
 
     /// Enters the part of a told violation that is asked about. All along it the two were nearer than the limit of the
-    /// recording; how near is known for the whole, and for a part only where they were the closest of all.
+    /// recording; how near is known for the whole, and for a part where they were closest in it, or the closest of all.
     fn enter<F: Fn(usize) -> Option<Counted>>(
         &self,
         told: &ToldViolation,
@@ -281,13 +281,25 @@ impl AllTold {
         results: &mut Results,
     ) {
         let Asked { pair, limit: limit_m, over: Interval { from_s, to_s }, is_whole, .. } = *asked;
-        let seen = self.nearest(told.pair, from_s - later_s, to_s - later_s);
         let (lower_m, of_all_m) = question.scaled(told.least_m, told.min_m);
         let below_m = told.limit_m / question.shortest_m;
-        let nearest_m = seen.map_or(f64::INFINITY, |(nearest_m, _)| nearest_m / question.shortest_m);
-        let upper_m = if is_whole { of_all_m } else { nearest_m.min(below_m.next_down()) };
-        let time_s = seen.map_or(f64::midpoint(from_s, to_s), |(_, at_s)| at_s + later_s);
-        results.enter(Approach { pair, lower_m, upper_m, time_s, limit_m });
+        let within = |at_s: &f64| (from_s..=to_s).contains(at_s);
+        let deepest_s = told.min_at_s.map(|at_s| at_s + later_s).filter(within);
+        let seen = self.nearest(told.pair, from_s - later_s, to_s - later_s);
+        let seen = seen.map(|(seen_m, at_s)| (seen_m / question.shortest_m, at_s + later_s));
+        let drawn = results.ledger.violations.iter().filter(|v| v.pair == pair && within(&v.min_at_s));
+        let drawn = drawn.map(|v| (v.min_m, v.min_at_s)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let deepest_s = deepest_s.or(seen.filter(|(seen_m, _)| is_whole && *seen_m <= of_all_m).map(|(_, at_s)| at_s));
+        let all_along_m = below_m.next_down();
+        let (upper_m, time_s) = match deepest_s {
+            Some(at_s) => (of_all_m, at_s),
+            None if is_whole => (of_all_m, drawn.map_or(to_s, |(_, at_s)| at_s)),
+            None => seen.or(drawn).map_or((all_along_m, from_s), |(near_m, at_s)| (near_m.min(all_along_m), at_s)),
+        };
+        results.closest.offer(Approach { pair, lower_m, upper_m, time_s, limit_m });
+        // Where it is not told when they were as near as that, it is known in the end.
+        let known_s = if deepest_s.is_none() && is_whole { to_s } else { time_s };
+        results.told.push(Approach { pair, lower_m, upper_m, time_s: known_s, limit_m });
         if limit_m >= below_m {
             // What is drawn of the same time is a part of the same violation.
             let (mut from_s, mut to_s) = (from_s, to_s);

@@ -235,6 +235,12 @@ impl From<&Event> for EventMessage<&'static str> {
                 *min_m,
                 format!("vehicles {pair} are clear again after coming to {min_m} m"),
             ),
+            Event::Approach { pair, separation_m, .. } => (
+                "approach",
+                pair.numbers(),
+                *separation_m,
+                format!("vehicles {pair} came to {separation_m} m at the closest"),
+            ),
             Event::ObstacleViolationBegan { vehicle, obstacle, .. } => (
                 "obstacle-violation-began",
                 [vehicle + 1, obstacle + 1],
@@ -292,6 +298,7 @@ impl EventMessage<String> {
         Ok(match self.kind.as_str() {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
+            "approach" => Event::Approach { pair: pair()?, time_s, separation_m: self.value },
             "obstacle-violation-began" => {
                 let [vehicle, obstacle] = self.vehicle_and_obstacle()?;
                 Event::ObstacleViolationBegan { vehicle, obstacle, time_s }

@@ -306,6 +306,11 @@ impl Timeline {
                 let (from_s, to_s, min_at_s) = (time_s, f64::INFINITY, time_s);
                 self.violations.push(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m });
             }
+            Event::Approach { pair, time_s, separation_m } => {
+                if let Some(&k) = self.open.get(&pair) {
+                    (self.violations[k].min_m, self.violations[k].min_at_s) = (separation_m, time_s);
+                }
+            }
             Event::ViolationEnded { pair, time_s, min_m } => {
                 if let Some(k) = self.open.remove(&pair) {
                     let violation = &mut self.violations[k];

@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use super::envelope::OfLimit;
 use super::named::{OfPair, OfVehicle};
-use crate::audit::recorded::{Approach, Contradiction, Gap, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS};
+use crate::audit::recorded::{
+    Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS,
+};
 use crate::audit::{Status, Undecided, Violation};
 use crate::report::findings::finite;
 use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
@@ -98,6 +100,8 @@ pub struct RecordedReport {
     pub limits: Vec<OfLimit>,
     /// When vehicles were not seen.
     pub gaps: Vec<OfVehicle<Gap>>,
+    /// Vehicles that are never there together with another, and when they are, where they are to keep apart from nothing else.
+    pub alone: Vec<OfVehicle<Presence>>,
     /// When it cannot be told whether two came too close.
     pub undecided: Vec<OfPair<Undecided<ObjectPair>>>,
     /// Where the recording contradicts the assumed bound on acceleration.
@@ -187,6 +191,11 @@ impl RecordedReport {
                 .gaps
                 .iter()
                 .map(|gap| OfVehicle { vehicle: outcome.name(gap.vehicle), finding: *gap })
+                .collect(),
+            alone: outcome
+                .alone
+                .iter()
+                .filter_map(|&of| Some(OfVehicle { vehicle: outcome.name(of), finding: outcome.presence[of]? }))
                 .collect(),
             undecided: outcome.undecided.iter().map(|u| OfPair { who: names(u.pair), finding: *u }).collect(),
             contradiction: outcome

@@ -58,7 +58,7 @@ impl RecordedReport {
                     format!("never closer than {least}{unit}, {first} and {second} at {at} ")
                 });
                 let motion = if self.audit.proved { format!(", {}", self.motion) } else { String::new() };
-                format!("{closest}({delta}{motion})")
+                format!("{closest}({delta}{motion}){}", self.of_those_alone())
             }
             Status::Violation => {
                 let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
@@ -79,6 +79,15 @@ impl RecordedReport {
             }
             Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(), self.motion),
         }
+    }
+
+    /// Who was there when nobody else was, of whom nothing is said.
+    fn of_those_alone(&self) -> String {
+        let others = |count: usize| if count > 0 { format!(" and {count} more") } else { String::new() };
+        self.alone.split_first().map_or(String::new(), |(first, rest)| {
+            let (is, others) = (if rest.is_empty() { "is" } else { "are" }, others(rest.len()));
+            format!("; {}{others} {is} never there with another", first.vehicle)
+        })
     }
 
     fn why_undecided(&self) -> String {
