@@ -28,18 +28,21 @@ pub(super) fn check_range(command: &Rows) -> Result<(), LawError> {
 /// over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)` and takes O(N) for all rows.
 pub(super) fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows) {
     let count = graph.count().max(1);
-    for (x, sums) in rows.as_slice().chunks_exact(count).zip(sums.as_mut_slice().chunks_exact_mut(count)) {
-        if graph.is_complete() {
+    let (x, sums) = (rows.as_slice(), sums.as_mut_slice());
+    if graph.is_complete() {
+        for (x, sums) in x.chunks_exact(count).zip(sums.chunks_exact_mut(count)) {
             let mean = x.iter().sum::<f64>() / count as f64;
             let gain = gain * count as f64;
             sums.iter_mut().zip(x).for_each(|(sum, x)| *sum += gain * (x - mean));
-        } else {
-            for (i, j) in graph.edges() {
-                let difference = gain * (x[i] - x[j]);
-                sums[i] += difference;
-                sums[j] -= difference;
-            }
         }
+    } else {
+        graph.edges().for_each(|(i, j)| {
+            for axis in [0, count, 2 * count] {
+                let difference = gain * (x[axis + i] - x[axis + j]);
+                sums[axis + i] += difference;
+                sums[axis + j] -= difference;
+            }
+        });
     }
 }
 

@@ -1,4 +1,4 @@
-//! The edge-tension sums over all edges, a block of edges at a time.
+//! The edge-tension sums over all edges, as many at a time as there are lanes.
 //!
 //! The loops over lanes hold nothing but IEEE additions, multiplications, divisions, square roots and selections, which
 //! the compiler turns into whatever vector instructions were found at run time. Nothing is fused or reordered, and sums
@@ -17,8 +17,6 @@ use crate::swarm::Rows;
 
 /// Number of partial sums that a long sum is split into, whatever the machine's vectors hold.
 const LANES: usize = 8;
-/// Edges that are evaluated together, a multiple of [`LANES`].
-const BLOCK: usize = 32;
 /// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. Around
 /// this number both ways take the same time.
 const LISTED_UP_TO: usize = 16;
@@ -109,38 +107,28 @@ impl WithSimd for AddPulls<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let Self { kernel, rows, axes, mut sums } = self;
-        let mut block = Block::new(kernel.delta_m);
-        let mut potential = [0.0; LANES];
+        let mut evaluator = Evaluator { delta_m: kernel.delta_m, potential: [0.0; LANES], outside: 0 };
         match &kernel.edges {
             Edges::All(count) => {
                 let start = rows.start;
                 for (i, row) in with_values(rows, *count, &kernel.inverse_k_per_m) {
-                    let mut of_own = [[0.0; LANES]; 3];
-                    for (c, inverse) in row.chunks(BLOCK).enumerate() {
-                        let first = i + 1 + c * BLOCK;
-                        block.fill_from_row(i, first, inverse, axes);
-                        block.turn_into_pulls(&mut potential);
-                        for axis in 0..3 {
-                            let pulls = &block.edges_m[axis];
-                            for lanes in pulls.as_chunks::<LANES>().0.iter().take(inverse.len().div_ceil(LANES)) {
-                                for k in 0..LANES {
-                                    of_own[axis][k] += lanes[k];
-                                }
-                            }
-                            let theirs = &mut sums[axis][first - start..][..inverse.len()];
-                            theirs.iter_mut().zip(pulls).for_each(|(sum, pull)| *sum -= pull);
-                        }
-                    }
+                    let own = axes.map(|axis| axis[i]);
+                    let of_own = evaluator.row(
+                        own,
+                        row,
+                        axes.map(|axis| &axis[i + 1..]),
+                        sums.each_mut().map(|axis| &mut axis[i + 1 - start..]),
+                    );
                     for axis in 0..3 {
                         sums[axis][i - start] += total(of_own[axis]);
                     }
                 }
             }
             Edges::Listed(edges) => {
-                for (edges, inverse) in edges.chunks(BLOCK).zip(kernel.inverse_k_per_m.chunks(BLOCK)) {
-                    block.fill_from_list(edges, inverse, axes);
-                    block.turn_into_pulls(&mut potential);
-                    for (sums, pulls) in sums.iter_mut().zip(&block.edges_m) {
+                for (edges, inverse) in edges.chunks(LANES).zip(kernel.inverse_k_per_m.chunks(LANES)) {
+                    let apart_m = |axis: usize, k: usize| axes[axis][edges[k][0]] - axes[axis][edges[k][1]];
+                    let pulls = evaluator.some(inverse, apart_m);
+                    for (sums, pulls) in sums.iter_mut().zip(&pulls) {
                         for (&[i, j], pull) in edges.iter().zip(pulls) {
                             sums[i] += pull;
                             sums[j] -= pull;
@@ -149,7 +137,7 @@ impl WithSimd for AddPulls<'_> {
                 }
             }
         }
-        block.within().map(|()| total(potential))
+        if evaluator.outside == 0 { Ok(total(evaluator.potential)) } else { Err(OutOfDomain) }
     }
 }
 
@@ -165,83 +153,87 @@ fn with_values(rows: Range<usize>, count: usize, values: &[f64]) -> impl Iterato
     })
 }
 
-/// Up to [`BLOCK`] edges.
-struct Block {
+/// Evaluates edges, as many at once as there are lanes.
+struct Evaluator {
     delta_m: f64,
-    /// Number of edges.
-    len: usize,
-    /// Along each axis `p_i - p_j` of the edges.
-    edges_m: [[f64; BLOCK]; 3],
-    inverse_k_per_m: [f64; BLOCK],
+    /// Sum of V/alpha.
+    potential: Lanes,
     /// Positive once some distance was not in (delta, infinity).
     outside: u64,
 }
 
-impl Block {
+impl Evaluator {
+    /// The edges from a vehicle at `own` \[m\] to as many others as there are 1/K: subtracts the pull of each from theirs, and
+    /// returns their sum along each axis in lanes.
     #[inline(always)]
-    fn new(delta_m: f64) -> Self {
-        Self { delta_m, len: 0, edges_m: [[0.0; BLOCK]; 3], inverse_k_per_m: [0.0; BLOCK], outside: 0 }
-    }
-
-    #[inline(always)]
-    fn within(&self) -> Result<(), OutOfDomain> {
-        if self.outside == 0 { Ok(()) } else { Err(OutOfDomain) }
-    }
-
-    /// The edges from vehicle `i` to the vehicles from `first` on, as many as there are 1/K.
-    #[inline(always)]
-    fn fill_from_row(&mut self, i: usize, first: usize, inverse_k_per_m: &[f64], axes: [&[f64]; 3]) {
-        let len = inverse_k_per_m.len();
-        for (edges, axis) in self.edges_m.iter_mut().zip(axes) {
-            let own = axis[i];
-            edges.iter_mut().zip(&axis[first..first + len]).for_each(|(edge, other)| *edge = own - other);
-        }
-        self.pad(inverse_k_per_m);
-    }
-
-    #[inline(always)]
-    fn fill_from_list(&mut self, list: &[[usize; 2]], inverse_k_per_m: &[f64], axes: [&[f64]; 3]) {
-        for (edges, axis) in self.edges_m.iter_mut().zip(axes) {
-            edges.iter_mut().zip(list).for_each(|(edge, &[i, j])| *edge = axis[i] - axis[j]);
-        }
-        self.pad(inverse_k_per_m);
-    }
-
-    /// Fills the last lanes with edges at a distance where every function is finite.
-    #[inline(always)]
-    fn pad(&mut self, inverse_k_per_m: &[f64]) {
-        self.len = inverse_k_per_m.len();
-        self.inverse_k_per_m[..self.len].copy_from_slice(inverse_k_per_m);
-        for k in self.len..self.len.next_multiple_of(LANES).min(BLOCK) {
-            self.inverse_k_per_m[k] = 1.0;
-            self.edges_m[0][k] = 2.0 * self.delta_m + 1.0;
-            self.edges_m[1][k] = 0.0;
-            self.edges_m[2][k] = 0.0;
-        }
-    }
-
-    /// Multiplies each edge by `w_ij/alpha = V'/(alpha l)`, and adds V/alpha of each to `potential`.
-    #[inline(always)]
-    fn turn_into_pulls(&mut self, potential: &mut Lanes) {
-        let chunks = self.len.div_ceil(LANES);
-        let mut values = [[0.0; LANES]; BLOCK / LANES];
-        let [x, y, z] = self.edges_m.each_mut().map(|edges| edges.as_chunks_mut::<LANES>().0);
-        let inverse = self.inverse_k_per_m.as_chunks::<LANES>().0;
-        for ((((x, y), z), inverse_k), values) in x.iter_mut().zip(y).zip(z).zip(inverse).zip(&mut values).take(chunks)
-        {
-            let outside;
-            ([*x, *y, *z], *values, outside) = pulls(self.delta_m, [*x, *y, *z], *inverse_k);
-            self.outside |= outside;
-        }
-        values.as_flattened_mut()[self.len..].fill(0.0);
-        for values in &values {
-            for k in 0..LANES {
-                potential[k] += values[k];
+    fn row(&mut self, own: [f64; 3], inverse_k: &[f64], others: [&[f64]; 3], theirs: [&mut [f64]; 3]) -> [Lanes; 3] {
+        let mut of_own = [[0.0; LANES]; 3];
+        let (whole, rest) = inverse_k.as_chunks::<LANES>();
+        let [x, y, z] = others.map(|axis| axis.as_chunks::<LANES>().0);
+        let [mut of_x, mut of_y, mut of_z] = theirs;
+        let sums = of_x
+            .as_chunks_mut::<LANES>()
+            .0
+            .iter_mut()
+            .zip(of_y.as_chunks_mut::<LANES>().0)
+            .zip(of_z.as_chunks_mut::<LANES>().0);
+        for ((((inverse_k, x), y), z), ((of_x, of_y), of_z)) in whole.iter().zip(x).zip(y).zip(z).zip(sums) {
+            let others = [x, y, z];
+            let edges_m = [0, 1, 2].map(|axis| others[axis].map(|other| own[axis] - other));
+            let pulls = self.pulls(edges_m, *inverse_k);
+            for (axis, theirs) in [of_x, of_y, of_z].into_iter().enumerate() {
+                for k in 0..LANES {
+                    of_own[axis][k] += pulls[axis][k];
+                    theirs[k] -= pulls[axis][k];
+                }
             }
         }
-        for edges in &mut self.edges_m {
-            edges[self.len..].iter_mut().take(LANES).for_each(|pull| *pull = 0.0);
+        let from = whole.len() * LANES;
+        if !rest.is_empty() {
+            let pulls = self.some(rest, |axis, k| own[axis] - others[axis][from + k]);
+            for (axis, theirs) in [&mut of_x, &mut of_y, &mut of_z].into_iter().enumerate() {
+                for k in 0..LANES {
+                    of_own[axis][k] += pulls[axis][k];
+                }
+                theirs[from..].iter_mut().zip(&pulls[axis][..rest.len()]).for_each(|(sum, pull)| *sum -= pull);
+            }
         }
+        of_own
+    }
+
+    /// The pulls of fewer edges than there are lanes, or as many; 0 in the lanes that are left.
+    #[inline(always)]
+    fn some(&mut self, inverse_k_per_m: &[f64], apart_m: impl Fn(usize, usize) -> f64) -> [Lanes; 3] {
+        let count = inverse_k_per_m.len();
+        // A distance where every function is finite.
+        let mut edges_m = [[2.0 * self.delta_m + 1.0; LANES], [0.0; LANES], [0.0; LANES]];
+        let mut inverse_k = [1.0; LANES];
+        for k in 0..count {
+            inverse_k[k] = inverse_k_per_m[k];
+            for axis in 0..3 {
+                edges_m[axis][k] = apart_m(axis, k);
+            }
+        }
+        let before = self.potential;
+        let mut pulls = self.pulls(edges_m, inverse_k);
+        for k in count..LANES {
+            self.potential[k] = before[k];
+            for pulls in &mut pulls {
+                pulls[k] = 0.0;
+            }
+        }
+        pulls
+    }
+
+    /// Multiplies each edge by `w_ij/alpha = V'/(alpha l)`, and adds V/alpha of each to the potential.
+    #[inline(always)]
+    fn pulls(&mut self, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> [Lanes; 3] {
+        let (pulls, values, outside) = pulls(self.delta_m, edges_m, inverse_k_per_m);
+        self.outside |= outside;
+        for k in 0..LANES {
+            self.potential[k] += values[k];
+        }
+        pulls
     }
 }
 

@@ -81,10 +81,9 @@ impl PinnedConsensus {
     ) -> Result<(), LawError> {
         let (slots_m, Gains { position: k, velocity: c }) = (&at.target.formation.slots_m, gains);
         if let Some(swarm) = at.shared() {
-            self.pulls.copy_from(&swarm.positions_m);
-            self.pulls -= slots_m;
+            let (p, h, v) = (swarm.positions_m.as_slice(), slots_m.as_slice(), swarm.velocities_m_s.as_slice());
             let pulls = self.pulls.as_mut_slice().iter_mut();
-            pulls.zip(swarm.velocities_m_s.as_slice()).for_each(|(pull, v)| *pull = k * *pull + c * v);
+            pulls.zip(p).zip(h).zip(v).for_each(|(((pull, p), h), v)| *pull = k * (p - h) + c * v);
             add_laplacian_product(&self.graph, &self.pulls, scale, sums);
         } else {
             add_heard(at, sums, |i, own, j, heard| {

@@ -160,15 +160,15 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Adds a violation by two that keep a distance.
-    pub(crate) fn violate(&mut self, violation: Violation<ObjectPair>) {
+    /// Adds a violation of a distance that two are to keep, from what else is known of the recording.
+    pub fn violate(&mut self, violation: Violation<ObjectPair>) {
         self.violations.push(violation);
         self.status = Status::Violation;
         self.separation = Some(Status::Violation);
     }
 
     /// Adds a time of two that keep a distance that cannot be decided.
-    pub(crate) fn leave_open(&mut self, undecided: Undecided<ObjectPair>) {
+    pub fn leave_open(&mut self, undecided: Undecided<ObjectPair>) {
         self.undecided.push(undecided);
         let at_best = |status| if status == Status::Clear { Status::Undecided } else { status };
         self.status = at_best(self.status);
@@ -176,7 +176,7 @@ impl Outcome {
     }
 
     /// Takes how close a vehicle came to an obstacle, where that is closer than was found.
-    pub(crate) fn offer_past_obstacle(&mut self, told: Approach) {
+    pub fn offer_past_obstacle(&mut self, told: Approach) {
         match self.obstacles.iter_mut().find(|known| known.pair == told.pair) {
             Some(known) if known.lower_m > told.lower_m => *known = told,
             Some(_) => {}
