@@ -222,7 +222,11 @@ fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
     assert!(refused.expect_err("not closed").help().contains("--allow-unfinished"));
     let accepting = ReadOptions { allow_unfinished: true, ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &accepting).expect("accepted");
-    assert!(found.samples().len() < passing().len() && passing().starts_with(&found.samples()), "{:?}", found.samples());
+    assert!(
+        found.samples().len() < passing().len() && passing().starts_with(&found.samples()),
+        "{:?}",
+        found.samples()
+    );
     let counted = format!("its files have {} messages, and metadata.yaml counts 21", found.samples().len() / 2);
     for note in ["the recording was not closed", &counted] {
         assert!(found.notes.iter().any(|said| said.starts_with(note)), "{:?}", found.notes);
