@@ -215,8 +215,9 @@ fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
         let path = folder.join("split_1.mcap.zstd");
         let bytes = zstd::decode_all(fs::File::open(&path).expect("a file")).expect("unpacked");
         // The last bytes are those of the end and of the index, which a recorder that is killed does not write.
-        let end = mcap::Summary::read(&bytes).expect("an index").expect("an index").chunk_indexes[0].chunk_start_offset;
-        fs::write(&path, &bytes[..end as usize]).expect("written");
+        let index = mcap::Summary::read(&bytes).expect("an index").expect("an index");
+        let end = usize::try_from(index.chunk_indexes[0].chunk_start_offset).expect("an offset");
+        fs::write(&path, &bytes[..end]).expect("written");
     };
     let (folder, refused) = changed(cut);
     assert!(refused.expect_err("not closed").help().contains("--allow-unfinished"));

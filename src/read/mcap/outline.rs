@@ -107,7 +107,8 @@ impl Outline {
             );
             return Err(Fault::content(
                 problem,
-                "record a pose for every vehicle in every list, or messages that name them",
+                "record a pose for every vehicle in every list, or messages that name them; name the other topics with \
+                 --topic if the list is of no vehicles",
             ));
         }
         told.listed = listed;

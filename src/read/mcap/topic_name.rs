@@ -2,7 +2,7 @@
 
 /// Words of topics that tell where somebody is asked to be, and not where a vehicle is: of MAVROS
 /// (`setpoint_position/local`), PX4 (`trajectory_setpoint`), Crazyswarm2 (`cmd_full_state`), Aerostack2
-/// (`motion_reference/pose`), planners, and what is clicked in RViz.
+/// (`motion_reference/pose`), planners, and what is clicked in a viewer.
 const WISHES: [&str; 20] = [
     "clicked",
     "cmd",
