@@ -16,10 +16,12 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
     here(py, || cli::entry(&arguments))
 }
 
-/// Runs a command without printing: whether its exit code is 0, and what it wrote for programs.
+/// Runs a command without printing: whether its exit code is 0, and what it wrote for programs. A scenario `-` is the text.
 #[pyfunction]
-pub(crate) fn call(py: Python<'_>, words: Vec<String>) -> PyResult<(bool, String)> {
+#[pyo3(signature = (words, text=None))]
+pub(crate) fn call(py: Python<'_>, words: Vec<String>, text: Option<String>) -> PyResult<(bool, String)> {
     let interrupted = Arc::default();
-    let answer = away(py, &interrupted, || cli::call(&words, &interrupted))?.map_err(Raised::raised)?;
+    let answer = away(py, &interrupted, || cli::call(&words, text.as_deref(), &interrupted))?;
+    let answer = answer.map_err(Raised::raised)?;
     Ok((answer.is_good, answer.data))
 }

@@ -176,6 +176,15 @@ class Kept(Case):
         self.assertEqual(tl.compare(s, ["edge-tension"], runs=1).runs, 1)
         self.assertEqual(os.listdir(self.folder), ["slots.csv"])
 
+    @unittest.skipUnless(sys.platform == "linux", "nobody can write into /proc there")
+    def test_a_text_needs_no_folder_that_can_be_written(self) -> None:
+        before = os.getcwd()
+        self.addCleanup(os.chdir, before)
+        os.chdir("/proc")
+        s = tl.Scenario.from_toml(short().to_toml())
+        self.assertTrue(tl.check(s).is_good)
+        self.assertEqual(tl.compare(s, ["edge-tension"], runs=1).runs, 1)
+
     def test_findings_travel_between_processes(self) -> None:
         a = tl.audit(*passing(), delta=1.5)
         sent = pickle.loads(pickle.dumps(a))
