@@ -7,6 +7,7 @@ import pickle
 import sys
 import threading
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import tautline as tl
@@ -206,9 +207,22 @@ class Kept(Case):
         with multiprocessing.get_context("fork").Pool(1) as pool:
             self.assertEqual(pool.apply_async(instants, (large,)).get(timeout=120), steps)
 
+    @unittest.skipUnless(sys.platform == "linux", "processes are forked there")
+    def test_a_forked_process_asks_about_a_large_swarm_and_in_several_threads(self) -> None:
+        large = tl.Scenario("thousand", set={"time.duration_s": 0.02, "arrival.hold_s": 0.0})
+        tl.fly(large)
+        with multiprocessing.get_context("fork").Pool(1) as pool:
+            self.assertEqual(pool.apply_async(answers, (large,)).get(timeout=120), [1, 1, 1])
+
 
 def instants(scenario: tl.Scenario) -> int:
     return len(tl.fly(scenario).t)
+
+
+def answers(scenario: tl.Scenario) -> list[int]:
+    tl.check(scenario)
+    with ThreadPoolExecutor() as threads:
+        return list(threads.map(lambda _: tl.compare(scenario, runs=1).runs, range(3)))
 
 
 if __name__ == "__main__":
