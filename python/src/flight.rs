@@ -19,7 +19,7 @@ use crate::errors::{Raised as _, broken, wrong};
 use crate::law::PythonLaw;
 use crate::numbers::{by_row, cube};
 use crate::scenario::Scenario;
-use crate::work::{Signals, flying};
+use crate::work::{Signals, here};
 
 /// The samples of a flight, in memory.
 #[derive(Default)]
@@ -136,7 +136,7 @@ pub(crate) fn fly(
     let raising = law.as_ref().map(PythonLaw::raising);
     let samples = Samples { is_kept: keep, vehicles: scenario.count(), ..Samples::default() };
     let mut signals = Signals::new();
-    let flown = flying(py, || -> Result<_, SimError> {
+    let flown = here(py, || -> Result<_, SimError> {
         let preflight = match &law {
             Some(law) => Preflight::under(scenario, law),
             None => Preflight::of(scenario)?,

@@ -14,7 +14,7 @@ use crate::errors::{Raised as _, wrong};
 use crate::law::{PythonLaw, Raising};
 use crate::numbers::{borrowed, shown, table, to_rows};
 use crate::scenario::Scenario;
-use crate::work::flying;
+use crate::work::here;
 
 /// Steps are flown for so long between two looks at Ctrl-C.
 const AT_ONCE: Duration = Duration::from_millis(50);
@@ -36,7 +36,7 @@ type Closest = ((usize, usize), f64, f64);
 impl Simulation {
     /// Does something with the simulation, unless somebody else does.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut sim::Simulation) -> T + Send) -> PyResult<T> {
-        let done = flying(py, || match self.state.try_lock() {
+        let done = here(py, || match self.state.try_lock() {
             Ok(mut simulation) => Ok(work(&mut simulation)),
             Err(TryLockError::WouldBlock) => {
                 Err("the simulation is being stepped, by another thread or by this law's own")
@@ -69,7 +69,7 @@ impl Simulation {
         let scenario = &scenario.scenario;
         let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
         let raising = law.as_ref().map(PythonLaw::raising);
-        let made = flying(py, || -> Result<_, SimError> {
+        let made = here(py, || -> Result<_, SimError> {
             let parts = match law {
                 Some(law) => Parts::under(scenario, Box::new(law)),
                 None => Parts::of(scenario)?,

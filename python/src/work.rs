@@ -50,23 +50,42 @@ pub(crate) fn away<T: Send>(
     })?;
     match raised {
         Some(signal) => Err(signal),
-        None => done.map_err(|panic| broken(&words(panic.as_ref()))),
+        None => finished(done),
     }
 }
 
-/// Does work in this thread, without the interpreter's lock.
+/// Does work while this thread waits, without the interpreter's lock. Threads that large swarms share are gone in a process that
+/// was forked: there it gets some that all of it share.
 pub(crate) fn here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| broken(&words(panic.as_ref())))
+    let with_threads = || if is_at_home() { Ok(work()) } else { own_pool().map(|pool| pool.install(work)) };
+    started(finished(py.detach(|| catch_unwind(AssertUnwindSafe(with_threads))))?)
 }
 
-/// Flies in this thread, without the interpreter's lock. Threads that large swarms share are gone in a process that was forked:
-/// there it gets some of its own.
-pub(crate) fn flying<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let at_home = *HOME.get_or_init(process::id);
-    if at_home == process::id() {
-        return here(py, work);
-    }
-    here(py, || own_pool().map(|pool| pool.install(work)))?.map_err(|error| broken(&error.to_string()))
+/// As [`away`], for work that shares threads. In a process that was forked it gets some that nobody else waits for.
+pub(crate) fn away_with_threads<T: Send>(
+    py: Python<'_>,
+    interrupted: &Arc<AtomicBool>,
+    work: impl FnOnce() -> T + Send,
+) -> PyResult<T> {
+    let with_threads = || if is_at_home() { Ok(work()) } else { new_pool().map(|pool| pool.install(work)) };
+    started(away(py, interrupted, with_threads)?)
+}
+
+/// Whether this process is the one that the package was imported in, and not one that it was forked into.
+fn is_at_home() -> bool {
+    *HOME.get_or_init(process::id) == process::id()
+}
+
+fn new_pool() -> Result<ThreadPool, ThreadPoolBuildError> {
+    ThreadPoolBuilder::new().stack_size(STACK).build()
+}
+
+fn finished<T>(done: thread::Result<T>) -> PyResult<T> {
+    done.map_err(|panic| broken(&words(panic.as_ref())))
+}
+
+fn started<T>(done: Result<T, ThreadPoolBuildError>) -> PyResult<T> {
+    done.map_err(|error| broken(&error.to_string()))
 }
 
 /// Takes note of the process that the package was imported in.
@@ -80,7 +99,7 @@ fn own_pool() -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
     match &*pools {
         Some((process, pool)) if *process == process::id() => Ok(Arc::clone(pool)),
         _ => {
-            let pool = Arc::new(ThreadPoolBuilder::new().build()?);
+            let pool = Arc::new(new_pool()?);
             // That of the process before has no threads here that could be waited for.
             std::mem::forget(pools.replace((process::id(), Arc::clone(&pool))));
             Ok(pool)

@@ -76,8 +76,7 @@ def export(
 
 def asked(command: str, scenario: Scenario | PathLike, set: Mapping[str, Any] | None, words: list[str]) -> Answer:
     """Asks a command about a scenario."""
-    with scenario_of(scenario, set)._words() as which:
-        return Answer(*_native.call([command, "--json=-", *words, *which]))
+    return Answer(*scenario_of(scenario, set)._ask([command, "--json=-", *words]))
 
 
 def compare(

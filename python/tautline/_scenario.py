@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -134,22 +132,12 @@ class Scenario:
         ways = np.stack([self.positions_m, self.slots_m])
         return _display.card("open", self.name, rows, _display.paths(ways, "From the start to the slots, seen from above"))
 
-    @contextlib.contextmanager
-    def _words(self) -> Iterator[list[str]]:
-        """What names it on the command line; a text is a file meanwhile."""
+    def _ask(self, words: list[str]) -> tuple[bool, str]:
+        """Asks a command about it: whether the exit code is 0, and what was written for programs."""
         self._check_unchanged()
         sets = [f"--set={text}" for text in self._sets]
-        if not self._is_text:
-            yield [*sets, "--", self._source]
-            return
-        # Where Python runs, because paths in the text count from there; and not named by the file.
-        handle, file = tempfile.mkstemp(prefix=".tautline-", suffix=".toml", dir=".", text=False)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as out:
-                out.write(self._source)
-            yield [f"--set=name={value_as_toml(self.name)}", *sets, "--", os.path.join(".", os.path.basename(file))]
-        finally:
-            os.unlink(file)
+        which = "-" if self._is_text else self._source
+        return _native.call([*words, *sets, "--", which], self._source if self._is_text else None)
 
 
 def scenario_of(given: Scenario | PathLike, set: Mapping[str, Any] | None = None) -> Scenario:

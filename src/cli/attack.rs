@@ -13,7 +13,7 @@ use super::scenario::ScenarioArguments;
 use super::{Exit, Failure};
 use crate::attack::{Asked, Attack, AttackError, AttackPage, Method, Plan, Variation};
 use crate::compare::Watch;
-use crate::scenario::{Override, Source};
+use crate::scenario::Override;
 
 /// Most flights of a search.
 const MOST_FLIGHTS: u64 = 10_000_000;
@@ -126,7 +126,7 @@ impl AttackArguments {
             seeds: self.seeds,
             seed: self.seed,
         };
-        Ok(Plan::new(Source::resolve(&self.what.scenario)?, &overrides, asked)?)
+        Ok(Plan::new(self.what.source()?, &overrides, asked)?)
     }
 
     /// The command that makes the same search again, for a shell.

@@ -48,22 +48,23 @@ pub struct Held<'a> {
 }
 
 /// Runs the command of these words, which do not begin with the program's name: what `tautline WORDS` does in a process of
-/// its own. Ctrl-C is the caller's; it ends the work by setting `interrupted`.
+/// its own. `input` stands for standard input, where the words ask for a scenario `-`. Ctrl-C is the caller's; it ends the work
+/// by setting `interrupted`.
 ///
 /// ```
 /// # use std::sync::Arc;
 /// let words = ["list", "--show", "pentagon"].map(str::to_owned);
-/// let answer = tautline::cli::call(&words, &Arc::default())?;
+/// let answer = tautline::cli::call(&words, None, &Arc::default())?;
 /// assert!(answer.is_good && answer.data.contains("[formation]"));
 /// # Ok::<(), tautline::cli::Refusal>(())
 /// ```
 ///
 /// # Errors
 /// [`Refusal`] where the exit code would be 2 or 3.
-pub fn call(words: &[String], interrupted: &Arc<AtomicBool>) -> Result<Answer, Refusal> {
+pub fn call(words: &[String], input: Option<&str>, interrupted: &Arc<AtomicBool>) -> Result<Answer, Refusal> {
     quiet_guarded_panics();
     let command = parsed(words)?;
-    let (done, data) = by_program(words, interrupted, || obey(command));
+    let (done, data) = by_program(words, input, interrupted, || obey(command));
     match done? {
         exit @ (Exit::Good | Exit::Bad) => Ok(Answer { is_good: exit == Exit::Good, data }),
         exit => Err(Refusal { is_machine: exit == Exit::MachineFailed, message: data }),
@@ -100,7 +101,7 @@ pub fn judge(
             judge_recorded(&arguments, recorded, console)
         }
     };
-    Ok(by_program(words, interrupted, work).0?)
+    Ok(by_program(words, None, interrupted, work).0?)
 }
 
 /// Opens a recording as `tautline WORDS` does, where the words are those of `audit`.

@@ -4,6 +4,11 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use crate::scenario::{ScenarioError, Source};
+
+/// What a scenario is called that a program gives as text.
+const GIVEN: &str = "TOML";
+
 /// A call of the thread that works on it.
 #[derive(Default)]
 struct Call {
@@ -13,8 +18,10 @@ struct Call {
     program: Option<Program>,
 }
 
-/// What a program that calls takes in the place of a terminal.
+/// What a program that calls has in the place of a terminal.
 struct Program {
+    /// What it gives in the place of standard input.
+    input: Option<String>,
     interrupted: Arc<AtomicBool>,
     data: String,
 }
@@ -30,11 +37,26 @@ pub(super) fn by_person(words: Vec<String>) {
 
 /// Does the work of a call by a program, which nothing is said to: what would be data on standard output is given back.
 /// The program ends the work by setting `interrupted`.
-pub(super) fn by_program<T>(words: &[String], interrupted: &Arc<AtomicBool>, work: impl FnOnce() -> T) -> (T, String) {
-    let program = Program { interrupted: Arc::clone(interrupted), data: String::new() };
+pub(super) fn by_program<T>(
+    words: &[String],
+    input: Option<&str>,
+    interrupted: &Arc<AtomicBool>,
+    work: impl FnOnce() -> T,
+) -> (T, String) {
+    let (input, interrupted) = (input.map(str::to_owned), Arc::clone(interrupted));
+    let program = Program { input, interrupted, data: String::new() };
     CALL.set(Call { words: words.to_vec(), program: Some(program) });
     let done = work();
     (done, CALL.take().program.map(|program| program.data).unwrap_or_default())
+}
+
+/// The scenario of this name or path. `-` is the text that the program that called gives, or else standard input.
+pub(super) fn source(name_or_path: &str) -> Result<Source, ScenarioError> {
+    let given = CALL.with_borrow(|call| call.program.as_ref().and_then(|program| program.input.clone()));
+    match given.filter(|_| name_or_path == "-") {
+        Some(text) => Ok(Source::Text { name: GIVEN.to_owned(), text }),
+        None => Source::resolve(name_or_path),
+    }
 }
 
 /// What was asked for, without the program's name.

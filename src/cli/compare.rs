@@ -12,7 +12,7 @@ use super::scenario::ScenarioArguments;
 use super::worst;
 use super::{Exit, Failure};
 use crate::compare::{CompareError, ComparePage, Comparison, Plan, Watch};
-use crate::scenario::{Override, Source, Template};
+use crate::scenario::{Override, Template};
 
 /// Largest seed that a scenario file can say, less the most runs.
 const LAST_SEED: u64 = i64::MAX as u64 - MOST_RUNS;
@@ -106,7 +106,7 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout, quiet: arguments.quiet };
     outputs::check_new(&arguments.what.scenario, arguments.outputs(), arguments.force)?;
     let overrides = arguments.what.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-    let template = Template::read(&Source::resolve(&arguments.what.scenario)?, &overrides)?;
+    let template = Template::read(&arguments.what.source()?, &overrides)?;
     let names = arguments.laws.clone().unwrap_or_else(|| template.compared());
     let plan = Plan::new(template, &names, arguments.runs, arguments.seed)?;
     let threads = arguments.threads.map_or_else(rayon::current_num_threads, usize::from);

@@ -11,7 +11,7 @@ use super::scenario::ScenarioArguments;
 use super::{Exit, Failure};
 use crate::compare::Watch;
 use crate::margin::{Asked, Margin, MarginError, MarginPage, Plan, Question, Range};
-use crate::scenario::{Override, Source};
+use crate::scenario::Override;
 
 /// Most runs of a value.
 const MOST_RUNS: u64 = 1_000_000;
@@ -112,7 +112,7 @@ impl MarginArguments {
             logarithmic: self.log,
         };
         let asked = Asked { question: self.verdict.into(), runs: self.runs, seed: self.seed };
-        Ok(Plan::new(Source::resolve(&self.what.scenario)?, &overrides, &self.key, range, asked)?)
+        Ok(Plan::new(self.what.source()?, &overrides, &self.key, range, asked)?)
     }
 
     /// The command that makes the same search again, for a shell.

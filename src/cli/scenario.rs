@@ -3,7 +3,8 @@
 use clap::Args;
 
 use super::Failure;
-use crate::scenario::{Override, Scenario, Source};
+use super::caller::source;
+use crate::scenario::{Override, Scenario, ScenarioError, Source};
 
 /// Which scenario, and what is changed of it.
 #[derive(Debug, Args)]
@@ -16,8 +17,15 @@ pub(super) struct ScenarioArguments {
     pub(super) overrides: Vec<String>,
 }
 
+impl ScenarioArguments {
+    /// Where the text of the scenario comes from.
+    pub(super) fn source(&self) -> Result<Source, ScenarioError> {
+        source(&self.scenario)
+    }
+}
+
 /// The scenario of this name or in this file, with these keys set.
 pub(super) fn read<'a>(scenario: &str, overrides: impl IntoIterator<Item = &'a String>) -> Result<Scenario, Failure> {
     let overrides = overrides.into_iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-    Ok(Scenario::read(&Source::resolve(scenario)?, &overrides)?)
+    Ok(Scenario::read(&source(scenario)?, &overrides)?)
 }

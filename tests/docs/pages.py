@@ -10,6 +10,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 FENCE = re.compile(r"^( *)```(\w*) *$")
 HEADING = re.compile(r"^#{1,6} +(.*?) *$")
+# What stands below the header of a table.
+RULE = re.compile(r"\|[-:| ]*-[-:| ]*\|$")
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 CODE = re.compile(r"(`+)(?:.*?)\1")
 NAMED = re.compile(r"^(?:#|//|<!--) (\S+\.\w+)(?: -->)?$")
@@ -57,11 +59,14 @@ class Page:
         self.spoken: list[Said] = []
         """Code within a line, and where."""
         self.headings: list[str] = []
+        self.headless: list[str] = []
+        """Where a row of a table stands that has no header above it, and so is shown as text."""
         self._read(path.read_text(encoding="utf-8").splitlines())
 
     def _read(self, lines: list[str]) -> None:
         fence: re.Match[str] | None = None
         begin, code, section = 0, [], ""
+        above = ""
         for number, line in enumerate(lines, 1):
             found = FENCE.match(line)
             if fence:
@@ -76,9 +81,12 @@ class Page:
                 if heading := HEADING.match(line):
                     section = heading[1]
                     self.headings.append(section)
+                if line.startswith("|") and not above.startswith("|") and not RULE.match("".join(lines[number : number + 1])):
+                    self.headless.append(f"{self.name}:{number}")
                 self.spoken += [Said(found[0].strip("`"), f"{self.name}:{number}") for found in CODE.finditer(line)]
                 bare = CODE.sub("", re.sub(r"\[`[^`]*`\]", "[code]", line))
                 self.links += [Said(target, f"{self.name}:{number}") for target in LINK.findall(bare)]
+            above = line
         if fence:
             raise ValueError(f"{self.name}:{begin}: this block of code has no end")
 

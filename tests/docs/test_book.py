@@ -29,7 +29,7 @@ def items(docs: Path, page: str) -> list[tuple[str, ...]]:
 
 
 def faults(docs: Path) -> list[str]:
-    """What is wrong with the order of the pages and with where they link to."""
+    """What is wrong with the order of the pages, with their tables and with where they link to."""
     contents, index = items(docs, "SUMMARY.md"), items(docs, "README.md")
     there = {path.name for path in docs.glob("*.md")} - {"SUMMARY.md", "README.md"}
     named = [file for _, file, _ in contents]
@@ -39,8 +39,9 @@ def faults(docs: Path) -> list[str]:
     if [one[:2] for one in contents] != [one[:2] for one in index]:
         wrong.append("SUMMARY.md and README.md name other pages, or in another order")
     wrong += [f"README.md does not say what {file} answers" for _, file, answer in index if len(answer) < 10]
-    links = [link for path in sorted(docs.glob("*.md")) for link in Page(path, docs).links]
-    outside = [link for link in links if re.match(r"\.\.|/", link.target)]
+    pages = [Page(path, docs) for path in sorted(docs.glob("*.md"))]
+    wrong += [f"{place}: this row of a table has no header above it" for page in pages for place in page.headless]
+    outside = [link for page in pages for link in page.links if re.match(r"\.\.|/", link.target)]
     return wrong + [f"{link.place}: {link.target} is dead where the book is read" for link in outside]
 
 
@@ -65,6 +66,7 @@ class Book(unittest.TestCase):
             "in another order": ("SUMMARY.md", "- [B](b.md)\n- [A](a.md)\n"),
             "does not say what b.md answers": ("README.md", "- [A](a.md): what is that?\n- [B](b.md)\n"),
             "a.md:3: ../x.md is dead": ("a.md", "# A\n\n[x](../x.md)\n"),
+            "b.md:5: this row of a table has no header": ("b.md", "| a |\n| --- |\n| 1 |\n\n| 2 |\n"),
         }
         for said, (file, text) in changes.items():
             with self.subTest(said), tempfile.TemporaryDirectory() as place:

@@ -64,12 +64,36 @@ impl Tracks for Passing {
 #[test]
 fn a_call_answers_with_what_the_command_prints() {
     let folder = tempfile::tempdir().expect("a folder");
-    let called = cli::call(&words("check pentagon --json"), &Arc::default()).expect("an answer");
+    let called = cli::call(&words("check pentagon --json"), None, &Arc::default()).expect("an answer");
     let printed = ran_by(TAUTLINE, folder.path(), &["check", "pentagon", "--json"]);
     assert_eq!(called.data, printed.out);
     assert!(called.is_good);
-    let refused = cli::call(&words("check pentagon-collinear --json"), &Arc::default()).expect("an answer");
+    let refused = cli::call(&words("check pentagon-collinear --json"), None, &Arc::default()).expect("an answer");
     assert!(!refused.is_good, "exit code 1 is an answer");
+}
+
+#[test]
+fn a_scenario_that_a_program_gives_stands_for_standard_input() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "[start]\npositions_m = [[0, 0], [4, 0.1], [8, 0]]\n[formation]\nshape = \"circle\"\nradius_m = 2.0\n\
+                [law]\ndelta_m = 1.5\n[time]\nduration_s = 1.0\n";
+    std::fs::write(folder.path().join("TOML.toml"), text).expect("written");
+    for asked in ["check --json -- -", "compare --laws laplacian,edge-tension --runs 1 --json=- -- -"] {
+        let called = cli::call(&words(asked), Some(text), &Arc::default()).expect("an answer");
+        let of_file = asked.replace("-- -", "-- TOML.toml");
+        let printed = ran_by(TAUTLINE, folder.path(), &of_file.split(' ').collect::<Vec<_>>());
+        let of = |data: &str| {
+            let mut answer: Value = serde_json::from_str(data).expect("JSON");
+            answer
+                .as_object_mut()
+                .expect("an object")
+                .retain(|key, _| !["performance", "command"].contains(&key.as_str()));
+            answer
+        };
+        assert_eq!(of(&called.data), of(&printed.out), "{asked}");
+    }
+    let refusal = cli::call(&words("check -- -"), Some("x = 3"), &Arc::default()).expect_err("a wrong key");
+    assert!(refusal.message.contains("TOML, line 1: unknown key `x`"), "{refusal}");
 }
 
 #[test]
@@ -81,7 +105,7 @@ fn a_refusal_says_what_the_command_says_and_whose_fault_it_is() {
         ("audit none.csv --delta 1", false, "none.csv: No such file"),
         ("validate --out /dev/null/none", true, "cannot write"),
     ] {
-        let refusal = cli::call(&words(asked), &Arc::default()).expect_err(asked);
+        let refusal = cli::call(&words(asked), None, &Arc::default()).expect_err(asked);
         assert_eq!(refusal.is_machine, is_machine, "{refusal}");
         assert!(refusal.message.contains(says), "{refusal}");
         assert!(!refusal.message.contains("Usage"), "{refusal}");
@@ -112,7 +136,7 @@ fn what_calls_ends_the_work() {
     let held = Held { command: "", own: None, open: &|| Ok(Box::new(Passing::new())) };
     let refusal = cli::judge(&words("audit --delta 2 arrays"), Some(&held), &interrupted).expect_err("ended");
     assert_eq!(refusal.message, "interrupted");
-    let compared =
-        cli::call(&words("compare pentagon --laws laplacian --runs 1 --json -"), &interrupted).expect("an answer");
+    let compared = cli::call(&words("compare pentagon --laws laplacian --runs 1 --json -"), None, &interrupted)
+        .expect("an answer");
     assert!(!compared.is_good && serde_json::from_str::<Value>(&compared.data).is_err(), "{compared:?}");
 }

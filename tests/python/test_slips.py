@@ -7,6 +7,7 @@ import pickle
 import sys
 import threading
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import tautline as tl
@@ -176,6 +177,15 @@ class Kept(Case):
         self.assertEqual(tl.compare(s, ["edge-tension"], runs=1).runs, 1)
         self.assertEqual(os.listdir(self.folder), ["slots.csv"])
 
+    @unittest.skipUnless(sys.platform == "linux", "nobody can write into /proc there")
+    def test_a_text_needs_no_folder_that_can_be_written(self) -> None:
+        before = os.getcwd()
+        self.addCleanup(os.chdir, before)
+        os.chdir("/proc")
+        s = tl.Scenario.from_toml(short().to_toml())
+        self.assertTrue(tl.check(s).is_good)
+        self.assertEqual(tl.compare(s, ["edge-tension"], runs=1).runs, 1)
+
     def test_findings_travel_between_processes(self) -> None:
         a = tl.audit(*passing(), delta=1.5)
         sent = pickle.loads(pickle.dumps(a))
@@ -197,9 +207,23 @@ class Kept(Case):
         with multiprocessing.get_context("fork").Pool(1) as pool:
             self.assertEqual(pool.apply_async(instants, (large,)).get(timeout=120), steps)
 
+    @unittest.skipUnless(sys.platform == "linux", "processes are forked there")
+    def test_a_forked_process_asks_about_a_large_swarm_and_in_several_threads(self) -> None:
+        shared = {"law.kind": "edge-tension", "graph.kind": "complete", "formation.assignment": "given"}
+        large = tl.Scenario("thousand", set={"time.duration_s": 0.02, "arrival.hold_s": 0.0, **shared})
+        tl.check(large)
+        with multiprocessing.get_context("fork").Pool(1) as pool:
+            self.assertEqual(pool.apply_async(answers, (large,)).get(timeout=120), [1, 1, 1])
+
 
 def instants(scenario: tl.Scenario) -> int:
     return len(tl.fly(scenario).t)
+
+
+def answers(scenario: tl.Scenario) -> list[int]:
+    tl.check(scenario)
+    with ThreadPoolExecutor() as threads:
+        return list(threads.map(lambda _: tl.compare(scenario, ["edge-tension"], runs=1).runs, range(3)))
 
 
 if __name__ == "__main__":

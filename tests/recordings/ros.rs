@@ -210,6 +210,34 @@ fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
 }
 
 #[test]
+fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
+    let cut = |folder: &Path| {
+        let path = folder.join("split_1.mcap.zstd");
+        let bytes = zstd::decode_all(fs::File::open(&path).expect("a file")).expect("unpacked");
+        // The last bytes are those of the end and of the index, which a recorder that is killed does not write.
+        let index = mcap::Summary::read(&bytes).expect("an index").expect("an index");
+        let end = usize::try_from(index.chunk_indexes[0].chunk_start_offset).expect("an offset");
+        fs::write(&path, &bytes[..end]).expect("written");
+    };
+    let (folder, refused) = changed(cut);
+    assert!(refused.expect_err("not closed").help().contains("--allow-unfinished"));
+    let accepting = ReadOptions { allow_unfinished: true, ..ReadOptions::default() };
+    let found = Whole::read(folder.path(), &accepting).expect("accepted");
+    assert!(
+        found.samples().len() < passing().len() && passing().starts_with(&found.samples()),
+        "{:?}",
+        found.samples()
+    );
+    let counted = format!("its files have {} messages, and metadata.yaml counts 21", found.samples().len() / 2);
+    for note in ["the recording was not closed", &counted] {
+        assert!(found.notes.iter().any(|said| said.starts_with(note)), "{:?}", found.notes);
+    }
+    // A bag whose files were all closed has lost messages elsewhere.
+    let short = changed(|folder| edit(&folder.join("metadata.yaml"), |text| text.replace("t: 21", "t: 22"))).0;
+    assert!(Whole::read(short.path(), &accepting).is_err());
+}
+
+#[test]
 fn splits_are_read_in_the_order_that_the_bag_lists_and_given_in_that_of_time() {
     let (_folder, swapped) = changed(|folder| {
         edit(&folder.join("metadata.yaml"), |text| {

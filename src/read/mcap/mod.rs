@@ -26,6 +26,7 @@ mod ros;
 mod run;
 mod schemas;
 mod splits;
+mod topic_name;
 mod tree;
 
 pub use channels::Channels;

@@ -7,13 +7,17 @@ use nalgebra::Vector3;
 use super::super::error::{Fault, Place, ReadError, quoted};
 use super::messages::{EARTH, FIXES, Seen, What, Who};
 use super::rigid::Placed;
-use super::schemas::reader_of_topic;
+use super::schemas::{is_of_transforms, reader_of_topic};
 use super::splits::Splits;
+use super::topic_name::{is_static, is_wish, last, namespace, space};
 use super::tree::{Body, Tree};
-use crate::record::mcap::topic::{Message, Part};
+use crate::record::mcap::topic::{Declared, Message, Part};
 
 /// Most parts of a topic that may be namespaces of transforms.
 const DEEPEST: usize = 16;
+
+/// What helps where it is not known which topics are vehicles.
+const CHOOSE: &str = "say which is read with --topic NAME, once for each topic that is";
 
 /// A topic with positions.
 #[derive(Debug, Default)]
@@ -29,45 +33,25 @@ pub(super) struct Told {
     is_vehicle: bool,
     /// How many poses its lists have, where vehicles are known by their place in a list.
     listed: usize,
-    /// Its first position on the Earth, in degrees and metres.
-    first_fix: Option<Vector3<f64>>,
 }
 
-/// What a first look at all messages finds.
+/// What a first look at all messages that are read finds.
 #[derive(Debug, Default)]
 pub(super) struct Outline {
+    /// The topics that the user names; all are read where he names none.
+    pub(super) named: Vec<String>,
     /// Frames, by the namespace of the topics that tell of them.
     pub(super) trees: BTreeMap<String, Tree>,
-    /// Topics with positions, without those of transforms.
+    /// Topics with positions that are read, without those of transforms.
     pub(super) topics: BTreeMap<String, Told>,
+    /// Topics with positions that are not read, because the user names others.
+    unread: BTreeSet<String>,
     /// Topics of transforms that move.
     transforms: BTreeSet<String>,
     /// Topics with a message that says its time.
     pub(super) stamped: BTreeSet<String>,
-    /// Topics with positions on the Earth, in the order of their first ones.
-    fixed: Vec<String>,
-}
-
-/// Whether a topic holds transforms that never change.
-pub(super) fn is_static(topic: &str) -> bool {
-    topic.rsplit('/').next() == Some("tf_static")
-}
-
-/// The namespace of a topic, without its last part: `/cf1` of `/cf1/pose`.
-fn namespace(topic: &str) -> &str {
-    topic.rsplit_once('/').map_or("", |(before, _)| before)
-}
-
-/// The namespace that a topic of transforms speaks of: `/r1` of `/r1/tf`, and the common one of a topic called otherwise.
-pub(super) fn space(topic: &str) -> &str {
-    if matches!(topic.rsplit('/').next(), Some("tf" | "tf_static")) { namespace(topic) } else { "" }
-}
-
-/// What is read of a message, and where the message is.
-pub(super) fn seen_in(message: &Message<'_>, number: &mut u64) -> Result<Vec<Seen>, ReadError> {
-    let Some(reader) = reader_of_topic(message.of) else { return Ok(Vec::new()) };
-    *number += 1;
-    reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
+    /// The first position on the Earth, in degrees and metres.
+    pub(super) first_fix: Option<Vector3<f64>>,
 }
 
 /// Where a message is.
@@ -76,12 +60,15 @@ pub(super) fn place(number: u64, message: &Message<'_>) -> Place {
 }
 
 impl Outline {
-    /// Looks at all messages.
-    pub(super) fn of(splits: &mut Splits) -> Result<Self, ReadError> {
-        let (mut outline, mut number) = (Self::default(), 0);
+    /// Looks at all messages of the topics that are named, or of all where none is, and at those of transforms.
+    pub(super) fn of(splits: &mut Splits, named: &[String]) -> Result<Self, ReadError> {
+        let (mut outline, mut number) = (Self { named: named.to_vec(), ..Self::default() }, 0);
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
-            let all = seen_in(&message, &mut number)?;
+            if !outline.reads(message.of) && reader_of_topic(message.of).is_some() {
+                outline.unread.insert(message.of.topic.clone());
+            }
+            let all = outline.seen_in(&message, &mut number)?;
             let listed = all.iter().filter(|seen| matches!(seen.who, Who::Listed(_))).count();
             let learnt = outline
                 .count(&message, listed)
@@ -89,6 +76,21 @@ impl Outline {
             learnt.map_err(|fault| fault.at(place(number, &message)))
         })?;
         Ok(outline)
+    }
+
+    /// Whether the messages of a topic are looked at: where the user names others, only transforms are, which frames may need.
+    fn reads(&self, topic: &Declared) -> bool {
+        self.named.is_empty() || self.named.contains(&topic.topic) || is_of_transforms(&topic.schema)
+    }
+
+    /// What is read of a message; `number` counts those that could be.
+    pub(super) fn seen_in(&self, message: &Message<'_>, number: &mut u64) -> Result<Vec<Seen>, ReadError> {
+        let Some(reader) = reader_of_topic(message.of) else { return Ok(Vec::new()) };
+        *number += 1;
+        if !self.reads(message.of) {
+            return Ok(Vec::new());
+        }
+        reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
     }
 
     /// Takes note of how many poses a list has. One that is shorter or longer than those before does not say whose pose came or
@@ -105,7 +107,8 @@ impl Outline {
             );
             return Err(Fault::content(
                 problem,
-                "record a pose for every vehicle in every list, or messages that name them",
+                "record a pose for every vehicle in every list, or messages that name them; name the other topics with \
+                 --topic if the list is of no vehicles",
             ));
         }
         told.listed = listed;
@@ -122,7 +125,8 @@ impl Outline {
             if still.is_none() && !self.transforms.contains(topic) {
                 self.transforms.insert(topic.clone());
             }
-            return self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, still);
+            self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, still);
+            return Ok(());
         }
         if seen.frame == EARTH && message.of.schema != FIXES {
             let problem = format!("its frame is called {}, as that of latitudes and longitudes is", quoted(EARTH));
@@ -130,9 +134,8 @@ impl Outline {
         }
         let told = self.topics.entry(topic.clone()).or_default();
         told.schema.clone_from(&message.of.schema);
-        if seen.frame == EARTH && told.first_fix.is_none() {
-            told.first_fix = Some(seen.position);
-            self.fixed.push(topic.clone());
+        if seen.frame == EARTH && self.first_fix.is_none() {
+            self.first_fix = Some(seen.position);
         }
         if !told.frames.contains(&seen.frame) {
             told.frames.insert(seen.frame);
@@ -158,56 +161,70 @@ impl Outline {
         nearest.next().map(|(space, tree)| (space.as_str(), tree))
     }
 
-    /// The first position on the Earth of topics that are read, in degrees and metres.
-    pub(super) fn first_fix(&self, reads: impl Fn(&str) -> bool) -> Option<Vector3<f64>> {
-        self.fixed.iter().filter(|topic| reads(topic)).find_map(|topic| self.topics.get(topic)?.first_fix)
-    }
-
     /// Names of all topics with positions, those of transforms last.
     pub(super) fn names(&self) -> Vec<String> {
-        self.topics.keys().chain(&self.transforms).cloned().collect()
+        self.topics.keys().chain(&self.unread).chain(&self.transforms).cloned().collect()
     }
 
-    /// Whether some of these topics tell of the frames of a namespace.
-    pub(super) fn is_told_by(&self, wanted: &str, topics: &[String]) -> bool {
-        self.transforms.iter().any(|topic| space(topic) == wanted && topics.contains(topic))
+    /// Whether topics that the user names tell of the frames of a namespace.
+    pub(super) fn is_told_by_named(&self, wanted: &str) -> bool {
+        self.transforms.iter().any(|topic| space(topic) == wanted && self.named.contains(topic))
     }
 
-    /// Refuses topics that tell of one vehicle twice, of those that are read.
-    pub(super) fn refuse_twice(&self, reads: impl Fn(&str) -> bool) -> Result<(), Fault> {
-        let read = || self.topics.iter().filter(|(topic, _)| reads(topic));
+    /// Refuses topics that tell of one vehicle twice. What their names alone say counts for nothing where the user names them.
+    pub(super) fn refuse_twice(&self) -> Result<(), Fault> {
+        let is_chosen = !self.named.is_empty();
         let twice = |first: &str, second: &str, who: &str| {
             let problem = format!("topics {} and {} both tell of {who}", quoted(first), quoted(second));
-            Fault::content(problem, "say which is read with --topic NAME, once for each topic that is")
+            let remedy = if is_chosen { "name one of the two alone with --topic" } else { CHOOSE };
+            Fault::content(problem, remedy)
         };
         let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
-        for (topic, told) in read() {
+        for (topic, told) in &self.topics {
             for name in &told.names {
                 if let Some(first) = named.insert(name.as_str(), topic) {
                     return Err(twice(first, topic, &quoted(name)));
                 }
             }
         }
-        for (topic, told) in read().filter(|(_, told)| told.is_vehicle) {
+        for (topic, told) in self.topics.iter().filter(|(_, told)| told.is_vehicle) {
             if let Some((name, first)) = topic.rsplit('/').take(2).find_map(|part| named.get_key_value(part)) {
                 return Err(twice(first, topic, &quoted(name)));
             }
-            let (first, schema) = *robots.entry(namespace(topic)).or_insert((topic, &told.schema));
-            if *schema != told.schema || (first != topic && (is_asked_for(first) || is_asked_for(topic))) {
-                let robot = namespace(topic);
-                return Err(twice(
-                    first,
-                    topic,
-                    &if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) },
-                ));
+            if is_chosen {
+                continue;
+            }
+            let robot = namespace(topic);
+            let (first, schema) = *robots.entry(robot).or_insert((topic, &told.schema));
+            if *schema != told.schema || (first != topic && [first, topic].iter().any(|topic| is_wish(last(topic)))) {
+                let who = if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) };
+                return Err(twice(first, topic, &who));
             }
         }
         Ok(())
     }
 
-    /// Topics that are vehicles, of those that are read, with each frame that they are given in.
-    pub(super) fn given_in(&self, reads: impl Fn(&str) -> bool) -> impl Iterator<Item = (&str, &str)> {
-        let vehicles = self.topics.iter().filter(move |(topic, told)| told.is_vehicle && reads(topic));
+    /// Refuses topics that tell by their names where somebody is asked to be beside topics that do not, unless the user names
+    /// those that are read: a vehicle is never judged against what it was asked to do, nor that in its place.
+    pub(super) fn refuse_wishes(&self) -> Result<(), Fault> {
+        let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_wish(topic));
+        let Some((wish, other)) = self.wishes().next().zip(others.next()) else { return Ok(()) };
+        let (wish, other) = (quoted(wish), quoted(other));
+        let problem = format!(
+            "topic {wish} tells by its name where somebody is asked to be, and stands beside {other}, which does not"
+        );
+        Err(Fault::content(problem, CHOOSE))
+    }
+
+    /// Topics that tell by their names where somebody is asked to be, unless the user names those that are read.
+    pub(super) fn wishes(&self) -> impl Iterator<Item = &str> {
+        let guessed = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
+        guessed.map(String::as_str).filter(|topic| is_wish(topic))
+    }
+
+    /// Topics that are vehicles, with each frame that they are given in.
+    pub(super) fn given_in(&self) -> impl Iterator<Item = (&str, &str)> {
+        let vehicles = self.topics.iter().filter(|(_, told)| told.is_vehicle);
         vehicles.flat_map(|(topic, told)| told.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
     }
 
@@ -223,11 +240,6 @@ impl Outline {
         }
         cover
     }
-}
-
-/// The last part of a name.
-fn last(path: &str) -> &str {
-    path.rsplit('/').next().unwrap_or_default()
 }
 
 /// Whom topics of poses tell of.
@@ -271,22 +283,9 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
     Ok(())
 }
 
-/// Whether the name of a topic says that it tells where a vehicle is to be, and not where it is.
-fn is_asked_for(topic: &str) -> bool {
-    const WORDS: [&str; 9] = ["cmd", "command", "desired", "goal", "planned", "ref", "reference", "setpoint", "target"];
-    let leaf = topic.rsplit('/').next().unwrap_or(topic);
-    leaf.split(|c: char| !c.is_ascii_alphanumeric()).any(|word| WORDS.contains(&word.to_ascii_lowercase().as_str()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_goal_is_no_vehicle_and_a_vehicle_no_goal() {
-        assert!(["/cf1/goal_pose", "/cf1/cmd_pose", "/uav/Setpoint", "/uav/pose_ref"].into_iter().all(is_asked_for));
-        assert!(!["/cf1/pose", "/drones/goalkeeper", "/target/pose", "/cf2"].into_iter().any(is_asked_for));
-    }
 
     #[test]
     fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {

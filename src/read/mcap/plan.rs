@@ -8,17 +8,16 @@ use super::super::earth::Local;
 use super::super::error::{Fault, ReadError, quoted};
 use super::super::options::ReadOptions;
 use super::messages::{EARTH, What, Who};
-use super::outline::{Outline, is_static, place, refuse_own_frames, seen_in, space};
+use super::outline::{Outline, place, refuse_own_frames};
 use super::rigid::{Known, Placed};
 use super::splits::Splits;
+use super::topic_name::{is_static, space};
 use super::tree::{Body, Chain, Tree};
 use crate::record::mcap::topic::Part;
 
 /// What is read, and how.
 pub(super) struct Plan {
     pub(super) outline: Outline,
-    /// The topics that the user names; all where he names none.
-    topics: Vec<String>,
     /// The frame that all is brought into.
     pub(super) wanted: Option<String>,
     /// The frame of places on the Earth, where there are some.
@@ -49,12 +48,10 @@ impl Way {
 impl Plan {
     /// Looks at all messages and decides what is read of them.
     pub(super) fn of(splits: &mut Splits, options: &ReadOptions) -> Result<Self, ReadError> {
-        let outline = Outline::of(splits)?;
-        let is_read = |topic: &str| options.topics.is_empty() || options.topics.iter().any(|of| of == topic);
-        let first_fix = outline.first_fix(is_read);
+        let outline = Outline::of(splits, &options.topics)?;
+        let first_fix = outline.first_fix;
         let origin = options.origin.map(Vector3::from).or(first_fix).filter(|_| first_fix.is_some());
         let mut plan = Self {
-            topics: options.topics.clone(),
             wanted: options.frame.clone(),
             earth: origin.map(Local::at).transpose()?,
             chains: BTreeMap::new(),
@@ -72,7 +69,7 @@ impl Plan {
                 .bodies
                 .iter()
                 .flat_map(|(space, of)| of.values().flatten().map(|body| (space.as_str(), body.carrier.as_str())));
-            refuse_own_frames(plan.outline.given_in(|topic| plan.reads(topic)).chain(bodies))?;
+            refuse_own_frames(plan.outline.given_in().chain(bodies))?;
         }
         let needed = plan.find_chains()?;
         plan.gather(&needed, splits)?;
@@ -81,25 +78,22 @@ impl Plan {
 
     fn check(&self) -> Result<(), Fault> {
         let known = self.outline.names();
-        if let Some(name) = self.topics.iter().find(|topic| !known.contains(topic)) {
+        if let Some(name) = self.outline.named.iter().find(|topic| !known.contains(topic)) {
             let problem =
                 format!("it has no topic {} with positions; those that it has are {}", quoted(name), known.join(", "));
             return Err(Fault::content(problem, "name one of these with --topic"));
         }
-        self.outline.refuse_twice(|topic| self.reads(topic))
-    }
-
-    /// Whether the poses of a topic are read.
-    pub(super) fn reads(&self, topic: &str) -> bool {
-        self.topics.is_empty() || self.topics.iter().any(|of| of == topic)
+        self.outline.refuse_twice()?;
+        self.outline.refuse_wishes()
     }
 
     /// Finds the vehicles of the transforms, unless topics of poses tell of them.
     fn find_bodies(&mut self) -> Result<(), Fault> {
-        let beside_poses = self.topics.is_empty() && !self.outline.topics.is_empty();
+        let is_chosen = !self.outline.named.is_empty();
+        let beside_poses = !is_chosen && !self.outline.topics.is_empty();
         let (cover, mut covered, mut uncovered) = (self.outline.cover(), Vec::new(), Vec::new());
         for (space, tree) in &self.outline.trees {
-            if !self.topics.is_empty() && !self.outline.is_told_by(space, &self.topics) {
+            if is_chosen && !self.outline.is_told_by_named(space) {
                 continue;
             }
             let bodies = tree.bodies()?;
@@ -144,7 +138,7 @@ impl Plan {
             }
         }
         if let Some(wanted) = &self.wanted {
-            for (topic, told) in self.outline.topics.iter().filter(|(topic, _)| self.reads(topic)) {
+            for (topic, told) in &self.outline.topics {
                 let Some((space, _)) = self.outline.tree_of(topic) else { continue };
                 let others = told.frames.iter().filter(|frame| *frame != wanted && *frame != EARTH);
                 ways.extend(others.map(|frame| (space.to_owned(), frame.clone(), wanted.clone(), None)));
@@ -175,7 +169,7 @@ impl Plan {
             let Part::Message(message) = part else { return Ok(()) };
             let topic = &message.of.topic;
             let space = space(topic);
-            for seen in seen_in(&message, &mut number)? {
+            for seen in self.outline.seen_in(&message, &mut number)? {
                 let (What::Transform(turn), Who::Named(child)) = (seen.what, seen.who) else { continue };
                 if is_static(topic) || !needed.get(space).is_some_and(|frames| frames.contains(&child)) {
                     continue;
@@ -253,8 +247,7 @@ impl Plan {
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.notes.clone();
         notes.extend(self.earth.filter(|_| self.wanted.is_none()).map(|local| local.note()));
-        let mut read = self.outline.topics.iter().filter(|(topic, _)| self.reads(topic));
-        if read.any(|(_, told)| told.schema == "nav_msgs/msg/Odometry") {
+        if self.outline.topics.values().any(|told| told.schema == "nav_msgs/msg/Odometry") {
             let why = "publishers differ on the frame that they are given in";
             notes.push(format!("velocities of odometry are not used: {why}"));
         }
@@ -266,6 +259,13 @@ impl Plan {
             let fixed: Vec<_> = fixed.into_iter().collect();
             notes.push(format!("frames of tf_static stand still and are no vehicles: {}", fixed.join(", ")));
         }
+        let wishes: Vec<_> = self.outline.wishes().collect();
+        if !wishes.is_empty() {
+            let wishes = wishes.join(", ");
+            notes.push(format!(
+                "these topics tell by their names where somebody is asked to be, not where a vehicle is: {wishes}"
+            ));
+        }
         notes.extend(self.left_out());
         notes
     }
@@ -274,7 +274,7 @@ impl Plan {
     fn left_out(&self) -> Option<String> {
         let wanted = self.wanted.as_ref()?;
         let mut left_out = Vec::new();
-        for (topic, told) in self.outline.topics.iter().filter(|(topic, _)| self.reads(topic)) {
+        for (topic, told) in &self.outline.topics {
             let leads =
                 |frame: &str| self.outline.tree_of(topic).is_some_and(|(space, _)| self.chain(space, frame).is_some());
             let strays = told.frames.iter().filter(|frame| *frame != wanted && !leads(frame));

@@ -7,9 +7,10 @@ use super::super::error::{Fault, ReadError, UNSEEN, quoted};
 use super::super::names::Names;
 use super::super::order::Row;
 use super::messages::{EARTH, Seen, What, Who};
-use super::outline::{is_static, place, seen_in, space};
+use super::outline::place;
 use super::plan::{Plan, Way};
 use super::rigid::{Known, Placed};
+use super::topic_name::{is_static, space};
 use crate::record::mcap::topic::Message;
 
 /// Positions out of messages.
@@ -49,7 +50,7 @@ impl Poses {
 
     /// Appends the rows of a message.
     pub(super) fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), ReadError> {
-        for seen in seen_in(message, &mut self.messages)? {
+        for seen in self.plan.outline.seen_in(message, &mut self.messages)? {
             self.append(seen, message, rows).map_err(|fault| fault.at(place(self.messages, message)))?;
         }
         Ok(())
@@ -60,9 +61,6 @@ impl Poses {
         let time_ns = self.plan.time_of(topic, seen.stamp_ns, message.log_ns);
         if let What::Transform(turn) = seen.what {
             return if is_static(topic) { Ok(()) } else { self.append_bodies(&seen, turn, topic, time_ns, rows) };
-        }
-        if !self.plan.reads(topic) {
-            return Ok(());
         }
         check_finite(&seen.position)?;
         let Some(position) = self.position(&seen, topic, time_ns)? else { return Ok(()) };

@@ -18,3 +18,14 @@ pub(super) fn reader_of_topic(topic: &Declared) -> Option<Reader> {
 pub(super) fn is_list(schema: &str) -> bool {
     matches!(schema, "foxglove.PosesInFrame" | "geometry_msgs/msg/PoseArray")
 }
+
+/// Whether the messages of a schema are transforms between frames.
+pub(super) fn is_of_transforms(schema: &str) -> bool {
+    matches!(
+        schema,
+        "foxglove.FrameTransform"
+            | "foxglove.FrameTransforms"
+            | "geometry_msgs/msg/TransformStamped"
+            | "tf2_msgs/msg/TFMessage"
+    )
+}

@@ -15,7 +15,7 @@ pub(super) struct Splits {
     options: ReadOptions,
     /// Fewest messages that they have by what is said of them.
     least_messages: u64,
-    /// What is to be said of files that were not closed.
+    /// What is to be said of files that were not closed, which the user accepts.
     pub(super) notes: Vec<String>,
 }
 
@@ -49,14 +49,19 @@ impl Splits {
         let source = file.seekable()?;
         let topics = TopicReader::open(&source.path)?;
         for note in self.options.accept_unfinished(topics.is_complete())? {
-            if !self.notes.contains(&note) {
-                self.notes.push(note);
-            }
+            self.note(note);
         }
         Ok((topics, source))
     }
 
-    /// Takes every part, from the first one on, and starts again. Fewer messages than there should be are an error.
+    fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Takes every part, from the first one on, and starts again. Fewer messages than there should be are an error, unless a
+    /// file was not closed and the user accepts what it holds.
     pub(super) fn visit_all(
         &mut self,
         mut take: impl FnMut(Part<'_>) -> Result<(), ReadError>,
@@ -72,7 +77,10 @@ impl Splits {
         if messages < self.least_messages {
             let problem =
                 format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
-            return Err(Fault::content(problem, "copy the whole folder again").into());
+            if self.notes.is_empty() {
+                return Err(Fault::content(problem, "copy the whole folder again").into());
+            }
+            self.note(problem);
         }
         Ok(())
     }

@@ -28,6 +28,8 @@ struct Edge {
     still: Option<Placed>,
     /// Whether it is said to move.
     moves: bool,
+    /// Another frame that is said to be its parent.
+    stray: Option<String>,
     /// Whether it is said to stand still in several places, or to move as well.
     torn: bool,
     /// Where it was at some times \[ns\], once these are needed.
@@ -72,22 +74,18 @@ pub(super) struct Body {
 
 impl Tree {
     /// Learns what a frame lies in, and where it stands still there.
-    pub(super) fn learn(&mut self, child: &str, parent: &str, still: Option<Placed>) -> Result<(), Fault> {
+    pub(super) fn learn(&mut self, child: &str, parent: &str, still: Option<Placed>) {
         let Some(known) = self.edges.get_mut(child) else {
-            let edge =
-                Edge { parent: parent.to_owned(), still, moves: still.is_none(), torn: false, samples: Vec::new() };
+            let (parent, moves) = (parent.to_owned(), still.is_none());
+            let edge = Edge { parent, still, moves, stray: None, torn: false, samples: Vec::new() };
             self.edges.insert(child.to_owned(), edge);
-            return Ok(());
+            return;
         };
-        if known.parent != parent {
-            let (child, first, second) = (quoted(child), quoted(&known.parent), quoted(parent));
-            let problem = format!("frame {child} is given in {first} and in {second}");
-            let remedy = "a frame has one parent: record robots under namespaces of their own";
-            return Err(Fault::content(problem, remedy));
+        if known.parent != parent && known.stray.is_none() {
+            known.stray = Some(parent.to_owned());
         }
         known.moves |= still.is_none();
         known.torn |= known.still != still;
-        Ok(())
     }
 
     /// Whether a frame moves in its parent, also one that is said to stand still there as well.
@@ -117,7 +115,13 @@ impl Tree {
     /// A frame and all that it is in, up to the root.
     pub(super) fn way_up<'a>(&'a self, frame: &'a str) -> Result<Vec<&'a str>, Fault> {
         let mut way = vec![frame];
-        while let Some(edge) = way.last().and_then(|last| self.edges.get(*last)) {
+        while let Some((child, edge)) = way.last().and_then(|last| self.edges.get_key_value(*last)) {
+            if let Some(stray) = &edge.stray {
+                let problem =
+                    format!("frame {} is given in {} and in {}", quoted(child), quoted(&edge.parent), quoted(stray));
+                let remedy = "a frame has one parent: record robots under namespaces of their own, or name topics of poses with --topic";
+                return Err(Fault::content(problem, remedy));
+            }
             if way.len() > DEEPEST {
                 let problem = format!("transforms lead from {} through more than {DEEPEST} frames", quoted(frame));
                 return Err(Fault::content(problem, "look whether they go round in a circle"));
@@ -253,7 +257,7 @@ mod tests {
     fn tree(edges: &[(&str, &str, Option<Placed>)]) -> Tree {
         let mut tree = Tree::default();
         for (parent, child, still) in edges {
-            tree.learn(child, parent, *still).expect("one parent");
+            tree.learn(child, parent, *still);
         }
         tree
     }
@@ -298,11 +302,13 @@ mod tests {
     #[test]
     fn a_frame_has_one_parent_and_one_place_in_it() {
         let mut tree = tree(&[("map", "a", STILL), ("map", "b", None)]);
-        assert!(tree.learn("a", "map", STILL).is_ok());
-        assert!(tree.learn("a", "odom", STILL).is_err());
-        assert!(tree.learn("a", "map", None).is_ok());
+        tree.learn("a", "map", STILL);
         let chain = tree.chain("a", "map").expect("a tree").expect("a way");
+        assert!(tree.along(&chain, 0, None).is_ok());
+        tree.learn("a", "map", None);
         assert!(tree.along(&chain, 0, None).is_err());
+        tree.learn("a", "odom", STILL);
+        assert!(tree.chain("a", "map").is_err() && tree.chain("b", "map").is_ok());
         let at = |x| Placed { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
         tree.remember("b", 5, &at(1.0)).expect("a rotation");
         tree.remember("b", 5, &at(1.0)).expect("a rotation");
