@@ -37,7 +37,7 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
             _ => said.push((from_s, words)),
         };
         let mut least: Option<Approach> = None;
-        for Slice { from_s, to_s, closest } in slices {
+        for Slice { from_s, to_s, closest, .. } in slices {
             if least.is_some_and(|least| least.certain_m() <= closest.certain_m()) {
                 continue;
             }
@@ -96,7 +96,7 @@ mod tests {
     fn slice(from_s: f64, [lower_m, upper_m]: [f64; 2]) -> Slice {
         let pair = ObjectPair::Vehicles(Pair::new(0, 1));
         let closest = Approach { pair, lower_m, upper_m, time_s: from_s + 0.5, limit_m: 1.0 };
-        Slice { from_s, to_s: from_s + 1.0, closest }
+        Slice { from_s, to_s: from_s + 1.0, closest, is_whole: true }
     }
 
     fn said(slices: &[Slice], has_gaps: bool) -> Vec<(f64, String)> {

@@ -301,7 +301,7 @@ fn findings_lie_within_the_flight_and_the_nearest_stops_at_a_gap() {
     let pair = ObjectPair::Vehicles(Pair::new(0, 1));
     let slice = |from_s: f64, to_s: f64| {
         let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };
-        Slice { from_s, to_s, closest }
+        Slice { from_s, to_s, closest, is_whole: true }
     };
     let mut near = Slices::default();
     for slice in [slice(0.0, 3.0), slice(5.0, 10.0)] {

@@ -295,7 +295,7 @@ fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
 }
 
 /// The segments that meet a window; mostly all of them.
-fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
+pub(super) fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
     let all_end_late = segments.first().is_none_or(|part| part.to_s >= from_s);
     let first = if all_end_late { 0 } else { segments.partition_point(|part| part.to_s < from_s) };
     let all_begin_early = segments.last().is_none_or(|part| part.from_s <= to_s);
