@@ -149,12 +149,8 @@ impl ClearanceAuditor {
             let (target, may_violate) = (Target::Shape(&obstacle.shape), least_m < limit_m);
             let stands = Segment::straight(step.from_s, step.to_s, *place_m, *place_m);
             let flies = Segment::straight(step.from_s, step.to_s, from, to);
-            PairSweep { pair, target, keep_out: keep_out.clone(), cutoff, may_violate, above: None }.judge(
-                &[stands],
-                &[flies],
-                step,
-                &mut self.results,
-            );
+            PairSweep { pair, target, keep_out: keep_out.clone(), cutoff, judges: true, may_violate, above: None }
+                .judge(&[stands], &[flies], step, &mut self.results);
             self.began.extend_from_slice(&self.results.ledger.violations[known..]);
             let was_below = std::mem::replace(&mut self.is_below[place], end_m < limit_m);
             let of_step = self.results.ledger.violations.len() > known;

@@ -25,7 +25,7 @@ pub(super) struct Smallest {
 
 impl Smallest {
     pub(super) fn new(settings: &Settings) -> Self {
-        Self { windows: Windows::new(settings.limits(), &[]), slices: Slices::new(MOST_KEPT) }
+        Self { windows: Windows::of_closest(settings.limits()), slices: Slices::new(MOST_KEPT) }
     }
 
     /// Looks at a window, in slices between the samples of a vehicle that has many in it and the instants at which anybody comes
