@@ -65,6 +65,8 @@ pub struct ClearanceOutcome {
     pub violations: Vec<Violation<ObjectPair>>,
     /// Every time at which it cannot be told.
     pub undecided: Vec<Undecided<ObjectPair>>,
+    /// Steps on which ways bend by more than there was room for.
+    pub unresolved: u64,
     /// What the second detector says.
     pub parry: ParryEvidence<ObjectPair>,
     /// Calls answered by an error: what they offered was not judged.
@@ -180,7 +182,8 @@ impl ClearanceAuditor {
         let (parry, decided) = (ledger.parry, self.time_s.is_some() && self.refused == 0 && ledger.is_decided());
         let (violations, undecided) = ledger.into_lists();
         let status = Status::new(!violations.is_empty(), decided);
-        ClearanceOutcome { status, closest: obstacles.kept, violations, undecided, parry, refused: self.refused }
+        let (closest, refused) = (obstacles.kept, self.refused);
+        ClearanceOutcome { status, closest, violations, undecided, unresolved: 0, parry, refused }
     }
 }
 
