@@ -15,6 +15,8 @@ const MOST_KEPT: usize = 4096;
 const MOST_SAMPLES: usize = 256;
 const MOST_STRETCHES: usize = 64;
 const MOST_CHANGES: usize = 64;
+/// No samples of a window are passed over up to so many.
+const FEWEST_SAMPLES: usize = 32;
 
 /// Follows the closest approach of all pairs, slice of time by slice of time.
 #[derive(Clone, Debug)]
@@ -28,8 +30,8 @@ impl Smallest {
         Self { windows: Windows::of_closest(settings.limits()), slices: Slices::new(MOST_KEPT) }
     }
 
-    /// Looks at a window, in slices between the samples of a vehicle that has many in it and the instants at which anybody comes
-    /// or goes. `nearest` says which of those that were drawn closest, the closest first, counts.
+    /// Looks at a window, in slices between the samples in it and the instants at which anybody comes or goes. `nearest` says which
+    /// of those that were drawn closest, the closest first, counts.
     pub(super) fn follow(
         &mut self,
         vehicles: &[Vehicle],
@@ -74,14 +76,17 @@ impl Smallest {
 
 /// Where slices of a window begin and end \[s\].
 fn ends(vehicles: &[Vehicle], window: Interval, company: &Company) -> Vec<f64> {
-    let parts = vehicles.iter().map(|vehicle| &vehicle.segments[within(&vehicle.segments, window)]);
-    let most = parts.max_by_key(|parts| parts.len()).unwrap_or_default();
-    let mut samples: Vec<_> = most.iter().flat_map(|part| [part.from_s, part.to_s]).collect();
+    let parts = || vehicles.iter().map(|vehicle| &vehicle.segments[within(&vehicle.segments, window)]);
+    let mut samples: Vec<_> = parts().flatten().flat_map(|part| [part.from_s, part.to_s]).collect();
+    samples.sort_unstable_by(f64::total_cmp);
     samples.dedup();
+    // Vehicles that are seen at instants of their own do not make slices much shorter than what lies between two of them.
+    let of_one = parts().map(<[_]>::len).max().unwrap_or(0);
+    let most_samples = (2 * of_one).clamp(FEWEST_SAMPLES, MOST_SAMPLES);
     let stretches: Vec<_> = company.stretches.iter().flat_map(|stretch| [stretch.from_s, stretch.to_s]).collect();
     let mut ends = vec![window.from_s, window.to_s];
     for (times_s, most) in
-        [(&samples, MOST_SAMPLES), (&stretches, 2 * MOST_STRETCHES), (&company.changes_s, MOST_CHANGES)]
+        [(&samples, most_samples), (&stretches, 2 * MOST_STRETCHES), (&company.changes_s, MOST_CHANGES)]
     {
         ends.extend(times_s.iter().step_by(times_s.len().div_ceil(most).max(1)));
     }
@@ -203,10 +208,10 @@ mod tests {
     #[test]
     fn those_who_left_are_not_near_until_another_comes() {
         let (a, b) = (at_rest(0.0, [0.0, 10.0], 1.0), at_rest(5.0, [0.0, 9.5], 0.5));
-        let late = at_rest(50.0, [3600.0, 3610.0], 1.0);
+        let late = at_rest(50.0, [3600.0, 3610.0], 0.25);
         let found = slices(with_gaps(2.0), &[a, b, late]);
         assert_eq!((found[0].from_s, found[found.len() - 1].to_s), (0.0, 9.5));
-        assert!(found.iter().all(|of| of.to_s - of.from_s <= 1.0), "{found:?}");
+        assert!(found.iter().all(|of| of.to_s - of.from_s <= 0.5), "{found:?}");
     }
 
     #[test]
