@@ -6,7 +6,7 @@
 /** @typedef {{name: string, radius_m: number | null, solid: string, rims: string, opacity: number, path: number[][]}} Thing */
 /** @typedef {{vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: string, middle_m: number[], origin_m: number[], look_m: number[],
     half_m: number[], cell_m: number, points: number, starts: string, steps: string, breaks: string, near_s: string, near_who: string, holds: boolean,
-    nearest: [number, string][], verdicts: [number, boolean, string][], decimals: number, moments: Moment[], things: Thing[], ground: string, square_m: number, links: string, tension: boolean,
+    nearest: [number, string][], verdicts: [number, boolean, string, number[], number | null][], decimals: number, moments: Moment[], things: Thing[], ground: string, square_m: number, links: string, tension: boolean,
     delta_m: number, formations: {from_s: number, slots: string}[], axis_m: number, axes: number | null, reference: number | null}} Data */
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
 /** @typedef {{made: WebGLProgram, at: Object<string, WebGLUniformLocation>}} Program */
@@ -300,7 +300,8 @@ const play = (root, data) => {
     const ratio = fit(canvas); if (!ratio || gone) return;
     const size = [canvas.width, canvas.height], { right, up, back, eye } = axes(), lens = [TANGENT * size[0] / size[1], TANGENT, distance * 0.02, distance + reach * 12];
     seek();
-    const wrong = moments.filter(moment => moment.kind === "violation" && moment.from_s <= t && t <= moment.to_s), who = new Set(wrong.flatMap(moment => moment.who));
+    const [, alarm, verdict, named, thing] = under(data.verdicts, t) ?? [0, false, "", [], null];
+    const wrong = [...moments.filter(of => of.kind === "violation" && of.from_s <= t && t <= of.to_s), { who: named, thing }], who = new Set(wrong.flatMap(of => of.who));
     if ([...who].join() !== painted) {
       painted = [...who].join();
       for (let k = 0; k < count; k++) {
@@ -333,7 +334,7 @@ const play = (root, data) => {
       gl.bindVertexArray(of?.vao ?? null);
       if (copies > 0) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, copies);
     };
-    const near = new Set(wrong.map(moment => moment.thing));
+    const near = new Set(wrong.map(of => of.thing));
     const solids = (/** @type {boolean} */ opaque) => things.forEach((thing, k) => {
       const colour = near.has(k) ? colours.alarm : colours.thing, offset = whereabouts(thing.path);
       if (thing.radius_m !== null && opaque) {
@@ -360,7 +361,7 @@ const play = (root, data) => {
     if (shows.links) quads(links);
     // The two nearest by the judge, and every two that are too near.
     const k = 2 * upTo(nearS, t) - 2, closest = [nearWho[k], nearWho[k + 1]].filter(vehicle => vehicle < count);
-    for (const [two, colour, width] of /** @type {[number[][], number, number][]} */ ([[[closest], colours.ink, 2.6], [wrong.map(moment => moment.who), colours.alarm, 5]])) {
+    for (const [two, colour, width] of /** @type {[number[][], number, number][]} */ ([[[closest], colours.ink, 2.6], [wrong.map(of => of.who), colours.alarm, 5]])) {
       set({ tint: rgba(colour), width: width * ratio });
       refill(pairs, Float32Array.from(two.filter(pair => pair.length === 2).flatMap(pair => [...pair, 0]))); quads(pairs);
     }
@@ -395,7 +396,7 @@ const play = (root, data) => {
         pen.strokeText(data.vehicles[vehicle], px, py); pen.fillText(data.vehicles[vehicle], px, py);
       }
     }
-    const [, alarm, verdict] = under(data.verdicts, t) ?? [0, false, ""], time = t.toFixed(data.decimals);
+    const time = t.toFixed(data.decimals);
     write(state, [verdict, under(data.nearest, t)?.[1], `squares of ${data.square_m} m`].filter(words => words).join(" · "));
     state.classList.toggle("replay-alarm", alarm);
     write(clock, time + " s");

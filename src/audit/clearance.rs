@@ -65,6 +65,8 @@ pub struct ClearanceOutcome {
     pub violations: Vec<Violation<ObjectPair>>,
     /// Every time at which it cannot be told.
     pub undecided: Vec<Undecided<ObjectPair>>,
+    /// Steps on which ways bend by more than there was room for.
+    pub unresolved: u64,
     /// What the second detector says.
     pub parry: ParryEvidence<ObjectPair>,
     /// Calls answered by an error: what they offered was not judged.
@@ -149,12 +151,8 @@ impl ClearanceAuditor {
             let (target, may_violate) = (Target::Shape(&obstacle.shape), least_m < limit_m);
             let stands = Segment::straight(step.from_s, step.to_s, *place_m, *place_m);
             let flies = Segment::straight(step.from_s, step.to_s, from, to);
-            PairSweep { pair, target, keep_out: keep_out.clone(), cutoff, may_violate, above: None }.judge(
-                &[stands],
-                &[flies],
-                step,
-                &mut self.results,
-            );
+            PairSweep { pair, target, keep_out: keep_out.clone(), cutoff, judges: true, may_violate, above: None }
+                .judge(&[stands], &[flies], step, &mut self.results);
             self.began.extend_from_slice(&self.results.ledger.violations[known..]);
             let was_below = std::mem::replace(&mut self.is_below[place], end_m < limit_m);
             let of_step = self.results.ledger.violations.len() > known;
@@ -184,7 +182,8 @@ impl ClearanceAuditor {
         let (parry, decided) = (ledger.parry, self.time_s.is_some() && self.refused == 0 && ledger.is_decided());
         let (violations, undecided) = ledger.into_lists();
         let status = Status::new(!violations.is_empty(), decided);
-        ClearanceOutcome { status, closest: obstacles.kept, violations, undecided, parry, refused: self.refused }
+        let (closest, refused) = (obstacles.kept, self.refused);
+        ClearanceOutcome { status, closest, violations, undecided, unresolved: 0, parry, refused }
     }
 }
 

@@ -19,6 +19,8 @@ pub(super) struct PairSweep<'a> {
     pub(super) keep_out: KeepOut,
     /// What the distance must come below to be among the closest.
     pub(super) cutoff: f64,
+    /// Whether the distance is held against the limit, and not only who came closest is asked.
+    pub(super) judges: bool,
     /// Whether bounds on the motion leave it open that the distance falls below its limit: then it is judged twice.
     pub(super) may_violate: bool,
     /// Height at or below which both are on the ground.
@@ -131,7 +133,8 @@ impl PairSweep<'_> {
         let mut search = Search::new(self.target, &r);
         let deviation = first.deviation() + second.deviation();
         let rounding = if search.straight().is_some() { 0.0 } else { first.rounding() + second.rounding() };
-        let Some(drawn) = search.minimum(limit_m.max(self.cutoff) + deviation + rounding) else { return };
+        let matters = if self.judges { limit_m.max(self.cutoff) } else { self.cutoff };
+        let Some(drawn) = search.minimum(matters + deviation + rounding) else { return };
 
         let floor = if matches!(self.target, Target::Origin) { 0.0 } else { f64::NEG_INFINITY };
         let lower = |lowest: &Minimum| (lowest.lower - deviation - rounding).max(floor);
@@ -148,6 +151,9 @@ impl PairSweep<'_> {
         let (lower_m, upper_m) = (lower(&drawn), upper(&search, 0.0, 1.0, &drawn));
         if lower_m < self.cutoff {
             self.offer(lower_m, upper_m, over.at(drawn.at), results);
+        }
+        if !self.judges {
+            return;
         }
         let mut enter = None;
         // Where it cannot be told whether both are on the ground, nothing too close is a violation for certain.

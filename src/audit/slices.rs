@@ -14,11 +14,15 @@ pub struct Slice {
     pub to_s: f64,
     /// Who, how near and when.
     pub closest: Approach,
+    /// Whether two are there all the time. Where it is not so nothing is known of some of it, and the distance is one of the
+    /// rest alone.
+    pub is_whole: bool,
 }
 
 /// Slices in order of time; nothing is known of the time between two that do not touch.
 ///
-/// Beyond so many, neighbours become one, and all slices are about as wide; the closest of all is never lost.
+/// Beyond so many, neighbours become one, and all slices are about as wide; the closest of all is never lost. Two that do not
+/// touch become one that is not whole, and only where what is between them is a small part of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slices {
     all: Vec<Slice>,
@@ -37,12 +41,26 @@ impl Default for Slices {
 }
 
 impl Slice {
-    fn joins(&self, next: &Self, width_s: f64) -> bool {
-        next.to_s - self.from_s <= width_s && next.from_s - self.to_s <= width_s * GAP_SHARE
+    /// From when to when \[s\] it is known how near two were: all the time of a whole one, of another no longer than the instant
+    /// at which they were closest.
+    #[must_use]
+    pub fn known_s(&self) -> [f64; 2] {
+        let at_s = self.closest.time_s.max(self.from_s).min(self.to_s);
+        if self.is_whole { [self.from_s, self.to_s] } else { [at_s; 2] }
+    }
+
+    /// The width \[s\] from which on this one and the next become one.
+    fn joined_at_s(&self, next: &Self) -> f64 {
+        (next.to_s - self.from_s).max((next.from_s - self.to_s) / GAP_SHARE)
     }
 
     fn and(self, next: Self) -> Self {
-        Self { to_s: next.to_s, closest: nearer(self.closest, next.closest), ..self }
+        Self {
+            to_s: next.to_s,
+            closest: nearer(self.closest, next.closest),
+            is_whole: self.is_whole && next.is_whole && next.from_s <= self.to_s,
+            ..self
+        }
     }
 }
 
@@ -60,7 +78,7 @@ impl Slices {
             return;
         }
         match self.all.last_mut() {
-            Some(last) if last.joins(&next, self.width_s) => *last = last.and(next),
+            Some(last) if last.joined_at_s(&next) <= self.width_s => *last = last.and(next),
             _ => self.all.push(next),
         }
         if self.all.len() > self.most {
@@ -74,18 +92,18 @@ impl Slices {
         let place = self.all.partition_point(|slice| slice.to_s < at_s);
         match self.all.get_mut(place) {
             Some(slice) if slice.from_s <= at_s => slice.closest = nearer(slice.closest, closest),
-            _ => self.all.insert(place, Slice { from_s: at_s, to_s: at_s, closest }),
+            _ => self.all.insert(place, Slice { from_s: at_s, to_s: at_s, closest, is_whole: true }),
         }
     }
 
     fn thin(&mut self, most: usize) {
-        let (Some(first), Some(last)) = (self.all.first(), self.all.last()) else { return };
-        self.width_s = self.width_s.max((last.to_s - first.from_s) / most as f64);
+        let known_s: f64 = self.all.iter().map(|slice| slice.to_s - slice.from_s).sum();
+        self.width_s = self.width_s.max(known_s / most as f64);
         loop {
             let mut wider: Vec<Slice> = Vec::new();
             for next in self.all.drain(..) {
                 match wider.last_mut() {
-                    Some(last) if last.joins(&next, self.width_s) => *last = last.and(next),
+                    Some(last) if last.joined_at_s(&next) <= self.width_s => *last = last.and(next),
                     _ => wider.push(next),
                 }
             }
@@ -93,7 +111,8 @@ impl Slices {
             if self.all.len() <= most {
                 return;
             }
-            self.width_s *= 2.0;
+            let needed_s = self.all.windows(2).map(|two| two[0].joined_at_s(&two[1])).fold(f64::INFINITY, f64::min);
+            self.width_s = needed_s.max(2.0 * self.width_s);
         }
     }
 
@@ -133,7 +152,7 @@ mod tests {
     fn slice(k: u32) -> Slice {
         let distance_m = if k == 12_345 { 0.5 } else { 2.0 + f64::from(k % 7) };
         let from_s = f64::from(k);
-        Slice { from_s, to_s: from_s + 1.0, closest: approach(from_s + 0.5, distance_m) }
+        Slice { from_s, to_s: from_s + 1.0, closest: approach(from_s + 0.5, distance_m), is_whole: true }
     }
 
     #[test]
@@ -157,6 +176,32 @@ mod tests {
         let kept = slices.finish(1000);
         let gaps: Vec<_> = kept.windows(2).filter(|two| two[0].to_s < two[1].from_s).collect();
         assert!(gaps.len() == 1 && gaps[0][0].to_s == 30_000.0 && gaps[0][1].from_s == 30_400.0, "{gaps:?}");
+        assert!(kept.iter().all(|of| of.is_whole));
+    }
+
+    #[test]
+    fn one_late_instant_makes_no_slice_wider() {
+        let mut slices = Slices::new(4096);
+        (0..6000).for_each(|k| slices.take(slice(k)));
+        slices.take(Slice { to_s: 2e8, ..slice(200_000_000) });
+        let kept = slices.finish(2000);
+        let widest_s = kept.iter().map(|of| of.to_s - of.from_s).fold(0.0, f64::max);
+        assert!(kept.len() > 1000 && widest_s <= 6.0, "{} of {widest_s} s", kept.len());
+    }
+
+    #[test]
+    fn what_is_joined_across_a_gap_is_known_at_its_closest_alone() {
+        let mut slices = Slices::new(4096);
+        (0..200).filter(|k| *k != 90).for_each(|k| slices.take(slice(k)));
+        let kept = slices.finish(4);
+        let of_gap: Vec<_> = kept.iter().filter(|of| of.from_s < 90.0 && 91.0 < of.to_s).collect();
+        assert!(of_gap.len() == 1 && !of_gap[0].is_whole, "{kept:?}");
+        assert_eq!(of_gap[0].known_s(), [of_gap[0].closest.time_s; 2]);
+        let others = kept.iter().filter(|of| !(of.from_s..of.to_s).contains(&90.0));
+        assert!(
+            others.clone().count() > 1 && others.clone().all(|of| of.known_s() == [of.from_s, of.to_s]),
+            "{kept:?}"
+        );
     }
 
     #[test]
@@ -164,6 +209,9 @@ mod tests {
         let mut slices = Slices::new(100);
         (0..10_000).map(|k| 2 * k).for_each(|k| slices.take(slice(k)));
         assert!(slices.all.len() <= 100 && slices.finish(7).len() <= 7);
+        let mut instants = Slices::new(100);
+        (0..10_000).map(slice).for_each(|of| instants.take(Slice { to_s: of.from_s, ..of }));
+        assert!(instants.all.len() <= 100 && instants.finish(7).len() <= 7);
     }
 
     #[test]

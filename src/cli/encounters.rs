@@ -48,9 +48,9 @@ pub(super) fn figures(
 
 /// When the closest of all was how near, and none where nothing is known of a time in between.
 fn over_time(slices: &[Slice]) -> Vec<Option<(f64, f64)>> {
-    let ends = std::iter::once(None).chain(slices.iter().map(|slice| Some(slice.to_s)));
+    let ends = std::iter::once(None).chain(slices.iter().map(|slice| Some(slice.known_s()[1])));
     let points = slices.iter().zip(ends).flat_map(|(slice, end_s)| {
-        let gap = end_s.is_some_and(|end_s| end_s < slice.from_s).then_some(None);
+        let gap = end_s.is_some_and(|end_s| end_s < slice.known_s()[0]).then_some(None);
         gap.into_iter().chain([Some((slice.closest.time_s, slice.closest.certain_m()))])
     });
     points.collect()

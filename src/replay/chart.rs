@@ -13,7 +13,7 @@ const MARGIN: f64 = 1.5;
 /// Lines and bands of the chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
-    /// The smallest distance of each slice of time, as a path; nothing is drawn across a gap.
+    /// The smallest distance of each slice of time, as a path; nothing is drawn across a gap, and of a slice that is not whole a dot.
     pub distance: String,
     /// Height of the limit, from above.
     pub limit: Option<f64>,
@@ -34,16 +34,16 @@ impl Chart {
         let y = |distance: f64| SIZE[1] * (1.0 - 0.96 * (distance / most).clamp(0.0, 1.0));
         let mut distance = String::new();
         let mut end_s = f64::NEG_INFINITY;
-        for Slice { from_s, to_s, closest } in near {
-            let height = y(closest.certain_m());
+        for slice in near {
+            let ([from_s, to_s], height) = (slice.known_s(), y(slice.closest.certain_m()));
             // Writing to a string cannot fail.
-            let _ = if *from_s > end_s {
-                write!(distance, "M{:.1} {height:.1}", x(*from_s))
+            let _ = if from_s > end_s {
+                write!(distance, "M{:.1} {height:.1}", x(from_s))
             } else {
                 write!(distance, "V{height:.1}")
             };
-            let _ = write!(distance, "H{:.1}", x(*to_s));
-            end_s = *to_s;
+            let _ = write!(distance, "H{:.1}", x(to_s));
+            end_s = to_s;
         }
         let of_pairs = moments.iter().find(|moment| moment.kind == Kind::Closest && moment.obstacle.is_none());
         let mut bands = Vec::new();
@@ -87,7 +87,7 @@ mod tests {
         let slice = |from_s: f64| {
             let pair = ObjectPair::Vehicles(Pair::new(0, 1));
             let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };
-            Slice { from_s, to_s: from_s + 1.0, closest }
+            Slice { from_s, to_s: from_s + 1.0, closest, is_whole: true }
         };
         let moment = |kind: Kind, from_s: f64, to_s: f64| {
             let span = Span { from_s, to_s, at_s: from_s };
@@ -99,8 +99,9 @@ mod tests {
             moment(Kind::Violation, 1.5, 3.0),
             moment(Kind::Unseen, 2.0, 4.0),
         ];
-        let chart = Chart::of(&[slice(0.0), slice(1.0), slice(8.0)], &moments, None, [0.0, 10.0]);
+        let in_parts = Slice { to_s: 7.0, is_whole: false, ..slice(5.0) };
+        let chart = Chart::of(&[slice(0.0), slice(1.0), in_parts, slice(8.0)], &moments, None, [0.0, 10.0]);
         assert_eq!(chart.bands, [(198.5, 401.5, false), (98.5, 301.5, true), (398.5, 501.5, true)]);
-        assert_eq!(chart.distance, "M0.0 4.0H100.0V4.0H200.0M800.0 4.0H900.0");
+        assert_eq!(chart.distance, "M0.0 4.0H100.0V4.0H200.0M500.0 4.0H500.0M800.0 4.0H900.0");
     }
 }

@@ -16,7 +16,7 @@ use super::nearest::{self, Said, Words};
 use super::stage::Stage;
 use super::targets::{self, Targets};
 use super::things::{POINT_BYTES, Thing};
-use super::verdict::{self, Told};
+use super::verdict;
 use super::words::{LONGEST_NAME, LONGEST_SENTENCE, cut};
 use crate::audit::{Obstacle, Shape};
 
@@ -25,7 +25,7 @@ const MOST_MOMENTS: usize = 200;
 /// Most slices of time of the chart.
 const MOST_SLICES: usize = 1000;
 /// Most sentences on the nearest so far, and on the verdict, and what one takes \[bytes\].
-const MOST_SAID: [usize; 2] = [400, 1000];
+const MOST_SAID: [usize; 2] = [1000, 1000];
 const SAID_BYTES: usize = 100;
 /// Most points of the way of an obstacle.
 const MOST_POINTS: usize = 5000;
@@ -85,9 +85,10 @@ struct Data<'a> {
     /// for one that is not drawn.
     near_s: String,
     near_who: String,
-    /// What is said from when on \[s\]: of the nearest so far, and of the verdict, and whether that is a violation.
+    /// What is said from when on \[s\]: of the nearest so far, and of the verdict, whether that is a violation, and who and
+    /// which obstacle are too near in it where it is not among the moments.
     nearest: Vec<Said>,
-    verdicts: Vec<Told>,
+    verdicts: Vec<(f64, bool, String, Vec<usize>, Option<usize>)>,
     /// In order of time.
     moments: Vec<MomentData<'a>>,
     things: Vec<Thing>,
@@ -154,6 +155,12 @@ impl Replay {
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
         let name = |vehicle: usize| stage.vehicles.get(vehicle).map(|name| cut(name, LONGEST_NAME));
         let words = Words { unit: judged.unit, has_gaps, name };
+        let verdicts = verdict::over_time(&moments, judged.is_else_known, begin_s, most_said[1]).into_iter();
+        let verdicts = verdicts.map(|(from_s, alarm, said, of)| {
+            let unlisted = of.and_then(|k| moments[listed.len()..].get(k.checked_sub(listed.len())?));
+            let who = unlisted.map_or_else(Vec::new, |of| of.data(&place).who);
+            (from_s, alarm, said, who, unlisted.and_then(|of| of.obstacle))
+        });
         let things = things(stage, &extent, listed, room_bytes);
         let obstacles_off_m = things.iter().map(|thing| thing.off_m).fold(0.0, f64::max);
         let mut data = Data {
@@ -179,7 +186,7 @@ impl Replay {
             near_s,
             near_who,
             nearest: nearest::so_far(&film.nearest, &words, most_said[0]),
-            verdicts: verdict::over_time(&moments, judged.is_else_known, begin_s, most_said[1]),
+            verdicts: verdicts.collect(),
             moments: in_order(listed).map(|moment| moment.data(&place)).collect(),
             things,
             targets,

@@ -88,7 +88,7 @@ impl Film {
         if let Some(ClosestApproach { pair, separation_m, time_s: at_s }) = closest {
             let (pair, lower_m, upper_m) = (ObjectPair::Vehicles(pair), separation_m, separation_m);
             let closest = Approach { pair, lower_m, upper_m, time_s: at_s, limit_m: 0.0 };
-            self.nearest.take(Slice { from_s, to_s: time_s, closest });
+            self.nearest.take(Slice { from_s, to_s: time_s, closest, is_whole: true });
         }
         let bytes = positions_m.len() * size_of::<f64>() * self.times_s.len();
         if bytes > self.budget_bytes.unwrap_or(BUDGET_BYTES) && self.times_s.len() > FEWEST {

@@ -22,11 +22,16 @@ pub(super) struct Words<'a, N> {
     pub(super) name: N,
 }
 
-/// What is said of the nearest so far, no more than so often (at least twice). In a slice in which it came to less, that is what it
-/// was at most.
+/// What is said of the nearest so far, no more than so often (at least twice), of as many slices as leave room for that. In a slice
+/// in which it came to less, that is what it was at most.
 pub(super) fn so_far<N: Fn(usize) -> Option<String>>(slices: &Slices, words: &Words<'_, N>, most: usize) -> Vec<Said> {
-    let said = words.over(&slices.clone().finish(usize::MAX));
-    if said.len() <= most { said } else { words.over(&slices.clone().finish(most / 2)) }
+    let mut finest = slices.clone().finish(usize::MAX);
+    let mut said = words.over(&finest);
+    while said.len() > most && finest.len() > 1 {
+        finest = slices.clone().finish(finest.len() / 2);
+        said = words.over(&finest);
+    }
+    said
 }
 
 impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
@@ -37,7 +42,7 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
             _ => said.push((from_s, words)),
         };
         let mut least: Option<Approach> = None;
-        for Slice { from_s, to_s, closest } in slices {
+        for Slice { from_s, to_s, closest, .. } in slices {
             if least.is_some_and(|least| least.certain_m() <= closest.certain_m()) {
                 continue;
             }
@@ -96,7 +101,7 @@ mod tests {
     fn slice(from_s: f64, [lower_m, upper_m]: [f64; 2]) -> Slice {
         let pair = ObjectPair::Vehicles(Pair::new(0, 1));
         let closest = Approach { pair, lower_m, upper_m, time_s: from_s + 0.5, limit_m: 1.0 };
-        Slice { from_s, to_s: from_s + 1.0, closest }
+        Slice { from_s, to_s: from_s + 1.0, closest, is_whole: true }
     }
 
     fn said(slices: &[Slice], has_gaps: bool) -> Vec<(f64, String)> {
@@ -133,7 +138,7 @@ mod tests {
         (0..4000).map(f64::from).for_each(|k| slices.take(slice(k, [5000.0 - k; 2])));
         let words = Words { unit: "m", has_gaps: false, name: |_| None };
         let said = so_far(&slices, &words, 40);
-        assert!(said.len() <= 40 && said.len() > 8, "{}", said.len());
+        assert!(said.len() <= 40 && said.len() > 24, "{}", said.len());
         assert_eq!(said.last(), Some(&(4000.0, "nearest so far 1001.000 m".to_owned())));
     }
 }

@@ -258,8 +258,11 @@ fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
     let at = |k: u32| 0.2 * f64::from(k);
     let moments: Vec<_> = (0..300).map(|k| violation(0, at(k), at(k))).collect();
     let longer = self::film(2, 4000);
-    let (replay, _) = packed(&stage(2), &longer, &moments, PAGE_BYTES);
+    let (replay, data) = packed(&stage(2), &longer, &moments, PAGE_BYTES);
     assert_eq!((replay.moments(), replay.inexact()), ([200, 300], 0), "{:?}", replay.instants());
+    let alarms = data["verdicts"].as_array().expect("verdicts").iter().filter(|told| told[1] == true);
+    let named: Vec<_> = alarms.map(|told| told[3].as_array().map_or(0, Vec::len)).collect();
+    assert_eq!(named, [vec![0; 200], vec![1; 100]].concat(), "those that are not listed are said with who they are");
     let (replay, _) = packed(&stage(2), &longer, &moments, 36_000);
     assert!(replay.inexact() > 0, "{:?}", replay.instants());
 }
@@ -301,7 +304,7 @@ fn findings_lie_within_the_flight_and_the_nearest_stops_at_a_gap() {
     let pair = ObjectPair::Vehicles(Pair::new(0, 1));
     let slice = |from_s: f64, to_s: f64| {
         let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };
-        Slice { from_s, to_s, closest }
+        Slice { from_s, to_s, closest, is_whole: true }
     };
     let mut near = Slices::default();
     for slice in [slice(0.0, 3.0), slice(5.0, 10.0)] {

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use super::moment::{Kind, Moment};
 use crate::text::seconds;
 
-/// From when on \[s\], whether there is a violation, and what is said.
-pub(super) type Told = (f64, bool, String);
+/// From when on \[s\], whether there is a violation, what is said, and the place of the violation under way that it is said of.
+pub(super) type Told = (f64, bool, String, Option<usize>);
 
 /// What is under way, by place in the list of moments, and what has begun.
 #[derive(Default)]
@@ -30,7 +30,7 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
     let mut groups: Vec<_> = events.chunk_by(|a, b| a.0 == b.0).collect();
     let mut told = Vec::new();
     if groups.first().is_none_or(|first| first[0].0 > begin_s) {
-        told.push((begin_s, false, state.said()));
+        told.push((begin_s, false, state.said(), None));
     }
     let together = groups.len().div_ceil(most.max(1)).max(1);
     while !groups.is_empty() {
@@ -44,7 +44,7 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
         told.push(match end_s.filter(|_| together > 1) {
             Some(end_s) => state.said_of_several(&seen, from_s, end_s),
             None if together > 1 => state.said_of_several(&seen, from_s, f64::INFINITY),
-            None => (from_s, !state.violations.is_empty(), state.said()),
+            None => (from_s, !state.violations.is_empty(), state.said(), state.violations.first().copied()),
         });
         groups = rest;
     }
@@ -89,9 +89,9 @@ impl State<'_> {
         let to = if to_s.is_finite() { format!(" to {}", seconds(to_s)) } else { " on".to_owned() };
         let around = format!("from {}{to}", seconds(from_s));
         match (self.first_of(violations), self.first_of(undecided)) {
-            (Some(violation), _) => (from_s, true, format!("violation {around}: {violation}")),
-            (None, Some(doubt)) => (from_s, false, format!("undecided {around}: {doubt}")),
-            (None, None) => (from_s, false, self.said()),
+            (Some(violation), _) => (from_s, true, format!("violation {around}: {violation}"), None),
+            (None, Some(doubt)) => (from_s, false, format!("undecided {around}: {doubt}"), None),
+            (None, None) => (from_s, false, self.said(), None),
         }
     }
 
@@ -113,7 +113,7 @@ mod tests {
     }
 
     fn said(told: &[Told], time_s: f64) -> (bool, &str) {
-        let (_, alarm, said) = &told[told.partition_point(|told| told.0 <= time_s) - 1];
+        let (_, alarm, said, _) = &told[told.partition_point(|told| told.0 <= time_s) - 1];
         (*alarm, said)
     }
 
@@ -127,7 +127,8 @@ mod tests {
         assert_eq!(said(&told, 4.0), (true, "violation: a and b, and 1 more"));
         assert_eq!(said(&told, 5.0), (true, "violation: a and b"));
         assert_eq!(said(&told, 5.1), (false, "2 violations so far"));
-        assert_eq!(over_time(&[], true, 1.0, 100), [(1.0, false, "no violation so far".to_owned())]);
+        assert_eq!(told.iter().map(|told| told.3).collect::<Vec<_>>(), [None, Some(0), Some(0), Some(0), None]);
+        assert_eq!(over_time(&[], true, 1.0, 100), [(1.0, false, "no violation so far".to_owned(), None)]);
     }
 
     #[test]

@@ -133,6 +133,8 @@ pub struct Audit {
     pub status: Status,
     /// Every time that a pair was closer than delta.
     pub violations: Vec<Violation>,
+    /// Times at which it cannot be told of two vehicles, whatever else there was.
+    pub undecided: u64,
     /// Steps swept.
     pub steps: u64,
     /// Pairs swept, summed over all steps.
@@ -275,6 +277,7 @@ impl Report {
             audit: Audit {
                 status: findings.status(),
                 violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
+                undecided: audit.unresolved + audit.refused,
                 steps: audit.steps,
                 pairs_checked: audit.pairs_checked,
                 closed_form: ClosedForm { min_m },

@@ -26,9 +26,9 @@ impl Report {
     #[must_use]
     pub fn judgement(&self) -> Judged {
         let unit = if self.separation.ellipsoid.is_some() { "m, scaled" } else { "m" };
+        let of_pairs = self.audit.undecided == 0 && self.audit.parry.disagreements == 0;
         let of_obstacles = self.obstacles.iter().all(|of| of.undecided == 0 && of.disagreements == 0);
-        let is_else_known =
-            self.audit.status != Status::Undecided && self.audit.parry.disagreements == 0 && of_obstacles;
+        let is_else_known = self.audit.status != Status::Undecided && of_pairs && of_obstacles;
         Judged { is_else_known, limit: Some(self.separation.delta_m), unit }
     }
 

@@ -24,7 +24,7 @@ pub struct Obstacles {
     /// Every time that a vehicle was nearer to an obstacle than its clearance.
     pub violations: Vec<ObstacleViolation>,
     /// Times at which it cannot be told.
-    pub undecided: usize,
+    pub undecided: u64,
     /// Distances measured again by parry that contradict the closed form.
     pub disagreements: u64,
 }
@@ -69,7 +69,7 @@ impl Obstacles {
             }),
             ObjectPair::Vehicles(_) => None,
         };
-        let ClearanceOutcome { status, closest, violations, undecided, parry, .. } = outcome;
+        let ClearanceOutcome { status, closest, violations, undecided, unresolved, parry, refused } = outcome;
         let of_violation = |found: &Violation<ObjectPair>| {
             let &Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = found;
             Some(ObstacleViolation { approach: approach(pair, limit_m, min_m, min_at_s)?, from_s, to_s })
@@ -80,7 +80,7 @@ impl Obstacles {
             certified_room_m: findings.certificate.certified_room_m.and_then(finite),
             closest: closest.iter().filter_map(of_closest).collect(),
             violations: violations.iter().filter_map(of_violation).collect(),
-            undecided: undecided.len(),
+            undecided: undecided.len() as u64 + unresolved + refused,
             disagreements: parry.disagreements,
         })
     }

@@ -107,6 +107,22 @@ fn who_is_too_near_to_an_obstacle_or_nearer_than_certified_does_not_pass() {
 }
 
 #[test]
+fn beside_a_violation_it_counts_what_could_not_be_told() {
+    let is_all_known = |change: fn(&mut crate::audit::AuditOutcome, &mut ClearanceOutcome)| {
+        let (mut audit, mut clearance) = (passing(1.5), passing_a_ball(1.25));
+        change(&mut audit, &mut clearance);
+        let report = Case { audit, clearance: Some(clearance), ..Case::good() }.report();
+        assert_eq!(report.audit.status, Status::Violation);
+        report.judgement().is_else_known
+    };
+    assert!(is_all_known(|_, _| {}));
+    assert!(!is_all_known(|audit, _| audit.unresolved = 1));
+    assert!(!is_all_known(|audit, _| audit.refused = 1));
+    assert!(!is_all_known(|_, clearance| clearance.unresolved = 1));
+    assert!(!is_all_known(|_, clearance| clearance.refused = 1));
+}
+
+#[test]
 fn around_ellipsoids_both_lengths_are_told_and_the_scaled_one_is_judged() {
     let case = Case { in_metres: Some(([1.0, 1.0, 3.0], passing(1.25))), ..Case::good() };
     let report = case.report();

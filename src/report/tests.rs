@@ -173,6 +173,7 @@ audit
       to_s
       min_m
       min_at_s
+  undecided
   steps
   pairs_checked
   closed_form

@@ -293,6 +293,7 @@ impl Judge {
         audit.status = unless(self.bent, audit.status);
         let mut clearance = self.clearance.map(ClearanceAuditor::finish);
         if let Some(clearance) = &mut clearance {
+            clearance.unresolved += self.bent_past_obstacles;
             clearance.status = unless(self.bent_past_obstacles, clearance.status);
         }
         Judged {
@@ -381,5 +382,23 @@ mod tests {
         assert_eq!(judged(1e-6, 2.0 + 1e-6), (Status::Undecided, 1), "each of the two may be nearer");
         assert_eq!(judged(1e-6, 2.0 + 3e-6), (Status::Clear, 0));
         assert_eq!(judged(1e-6, 2.0 - 1e-6).0, Status::Violation);
+    }
+
+    #[test]
+    fn what_bends_past_an_obstacle_counts_beside_a_violation() {
+        let line = |from_m: f64| Rows::from_row_slice(&[from_m, 0.0, 0.0, from_m + 9.0, 0.0, 0.0]);
+        let mut scenario = Scenario::new("two", Swarm::at_rest(line(3.0)), Formation::line(2, 9.0), 2.0, 2.0);
+        scenario.obstacles = vec![crate::space::Obstacle {
+            name: "ball".to_owned(),
+            place_m: nalgebra::Vector3::zeros(),
+            shape: crate::space::Shape::Ball { radius_m: 1.0 },
+            clearance_m: 1.0,
+        }];
+        let (mut judge, mut events) = (Judge::new(&scenario).expect("a judge"), Vec::new());
+        judge.start(0.0, &line(3.0), &mut events).expect("judged");
+        judge.sweep(1.0, &line(2.0 + 1e-6), 2e-6, &mut events).expect("judged");
+        judge.sweep(2.0, &line(1.5), 0.0, &mut events).expect("judged");
+        let clearance = judge.finish().clearance.expect("judged");
+        assert_eq!((clearance.status, clearance.unresolved), (Status::Violation, 1));
     }
 }

@@ -87,7 +87,7 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "verdict.pass verdict.refused verdict.reasons",
         "separation.delta_m separation.min_m separation.min_at_s separation.min_pair separation.certified_m",
         "separation.certified_until_s separation.certificate_void",
-        "audit.status audit.violations audit.steps audit.pairs_checked audit.closed_form.min_m",
+        "audit.status audit.violations audit.undecided audit.steps audit.pairs_checked audit.closed_form.min_m",
         "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
         "hulls.bounces hulls.passed_through",
         "formation.reached formation.reached_at_s formation.held_s formation.fails formation.at_rest",

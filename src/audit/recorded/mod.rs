@@ -42,6 +42,7 @@
 //! ```
 
 mod auditor;
+mod company;
 mod error;
 mod outcome;
 mod places;

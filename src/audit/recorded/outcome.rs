@@ -134,7 +134,8 @@ pub struct Outcome {
     /// The ten closest approaches to obstacles, likewise.
     pub obstacles: Vec<Approach>,
     /// The closest approach of all pairs of vehicles in one slice of time after the other, about a sample long, of a long
-    /// recording longer, where two are there. Empty unless it was asked for.
+    /// recording longer; of times at which no two are there, or both are on the ground, nothing is known. Empty unless it was
+    /// asked for.
     pub smallest: Vec<Slice>,
     /// Every violation, in order of time.
     pub violations: Vec<Violation<ObjectPair>>,

@@ -56,6 +56,8 @@ struct Extent {
 #[derive(Clone, Debug)]
 pub(super) struct Windows {
     limits: Limits,
+    /// Whether distances are held against the limits, and not only who came closest is asked.
+    judges: bool,
     /// Obstacles, each with its path.
     obstacles: Vec<(Obstacle, Vec<Segment>)>,
     extents: Vec<Extent>,
@@ -95,7 +97,13 @@ impl Windows {
         let grounded = |part| Segment { grounded: Some(true), ..part };
         let with_path =
             |obstacle: &Obstacle| (obstacle.clone(), obstacle.segments().into_iter().map(grounded).collect());
-        Self { limits, obstacles: obstacles.iter().map(with_path).collect(), extents: Vec::new(), near: Vec::new() }
+        let obstacles = obstacles.iter().map(with_path).collect();
+        Self { limits, judges: true, obstacles, extents: Vec::new(), near: Vec::new() }
+    }
+
+    /// Which ask who came closest, and nothing else.
+    pub(super) fn of_closest(limits: Limits) -> Self {
+        Self { judges: false, ..Self::new(limits, &[]) }
     }
 
     /// Judges everything in a window.
@@ -170,11 +178,12 @@ impl Windows {
     /// Lists the pairs that could matter of the extents from one on with later ones, until they are more than `most`; returns
     /// the extent that follows.
     fn collect(&mut self, results: &Results, from: usize, most: usize) -> usize {
-        let Self { extents, near, limits, .. } = self;
+        let Self { extents, near, limits, judges, .. } = self;
+        let limit = |first: f64, second: f64| if *judges { limits.of_vehicles(first, second) } else { 0.0 };
         near.clear();
         let radius = extents.iter().map(|extent| extent.radius).fold(0.0, f64::max);
         let threshold = results.closest.threshold;
-        let reach = threshold.max(limits.of_vehicles(radius, radius));
+        let reach = threshold.max(limit(radius, radius));
         for (k, a) in (0_u32..).zip(extents.iter()).skip(from) {
             let until = a.high[0] + reach;
             for (l, b) in (k + 1..).zip(extents[k as usize + 1..].iter()).take_while(|(_, b)| b.low[0] <= until) {
@@ -184,7 +193,7 @@ impl Windows {
                     .max(b.low[2] - a.high[2]);
                 if aside <= reach && !(a.grounded && b.grounded) {
                     let of_both = Near::new(extents, k, l);
-                    if of_both.may_come_within(threshold.max(limits.of_vehicles(a.radius, b.radius))) {
+                    if of_both.may_come_within(threshold.max(limit(a.radius, b.radius))) {
                         near.push(of_both);
                     }
                 }
@@ -202,9 +211,10 @@ impl Windows {
         let pair = ObjectPair::Vehicles(Pair::new(a.vehicle, b.vehicle));
         let limit = self.limits.of_vehicles(a.radius, b.radius);
         let cutoff = results.closest.cutoff(pair, limit);
-        if near.may_come_within(limit.max(cutoff * (1.0 - TIE))) {
-            let (may_violate, keep_out) = (near.may_come_within(limit), KeepOut::new(limit));
-            PairSweep { pair, target: Target::Origin, keep_out, cutoff, may_violate, above: self.limits.above }.judge(
+        let may_violate = self.judges && near.may_come_within(limit);
+        if may_violate || near.may_come_within(cutoff * (1.0 - TIE)) {
+            let (target, keep_out, above) = (Target::Origin, KeepOut::new(limit), self.limits.above);
+            PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
                 a.segments(vehicles),
                 b.segments(vehicles),
                 window,
@@ -225,8 +235,13 @@ impl Windows {
                 let least = between - chord.stray - place.stray;
                 if least < limit.max(cutoff * (1.0 - TIE)) {
                     let (target, keep_out) = (Target::Shape(&obstacle.shape), KeepOut::new(limit));
-                    PairSweep { pair, target, keep_out, cutoff, may_violate: least < limit, above: self.limits.above }
-                        .judge(path, extent.segments(vehicles), window, results);
+                    let (may_violate, above) = (least < limit, self.limits.above);
+                    PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
+                        path,
+                        extent.segments(vehicles),
+                        window,
+                        results,
+                    );
                 }
             }
         }
@@ -295,7 +310,7 @@ fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
 }
 
 /// The segments that meet a window; mostly all of them.
-fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
+pub(super) fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
     let all_end_late = segments.first().is_none_or(|part| part.to_s >= from_s);
     let first = if all_end_late { 0 } else { segments.partition_point(|part| part.to_s < from_s) };
     let all_begin_early = segments.last().is_none_or(|part| part.from_s <= to_s);
@@ -333,6 +348,8 @@ impl Extent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::audit::recorded::Settings;
+    use crate::audit::segment::{Curve, Deviation};
 
     #[test]
     fn a_vehicle_strays_from_its_straight_way_as_far_as_its_corners() {
@@ -375,5 +392,47 @@ mod tests {
             assert_eq!(within(&parts, Interval { from_s, to_s }), expected, "{from_s} {to_s}");
         }
         assert_eq!(within(&[], Interval { from_s: 0.0, to_s: 1.0 }), 0..0);
+    }
+
+    #[test]
+    fn who_came_closest_is_the_same_where_nothing_is_held_against_a_limit() {
+        // Forty that fly through each other, every third of them on a curve that may be off.
+        let at = |k: u32, by: f64| {
+            Vector3::new(f64::from(k * k % 41) + by, f64::from(k * 17 % 37) * (1.0 - by), f64::from(k % 3))
+        };
+        let part = |k: u32, from_s: u32| {
+            let (from_s, by) = (f64::from(from_s), f64::from(from_s) / 8.0);
+            let (from, to) = (at(k, by), at(k, by + 0.125));
+            let deviation = Deviation { peak: 0.01, hermite: false };
+            let curve = Curve { from_s, to_s: from_s + 1.0, coefficients: vec![from, to - from], deviation };
+            if k.is_multiple_of(3) { Segment::curved(curve) } else { Segment::straight(from_s, from_s + 1.0, from, to) }
+        };
+        let settings = Settings { delta_m: Some(2.0), radius_m: Some(5.0), ..Settings::default() };
+        let vehicle = |k: u32| {
+            let mut vehicle = Vehicle::new("", &settings, 1.0);
+            vehicle.segments = (0..8).map(|from_s| part(k, from_s)).collect();
+            vehicle
+        };
+        let vehicles: Vec<_> = (0..40).map(vehicle).collect();
+        let found =
+            [Windows::new(settings.limits(), &[]), Windows::of_closest(settings.limits())].map(|mut windows| {
+                let mut results = Results::default();
+                windows.judge(&vehicles, Interval { from_s: 0.0, to_s: 8.0 }, &mut results);
+                results
+            });
+        let [judged, closest] = found;
+        assert_eq!(judged.closest.kept, closest.closest.kept);
+        assert!(
+            closest.closest.kept[0].limit_m == 10.0 && closest.swept < judged.swept / 2,
+            "{} and {}",
+            closest.swept,
+            judged.swept
+        );
+        assert!(!judged.ledger.violations.is_empty() && judged.ledger.parry.min_toi_s.is_some());
+        assert!(
+            closest.ledger.violations.is_empty()
+                && closest.ledger.is_decided()
+                && closest.ledger.parry.min_toi_s.is_none()
+        );
     }
 }

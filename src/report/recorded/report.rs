@@ -166,6 +166,7 @@ impl RecordedReport {
                         .iter()
                         .filter_map(|v| Some(flight::Violation::new(v.pair.vehicles()?, v)))
                         .collect(),
+                    undecided: outcome.undecided.iter().filter(|of| of.pair.vehicles().is_some()).count() as u64,
                     steps: outcome.segments,
                     pairs_checked: outcome.swept,
                     closed_form: ClosedForm { min_m },
