@@ -85,16 +85,19 @@ struct Data<'a> {
     /// for one that is not drawn.
     near_s: String,
     near_who: String,
-    /// What is said from when on \[s\]: of the nearest so far, and of the verdict, whether that is a violation, and who and
-    /// which obstacle are too near in it where it is not among the moments.
+    /// What is said from when on \[s\]: of the nearest so far, and of the verdict.
     nearest: Vec<Said>,
-    verdicts: Vec<(f64, bool, String, Vec<usize>, Option<usize>)>,
+    verdicts: Vec<Verdict>,
     /// In order of time.
     moments: Vec<MomentData<'a>>,
     things: Vec<Thing>,
     #[serde(flatten)]
     targets: Targets,
 }
+
+/// From when on \[s\], whether there is a violation, what is said, and who and which obstacle are too near in a violation that cannot
+/// be jumped to.
+type Verdict = (f64, bool, String, Vec<usize>, Option<usize>);
 
 #[derive(Serialize)]
 struct MomentData<'a> {
@@ -155,12 +158,6 @@ impl Replay {
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
         let name = |vehicle: usize| stage.vehicles.get(vehicle).map(|name| cut(name, LONGEST_NAME));
         let words = Words { unit: judged.unit, has_gaps, name };
-        let verdicts = verdict::over_time(&moments, judged.is_else_known, begin_s, most_said[1]).into_iter();
-        let verdicts = verdicts.map(|(from_s, alarm, said, of)| {
-            let unlisted = of.and_then(|k| moments[listed.len()..].get(k.checked_sub(listed.len())?));
-            let who = unlisted.map_or_else(Vec::new, |of| of.data(&place).who);
-            (from_s, alarm, said, who, unlisted.and_then(|of| of.obstacle))
-        });
         let things = things(stage, &extent, listed, room_bytes);
         let obstacles_off_m = things.iter().map(|thing| thing.off_m).fold(0.0, f64::max);
         let mut data = Data {
@@ -186,7 +183,7 @@ impl Replay {
             near_s,
             near_who,
             nearest: nearest::so_far(&film.nearest, &words, most_said[0]),
-            verdicts: verdicts.collect(),
+            verdicts: verdicts(&moments, judged.is_else_known, begin_s, most_said[1], &place),
             moments: in_order(listed).map(|moment| moment.data(&place)).collect(),
             things,
             targets,
@@ -330,6 +327,23 @@ impl Moment {
             said: cut(&self.said, LONGEST_SENTENCE),
         }
     }
+}
+
+/// What is said of the verdict, no more than so often.
+fn verdicts(
+    moments: &[Moment],
+    is_else_known: bool,
+    begin_s: f64,
+    most: usize,
+    place: &impl Fn(usize) -> Option<usize>,
+) -> Vec<Verdict> {
+    let told = verdict::over_time(moments, is_else_known, begin_s, most).into_iter();
+    let with_unlisted = |(from_s, alarm, said, of): verdict::Told| {
+        let unlisted = of.filter(|&k| k >= MOST_MOMENTS).map(|k| moments[k].data(place));
+        let thing = unlisted.as_ref().and_then(|of| of.thing);
+        (from_s, alarm, said, unlisted.map_or_else(Vec::new, |of| of.who), thing)
+    };
+    told.map(with_unlisted).collect()
 }
 
 fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {

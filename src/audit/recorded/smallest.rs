@@ -128,7 +128,8 @@ mod tests {
 
     /// Seen at rest every so often \[s\] from one time to another.
     fn at_rest(x: f64, [from_s, to_s]: [f64; 2], every_s: f64) -> Track {
-        (0..).map(|k| from_s + every_s * f64::from(k)).take_while(|time_s| *time_s <= to_s).map(|t| (t, x)).collect()
+        let times = std::iter::successors(Some(from_s), |time_s| Some(time_s + every_s));
+        times.take_while(|time_s| *time_s <= to_s).map(|time_s| (time_s, x)).collect()
     }
 
     /// From when to when \[s\] a vehicle is there.
@@ -197,7 +198,7 @@ mod tests {
     fn nothing_is_said_of_the_gaps_of_two_while_a_third_is_dense_before_them() {
         let of_two =
             |x: [f64; 2]| [(0.0, x[0]), (2.0, x[0]), (4.0, x[0]), (50.0, x[1]), (52.0, x[1]), (54.0, x[1])].to_vec();
-        let tracks = [of_two([0.0; 2]), of_two([5.0, 3.0]), at_rest(100.0, [0.0, 4.0], 0.1)];
+        let tracks = [of_two([0.0; 2]), of_two([5.0, 3.0]), at_rest(100.0, [0.0, 4.0], 0.125)];
         let found = slices(with_gaps(2.0), &tracks);
         assert!(found.iter().all(|of| of.is_whole && (of.to_s <= 4.0 || of.from_s >= 50.0)), "{found:?}");
         let first = found.iter().find(|of| of.closest.lower_m == 3.0).expect("they come to 3 m");
@@ -236,14 +237,10 @@ mod tests {
     #[test]
     fn of_more_comings_and_goings_than_there_are_slices_no_time_of_fewer_than_two_is_known() {
         // Fifteen pairs in turn, each there for most of a second, a second apart.
-        let turn =
-            |k: usize, later_s: f64| (0..20).map(move |j| 2.0 * (15.0 * f64::from(j) + (k / 2) as f64) + later_s);
-        let track = |k: usize| {
-            let [from_s, to_s] = if k.is_multiple_of(2) { [0.0, 0.9] } else { [0.1, 1.0] };
-            turn(k, from_s)
-                .zip(turn(k, to_s))
-                .flat_map(|(from_s, to_s)| [from_s, to_s].map(|t| (t, 3.0_f64.powi(k as i32))))
-                .collect()
+        let track = |k: i32| {
+            let within_s = if k % 2 == 0 { [0.0, 0.9] } else { [0.1, 1.0] };
+            let turns = (0..20).map(|turn| f64::from(30 * turn + k / 2 * 2));
+            turns.flat_map(|turn_s| within_s.map(|later_s| (turn_s + later_s, 3.0_f64.powi(k)))).collect()
         };
         let tracks: Vec<Track> = (0..30).map(track).collect();
         let found = slices(with_gaps(0.9), &tracks);
