@@ -210,9 +210,7 @@ impl Evaluator {
         let mut inverse_k = [1.0; LANES];
         for k in 0..count {
             inverse_k[k] = inverse_k_per_m[k];
-            for axis in 0..3 {
-                edges_m[axis][k] = apart_m(axis, k);
-            }
+            edges_m.iter_mut().enumerate().for_each(|(axis, edges_m)| edges_m[k] = apart_m(axis, k));
         }
         let before = self.potential;
         let mut pulls = self.pulls(edges_m, inverse_k);
@@ -230,9 +228,7 @@ impl Evaluator {
     fn pulls(&mut self, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> [Lanes; 3] {
         let (pulls, values, outside) = pulls(self.delta_m, edges_m, inverse_k_per_m);
         self.outside |= outside;
-        for k in 0..LANES {
-            self.potential[k] += values[k];
-        }
+        self.potential.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
         pulls
     }
 }

@@ -171,9 +171,12 @@ impl Outcome {
     /// Adds a time of two that keep a distance that cannot be decided.
     pub fn leave_open(&mut self, undecided: Undecided<ObjectPair>) {
         self.undecided.push(undecided);
-        let at_best = |status| if status == Status::Clear { Status::Undecided } else { status };
-        self.status = at_best(self.status);
-        self.separation = self.separation.map(at_best);
+        if self.status == Status::Clear {
+            self.status = Status::Undecided;
+        }
+        if self.separation == Some(Status::Clear) {
+            self.separation = Some(Status::Undecided);
+        }
     }
 
     /// Takes how close a vehicle came to an obstacle, where that is closer than was found.
