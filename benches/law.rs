@@ -75,14 +75,15 @@ fn laws(criterion: &mut Criterion) {
     }
 }
 
-/// A square grid of 2 m, moved a little by a third of a metre at most, on its way to one of 1.6 m.
+/// A square grid of 2 m, moved by a third of a metre at most, on its way to one of 1.6 m. Neighbours are moved as if at random,
+/// so that the same share of them is near enough to push, however many there are.
 fn displacement(criterion: &mut Criterion) {
     const DELTA_M: f64 = 1.0;
     for count in [1000, 10_000, 100_000] {
         let mut group = criterion.benchmark_group(format!("displacement/{count}"));
         group.sample_size(10).throughput(Throughput::Elements(count as u64));
         let (formation, grid) = (Formation::grid(count, 1.6), Formation::grid(count, 2.0).slots_m);
-        let moved = |i: usize, axis: usize| [0.2, 0.25, 0.0][axis] * ((3 * i + axis) as f64).sin();
+        let moved = |i: usize, axis: usize| [0.2, 0.25, 0.0][axis] * ((i * i + axis) as f64).sin();
         let mut swarm = Swarm::at_rest(Rows::from_fn(count, |i, axis| grid[(i, axis)] + moved(i, axis)));
         swarm.velocities_m_s = &swarm.positions_m * 0.01;
         for (name, graph) in [("star", Graph::star(count)), ("complete", Graph::complete(count))] {

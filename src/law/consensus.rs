@@ -27,22 +27,32 @@ pub(super) fn check_range(command: &Rows) -> Result<(), LawError> {
 /// Adds `gain L_G X` to `sums`, where X has a row for each vehicle: row i gains `gain` times the sum of `x_i - x_j`
 /// over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)` and takes O(N) for all rows.
 pub(super) fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows) {
-    let count = graph.count().max(1);
+    let count = graph.count();
     let (x, sums) = (rows.as_slice(), sums.as_mut_slice());
     if graph.is_complete() {
-        for (x, sums) in x.chunks_exact(count).zip(sums.chunks_exact_mut(count)) {
+        for (x, sums) in x.chunks_exact(count.max(1)).zip(sums.chunks_exact_mut(count.max(1))) {
             let mean = x.iter().sum::<f64>() / count as f64;
             let gain = gain * count as f64;
             sums.iter_mut().zip(x).for_each(|(sum, x)| *sum += gain * (x - mean));
         }
     } else {
-        graph.edges().for_each(|(i, j)| {
-            for axis in [0, count, 2 * count] {
-                let difference = gain * (x[axis + i] - x[axis + j]);
-                sums[axis + i] += difference;
-                sums[axis + j] -= difference;
+        let (x_axis, rest) = x.split_at(count);
+        let (y_axis, z_axis) = rest.split_at(count);
+        let (x_sums, rest) = sums.split_at_mut(count);
+        let (y_sums, z_sums) = rest.split_at_mut(count);
+        for i in 0..count {
+            let (x, y, z) = (x_axis[i], y_axis[i], z_axis[i]);
+            let (mut x_sum, mut y_sum, mut z_sum) = (x_sums[i], y_sums[i], z_sums[i]);
+            for j in graph.later_neighbours(i) {
+                let [along_x, along_y, along_z] =
+                    [gain * (x - x_axis[j]), gain * (y - y_axis[j]), gain * (z - z_axis[j])];
+                (x_sum, y_sum, z_sum) = (x_sum + along_x, y_sum + along_y, z_sum + along_z);
+                x_sums[j] -= along_x;
+                y_sums[j] -= along_y;
+                z_sums[j] -= along_z;
             }
-        });
+            (x_sums[i], y_sums[i], z_sums[i]) = (x_sum, y_sum, z_sum);
+        }
     }
 }
 

@@ -130,6 +130,16 @@ fn a_vehicle_that_is_flown_into_an_obstacle_fails_in_every_word_and_in_an_audit_
     let audited = ran(&folder, &["audit", "out/among/run.mcap"]);
     assert_eq!(audited.exit, Some(1), "{}", audited.out);
     assert!(audited.out.starts_with("VIOLATION: 1 and tower"), "{}", audited.out);
+
+    // One vehicle and an obstacle are two, also beside a question about single vehicles.
+    for (vehicle, exit, status) in [("1", 1, "violation"), ("2", 0, "clear")] {
+        let words = ["audit", "out/among/run.mcap", "--ids", vehicle, "--limit", "speed=50", "--json"];
+        let audited = ran(&folder, &words);
+        let audit = json(&audited);
+        assert_eq!((audited.exit, audit["status"].as_str()), (Some(exit), Some(status)), "{}", audited.err);
+        assert!(audited.err.contains("the obstacles are the recording's own: tower"), "{}", audited.err);
+        assert_eq!(audit["obstacles"]["closest"][0]["who"], serde_json::json!([vehicle, "tower"]));
+    }
 }
 
 #[test]

@@ -226,12 +226,17 @@ impl TrackAuditor {
     }
 
     /// Whether the verdict is on pairs too: always where the question is about them. Limits that a recording brings of its own
-    /// count beside a question about single vehicles where there are two, and each of them has one.
+    /// count beside a question about single vehicles where there are two, or one and an obstacle, and each vehicle has one.
     fn is_separation_asked(&self) -> bool {
         let is_own = self.settings.is_own_limit || !self.settings.asks_for_separation();
         let mut judged = self.vehicles.iter().filter(|vehicle| vehicle.is_judged());
-        let are_two = judged.clone().count() > 1 && judged.all(|vehicle| vehicle.has_limit(&self.settings));
-        if is_own && !self.settings.envelope.is_empty() { are_two && self.asks_for_separation() } else { true }
+        let are_two = judged.clone().count().min(2) + self.settings.obstacles.len().min(1) > 1;
+        let have_limits = judged.all(|vehicle| vehicle.has_limit(&self.settings));
+        if is_own && !self.settings.envelope.is_empty() {
+            are_two && have_limits && self.asks_for_separation()
+        } else {
+            true
+        }
     }
 
     /// Notes a gap as far as it lies in the window that is asked for.
