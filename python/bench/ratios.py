@@ -1,6 +1,7 @@
 """What the package costs beside the library: ``python python/bench/ratios.py``. Build it for release first (``pip install ./python``).
 
-Prints ratios of times that are taken in turn in one process, the best of several each.
+Prints ratios of times that are taken in turn in one process, the best of many each: a machine that others share is slower at
+times, never faster.
 """
 
 from __future__ import annotations
@@ -14,14 +15,19 @@ import tautline as tl
 from tautline import _native
 
 
-def best_s(work: Callable[[], object], times: int = 5) -> float:
-    """The shortest of several times [s]."""
-    took = []
-    for _ in range(times):
-        began = time.perf_counter()
-        work()
-        took.append(time.perf_counter() - began)
-    return min(took)
+ROUNDS = 15
+
+
+def took_s(work: Callable[[], object]) -> float:
+    """How long a call takes [s]."""
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def best_s(*works: Callable[[], object]) -> list[float]:
+    """The shortest time of each [s], taken in turn."""
+    return [min(times) for times in zip(*([took_s(work) for work in works] for _ in range(ROUNDS)))]
 
 
 def show(instants: int, vehicles: int) -> tuple[np.ndarray, np.ndarray]:
@@ -38,8 +44,8 @@ def audits() -> None:
     """An audit of (2000, 1000, 3) against the same call in Rust."""
     t, p = show(2000, 1000)
     ours, judged, with_items = [], [], []
-    for _ in range(7):
-        ours.append(best_s(lambda: tl.audit(t, p, delta=1.5), 1))
+    for _ in range(ROUNDS):
+        ours.append(took_s(lambda: tl.audit(t, p, delta=1.5)))
         rust = _native.audit_in_rust(t, p, 1.5)
         judged.append(rust[0])
         with_items.append(rust[1])
@@ -59,8 +65,7 @@ def laws() -> None:
     """Steps a second of a law in Python at N = 100."""
     scenario = tl.Scenario("show", set={"time.duration_s": 20})
     steps = scenario.steps
-    own = best_s(lambda: tl.fly(scenario, keep=False), 3)
-    ours = best_s(lambda: tl.fly(scenario, law=Springs(), keep=False), 3)
+    own, ours = best_s(lambda: tl.fly(scenario, keep=False), lambda: tl.fly(scenario, law=Springs(), keep=False))
     print(f"N = {len(scenario)}: a law in Python      {steps / ours:8.0f} steps/s; {scenario.law} in Rust {steps / own:.0f} steps/s")
 
 
@@ -78,7 +83,7 @@ def threads() -> None:
         for one in both:
             one.join()
 
-    after, beside = best_s(lambda: (fly(), fly()), 5), best_s(side_by_side, 5)
+    after, beside = best_s(lambda: (fly(), fly()), side_by_side)
     print(f"two threads fly                {after / beside:8.2f} times as fast as one")
 
 
