@@ -390,7 +390,7 @@ fn margins_are_predicted_where_the_theory_gives_them_and_scenarios_beyond_them_a
 
     // An edge tension has modes on the complete graph alone, other laws none.
     assert!(!check(&scenario("pentagon", &[])).margins.is_empty());
-    for sets in [&["graph.kind=ring"][..], &["law.kind=orca", "swarm.hull_radius_m=0.2"]] {
+    for sets in [&["graph.kind=ring"][..], &["law={kind=\"orca\", delta_m=2.0}", "swarm.hull_radius_m=0.2"]] {
         assert_eq!(check(&scenario("pentagon", sets)).margins, []);
     }
     // Followers of a hub hear nobody in a loop.
