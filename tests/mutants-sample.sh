@@ -48,6 +48,7 @@ grep -v ': delete field ' "$scratch/all.txt" |
 # Tries the mutants whose whole names are in a file on some tests; results go to a folder.
 try() {
     file=$1 results=$2 tests=$3
+    [ -s "$file" ] || { echo "no mutant of the sample is in this part" >&2; exit 2; }
     set --
     while IFS= read -r name; do
         set -- "$@" --re "^$(printf '%s' "$name" | sed 's/[][(){}.*+?|^$\\]/\\&/g')\$"

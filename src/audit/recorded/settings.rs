@@ -77,8 +77,8 @@ pub struct Settings {
     pub obstacles: Vec<Obstacle>,
     /// What each vehicle may do by itself. Where it is all that is asked, nothing is said of how close two came.
     pub envelope: Envelope,
-    /// Whether delta or the ellipsoid are what the recording says of itself: beside an `envelope` that asks nothing of vehicles
-    /// that are alone.
+    /// Whether delta or the ellipsoid are what the recording says of itself: beside an `envelope` that asks nothing of a
+    /// vehicle that is alone, without an obstacle.
     pub is_own_limit: bool,
 }
 
