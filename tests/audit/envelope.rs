@@ -88,6 +88,21 @@ fn accelerations_of_samples_are_those_of_three_and_say_so() {
 }
 
 #[test]
+fn recorded_velocities_ask_for_the_accelerations_that_the_way_between_them_needs() {
+    let along = |x: f64| Vector3::new(x, 0.0, 10.0);
+    let speed = |x: f64| Some(Vector3::new(x, 0.0, 0.0));
+    // From 0 to 4 m in 2 s: whoever has another velocity at an end is accelerated by twice the difference over 2 s, on average.
+    for ([start_m_s, end_m_s], needed_m_s2) in
+        [([2.0, 2.0], 0.0), ([-3.0, 2.0], 5.0), ([2.0, -5.0], 7.0), ([0.0, 4.0], 2.0)]
+    {
+        let items = [sample(0.0, along(0.0), speed(start_m_s)), sample(2.0, along(4.0), speed(end_m_s))];
+        let (_, found) = judged(&items, asked(limits(&[(Quantity::Acceleration, 1.0)])));
+        let extreme = found[0].extreme.expect("an acceleration");
+        assert!((extreme.upper - needed_m_s2).abs() < 1e-9, "{start_m_s} {end_m_s}: {extreme:?}");
+    }
+}
+
+#[test]
 fn curves_are_judged_between_their_ends() {
     // x = 4 u (1 - u) over 2 s: at rest nowhere, fastest at both ends with 2 m/s, accelerated by 2 m/s^2; z likewise.
     let arc = |vehicle| Piece {

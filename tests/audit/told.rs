@@ -289,6 +289,22 @@ fn what_is_open_of_others_is_said_of_ten_pairs_and_by_the_limit_of_each() {
 }
 
 #[test]
+fn beside_a_violation_nothing_is_left_open_of_others() {
+    let judged = |last_m: f64| {
+        let at =
+            |time_s| [0.0, 9.0, 18.0, last_m].into_iter().enumerate().map(move |(k, x)| seen(k, time_s, [x, 0.0, 0.0]));
+        let only = Some(["bravo", "charlie", "delta"].map(str::to_owned).into());
+        let mut auditor = TrackAuditor::new(Settings { only, ..Settings::delta(2.5) }).expect("settings");
+        auditor.tell(told(0.5, 0.5));
+        auditor.push(&names(4), &at(0.0).chain(at(1.0)).collect::<Vec<_>>()).expect("items");
+        let outcome = auditor.finish().expect("an outcome");
+        (outcome.status, outcome.violations.len(), outcome.undecided.len())
+    };
+    assert_eq!(judged(27.0), (Status::Undecided, 0, 3));
+    assert_eq!(judged(19.0), (Status::Violation, 1, 0));
+}
+
+#[test]
 fn a_told_violation_is_of_its_pair_and_time_and_takes_no_other_away() {
     // Charlie is near alpha all along, and bravo near alpha at the begin by what is drawn.
     let mut items = vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [0.0, 1.0, 0.0]), seen(2, 0.0, [1.0, 0.0, 0.0])];

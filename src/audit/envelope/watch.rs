@@ -120,7 +120,6 @@ impl Watch {
             last.map(|(mean_before, h_before)| 2.0 * (mean - mean_before).norm() / (h_before + h)),
             before.velocity_m_s.map(|start| 2.0 * (mean - start).norm() / h),
             seen.velocity_m_s.map(|end| 2.0 * (end - mean).norm() / h),
-            before.velocity_m_s.zip(seen.velocity_m_s).map(|(start, end)| (end - start).norm() / h),
         ];
         let needed = needs.into_iter().flatten().reduce(f64::max).map(|needed| (needed - rounding).max(0.0));
         let from_s = before.time_s - last.map_or(0.0, |(_, h_before)| h_before);

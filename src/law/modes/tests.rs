@@ -74,6 +74,27 @@ fn sampling_margins_are_the_closed_form_and_where_the_largest_eigenvalue_leaves_
     assert_eq!(mode(1.0, 0.1).sampling_margin_s(0.2), 0.0);
 }
 
+#[test]
+fn what_a_held_command_does_is_as_exact_where_the_closed_form_cancels() {
+    for x in [0.0, 1e-12, 1e-6, 9.9e-4, -9.9e-4, 1.01e-3, -1.01e-3, 0.5, -2.0_f64] {
+        // e^x, (e^x - 1)/x and (e^x - 1 - x)/x^2 are sums of x^n/(n + k)!.
+        let sum = |k: u32| {
+            let first = (1..=k).map(f64::from).product::<f64>().recip();
+            let terms = (1..40).scan(first, |term, n| {
+                *term *= x / f64::from(n + k);
+                Some(*term)
+            });
+            first + terms.sum::<f64>()
+        };
+        let period_s = 2.5;
+        let (grown, moved_s, pushed_s2) = held(x / period_s, period_s);
+        for (found, exact) in [(grown, sum(0)), (moved_s, period_s * sum(1)), (pushed_s2, period_s * period_s * sum(2))]
+        {
+            assert!((found / exact - 1.0).abs() < 1e-10, "{x}: {found} {exact}");
+        }
+    }
+}
+
 /// det of s^2 - a22 s + (k + c s) (D - A e^(-s tau)) over a graph.
 fn determinant(
     heard: &Heard,

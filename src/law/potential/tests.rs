@@ -103,3 +103,15 @@ fn rates_are_those_of_the_potential_s_second_derivative_and_of_the_braking() {
     assert_eq!([margin.per_s, margin.terms_per_s], [1.1 - A22_PER_S, 1.1 + A22_PER_S]);
     assert_eq!(law.common_mode_rate_per_s(A22_PER_S), A22_PER_S - 1.1);
 }
+
+#[test]
+fn no_more_push_a_vehicle_than_balls_fit_around_it() {
+    let rate_per_s = |count: usize| {
+        let law = law(&Graph::star(count), &Formation::grid(count, 2.0));
+        law.fastest_rate_per_s(Some(0.75 * law.range_m), A22_PER_S).expect("a rate")
+    };
+    // Balls of three quarters of the range, within the range and half a ball: (1 + 8/3)^3 = 49.3 by their volume, one of them
+    // the vehicle's own.
+    assert!(rate_per_s(49) < rate_per_s(50));
+    assert_eq!(rate_per_s(50), rate_per_s(300));
+}
