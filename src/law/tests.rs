@@ -123,3 +123,12 @@ fn who_compares_directions_needs_a_compass_and_who_senses_needs_a_sensor() {
         assert!(law.promise().starts_with("The certified distance holds for ") && law.promise().ends_with('.'));
     }
 }
+
+#[test]
+fn every_law_is_named_as_its_kind_is() {
+    let (links, formation) = (Graph::complete(COUNT), Formation::grid(COUNT, 2.0));
+    let specs = LawSpec::all();
+    let names: Vec<_> = specs.iter().map(|spec| built(spec, &links, &formation).name().to_owned()).collect();
+    let kinds = ["edge-tension", "displacement", "laplacian", "potential", "orca", "cbf-qp", "flocking"];
+    assert_eq!(names, kinds);
+}

@@ -216,6 +216,14 @@ fn the_window_counts_and_nothing_outside_of_it() {
 }
 
 #[test]
+fn a_window_within_an_interval_has_its_part_of_the_way() {
+    let items = [(0.0, 10.0), (4.0, 18.0)].map(|(t, z)| sample(t, Vector3::new(0.0, 0.0, z), None));
+    let settings = Settings { from_s: Some(1.0), to_s: Some(3.0), ..asked(limits(&[(Quantity::Height, 20.0)])) };
+    let extreme = judged(&items, settings).1[0].extreme.expect("a height");
+    assert_eq!((extreme.lower, extreme.upper, extreme.at_s), (16.0, 16.0, 3.0));
+}
+
+#[test]
 fn what_a_bounded_motion_needed_somewhere_is_not_said_of_a_part() {
     let items: Vec<_> = [(0.0, 0.0), (2.0, 0.0), (4.0, 8.0), (6.0, 16.0)]
         .map(|(t, x)| sample(t, Vector3::new(x, 0.0, 1.0), None))

@@ -236,6 +236,20 @@ fn a_curve_that_dips_twice_has_a_violation_for_each_with_its_own_minimum() {
 }
 
 #[test]
+fn straight_motion_of_curves_that_rounding_hides_is_undecided() {
+    // Both fall alike; one passes the other 5 m aside, from so far that the distance is off by up to 9 m, or by next to nothing.
+    let passes = |from_m: f64| {
+        let piece = |vehicle, x: [f64; 2], y: f64| {
+            let coefficients =
+                vec![Vector3::new(x[0], y, 0.0), Vector3::new(x[1], 0.0, 0.0), Vector3::new(0.0, 0.0, -5.0)];
+            Item::Piece(Piece { vehicle, from_s: 0.0, to_s: 1.0, coefficients })
+        };
+        status(&[piece(0, [0.0, 0.0], 0.0), piece(1, [-from_m, 2.0 * from_m], 5.0)], Settings::delta(2.0))
+    };
+    assert_eq!([1e16, 1e6].map(passes), [Status::Undecided, Status::Clear]);
+}
+
+#[test]
 fn a_curve_with_more_coefficients_than_can_be_judged_is_refused() {
     let rises = |count: usize| rising(&vec![1e-3; count], 9.0);
     assert_eq!(status(&rises(64), Settings::delta(1.0)), Status::Clear);

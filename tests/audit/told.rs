@@ -279,13 +279,14 @@ fn what_is_open_of_others_is_said_of_ten_pairs_and_by_the_limit_of_each() {
         let mut auditor = TrackAuditor::new(settings).expect("settings");
         auditor.tell(told);
         auditor.push(&names, &items).expect("items");
-        auditor.finish().expect("an outcome").undecided.len()
+        let outcome = auditor.finish().expect("an outcome");
+        (outcome.undecided.len(), outcome.is_else_known)
     };
     // Of seven vehicles six are asked about, which are fifteen pairs; of four three, which are three.
-    assert_eq!([7, 4].map(|count| open(count, &[], told(0.5, 0.5), Some(2.5))), [10, 3]);
+    assert_eq!([7, 4].map(|count| open(count, &[], told(0.5, 0.5), Some(2.5))), [(10, false), (3, true)]);
     // Off by a thousandth of the limits of the small, and by less of those that a large one is in.
     let off = Told { drawn_m: 0.5 + 3e-3, others_m: 1.0, ..told(0.5, 0.5) };
-    assert_eq!(open(4, &[1.0, 1.0, 1.0, 3.0], off, None), 1);
+    assert_eq!(open(4, &[1.0, 1.0, 1.0, 3.0], off, None), (1, true));
 }
 
 #[test]
@@ -317,6 +318,25 @@ fn a_told_violation_is_of_its_pair_and_time_and_takes_no_other_away() {
     let found: Vec<_> = outcome.violations.iter().map(|v| (v.pair, v.from_s)).collect();
     assert_eq!(found[..3], [(of(0, 1), 0.0), (of(0, 2), 0.0), (of(1, 2), 0.0)]);
     assert_eq!(found[3..], [(of(0, 1), 0.3)]);
+}
+
+#[test]
+fn the_closest_of_a_slice_is_within_it() {
+    // Two pass each other on one line each, while a third is seen every second.
+    let end = |vehicle, time_s, x, y| seen(vehicle, time_s, [x, y, 0.0]);
+    let mut items =
+        vec![end(0, 0.0, -10.0, 0.0), end(1, 0.0, 10.0, 3.0), end(0, 10.0, 10.0, 0.0), end(1, 10.0, -10.0, 3.0)];
+    items.extend((0..=10).map(|k| end(2, f64::from(k), 0.0, 90.0)));
+    items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    let settings = Settings { max_gap_s: Some(20.0), ..Settings::delta(2.0) };
+    let mut auditor = TrackAuditor::new(settings).expect("settings").with_smallest();
+    auditor.push(&names(3), &items).expect("items");
+    let slices = auditor.finish().expect("an outcome").smallest;
+    assert_eq!(slices.len(), 10);
+    for slice in slices {
+        let nearest_s = 5.0_f64.clamp(slice.from_s, slice.to_s);
+        assert!((slice.closest.time_s - nearest_s).abs() < 1e-9, "{slice:?}");
+    }
 }
 
 #[test]

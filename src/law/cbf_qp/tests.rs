@@ -101,6 +101,14 @@ fn who_is_alone_flies_as_the_nominal_controller_says() {
 }
 
 #[test]
+fn how_fast_the_law_is_is_known_of_vehicles_that_are_alone() {
+    let law = law(&Formation::grid(2, 9.0));
+    let rate_per_s = |nearest_m: f64| law.fastest_rate_per_s(Some(nearest_m), 0.1);
+    assert_eq!(rate_per_s(law.range_m.next_up()), Some(law.keys.c_per_s.max(law.keys.k_per_s2.sqrt())));
+    assert_eq!((rate_per_s(law.range_m), law.fastest_rate_per_s(None, 0.1)), (None, None));
+}
+
+#[test]
 fn two_that_can_brake_no_later_brake_with_all_they_have() {
     // h = 0: closing at sqrt(2 A clearance).
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[-1.5, 0.0, 0.0, 1.5, 0.0, 0.0]));
