@@ -1,7 +1,9 @@
 //! What the loop of sense, law, plant and judge keeps: no step jumps a barrier, nothing passes unseen, energy is not
 //! made, symmetries hold, and a flight that cannot go on ends with a name and with what was recorded.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex};
 
 use crate::flight::{Log, builtin, fly, fly_with};
 use tautline::audit::Status;
@@ -336,6 +338,47 @@ fn a_law_of_ones_own_is_recorded_by_its_name_and_not_by_the_scenarios() {
     // Nothing is told of the scenario's own.
     let (flight, log) = fly(&scenario);
     assert_eq!((flight.law.as_str(), &log.events[..]), ("edge-tension", &[][..]));
+}
+
+/// Notes who asks it.
+#[derive(Clone)]
+struct Asked {
+    stays: bool,
+    by: Arc<Mutex<BTreeSet<String>>>,
+}
+
+impl Law for Asked {
+    fn name(&self) -> &'static str {
+        "asked"
+    }
+
+    fn command(&mut self, _: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.by.lock().expect("nobody panicked").insert(format!("{:?}", std::thread::current().id()));
+        command.fill(0.0);
+        Ok(())
+    }
+
+    fn stays_in_its_thread(&self) -> bool {
+        self.stays
+    }
+}
+
+#[test]
+fn a_law_that_stays_in_its_thread_is_asked_by_no_other_and_that_of_a_large_swarm_may_be() {
+    let grid = Formation::grid(600, 4.0);
+    let scenario = Scenario::new("grid", Swarm::at_rest(grid.slots_m.clone()), grid, 2.0, 60.0);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+    let asked_by = |stays: bool| {
+        let by = Arc::new(Mutex::new(BTreeSet::new()));
+        let parts =
+            Parts { law: Box::new(Asked { stays, by: Arc::clone(&by) }), ..Parts::of(&scenario).expect("parts") };
+        let many = || by.lock().expect("nobody panicked").len();
+        let enough = |step: u64| stays && step == 300 || many() > 1;
+        let mut go_on = |step| if enough(step) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        pool.install(|| sim::fly(&scenario, parts, &mut (), &mut go_on)).expect("a flight");
+        many()
+    };
+    assert_eq!([true, false].map(asked_by), [1, 2]);
 }
 
 #[test]
