@@ -212,6 +212,16 @@ mod tests {
         swarm.velocities_m_s[(1, 2)] = f64::NAN;
         swarm.positions_m[(2, 0)] = f64::INFINITY;
         assert_eq!(swarm.first_not_finite(), Some(1));
+        // Wherever it is among many, and whatever is not finite.
+        for (row, axis) in [(0, 0), (255, 0), (256, 0), (99, 1), (299, 2)] {
+            for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                let mut rows = Rows::from_element(300, f64::MAX);
+                assert_eq!(first_row_not_finite(&rows), None);
+                rows[(row, axis)] = number;
+                assert_eq!(first_row_not_finite(&rows), Some(row));
+            }
+        }
+        assert_eq!(first_row_not_finite(&Rows::zeros(0)), None);
     }
 
     #[test]

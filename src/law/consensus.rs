@@ -114,14 +114,14 @@ pub(super) fn add_heard(
 
 /// Adds to the row of each vehicle what it makes of every other that is near, from where it sees itself apart \[m\]:
 /// `push(i, j, apart_m)` gives that and the potential of the pair, and the opposite push for the opposite way. The sum of the
-/// potentials over the near pairs is the result.
+/// potentials over the near pairs is the result, where all share one state.
 pub(super) fn add_pushes(
     at: &Observation<'_>,
     sums: &mut Rows,
     push: impl Fn(usize, usize, Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError>,
-) -> Result<f64, LawError> {
-    let mut potential = 0.0;
+) -> Result<Option<f64>, LawError> {
     if let Some(swarm) = at.shared() {
+        let mut potential = 0.0;
         // Two who see each other where they are push each other alike.
         for &(i, j) in at.near {
             let (pushed, of_pair) = push(i, j, row(&swarm.positions_m, i) - row(&swarm.positions_m, j))?;
@@ -130,15 +130,14 @@ pub(super) fn add_pushes(
             set_row(sums, j, of_j);
             potential = (potential + 0.5 * of_pair) + 0.5 * of_pair;
         }
-        return Ok(potential);
+        return Ok(Some(potential));
     }
     for &(a, b) in at.near {
         for (i, j) in [(a, b), (b, a)] {
-            let (pushed, of_pair) = push(i, j, row(&at.own.positions_m, i) - at.seen(i, j).position_m)?;
+            let (pushed, _) = push(i, j, row(&at.own.positions_m, i) - at.seen(i, j).position_m)?;
             let sum = row(sums, i) + pushed;
             set_row(sums, i, sum);
-            potential += 0.5 * of_pair;
         }
     }
-    Ok(potential)
+    Ok(None)
 }

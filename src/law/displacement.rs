@@ -296,12 +296,10 @@ impl Law for DisplacementLaw {
         command.fill(0.0);
         let gains = Gains { position: self.keys.k_per_s2, velocity: self.damping_per_s() };
         self.pulls.add_pulls(at, gains, -self.scale(), command)?;
-        let mut potential = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
-        if let Some(clearance) = &self.clearance {
-            potential += clearance.add_pushes(at, command)?;
-        }
-        if let Some(swarm) = at.shared() {
-            self.memo.keep(&swarm.positions_m, potential);
+        let of_pairs = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
+        let of_obstacles = self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(at, command))?;
+        if let Some(of_pairs) = of_pairs {
+            self.memo.keep(&at.own.positions_m, of_pairs + of_obstacles);
         }
         if self.is_guided() {
             if self.is_fed {

@@ -198,8 +198,8 @@ impl Law for PotentialLaw {
             })?;
         }
         let potential = add_pushes(at, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
-        if let Some(swarm) = at.shared() {
-            self.memo.keep(&swarm.positions_m, potential);
+        if let Some(potential) = potential {
+            self.memo.keep(&at.own.positions_m, potential);
         }
         if let Some(limit) = self.keys.max_accel_m_s2 {
             (0..command.nrows()).for_each(|i| set_row(command, i, row(command, i).cap_magnitude(limit)));

@@ -230,13 +230,15 @@ impl TrackAuditor {
     fn is_separation_asked(&self) -> bool {
         let is_own = self.settings.is_own_limit || !self.settings.asks_for_separation();
         let mut judged = self.vehicles.iter().filter(|vehicle| vehicle.is_judged());
-        let are_two = judged.clone().count().min(2) + self.settings.obstacles.len().min(1) > 1;
-        let have_limits = judged.all(|vehicle| vehicle.has_limit(&self.settings));
-        if is_own && !self.settings.envelope.is_empty() {
-            are_two && have_limits && self.asks_for_separation()
-        } else {
-            true
+        if !is_own || self.settings.envelope.is_empty() {
+            return true;
         }
+        let are_two = match judged.clone().count() {
+            0 => false,
+            1 => !self.settings.obstacles.is_empty(),
+            _ => true,
+        };
+        are_two && judged.all(|vehicle| vehicle.has_limit(&self.settings)) && self.asks_for_separation()
     }
 
     /// Notes a gap as far as it lies in the window that is asked for.
