@@ -1,30 +1,32 @@
-//! The edge-tension sums over all edges, as many at a time as there are lanes.
+//! The edge-tension sums over all edges, in blocks that fill the lanes of vector instructions.
 //!
-//! The loops over lanes hold nothing but IEEE additions, multiplications, divisions, square roots and selections, which
+//! The loops over edges hold nothing but IEEE additions, multiplications, divisions, square roots and selections, which
 //! the compiler turns into whatever vector instructions were found at run time. Nothing is fused or reordered, and sums
 //! are taken in an order fixed by the edges alone, so the bits depend neither on the width of the machine's vectors
 //! nor on the level of optimisation.
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
 
+mod block;
+
 use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
+use self::block::{Block, LANES, Lanes};
 use super::bands::Bands;
-use super::tension;
 use crate::graph::Graph;
 use crate::swarm::Rows;
 
-/// Number of partial sums that a long sum is split into, whatever the machine's vectors hold.
-const LANES: usize = 8;
-/// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. Around
-/// this number both ways take the same time.
+/// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. The order of sums
+/// differs, so this number is a part of what the bits of a flight rest on.
 const LISTED_UP_TO: usize = 16;
 /// From this many vehicles on all threads at hand share the rows of the complete graph, in bands. Sums of bands differ from
 /// those of all rows in their last bits, so this number is a part of what the bits of a flight rest on.
 const BANDED_FROM: usize = 640;
-
-type Lanes = [f64; LANES];
+/// Edges in a block of a row: so many that stages follow each other seldom, and so few that they stay near the processor.
+const ROW_BLOCK: usize = 8 * LANES;
+/// Edges in a block of a list: of a few vehicles, which must not wait for the clearing of more.
+const LIST_BLOCK: usize = 2 * LANES;
 
 /// The edges of a graph with the length scale of each.
 #[derive(Clone, Debug)]
@@ -107,9 +109,9 @@ impl WithSimd for AddPulls<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let Self { kernel, rows, axes, mut sums } = self;
-        let mut evaluator = Evaluator { delta_m: kernel.delta_m, potential: [0.0; LANES], outside: 0 };
         match &kernel.edges {
             Edges::All(count) => {
+                let mut evaluator = Evaluator::<ROW_BLOCK>::new(kernel.delta_m);
                 let start = rows.start;
                 for (i, row) in with_values(rows, *count, &kernel.inverse_k_per_m) {
                     let own = axes.map(|axis| axis[i]);
@@ -123,21 +125,24 @@ impl WithSimd for AddPulls<'_> {
                         sums[axis][i - start] += total(of_own[axis]);
                     }
                 }
+                evaluator.finish()
             }
             Edges::Listed(edges) => {
-                for (edges, inverse) in edges.chunks(LANES).zip(kernel.inverse_k_per_m.chunks(LANES)) {
-                    let apart_m = |axis: usize, k: usize| axes[axis][edges[k][0]] - axes[axis][edges[k][1]];
-                    let pulls = evaluator.some(inverse, apart_m);
-                    for (sums, pulls) in sums.iter_mut().zip(&pulls) {
-                        for (&[i, j], pull) in edges.iter().zip(pulls) {
+                let mut evaluator = Evaluator::<LIST_BLOCK>::new(kernel.delta_m);
+                let blocks = edges.chunks(LIST_BLOCK).zip(kernel.inverse_k_per_m.chunks(LIST_BLOCK));
+                for (edges, inverse_k_per_m) in blocks {
+                    evaluator.block.take_list(inverse_k_per_m, edges, axes);
+                    evaluator.evaluate();
+                    for (axis, sums) in sums.iter_mut().enumerate() {
+                        for (&[i, j], pull) in edges.iter().zip(evaluator.block.pulls(axis)) {
                             sums[i] += pull;
                             sums[j] -= pull;
                         }
                     }
                 }
+                evaluator.finish()
             }
         }
-        if evaluator.outside == 0 { Ok(total(evaluator.potential)) } else { Err(OutOfDomain) }
     }
 }
 
@@ -153,112 +158,62 @@ fn with_values(rows: Range<usize>, count: usize, values: &[f64]) -> impl Iterato
     })
 }
 
-/// Evaluates edges, as many at once as there are lanes.
-struct Evaluator {
+/// Evaluates edges, a block at a time.
+struct Evaluator<const B: usize> {
     delta_m: f64,
+    block: Block<B>,
     /// Sum of V/alpha.
     potential: Lanes,
-    /// Positive once some distance was not in (delta, infinity).
-    outside: u64,
+    /// Whether some distance was not in (delta, infinity).
+    is_outside: bool,
 }
 
-impl Evaluator {
+impl<const B: usize> Evaluator<B> {
+    #[inline(always)]
+    fn new(delta_m: f64) -> Self {
+        Self { delta_m, block: Block::new(), potential: [0.0; LANES], is_outside: false }
+    }
+
     /// The edges from a vehicle at `own` \[m\] to as many others as there are 1/K: subtracts the pull of each from theirs, and
     /// returns their sum along each axis in lanes.
     #[inline(always)]
-    fn row(&mut self, own: [f64; 3], inverse_k: &[f64], others: [&[f64]; 3], theirs: [&mut [f64]; 3]) -> [Lanes; 3] {
+    fn row(
+        &mut self,
+        own: [f64; 3],
+        inverse_k_per_m: &[f64],
+        others: [&[f64]; 3],
+        mut theirs: [&mut [f64]; 3],
+    ) -> [Lanes; 3] {
         let mut of_own = [[0.0; LANES]; 3];
-        let (whole, rest) = inverse_k.as_chunks::<LANES>();
-        let [x, y, z] = others.map(|axis| axis.as_chunks::<LANES>().0);
-        let [mut of_x, mut of_y, mut of_z] = theirs;
-        let sums = of_x
-            .as_chunks_mut::<LANES>()
-            .0
-            .iter_mut()
-            .zip(of_y.as_chunks_mut::<LANES>().0)
-            .zip(of_z.as_chunks_mut::<LANES>().0);
-        for ((((inverse_k, x), y), z), ((of_x, of_y), of_z)) in whole.iter().zip(x).zip(y).zip(z).zip(sums) {
-            let others = [x, y, z];
-            let edges_m = [0, 1, 2].map(|axis| others[axis].map(|other| own[axis] - other));
-            let pulls = self.pulls(edges_m, *inverse_k);
-            for (axis, theirs) in [of_x, of_y, of_z].into_iter().enumerate() {
-                for k in 0..LANES {
-                    of_own[axis][k] += pulls[axis][k];
-                    theirs[k] -= pulls[axis][k];
-                }
-            }
-        }
-        let from = whole.len() * LANES;
-        if !rest.is_empty() {
-            let pulls = self.some(rest, |axis, k| own[axis] - others[axis][from + k]);
-            for (axis, theirs) in [&mut of_x, &mut of_y, &mut of_z].into_iter().enumerate() {
-                for k in 0..LANES {
-                    of_own[axis][k] += pulls[axis][k];
-                }
-                theirs[from..].iter_mut().zip(&pulls[axis][..rest.len()]).for_each(|(sum, pull)| *sum -= pull);
+        for (from, inverse_k_per_m) in (0..).step_by(B).zip(inverse_k_per_m.chunks(B)) {
+            self.block.take_row(inverse_k_per_m, own, others.map(|axis| &axis[from..]));
+            self.evaluate();
+            for (axis, (of_own, theirs)) in of_own.iter_mut().zip(&mut theirs).enumerate() {
+                add_lanes(of_own, self.block.pulls_in_lanes(axis));
+                theirs[from..].iter_mut().zip(self.block.pulls(axis)).for_each(|(sum, pull)| *sum -= pull);
             }
         }
         of_own
     }
 
-    /// The pulls of fewer edges than there are lanes, or as many; 0 in the lanes that are left.
     #[inline(always)]
-    fn some(&mut self, inverse_k_per_m: &[f64], apart_m: impl Fn(usize, usize) -> f64) -> [Lanes; 3] {
-        let count = inverse_k_per_m.len();
-        // A distance where every function is finite.
-        let mut edges_m = [[2.0 * self.delta_m + 1.0; LANES], [0.0; LANES], [0.0; LANES]];
-        let mut inverse_k = [1.0; LANES];
-        for k in 0..count {
-            inverse_k[k] = inverse_k_per_m[k];
-            edges_m.iter_mut().enumerate().for_each(|(axis, edges_m)| edges_m[k] = apart_m(axis, k));
-        }
-        let before = self.potential;
-        let mut pulls = self.pulls(edges_m, inverse_k);
-        for k in count..LANES {
-            self.potential[k] = before[k];
-            for pulls in &mut pulls {
-                pulls[k] = 0.0;
-            }
-        }
-        pulls
+    fn evaluate(&mut self) {
+        self.is_outside |= self.block.evaluate(self.delta_m);
+        add_lanes(&mut self.potential, self.block.values_in_lanes());
     }
 
-    /// Multiplies each edge by `w_ij/alpha = V'/(alpha l)`, and adds V/alpha of each to the potential.
+    /// (1/alpha) sum of V.
     #[inline(always)]
-    fn pulls(&mut self, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> [Lanes; 3] {
-        let (pulls, values, outside) = pulls(self.delta_m, edges_m, inverse_k_per_m);
-        self.outside |= outside;
-        self.potential.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-        pulls
+    fn finish(self) -> Result<f64, OutOfDomain> {
+        if self.is_outside { Err(OutOfDomain) } else { Ok(total(self.potential)) }
     }
 }
 
-/// The length of an edge, and 1 where it is not in (delta, infinity).
 #[inline(always)]
-fn distance_m(delta_m: f64, x: f64, y: f64, z: f64) -> (f64, u64) {
-    let distance_m = (x * x + y * y + z * z).sqrt();
-    (distance_m, u64::from(!(distance_m > delta_m && distance_m < f64::INFINITY)))
-}
-
-/// The edges times `w_ij/alpha`, their V/alpha, and 1 where some length is not in (delta, infinity). Arrays go in and out
-/// by value: with nothing that may alias, the loop becomes vector instructions.
-#[inline(always)]
-fn pulls(delta_m: f64, edges_m: [Lanes; 3], inverse_k_per_m: Lanes) -> ([Lanes; 3], Lanes, u64) {
-    let [mut x, mut y, mut z] = edges_m;
-    let mut values = [0.0; LANES];
-    let mut outside = 0;
-    for k in 0..LANES {
-        let (distance_m, out) = distance_m(delta_m, x[k], y[k], z[k]);
-        outside |= out;
-        let s = (distance_m - delta_m) * inverse_k_per_m[k];
-        let (slope_per_m, value) = tension::slope_and_value_over(distance_m, s, s - tension::REST);
-        let weight = inverse_k_per_m[k] * slope_per_m;
-        x[k] *= weight;
-        y[k] *= weight;
-        z[k] *= weight;
-        values[k] = value;
+fn add_lanes(sums: &mut Lanes, lanes: &[Lanes]) {
+    for lanes in lanes {
+        sums.iter_mut().zip(lanes).for_each(|(sum, lane)| *sum += lane);
     }
-    ([x, y, z], values, outside)
 }
 
 #[inline(always)]

@@ -218,10 +218,10 @@ pub(super) fn slope(s: f64, h: f64) -> f64 {
     of_h * (1.0 - REST_DECAY * (1.0 - of_s)) / (of_s * of_s)
 }
 
-/// [`slope`] over a length, and [`value`], with one division for both.
+/// [`slope`] over a length, and [`value`], with one division for both; `power` is [`expm1`] of their [`exponent`].
 #[inline(always)]
-pub(super) fn slope_and_value_over(length: f64, s: f64, h: f64) -> (f64, f64) {
-    let (of_s, of_h) = decay_complements(s, h);
+pub(super) fn slope_and_value_over(length: f64, s: f64, h: f64, power: f64) -> (f64, f64) {
+    let (of_s, of_h) = complements_from(s, power);
     let ratio = of_h / (of_s * of_s * length);
     let slope = ratio * (1.0 - REST_DECAY * (1.0 - of_s));
     (slope, h - REST_DECAY_ROOT * (ratio * (of_s * length)))
@@ -233,12 +233,27 @@ pub(super) fn slope_and_value_over(length: f64, s: f64, h: f64) -> (f64, f64) {
 /// cancellation.
 #[inline(always)]
 fn decay_complements(s: f64, h: f64) -> (f64, f64) {
-    let near_barrier = s < 0.5 * REST;
-    // Branches would make the compiler take both exponentials.
-    let power = expm1(-2.0 * select_unpredictable(near_barrier, s, h));
+    complements_from(s, expm1(exponent(s, h)))
+}
+
+/// The exponent of the exponential that serves for both complements of s > 0 and h = s - asinh(1).
+#[inline(always)]
+pub(super) fn exponent(s: f64, h: f64) -> f64 {
+    // A branch would make the compiler take both exponentials.
+    -2.0 * select_unpredictable(is_near_barrier(s), s, h)
+}
+
+#[inline(always)]
+fn complements_from(s: f64, power: f64) -> (f64, f64) {
+    let near_barrier = is_near_barrier(s);
     let of_s = select_unpredictable(near_barrier, -power, (1.0 - REST_DECAY) - REST_DECAY * power);
     let of_h = select_unpredictable(near_barrier, 1.0 - (1.0 + power) * (1.0 / REST_DECAY), -power);
     (of_s, of_h)
+}
+
+#[inline(always)]
+fn is_near_barrier(s: f64) -> bool {
+    s < 0.5 * REST
 }
 
 /// e^x - 1 for x <= 1, to two units in the last place.
@@ -246,7 +261,7 @@ fn decay_complements(s: f64, h: f64) -> (f64, f64) {
 /// Built from additions and multiplications alone and without branches: the compiler can turn it into vector
 /// instructions of any width, and its bits are the same on every machine.
 #[inline(always)]
-fn expm1(x: f64) -> f64 {
+pub(super) fn expm1(x: f64) -> f64 {
     /// Adding this to a small number rounds it to an integer, held in the lowest bits of the sum.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// ln 2 in two parts; products of the first with integers of up to 11 bits are exact.

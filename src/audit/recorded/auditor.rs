@@ -150,17 +150,22 @@ impl TrackAuditor {
             return Ok(());
         }
         let unseen = vehicle.is_unseen();
-        let gap = vehicle.take(item)?;
+        // Looked at where it lies: a gap is read back in one piece, and waiting until it was written costs as much as a sample.
+        let after_gap = match vehicle.take(item) {
+            Ok(None) => false,
+            Ok(Some(gap)) => {
+                self.gaps.extend(gap.within(self.settings.window()));
+                true
+            }
+            Err(error) => return Err(error),
+        };
         if unseen {
             vehicle.check(&self.settings)?;
         }
         if let Some(envelope) = &mut self.envelope {
-            envelope.take(item, vehicle.seen(gap.is_some()));
+            envelope.take(item, vehicle.seen(after_gap));
         }
         self.pending += 1;
-        if let Some(gap) = gap {
-            self.note(gap);
-        }
         Ok(())
     }
 
@@ -239,15 +244,6 @@ impl TrackAuditor {
             _ => true,
         };
         are_two && judged.all(|vehicle| vehicle.has_limit(&self.settings)) && self.asks_for_separation()
-    }
-
-    /// Notes a gap as far as it lies in the window that is asked for.
-    fn note(&mut self, gap: Gap) {
-        let window = self.settings.window();
-        let (from_s, to_s) = (gap.from_s.max(window.from_s), gap.to_s.min(window.to_s));
-        if from_s < to_s {
-            self.gaps.push(Gap { from_s, to_s, ..gap });
-        }
     }
 
     /// The verdict over everything judged.

@@ -7,6 +7,7 @@ use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use crate::audit::results::KEPT;
 use crate::audit::slices::Slice;
+use crate::audit::sweep::Interval;
 use crate::swarm::{ClosestApproach, Pair};
 
 /// A time during which a vehicle was not seen.
@@ -27,6 +28,12 @@ pub struct Gap {
 impl Gap {
     pub(super) fn new(vehicle: usize, from_s: f64, to_s: f64) -> Self {
         Self { vehicle, from_s, to_s, joined_by_s: to_s - from_s }
+    }
+
+    /// As far as it lies in a window.
+    pub(super) fn within(self, window: Interval) -> Option<Self> {
+        let (from_s, to_s) = (self.from_s.max(window.from_s), self.to_s.min(window.to_s));
+        (from_s < to_s).then_some(Self { from_s, to_s, ..self })
     }
 }
 

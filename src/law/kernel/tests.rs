@@ -26,7 +26,7 @@ fn tension(formation: &Formation, i: usize, j: usize) -> EdgeTension {
 }
 
 fn graphs() -> Vec<Graph> {
-    let complete = [1, 2, 3, 5, 9, LISTED_UP_TO, LISTED_UP_TO + 1, 33, 40, 41, 64].map(Graph::complete);
+    let complete = [1, 2, 3, 5, 9, LISTED_UP_TO, LISTED_UP_TO + 1, 33, 40, 41, 64, 65, 66, 131].map(Graph::complete);
     complete.into_iter().chain([Graph::star(30), Graph::ring(17), Graph::path(10)]).collect()
 }
 
@@ -89,7 +89,7 @@ fn the_bits_are_the_same_in_every_build() {
 
 #[test]
 fn one_pair_out_of_domain_is_noticed_wherever_it_is() {
-    for graph in [Graph::complete(7), Graph::complete(43)] {
+    for graph in [Graph::complete(7), Graph::complete(ROW_BLOCK + 3), Graph::ring(2 * LIST_BLOCK + 3)] {
         let (mut kernel, positions_m, _) = fixture(&graph);
         for (i, j) in graph.edges() {
             let mut touching = positions_m.clone();
