@@ -25,7 +25,7 @@ const LISTED_UP_TO: usize = 16;
 const BANDED_FROM: usize = 640;
 /// Edges in a block of a row: so many that stages follow each other seldom, and so few that they stay near the processor.
 const ROW_BLOCK: usize = 8 * LANES;
-/// Edges in a block of a list: of a few vehicles, which must not wait for the clearing of more.
+/// Edges in a block of a list: few, because lists are often short and a block is cleared for each.
 const LIST_BLOCK: usize = 2 * LANES;
 
 /// The edges of a graph with the length scale of each.

@@ -52,7 +52,9 @@ impl<const B: usize> Block<B> {
 
     #[inline(always)]
     fn take_scales(&mut self, inverse_k_per_m: &[f64]) {
-        self.count = inverse_k_per_m.len().min(B);
+        const { assert!(B.is_multiple_of(LANES), "blocks hold whole lanes") };
+        self.count = inverse_k_per_m.len();
+        assert!(self.count <= B, "the edges fit in the block");
         self.inverse_k_per_m[..self.count].copy_from_slice(&inverse_k_per_m[..self.count]);
     }
 
@@ -71,7 +73,7 @@ impl<const B: usize> Block<B> {
         let (inverse_k_per_m, lengths_m) = (&mut inverse_k_per_m[..filled], &mut lengths_m[..filled]);
         let (scaled, decays) = (&mut scaled[..filled], &mut decays[..filled]);
         for k in count..filled {
-            // A length where every function is finite.
+            // A length where every function is finite, for every delta below 1e153 m.
             (x[k], y[k], z[k], inverse_k_per_m[k]) = (2.0 * delta_m + 1.0, 0.0, 0.0, 1.0);
         }
         let mut outside = 0;
