@@ -224,6 +224,27 @@ fn a_window_within_an_interval_has_its_part_of_the_way() {
 }
 
 #[test]
+fn nothing_was_flown_across_a_gap_and_one_outside_of_the_window_is_nobodys() {
+    // 1 m/s for 2 s, and again from 7 s on, 1 km away.
+    let from = |start_s: f64, x: f64| {
+        let times = (0..=20).map(move |k| 0.1 * f64::from(k));
+        times.map(move |t| sample(start_s + t, Vector3::new(x + t, 0.0, 1.0), None))
+    };
+    let items: Vec<_> = from(0.0, 0.0).chain(from(7.0, 1000.0)).collect();
+    let found = |from_s, to_s| {
+        let settings =
+            Settings { from_s, to_s, ..asked(limits(&[(Quantity::Speed, 2.0), (Quantity::Acceleration, 2.0)])) };
+        let outcome = audit(&["one".to_owned()], &items, settings).expect("a verdict");
+        let fastest = outcome.envelope.limits[0].extreme.expect("a speed");
+        assert!((fastest.upper - 1.0).abs() < 1e-6, "{fastest:?}");
+        (outcome.status, outcome.gaps.len())
+    };
+    assert_eq!(found(None, None), (Status::Undecided, 1));
+    assert_eq!(found(None, Some(1.9)), (Status::Clear, 0));
+    assert_eq!(found(Some(7.1), None), (Status::Clear, 0));
+}
+
+#[test]
 fn what_a_bounded_motion_needed_somewhere_is_not_said_of_a_part() {
     let items: Vec<_> = [(0.0, 0.0), (2.0, 0.0), (4.0, 8.0), (6.0, 16.0)]
         .map(|(t, x)| sample(t, Vector3::new(x, 0.0, 1.0), None))

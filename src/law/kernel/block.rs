@@ -37,7 +37,7 @@ impl<const B: usize> Block<B> {
     pub(super) fn take_row(&mut self, inverse_k_per_m: &[f64], own: [f64; 3], others: [&[f64]; 3]) {
         self.take_scales(inverse_k_per_m);
         for ((edges, own), others) in self.edges.iter_mut().zip(own).zip(others) {
-            edges[..self.count].iter_mut().zip(others).for_each(|(edge, other)| *edge = own - other);
+            edges[..self.count].iter_mut().zip(&others[..self.count]).for_each(|(edge, other)| *edge = own - other);
         }
     }
 
@@ -46,7 +46,10 @@ impl<const B: usize> Block<B> {
     pub(super) fn take_list(&mut self, inverse_k_per_m: &[f64], list: &[[usize; 2]], axes: [&[f64]; 3]) {
         self.take_scales(inverse_k_per_m);
         for (edges, axis) in self.edges.iter_mut().zip(axes) {
-            edges[..self.count].iter_mut().zip(list).for_each(|(edge, &[i, j])| *edge = axis[i] - axis[j]);
+            edges[..self.count]
+                .iter_mut()
+                .zip(&list[..self.count])
+                .for_each(|(edge, &[i, j])| *edge = axis[i] - axis[j]);
         }
     }
 
@@ -54,8 +57,7 @@ impl<const B: usize> Block<B> {
     fn take_scales(&mut self, inverse_k_per_m: &[f64]) {
         const { assert!(B.is_multiple_of(LANES), "blocks hold whole lanes") };
         self.count = inverse_k_per_m.len();
-        assert!(self.count <= B, "the edges fit in the block");
-        self.inverse_k_per_m[..self.count].copy_from_slice(&inverse_k_per_m[..self.count]);
+        self.inverse_k_per_m[..self.count].copy_from_slice(inverse_k_per_m);
     }
 
     #[inline(always)]
