@@ -12,11 +12,11 @@ use tautline::formation::Formation;
 use tautline::law::{DisplacementKeys, LawSpec};
 use tautline::plant::{Path, rapier};
 use tautline::scenario::{Precision, Scenario};
-use tautline::sim::{self, Parts};
+use tautline::sim::{self, Simulation};
 use tautline::swarm::{Rows, Swarm};
 
 const DELTA_M: f64 = 2.0;
-/// Steps in one measured flight: so many that setting up and the audit of the start weigh little.
+/// Steps in one measured flight. Setting it up is measured with neither.
 const STEPS: u16 = 240;
 
 /// A lattice that contracts for so many steps.
@@ -65,9 +65,9 @@ fn steps(criterion: &mut Criterion, name: &str, scenario: &Scenario, steps: u16)
         let name = format!("whole, {threads} threads");
         group.bench_function(BenchmarkId::from_parameter(name), |bencher| {
             bencher.iter_batched(
-                || Parts::of(scenario).expect("a law"),
-                |parts| {
-                    pool.install(|| sim::fly(scenario, parts, &mut (), &mut |_| ControlFlow::Continue(())))
+                || Simulation::new(scenario).expect("a law and a judge"),
+                |simulation| {
+                    pool.install(|| sim::fly_on(simulation, &mut (), &mut |_| ControlFlow::Continue(())))
                         .expect("a clean flight")
                 },
                 BatchSize::LargeInput,

@@ -1,6 +1,6 @@
 //! The audit of a flight: straight steps of all vehicles, one after the other.
 
-use super::candidates::{Candidates, for_each_pair, pair_count};
+use super::candidates::{Candidates, pair_count, pairs, pairs_of};
 use super::error::AuditError;
 use super::ledger::Ledger;
 use super::outcome::{AuditOutcome, Status, StepFinding, Violation};
@@ -123,7 +123,9 @@ impl Auditor {
         ended.clear();
 
         let bound_m = self.nearest_m.max(keep_out.delta_m);
-        let swept = for_each_pair(self.candidates.cover(from, to, bound_m), self.vehicles, |i, j| {
+        let listed = self.candidates.cover(from, to, bound_m);
+        let swept = pairs_of(listed, self.vehicles);
+        for (i, j) in pairs(listed, self.vehicles) {
             let motion = RelativeMotion::new(row(from, j) - row(from, i), row(to, j) - row(to, i));
             let point = motion.closest();
             if point.squared < closest.squared && point.separation_m() < closest.separation_m() {
@@ -143,7 +145,7 @@ impl Auditor {
                     }
                 }
             }
-        });
+        }
 
         self.outcome.pairs_checked += swept;
         self.outcome.pairs_excluded += pair_count(self.vehicles) - swept;
@@ -172,7 +174,7 @@ pub(super) fn check_instant(vehicles: usize, time_s: f64, positions_m: &Rows) ->
     }
     let near = |x: &f64| x.abs() <= MAX_LENGTH_M;
     // Without an early exit the usual case has no branch per number.
-    if positions_m.iter().fold(true, |all, x| all & near(x)) {
+    if positions_m.as_slice().iter().fold(true, |all, x| all & near(x)) {
         return Ok(());
     }
     let far = (0..vehicles).find(|&i| !positions_m.row(i).iter().all(near));

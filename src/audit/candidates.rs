@@ -55,22 +55,26 @@ struct Reach {
     vehicle: u32,
 }
 
-/// Calls `f` with each of these pairs, or with all of so many vehicles where none are listed, in the order of pairs; returns
-/// their number.
+/// These pairs, or all of so many vehicles where none are listed, in the order of pairs.
 #[inline]
-pub(super) fn for_each_pair(listed: Option<&[[u32; 2]]>, n: usize, mut f: impl FnMut(usize, usize)) -> u64 {
-    if let Some(pairs) = listed {
-        for &[i, j] in pairs {
-            f(i as usize, j as usize);
+pub(super) fn pairs(listed: Option<&[[u32; 2]]>, n: usize) -> impl Iterator<Item = (usize, usize)> {
+    let (mut k, mut next) = (0, (0, 1));
+    // One loop for both: whoever judges a pair is then a part of it.
+    std::iter::from_fn(move || {
+        if let Some(pairs) = listed {
+            let &[i, j] = pairs.get(k)?;
+            k += 1;
+            return Some((i as usize, j as usize));
         }
-        return pairs.len() as u64;
-    }
-    for i in 0..n {
-        for j in i + 1..n {
-            f(i, j);
-        }
-    }
-    pair_count(n)
+        let (i, j) = next;
+        next = if j + 1 < n { (i, j + 1) } else { (i + 1, i + 2) };
+        (j < n).then_some((i, j))
+    })
+}
+
+/// How many these pairs are, or all of so many vehicles where none are listed.
+pub(super) fn pairs_of(listed: Option<&[[u32; 2]]>, n: usize) -> u64 {
+    listed.map_or_else(|| pair_count(n), |pairs| pairs.len() as u64)
 }
 
 /// N (N - 1) / 2.
@@ -250,9 +254,14 @@ mod tests {
     #[test]
     fn a_small_swarm_is_swept_whole_and_in_the_order_of_pairs() {
         let rows = line(4, |_| 0.0);
-        let mut pairs = vec![];
-        let count = for_each_pair(Candidates::new(4).cover(&rows, &rows, 1.0), 4, |i, j| pairs.push((i, j)));
-        assert_eq!((count, pairs), (6, vec![(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]));
+        let mut candidates = Candidates::new(4);
+        let listed = candidates.cover(&rows, &rows, 1.0);
+        assert_eq!(pairs_of(listed, 4), 6);
+        assert_eq!(pairs(listed, 4).collect::<Vec<_>>(), [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]);
+        assert_eq!(pairs(Some(&[[0, 3], [2, 3]]), 4).collect::<Vec<_>>(), [(0, 3), (2, 3)]);
+        for n in 0..6 {
+            assert_eq!(pairs(None, n).count() as u64, pair_count(n));
+        }
     }
 
     #[test]

@@ -10,9 +10,14 @@ use crate::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 
 /// Whether a state is of `count` vehicles and finite.
 pub(super) fn check_state(count: usize, swarm: &Swarm) -> Result<(), LawError> {
-    check_count(count, swarm.positions_m.nrows())?;
-    check_count(count, swarm.velocities_m_s.nrows())?;
+    check_rows(count, swarm)?;
     swarm.first_not_finite().map_or(Ok(()), |vehicle| Err(LawError::NotFinite { vehicle }))
+}
+
+/// Whether a state is of `count` vehicles.
+pub(super) fn check_rows(count: usize, swarm: &Swarm) -> Result<(), LawError> {
+    check_count(count, swarm.positions_m.nrows())?;
+    check_count(count, swarm.velocities_m_s.nrows())
 }
 
 pub(super) fn check_count(expected: usize, found: usize) -> Result<(), LawError> {

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
 use super::consensus::{
-    add_heard, add_laplacian_product, check_count, check_observation, check_range, check_state, consensus_margin,
-    relative_kinetic_energy,
+    add_heard, add_laplacian_product, check_count, check_observation, check_range, check_rows, check_state,
+    consensus_margin, relative_kinetic_energy,
 };
 use super::error::{LawError, ParameterError};
 use super::growth::{Frame, Grown, Growth};
@@ -214,10 +214,13 @@ impl EdgeTensionLaw {
     }
 
     fn try_energy(&self, swarm: &Swarm) -> Result<f64, LawError> {
-        check_state(self.graph.count(), swarm)?;
+        check_rows(self.graph.count(), swarm)?;
         let potential = match self.memo.of(&swarm.positions_m) {
             Some(potential) => potential,
-            None => self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?,
+            None => {
+                check_state(self.graph.count(), swarm)?;
+                self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?
+            }
         };
         let energy = relative_kinetic_energy(swarm) + self.parameters.alpha * potential / swarm.count().max(1) as f64;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }

@@ -12,8 +12,9 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use self::block::{Block, LANES, Lanes};
+use self::block::{Block, Ends, LANES, NOWHERE_M, add_lanes, total};
 use super::bands::Bands;
+use super::tension::OutOfDomain;
 use crate::graph::Graph;
 use crate::swarm::Rows;
 
@@ -23,6 +24,8 @@ const LISTED_UP_TO: usize = 16;
 /// From this many vehicles on all threads at hand share the rows of the complete graph, in bands. Sums of bands differ from
 /// those of all rows in their last bits, so this number is a part of what the bits of a flight rest on.
 const BANDED_FROM: usize = 640;
+/// Number of bands, each with about as many edges as any other; so many threads have work.
+const BANDS: usize = 16;
 /// Edges in a block of a row: so many that stages follow each other seldom, and so few that they stay near the processor.
 const ROW_BLOCK: usize = 8 * LANES;
 /// Edges in a block of a list: few, because lists are often short and a block is cleared for each.
@@ -32,40 +35,36 @@ const LIST_BLOCK: usize = 2 * LANES;
 #[derive(Clone, Debug)]
 pub(super) struct Kernel {
     delta_m: f64,
-    edges: Edges,
-    /// 1/K of each edge, in row order.
+    /// The number of edges.
+    edges: usize,
+    /// 1/K of each edge, in row order, and room for whole lanes.
     inverse_k_per_m: Vec<f64>,
+    /// The rows of the complete graph; none where edges are listed.
     bands: Option<Bands>,
+    list: Vec<[usize; 2]>,
     arch: pulp::Arch,
 }
 
-#[derive(Clone, Debug)]
-enum Edges {
-    /// All pairs of this many vehicles.
-    All(usize),
-    Listed(Vec<[usize; 2]>),
-}
-
-/// Some distance is not in (delta, infinity).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct OutOfDomain;
-
 impl Kernel {
     /// `inverse_k_per_m` holds 1/K for each edge of the graph in row order.
-    pub(super) fn new(graph: &Graph, delta_m: f64, inverse_k_per_m: Vec<f64>) -> Self {
-        let edges = if graph.is_complete() && graph.count() > LISTED_UP_TO {
-            Edges::All(graph.count())
-        } else {
-            Edges::Listed(graph.edges().map(|(i, j)| [i, j]).collect())
-        };
-        let is_banded = matches!(edges, Edges::All(BANDED_FROM..));
-        let bands = is_banded.then(|| Bands::new(graph.count()));
-        Self { delta_m, edges, inverse_k_per_m, bands, arch: pulp::Arch::new() }
+    pub(super) fn new(graph: &Graph, delta_m: f64, mut inverse_k_per_m: Vec<f64>) -> Self {
+        let (count, edges) = (graph.count(), inverse_k_per_m.len());
+        inverse_k_per_m.resize(edges + LANES, 1.0);
+        let is_listed = !graph.is_complete() || count <= LISTED_UP_TO;
+        let bands = if count < BANDED_FROM { 1 } else { BANDS };
+        Self {
+            delta_m,
+            edges,
+            inverse_k_per_m,
+            bands: (!is_listed).then(|| Bands::new(count, bands, LANES, NOWHERE_M)),
+            list: graph.edges().take_while(|_| is_listed).map(|(i, j)| [i, j]).collect(),
+            arch: pulp::Arch::new(),
+        }
     }
 
     /// 1/K of each edge in row order \[1/m\].
     pub(super) fn inverse_k_per_m_mut(&mut self) -> &mut [f64] {
-        &mut self.inverse_k_per_m
+        &mut self.inverse_k_per_m[..self.edges]
     }
 
     /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\], and
@@ -85,140 +84,107 @@ impl Kernel {
 
     fn add_pulls_in(&self, bands: Option<&mut Bands>, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
         let (axes, sums) = (columns(positions_m), columns_mut(sums));
-        let add =
-            |rows: Range<usize>, sums: [&mut [f64]; 3]| self.arch.dispatch(AddPulls { kernel: self, rows, axes, sums });
         match bands {
-            Some(bands) => bands.add_to(sums, |rows, sums| add(rows, sums).ok()).ok_or(OutOfDomain),
-            None => add(0..positions_m.nrows(), sums),
+            Some(bands) => bands.add_to(axes, sums, |rows, axes, sums| {
+                self.arch.dispatch(AddRows { kernel: self, count: positions_m.nrows(), rows, axes, sums })
+            }),
+            None => self.arch.dispatch(AddList { kernel: self, axes, sums }),
         }
     }
 }
 
-/// Adds the pulls of the edges from these rows of the complete graph to later ones, or of all edges that are listed.
-struct AddPulls<'a> {
+/// Adds the pulls of the edges from these rows of the complete graph to later ones.
+struct AddRows<'a> {
     kernel: &'a Kernel,
+    count: usize,
     rows: Range<usize>,
+    /// The positions along each axis, and [`NOWHERE_M`] in the rest of the lanes.
     axes: [&'a [f64]; 3],
-    /// From the first of the rows on.
+    /// From the first of the rows on, and room for whole lanes.
     sums: [&'a mut [f64]; 3],
 }
 
-impl WithSimd for AddPulls<'_> {
+impl WithSimd for AddRows<'_> {
     type Output = Result<f64, OutOfDomain>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let Self { kernel, rows, axes, mut sums } = self;
-        match &kernel.edges {
-            Edges::All(count) => {
-                let mut evaluator = Evaluator::<ROW_BLOCK>::new(kernel.delta_m);
-                let start = rows.start;
-                for (i, row) in with_values(rows, *count, &kernel.inverse_k_per_m) {
-                    let own = axes.map(|axis| axis[i]);
-                    let of_own = evaluator.row(
-                        own,
-                        row,
-                        axes.map(|axis| &axis[i + 1..]),
-                        sums.each_mut().map(|axis| &mut axis[i + 1 - start..]),
-                    );
-                    for axis in 0..3 {
-                        sums[axis][i - start] += total(of_own[axis]);
-                    }
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { kernel, count, rows, axes: [x, y, z], sums: [of_x, of_y, of_z] } = self;
+        let mut block = Block::<ROW_BLOCK>::new(kernel.delta_m);
+        let start = rows.start;
+        let mut edge = start * (2 * count - start).saturating_sub(1) / 2;
+        for i in start..rows.end {
+            let own = [x[i], y[i], z[i]];
+            let mut of_own = [[0.0; LANES]; 3];
+            let mut j = i + 1;
+            while j < count {
+                let edges = ROW_BLOCK.min(count - j);
+                let lanes = edges.next_multiple_of(LANES);
+                let (from, to) = (j - start, j - start + lanes);
+                let ends = Ends {
+                    count: edges,
+                    inverse_k_per_m: &kernel.inverse_k_per_m[edge..edge + lanes],
+                    positions_m: [&x[j..j + lanes], &y[j..j + lanes], &z[j..j + lanes]],
+                    sums: [&mut of_x[from..to], &mut of_y[from..to], &mut of_z[from..to]],
+                };
+                let pulls = block.pull(simd, own, ends);
+                for axis in 0..3 {
+                    add_lanes(simd, &mut of_own[axis], pulls[axis]);
                 }
-                evaluator.finish()
+                edge += edges;
+                j += edges;
             }
-            Edges::Listed(edges) => {
-                let mut evaluator = Evaluator::<LIST_BLOCK>::new(kernel.delta_m);
-                let blocks = edges.chunks(LIST_BLOCK).zip(kernel.inverse_k_per_m.chunks(LIST_BLOCK));
-                for (edges, inverse_k_per_m) in blocks {
-                    evaluator.block.take_list(inverse_k_per_m, edges, axes);
-                    evaluator.evaluate();
-                    for (axis, sums) in sums.iter_mut().enumerate() {
-                        for (&[i, j], pull) in edges.iter().zip(evaluator.block.pulls(axis)) {
-                            sums[i] += pull;
-                            sums[j] -= pull;
-                        }
-                    }
+            of_x[i - start] += total(of_own[0]);
+            of_y[i - start] += total(of_own[1]);
+            of_z[i - start] += total(of_own[2]);
+        }
+        block.finish()
+    }
+}
+
+/// Adds the pulls of all edges that are listed.
+struct AddList<'a> {
+    kernel: &'a Kernel,
+    axes: [&'a [f64]; 3],
+    sums: [&'a mut [f64]; 3],
+}
+
+impl WithSimd for AddList<'_> {
+    type Output = Result<f64, OutOfDomain>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { kernel, axes, sums } = self;
+        let mut block = Block::<LIST_BLOCK>::new(kernel.delta_m);
+        let mut first = 0;
+        while first < kernel.list.len() {
+            let list = &kernel.list[first..kernel.list.len().min(first + LIST_BLOCK)];
+            // Each edge begins at the origin, where its first vehicle is to its second.
+            let (mut ends_m, mut of_ends) = ([[NOWHERE_M; LIST_BLOCK]; 3], [[0.0; LIST_BLOCK]; 3]);
+            for axis in 0..3 {
+                for k in 0..list.len() {
+                    ends_m[axis][k] = axes[axis][list[k][1]] - axes[axis][list[k][0]];
                 }
-                evaluator.finish()
             }
-        }
-    }
-}
-
-/// Each of these vehicles of the complete graph with the values of its edges to all later ones.
-#[inline(always)]
-fn with_values(rows: Range<usize>, count: usize, values: &[f64]) -> impl Iterator<Item = (usize, &[f64])> {
-    let edges_before = rows.start * (2 * count - rows.start).saturating_sub(1) / 2;
-    let mut values = &values[edges_before..];
-    rows.map(move |i| {
-        let (row, rest) = values.split_at(count - i - 1);
-        values = rest;
-        (i, row)
-    })
-}
-
-/// Evaluates edges, a block at a time.
-struct Evaluator<const B: usize> {
-    delta_m: f64,
-    block: Block<B>,
-    /// Sum of V/alpha.
-    potential: Lanes,
-    /// Whether some distance was not in (delta, infinity).
-    is_outside: bool,
-}
-
-impl<const B: usize> Evaluator<B> {
-    #[inline(always)]
-    fn new(delta_m: f64) -> Self {
-        Self { delta_m, block: Block::new(), potential: [0.0; LANES], is_outside: false }
-    }
-
-    /// The edges from a vehicle at `own` \[m\] to as many others as there are 1/K: subtracts the pull of each from theirs, and
-    /// returns their sum along each axis in lanes.
-    #[inline(always)]
-    fn row(
-        &mut self,
-        own: [f64; 3],
-        inverse_k_per_m: &[f64],
-        others: [&[f64]; 3],
-        mut theirs: [&mut [f64]; 3],
-    ) -> [Lanes; 3] {
-        let mut of_own = [[0.0; LANES]; 3];
-        for (from, inverse_k_per_m) in (0..).step_by(B).zip(inverse_k_per_m.chunks(B)) {
-            self.block.take_row(inverse_k_per_m, own, others.map(|axis| &axis[from..]));
-            self.evaluate();
-            for (axis, (of_own, theirs)) in of_own.iter_mut().zip(&mut theirs).enumerate() {
-                add_lanes(of_own, self.block.pulls_in_lanes(axis));
-                theirs[from..].iter_mut().zip(self.block.pulls(axis)).for_each(|(sum, pull)| *sum -= pull);
+            let lanes = list.len().next_multiple_of(LANES);
+            let ([x, y, z], [of_x, of_y, of_z]) = (&ends_m, &mut of_ends);
+            let ends = Ends {
+                count: list.len(),
+                inverse_k_per_m: &kernel.inverse_k_per_m[first..first + lanes],
+                positions_m: [&x[..lanes], &y[..lanes], &z[..lanes]],
+                sums: [&mut of_x[..lanes], &mut of_y[..lanes], &mut of_z[..lanes]],
+            };
+            let pulls = block.pull(simd, [0.0; 3], ends);
+            for axis in 0..3 {
+                for k in 0..list.len() {
+                    sums[axis][list[k][0]] += pulls[axis][k];
+                    sums[axis][list[k][1]] -= pulls[axis][k];
+                }
             }
+            first += list.len();
         }
-        of_own
+        block.finish()
     }
-
-    #[inline(always)]
-    fn evaluate(&mut self) {
-        self.is_outside |= self.block.evaluate(self.delta_m);
-        add_lanes(&mut self.potential, self.block.values_in_lanes());
-    }
-
-    /// (1/alpha) sum of V.
-    #[inline(always)]
-    fn finish(self) -> Result<f64, OutOfDomain> {
-        if self.is_outside { Err(OutOfDomain) } else { Ok(total(self.potential)) }
-    }
-}
-
-#[inline(always)]
-fn add_lanes(sums: &mut Lanes, lanes: &[Lanes]) {
-    for lanes in lanes {
-        sums.iter_mut().zip(lanes).for_each(|(sum, lane)| *sum += lane);
-    }
-}
-
-#[inline(always)]
-fn total(lanes: Lanes) -> f64 {
-    ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
 }
 
 fn columns(rows: &Rows) -> [&[f64]; 3] {

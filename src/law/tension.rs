@@ -172,6 +172,10 @@ impl EdgeTension {
     }
 }
 
+/// Some distance is not in (delta, infinity), or so short or long that V has no finite value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct OutOfDomain;
+
 /// The scaled clearance s in (0, asinh(1)] with V/alpha = `value` > 0, and the iterations taken.
 fn push_side_root(value: f64) -> (f64, u32) {
     const MOST_ITERATIONS: u32 = 64;

@@ -71,10 +71,9 @@ fn the_bits_do_not_depend_on_the_vector_instructions() {
         let (mut kernel, positions_m, _) = fixture(&graph);
         let (mut dispatched, mut baseline) = (Rows::zeros(graph.count()), Rows::zeros(graph.count()));
         let potential = kernel.add_pulls(&positions_m, &mut dispatched);
-        let (axes, rows) = (columns(&positions_m), 0..graph.count());
-        // Called without dispatch, this is the code for the oldest processor of the target.
-        let add_pulls = AddPulls { kernel: &kernel, rows, axes, sums: columns_mut(&mut baseline) };
-        assert_eq!(potential, add_pulls.with_simd(pulp::Scalar));
+        // The code for the oldest processor of the target.
+        kernel.arch = pulp::Arch::Scalar;
+        assert_eq!(potential, kernel.add_pulls(&positions_m, &mut baseline));
         assert!(potential.is_ok());
         assert_eq!(dispatched, baseline);
     }
@@ -122,9 +121,9 @@ fn the_bits_of_bands_do_not_depend_on_the_number_of_threads_and_are_those_of_the
     let graph = Graph::complete(BANDED_FROM);
     let (mut kernel, positions_m, _) = fixture(&graph);
     let mut whole = Rows::zeros(graph.count());
-    let (axes, rows) = (columns(&positions_m), 0..graph.count());
-    let add_pulls = AddPulls { kernel: &kernel, rows, axes, sums: columns_mut(&mut whole) };
-    let potential = add_pulls.with_simd(pulp::Scalar).expect("far apart");
+    let mut in_one = kernel.clone();
+    in_one.bands = Some(Bands::new(graph.count(), 1, LANES, NOWHERE_M));
+    let potential = in_one.add_pulls(&positions_m, &mut whole).expect("far apart");
 
     let mut on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
