@@ -215,12 +215,11 @@ impl EdgeTensionLaw {
 
     fn try_energy(&self, swarm: &Swarm) -> Result<f64, LawError> {
         check_rows(self.graph.count(), swarm)?;
-        let potential = match self.memo.of(&swarm.positions_m) {
-            Some(potential) => potential,
-            None => {
-                check_state(self.graph.count(), swarm)?;
-                self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?
-            }
+        let potential = if let Some(potential) = self.memo.of(&swarm.positions_m) {
+            potential
+        } else {
+            check_state(self.graph.count(), swarm)?;
+            self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?
         };
         let energy = relative_kinetic_energy(swarm) + self.parameters.alpha * potential / swarm.count().max(1) as f64;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }

@@ -28,9 +28,8 @@ impl Memo {
 
     /// The potential of these very positions, where it is known.
     pub(super) fn of(&self, positions_m: &Rows) -> Option<f64> {
-        // Numbers are compared without a branch for each, many together.
         let differ =
-            |(mine, theirs): (&[f64], &[f64])| mine.iter().zip(theirs).fold(false, |any, (a, b)| any | (a != b));
+            |(mine, theirs): (&[f64], &[f64])| mine.iter().zip(theirs).fold(false, |any, (a, b)| any || a != b);
         let (mine, theirs) = (self.positions_m.as_slice(), positions_m.as_slice());
         self.potential.filter(|_| mine.len() == theirs.len() && !mine.chunks(256).zip(theirs.chunks(256)).any(differ))
     }

@@ -61,8 +61,8 @@ impl<const B: usize> Block<B> {
         let (lengths_m, scaled, decays) = (&mut lengths_m[..lanes], &mut scaled[..lanes], &mut decays[..lanes]);
 
         self.is_inside |= measure(*delta_m, own, to.positions_m, to.inverse_k_per_m, edges, lengths_m, scaled, decays);
-        for k in 0..lanes {
-            decays[k] = tension::expm1(decays[k]);
+        for decay in &mut *decays {
+            *decay = tension::expm1(*decay);
         }
         let edges = [&mut x[..lanes], &mut y[..lanes], &mut z[..lanes]];
         weigh(to.count, to.inverse_k_per_m, lengths_m, decays, edges, scaled, to.sums);
