@@ -129,15 +129,13 @@ impl EdgeTensionLaw {
         parameters: EdgeTensionParameters,
     ) -> Result<Self, ParameterError> {
         ParameterError::check(graph, formation, &[("a22", parameters.a22_per_s)])?;
-        let mut inverse_k_per_m = Vec::new();
-        let edges = graph.edge_count();
-        inverse_k_per_m.try_reserve_exact(edges).map_err(|_| ParameterError::Memory { edges })?;
-        inverse_k_per_m.resize(edges, f64::NAN);
+        let kernel =
+            Kernel::new(graph, parameters.delta_m).map_err(|_| ParameterError::Memory { edges: graph.edge_count() })?;
         let mut law = Self {
             graph: graph.clone(),
             formation: formation.clone(),
             parameters,
-            kernel: Kernel::new(graph, parameters.delta_m, inverse_k_per_m),
+            kernel,
             tightest: None,
             revision: 0,
             growth: None,

@@ -8,6 +8,7 @@
 
 mod block;
 
+use std::collections::TryReserveError;
 use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
@@ -46,20 +47,23 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// `inverse_k_per_m` holds 1/K for each edge of the graph in row order.
-    pub(super) fn new(graph: &Graph, delta_m: f64, mut inverse_k_per_m: Vec<f64>) -> Self {
-        let (count, edges) = (graph.count(), inverse_k_per_m.len());
+    /// The edges of a graph, whose 1/K are still to be given. An error where they do not fit in memory.
+    pub(super) fn new(graph: &Graph, delta_m: f64) -> Result<Self, TryReserveError> {
+        let (count, edges) = (graph.count(), graph.edge_count());
+        let mut inverse_k_per_m = Vec::new();
+        inverse_k_per_m.try_reserve_exact(edges + LANES)?;
+        inverse_k_per_m.resize(edges, f64::NAN);
         inverse_k_per_m.resize(edges + LANES, 1.0);
         let is_listed = !graph.is_complete() || count <= LISTED_UP_TO;
         let bands = if count < BANDED_FROM { 1 } else { BANDS };
-        Self {
+        Ok(Self {
             delta_m,
             edges,
             inverse_k_per_m,
             bands: (!is_listed).then(|| Bands::new(count, bands, LANES, NOWHERE_M)),
-            list: graph.edges().take_while(|_| is_listed).map(|(i, j)| [i, j]).collect(),
+            list: if is_listed { graph.edges().map(|(i, j)| [i, j]).collect() } else { Vec::new() },
             arch: pulp::Arch::new(),
-        }
+        })
     }
 
     /// 1/K of each edge in row order \[1/m\].

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 mod circles;
+mod mutants;
 
 const PAGE: &str = include_str!("../../ARCHITECTURE.md");
 

@@ -17,8 +17,11 @@ fn fixture(graph: &Graph) -> (Kernel, Rows, Formation) {
         positions_m[(i, 0)] += libm::sin(i as f64);
         positions_m[(i, 2)] *= 1.5;
     }
-    let inverse = graph.edges().map(|(i, j)| 1.0 / tension(&formation, i, j).k_m()).collect();
-    (Kernel::new(graph, DELTA_M, inverse), positions_m, formation)
+    let mut kernel = Kernel::new(graph, DELTA_M).expect("memory");
+    for ((i, j), inverse_k_per_m) in graph.edges().zip(kernel.inverse_k_per_m_mut()) {
+        *inverse_k_per_m = 1.0 / tension(&formation, i, j).k_m();
+    }
+    (kernel, positions_m, formation)
 }
 
 fn tension(formation: &Formation, i: usize, j: usize) -> EdgeTension {
@@ -110,8 +113,10 @@ fn one_pair_out_of_domain_is_noticed_wherever_it_is() {
         }
         for i in 0..graph.count() {
             let mut far = positions_m.clone();
-            far[(i, 2)] = 1e200;
-            assert_eq!(kernel.potential(&far), Err(OutOfDomain));
+            for number in [1e200, f64::MAX, f64::INFINITY, f64::NAN] {
+                far[(i, 2)] = number;
+                assert_eq!(kernel.potential(&far), Err(OutOfDomain), "{i} {number}");
+            }
         }
     }
 }
