@@ -93,8 +93,8 @@ pub fn mean_row(rows: &Rows) -> Vector3<f64> {
 /// Largest Euclidean norm of a row, 0 for an empty table; NaN where there is one.
 #[must_use]
 pub fn largest_row_norm(rows: &Rows) -> f64 {
-    let norms = (0..rows.nrows()).map(|i| row(rows, i).norm());
-    norms.fold(0.0, |a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) })
+    let squares = (0..rows.nrows()).map(|i| row(rows, i).norm_squared());
+    squares.fold(0.0, |a: f64, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }).sqrt()
 }
 
 /// The first row that holds a number that is not finite.

@@ -47,7 +47,19 @@ impl KeepOut {
     /// When the balls first touch, as a fraction of the step; NaN if parry cannot tell.
     #[inline]
     pub(super) fn cast(&self, motion: &RelativeMotion) -> Option<f64> {
-        let by = if motion.by.norm_squared() < NO_MOTION_M * NO_MOTION_M { Vector::ZERO } else { vector(motion.by) };
+        if motion.by.norm_squared() < NO_MOTION_M * NO_MOTION_M {
+            return self.cast_at_rest(motion);
+        }
+        self.cast_by(motion, vector(motion.by))
+    }
+
+    #[cold]
+    fn cast_at_rest(&self, motion: &RelativeMotion) -> Option<f64> {
+        self.cast_by(motion, Vector::ZERO)
+    }
+
+    #[inline]
+    fn cast_by(&self, motion: &RelativeMotion, by: Vector) -> Option<f64> {
         let options = ShapeCastOptions {
             max_time_of_impact: 1.0,
             compute_impact_geometry_on_penetration: false,
