@@ -7,6 +7,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::browser::WITHOUT_WEBGL;
 use crate::replays_in_browser::{steer, steer_with};
 
 const DESKTOP: (u32, bool) = (1000, false);
@@ -208,7 +209,7 @@ fn no_other_script_runs_and_without_webgl_the_page_says_so() {
         "{found} {said:?}"
     );
     fs::write(&page, &html).expect("written");
-    let (found, said) = steer_with(folder.path(), &page, DESKTOP, &["--disable-gpu"], state);
+    let (found, said) = steer_with(folder.path(), &page, DESKTOP, &WITHOUT_WEBGL, state);
     assert!(found["state"] == "none" && said.is_empty(), "{found} {said:?}");
     assert!(text(&found["none"]).contains("does not draw WebGL 2: there is no replay"), "{found}");
     // One letter of the script changed, and it does not run.

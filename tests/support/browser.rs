@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 
 /// A page loads in a second or two; a browser that hangs is stopped.
 const PATIENCE: Duration = Duration::from_mins(2);
+/// Some browsers draw WebGL without a graphics card, others do not.
+pub(crate) const WITHOUT_WEBGL: [&str; 2] = ["--disable-gpu", "--disable-3d-apis"];
 const WIDTHS_PX: [u32; 3] = [320, 390, 1280];
 /// A contrast of text that people with moderately low vision read (WCAG 2.2, level AA).
 const CONTRAST: f64 = 4.5;
@@ -23,7 +25,7 @@ frame.addEventListener("load", () => {
   const inside = element => element.closest(".scroll, pre, svg") !== null;
   const stickingOut = [...page.body.querySelectorAll("*")].filter(element =>
     !inside(element) && element.getBoundingClientRect().right > view.innerWidth + 0.5);
-  const rgb = color => color.match(/[\d.]+/g).map(Number);
+  const rgb = color => color.match(/[\d.]+/g).map((part, k) => k < 3 && color.startsWith("color(") ? 255 * part : Number(part));
   const luminance = color => {
     const [r, g, b] = rgb(color).map(c => c / 255).map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
@@ -118,7 +120,8 @@ pub(crate) fn probe(folder: &Path, page: &Path, width_px: u32, dark: bool) -> (s
         page.display()
     );
     fs::write(&wrapper, html).expect("written");
-    let mut flags = vec!["--dump-dom".to_owned(), "--disable-gpu".to_owned(), "--window-size=1400,900".to_owned()];
+    let mut flags: Vec<_> =
+        ["--dump-dom", "--window-size=1400,900"].into_iter().chain(WITHOUT_WEBGL).map(str::to_owned).collect();
     flags.extend(scheme(dark));
     let output = open(folder, &wrapper, &flags);
     let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
