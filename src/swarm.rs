@@ -76,6 +76,25 @@ pub fn set_row(rows: &mut Rows, i: usize, v: Vector3<f64>) {
     (rows[(i, 0)], rows[(i, 1)], rows[(i, 2)]) = (v.x, v.y, v.z);
 }
 
+/// The numbers along each axis, a number per vehicle.
+#[inline]
+#[must_use]
+pub fn columns(rows: &Rows) -> [&[f64]; 3] {
+    let (x, rest) = rows.as_slice().split_at(rows.nrows());
+    let (y, z) = rest.split_at(rows.nrows());
+    [x, y, z]
+}
+
+/// The numbers along each axis, to be written.
+#[inline]
+#[must_use]
+pub fn columns_mut(rows: &mut Rows) -> [&mut [f64]; 3] {
+    let count = rows.nrows();
+    let (x, rest) = rows.as_mut_slice().split_at_mut(count);
+    let (y, z) = rest.split_at_mut(count);
+    [x, y, z]
+}
+
 /// Distance between rows `i` and `j` of a table of positions.
 #[inline]
 #[must_use]

@@ -6,7 +6,7 @@ use super::error::LawError;
 use super::interface::VelocityMargin;
 use crate::graph::Graph;
 use crate::observation::{Neighbour, Observation, Others};
-use crate::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
+use crate::swarm::{Rows, Swarm, columns, columns_mut, first_row_not_finite, row, set_row};
 
 /// Whether a state is of `count` vehicles and finite.
 pub(super) fn check_state(count: usize, swarm: &Swarm) -> Result<(), LawError> {
@@ -29,36 +29,47 @@ pub(super) fn check_range(command: &Rows) -> Result<(), LawError> {
     first_row_not_finite(command).map_or(Ok(()), |_| Err(LawError::OutOfRange))
 }
 
-/// Adds `gain L_G X` to `sums`, where X has a row for each vehicle: row i gains `gain` times the sum of `x_i - x_j`
-/// over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)` and takes O(N) for all rows.
-pub(super) fn add_laplacian_product(graph: &Graph, rows: &Rows, gain: f64, sums: &mut Rows) {
-    let count = graph.count();
-    let (x, sums) = (rows.as_slice(), sums.as_mut_slice());
+/// Adds `gain L_G X` to `sums`, where X has a row for each vehicle, whose number along each axis `x` gives: row i gains `gain`
+/// times the sum of `x_i - x_j` over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)` and takes
+/// O(N) for all rows.
+#[inline]
+pub(super) fn add_laplacian_product(graph: &Graph, x: &[impl Fn(usize) -> f64; 3], gain: f64, sums: &mut Rows) {
+    let (count, sums) = (graph.count(), columns_mut(sums));
     if graph.is_complete() {
-        for (x, sums) in x.chunks_exact(count.max(1)).zip(sums.chunks_exact_mut(count.max(1))) {
-            let mean = x.iter().sum::<f64>() / count as f64;
-            let gain = gain * count as f64;
-            sums.iter_mut().zip(x).for_each(|(sum, x)| *sum += gain * (x - mean));
+        let mut totals = [0.0; 3];
+        for i in 0..count {
+            (0..3).for_each(|axis| totals[axis] += x[axis](i));
+        }
+        let gain = gain * count as f64;
+        for ((x, sums), total) in x.iter().zip(sums).zip(totals) {
+            let mean = total / count as f64;
+            sums.iter_mut().enumerate().for_each(|(i, sum)| *sum += gain * (x(i) - mean));
         }
     } else {
-        let (x_axis, rest) = x.split_at(count);
-        let (y_axis, z_axis) = rest.split_at(count);
-        let (x_sums, rest) = sums.split_at_mut(count);
-        let (y_sums, z_sums) = rest.split_at_mut(count);
         for i in 0..count {
-            let (x, y, z) = (x_axis[i], y_axis[i], z_axis[i]);
-            let (mut x_sum, mut y_sum, mut z_sum) = (x_sums[i], y_sums[i], z_sums[i]);
+            let own = [x[0](i), x[1](i), x[2](i)];
+            let mut of_own = [sums[0][i], sums[1][i], sums[2][i]];
             for j in graph.later_neighbours(i) {
-                let [along_x, along_y, along_z] =
-                    [gain * (x - x_axis[j]), gain * (y - y_axis[j]), gain * (z - z_axis[j])];
-                (x_sum, y_sum, z_sum) = (x_sum + along_x, y_sum + along_y, z_sum + along_z);
-                x_sums[j] -= along_x;
-                y_sums[j] -= along_y;
-                z_sums[j] -= along_z;
+                for axis in 0..3 {
+                    let along = gain * (own[axis] - x[axis](j));
+                    of_own[axis] += along;
+                    sums[axis][j] -= along;
+                }
             }
-            (x_sums[i], y_sums[i], z_sums[i]) = (x_sum, y_sum, z_sum);
+            (0..3).for_each(|axis| sums[axis][i] = of_own[axis]);
         }
     }
+}
+
+/// The numbers of a table along each axis, as [`add_laplacian_product`] takes them.
+pub(super) fn of_table(rows: &Rows) -> [impl Fn(usize) -> f64; 3] {
+    columns(rows).map(|x| move |i: usize| x[i])
+}
+
+/// Where vehicles are from their slots along each axis \[m\], as [`add_laplacian_product`] takes it.
+pub(super) fn of_errors_m(positions_m: &Rows, slots_m: &Rows) -> [impl Fn(usize) -> f64; 3] {
+    let ([x, y, z], [slot_x, slot_y, slot_z]) = (columns(positions_m), columns(slots_m));
+    [(x, slot_x), (y, slot_y), (z, slot_z)].map(|(at, slot)| move |i: usize| at[i] - slot[i])
 }
 
 /// `1/2 sum |v_i - mean v|^2` \[m^2/s^2\].
@@ -87,6 +98,12 @@ pub(super) fn consensus_margin(count: usize, gain_per_s: f64, connectivity: f64,
 /// Whether an observation is of `count` vehicles and finite, and the table of accelerations of as many.
 pub(super) fn check_observation(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
     check_state(count, at.own)?;
+    check_tables(count, at, command)
+}
+
+/// Whether an observation is of `count` vehicles, what they hold of others finite, and the table of accelerations of as many.
+pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
+    check_rows(count, at.own)?;
     if let Others::Held(held) = at.others {
         if !held.is_of(count) {
             return Err(LawError::Pictures { count });
@@ -118,30 +135,34 @@ pub(super) fn add_heard(
 }
 
 /// Adds to the row of each vehicle what it makes of every other that is near, from where it sees itself apart \[m\]:
-/// `push(i, j, apart_m)` gives that and the potential of the pair, and the opposite push for the opposite way. The sum of the
-/// potentials over the near pairs is the result, where all share one state.
+/// `push(i, j, apart_m)` gives that and the potential of the pair, or nothing, and the opposite push for the opposite way. The sum
+/// of the potentials over the near pairs is the result, where all share one state.
 pub(super) fn add_pushes(
     at: &Observation<'_>,
     sums: &mut Rows,
-    push: impl Fn(usize, usize, Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError>,
+    push: impl Fn(usize, usize, Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError>,
 ) -> Result<Option<f64>, LawError> {
     if let Some(swarm) = at.shared() {
         let mut potential = 0.0;
         // Two who see each other where they are push each other alike.
         for &(i, j) in at.near {
-            let (pushed, of_pair) = push(i, j, row(&swarm.positions_m, i) - row(&swarm.positions_m, j))?;
-            let (of_i, of_j) = (row(sums, i) + pushed, row(sums, j) - pushed);
-            set_row(sums, i, of_i);
-            set_row(sums, j, of_j);
-            potential = (potential + 0.5 * of_pair) + 0.5 * of_pair;
+            let apart_m = row(&swarm.positions_m, i) - row(&swarm.positions_m, j);
+            if let Some((pushed, of_pair)) = push(i, j, apart_m)? {
+                let (of_i, of_j) = (row(sums, i) + pushed, row(sums, j) - pushed);
+                set_row(sums, i, of_i);
+                set_row(sums, j, of_j);
+                potential = (potential + 0.5 * of_pair) + 0.5 * of_pair;
+            }
         }
         return Ok(Some(potential));
     }
     for &(a, b) in at.near {
         for (i, j) in [(a, b), (b, a)] {
-            let (pushed, _) = push(i, j, row(&at.own.positions_m, i) - at.seen(i, j).position_m)?;
-            let sum = row(sums, i) + pushed;
-            set_row(sums, i, sum);
+            let apart_m = row(&at.own.positions_m, i) - at.seen(i, j).position_m;
+            if let Some((pushed, _)) = push(i, j, apart_m)? {
+                let sum = row(sums, i) + pushed;
+                set_row(sums, i, sum);
+            }
         }
     }
     Ok(None)

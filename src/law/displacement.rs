@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
 use super::clearance::{ClearanceTension, slot_room_m};
-use super::consensus::{add_pushes, check_count, check_observation, check_range, check_state};
+use super::consensus::{add_pushes, check_count, check_range, check_state, check_tables};
 use super::contact::in_contact;
 use super::error::{LawError, ParameterError};
 use super::growth::Growth;
@@ -218,18 +218,19 @@ impl DisplacementLaw {
         self.pulls.pinning != Pinning::Nobody
     }
 
-    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and `V_R`.
-    fn push(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError> {
+    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and `V_R`; nothing out of range.
+    fn push(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError> {
         let scaled_m = self.metric.scaled(apart_m);
         let separation_m = scaled_m.norm();
         if separation_m >= self.tension.rest_m() {
-            return Ok((Vector3::zeros(), 0.0));
+            return Ok(None);
         }
         if separation_m <= self.delta_m {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m, delta_m: self.delta_m });
         }
         let slope_m_s2 = self.tension.derivative(separation_m);
-        Ok((self.metric.scaled(scaled_m) * (-slope_m_s2 / separation_m), self.tension.value(separation_m)))
+        let pushed = self.metric.scaled(scaled_m) * (-slope_m_s2 / separation_m);
+        Ok(Some((pushed, self.tension.value(separation_m))))
     }
 
     /// Sum of the tensions of a state that the law was not asked about \[m^2/s^2\].
@@ -240,7 +241,10 @@ impl DisplacementLaw {
         };
         let mut near = NearPairs::default();
         near.update(positions_m, self.metric.longest_m(self.tension.rest_m()));
-        let of_pair = |&(i, j): &(usize, usize)| Ok(self.push(i, j, row(positions_m, i) - row(positions_m, j))?.1);
+        let of_pair = |&(i, j): &(usize, usize)| {
+            let pushed = self.push(i, j, row(positions_m, i) - row(positions_m, j));
+            pushed.map(|pushed| pushed.map_or(0.0, |(_, of_pair)| of_pair))
+        };
         Ok(of_obstacles + near.pairs().iter().map(of_pair).sum::<Result<f64, LawError>>()?)
     }
 
@@ -262,6 +266,28 @@ impl DisplacementLaw {
         };
         let energy = kinetic + stretch + pushes;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
+    }
+
+    fn try_command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        command.fill(0.0);
+        let gains = Gains { position: self.keys.k_per_s2, velocity: self.damping_per_s() };
+        self.pulls.add_pulls(at, gains, -self.scale(), command)?;
+        let of_pairs = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
+        let of_obstacles = self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(at, command))?;
+        if let Some(of_pairs) = of_pairs {
+            self.memo.keep(&at.own.positions_m, of_pairs + of_obstacles);
+        }
+        if self.is_guided() {
+            if self.is_fed {
+                let fed = fed_forward(&at.target.reference, self.a22_per_s);
+                (0..command.nrows()).for_each(|i| {
+                    let sum = row(command, i) + fed;
+                    set_row(command, i, sum);
+                });
+            }
+            self.pulls.lead(at, gains, self.a22_per_s, command);
+        }
+        check_range(command)
     }
 
     /// R for these slots \[m\].
@@ -292,26 +318,10 @@ impl Law for DisplacementLaw {
     }
 
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.pulls.graph.count(), at, command)?;
-        command.fill(0.0);
-        let gains = Gains { position: self.keys.k_per_s2, velocity: self.damping_per_s() };
-        self.pulls.add_pulls(at, gains, -self.scale(), command)?;
-        let of_pairs = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
-        let of_obstacles = self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(at, command))?;
-        if let Some(of_pairs) = of_pairs {
-            self.memo.keep(&at.own.positions_m, of_pairs + of_obstacles);
-        }
-        if self.is_guided() {
-            if self.is_fed {
-                let fed = fed_forward(&at.target.reference, self.a22_per_s);
-                (0..command.nrows()).for_each(|i| {
-                    let sum = row(command, i) + fed;
-                    set_row(command, i, sum);
-                });
-            }
-            self.pulls.lead(at, gains, self.a22_per_s, command);
-        }
-        check_range(command)
+        let count = self.pulls.graph.count();
+        check_tables(count, at, command)?;
+        // No state that is not finite has a finite command: who is to blame is looked for where there is none.
+        self.try_command(at, command).map_err(|fault| check_state(count, at.own).err().unwrap_or(fault))
     }
 
     fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::certificate::{Certificate, Void};
 use super::consensus::{
     add_heard, add_laplacian_product, check_count, check_observation, check_range, check_rows, check_state,
-    consensus_margin, relative_kinetic_energy,
+    consensus_margin, of_table, relative_kinetic_energy,
 };
 use super::error::{LawError, ParameterError};
 use super::growth::{Frame, Grown, Growth};
@@ -239,7 +239,7 @@ impl Law for EdgeTensionLaw {
             let potential = self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
             self.memo.keep(&swarm.positions_m, potential);
             *command *= alpha * per_vehicle;
-            add_laplacian_product(&self.graph, &swarm.velocities_m_s, velocity_gain, command);
+            add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), velocity_gain, command);
         } else {
             self.add_heard_pulls(at, command)?;
             *command *= alpha * per_vehicle;

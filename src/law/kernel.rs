@@ -17,7 +17,7 @@ use self::block::{Block, Ends, LANES, NOWHERE_M, add_lanes, total};
 use super::bands::Bands;
 use super::tension::OutOfDomain;
 use crate::graph::Graph;
-use crate::swarm::Rows;
+use crate::swarm::{Rows, columns, columns_mut};
 
 /// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. The order of sums
 /// differs, so this number is a part of what the bits of a flight rest on.
@@ -189,19 +189,6 @@ impl WithSimd for AddList<'_> {
         }
         block.finish()
     }
-}
-
-fn columns(rows: &Rows) -> [&[f64]; 3] {
-    let (x, rest) = rows.as_slice().split_at(rows.nrows());
-    let (y, z) = rest.split_at(rows.nrows());
-    [x, y, z]
-}
-
-fn columns_mut(rows: &mut Rows) -> [&mut [f64]; 3] {
-    let count = rows.nrows();
-    let (x, rest) = rows.as_mut_slice().split_at_mut(count);
-    let (y, z) = rest.split_at_mut(count);
-    [x, y, z]
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
 use super::consensus::{
-    add_heard, add_laplacian_product, check_observation, check_range, check_state, consensus_margin,
-    relative_kinetic_energy, sum_of_squares_about_mean,
+    add_heard, add_laplacian_product, check_observation, check_range, check_state, consensus_margin, of_errors_m,
+    of_table, relative_kinetic_energy, sum_of_squares_about_mean,
 };
 use super::error::{LawError, ParameterError};
 use super::interface::{Law, VelocityMargin};
@@ -83,8 +83,6 @@ pub struct LaplacianLaw {
     graph: Graph,
     f1_per_s2: f64,
     f2_per_s: f64,
-    /// Scratch: `p_i - h_i`.
-    errors_m: Rows,
 }
 
 impl LaplacianLaw {
@@ -95,8 +93,7 @@ impl LaplacianLaw {
     /// is not finite.
     pub fn new(graph: &Graph, formation: &Formation, f1_per_s2: f64, f2_per_s: f64) -> Result<Self, ParameterError> {
         ParameterError::check(graph, formation, &[("f1", f1_per_s2), ("f2", f2_per_s)])?;
-        let errors_m = Rows::zeros(graph.count());
-        Ok(Self { graph: graph.clone(), f1_per_s2, f2_per_s, errors_m })
+        Ok(Self { graph: graph.clone(), f1_per_s2, f2_per_s })
     }
 }
 
@@ -115,10 +112,8 @@ impl Law for LaplacianLaw {
         let (per_vehicle, slots_m) = (-1.0 / at.own.count().max(1) as f64, &at.target.formation.slots_m);
         let (f1, f2) = (self.f1_per_s2 * per_vehicle, self.f2_per_s * per_vehicle);
         if let Some(swarm) = at.shared() {
-            self.errors_m.copy_from(&swarm.positions_m);
-            self.errors_m -= slots_m;
-            add_laplacian_product(&self.graph, &self.errors_m, f1, command);
-            add_laplacian_product(&self.graph, &swarm.velocities_m_s, f2, command);
+            add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), f1, command);
+            add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), f2, command);
         } else {
             add_heard(at, command, |i, own, j, heard| {
                 let errors_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));

@@ -18,7 +18,7 @@ impl Memo {
 
     /// Keeps the potential of these positions, as many as [`Memo::new`] was told.
     pub(super) fn keep(&mut self, positions_m: &Rows, potential: f64) {
-        self.positions_m.copy_from(positions_m);
+        self.positions_m.as_mut_slice().copy_from_slice(positions_m.as_slice());
         self.potential = Some(potential);
     }
 

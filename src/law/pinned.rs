@@ -2,13 +2,15 @@
 
 use nalgebra::Vector3;
 
-use super::consensus::{add_heard, add_laplacian_product, relative_kinetic_energy, sum_of_squares_about_mean};
+use super::consensus::{
+    add_heard, add_laplacian_product, of_errors_m, of_table, relative_kinetic_energy, sum_of_squares_about_mean,
+};
 use super::error::LawError;
 use super::modes::{Heard, HeardLinks, Linear, Mode};
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
-use crate::swarm::{Rows, Swarm, row, set_row};
+use crate::swarm::{Rows, Swarm, columns, columns_mut, row, set_row};
 use crate::target::Reference;
 
 /// Gains on errors of position \[1/s^2\] and of velocity \[1/s\].
@@ -23,7 +25,7 @@ pub(super) struct Gains {
 pub(super) struct PinnedConsensus {
     pub(super) graph: Graph,
     pub(super) pinning: Pinning,
-    /// Scratch: `k e_i + c v_i`.
+    /// Scratch: `k e_i + c v_i`, where links are many.
     pulls: Rows,
 }
 
@@ -81,10 +83,21 @@ impl PinnedConsensus {
     ) -> Result<(), LawError> {
         let (slots_m, Gains { position: k, velocity: c }) = (&at.target.formation.slots_m, gains);
         if let Some(swarm) = at.shared() {
-            let (p, h, v) = (swarm.positions_m.as_slice(), slots_m.as_slice(), swarm.velocities_m_s.as_slice());
-            let pulls = self.pulls.as_mut_slice().iter_mut();
-            pulls.zip(p).zip(h).zip(v).for_each(|(((pull, p), h), v)| *pull = k * (p - h) + c * v);
-            add_laplacian_product(&self.graph, &self.pulls, scale, sums);
+            let (errors_m, velocities_m_s) = (of_errors_m(&swarm.positions_m, slots_m), columns(&swarm.velocities_m_s));
+            let pull = |axis: usize| {
+                let (error_m, velocity_m_s) = (&errors_m[axis], velocities_m_s[axis]);
+                move |i: usize| k * error_m(i) + c * velocity_m_s[i]
+            };
+            let pulls = [pull(0), pull(1), pull(2)];
+            if self.graph.is_complete() || self.graph.edge_count() <= self.graph.count() {
+                add_laplacian_product(&self.graph, &pulls, scale, sums);
+            } else {
+                // Each is wanted at several links.
+                for (pull, column) in pulls.iter().zip(columns_mut(&mut self.pulls)) {
+                    column.iter_mut().enumerate().for_each(|(i, kept)| *kept = pull(i));
+                }
+                add_laplacian_product(&self.graph, &of_table(&self.pulls), scale, sums);
+            }
         } else {
             add_heard(at, sums, |i, own, j, heard| {
                 let error_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, Void};
 use super::consensus::{
-    add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state,
+    add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state, of_errors_m,
 };
 use super::error::{LawError, ParameterError};
 use super::interface::{Law, VelocityMargin};
@@ -94,8 +94,6 @@ pub struct PotentialLaw {
     range_m: f64,
     /// That of the target that R is taken from.
     revision: u64,
-    /// Scratch: `p_i - h_i`.
-    errors_m: Rows,
     /// Sum of U over the near pairs.
     memo: Memo,
 }
@@ -120,7 +118,6 @@ impl PotentialLaw {
             a22_per_s: setting.a22_per_s,
             range_m,
             revision: 0,
-            errors_m: Rows::zeros(setting.links.count()),
             memo: Memo::new(setting.links.count()),
         })
     }
@@ -134,16 +131,16 @@ impl PotentialLaw {
         Ok((inverse - 1.0 / (self.range_m - self.delta_m), inverse))
     }
 
-    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and U.
-    fn repulsion(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<(Vector3<f64>, f64), LawError> {
+    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and U; nothing out of range.
+    fn repulsion(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError> {
         let separation_m = apart_m.norm();
         if separation_m >= self.range_m {
-            return Ok((Vector3::zeros(), 0.0));
+            return Ok(None);
         }
         let (steep, inverse) = self.steepness(Pair::new(i, j), separation_m)?;
         let eta_m4_per_s2 = self.keys.eta_m4_per_s2;
         let push_m_s2 = apart_m * (eta_m4_per_s2 * steep * inverse * inverse / separation_m);
-        Ok((push_m_s2, 0.5 * eta_m4_per_s2 * steep * steep))
+        Ok(Some((push_m_s2, 0.5 * eta_m4_per_s2 * steep * steep)))
     }
 
     /// Sum of U over all pairs \[m^2/s^2\].
@@ -151,7 +148,8 @@ impl PotentialLaw {
         let mut sum = 0.0;
         for i in 0..positions_m.nrows() {
             for j in i + 1..positions_m.nrows() {
-                sum += self.repulsion(i, j, row(positions_m, i) - row(positions_m, j))?.1;
+                let repulsion = self.repulsion(i, j, row(positions_m, i) - row(positions_m, j))?;
+                sum += repulsion.map_or(0.0, |(_, of_pair)| of_pair);
             }
         }
         Ok(sum)
@@ -189,9 +187,7 @@ impl Law for PotentialLaw {
         *command *= -self.keys.c_per_s;
         let (slots_m, gain) = (&at.target.formation.slots_m, -self.keys.k_per_s2 / at.own.count().max(1) as f64);
         if let Some(swarm) = at.shared() {
-            self.errors_m.copy_from(&swarm.positions_m);
-            self.errors_m -= slots_m;
-            add_laplacian_product(&self.graph, &self.errors_m, gain, command);
+            add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), gain, command);
         } else {
             add_heard(at, command, |i, own, j, heard| {
                 Ok(gain * ((own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j))))

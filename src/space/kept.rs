@@ -1,13 +1,17 @@
 //! Near pairs that are kept while points move little.
 
+use std::ops::Range;
+
 use super::near::NearPairs;
-use crate::swarm::{Rows, row};
+use crate::swarm::{Rows, columns};
 
 /// How much farther than the range is searched, as a part of the range: points may move half of that before a pair can be
 /// missing.
 const SKIN: f64 = 0.3;
 /// Rounding of distances, as a part of the range.
 const ROUNDING: f64 = 1e-9;
+/// Points that are looked at together, without a branch for each.
+const SIDE_BY_SIDE: usize = 128;
 
 /// The pairs of points within a range of each other, and some that are up to 30 % farther apart.
 ///
@@ -45,11 +49,22 @@ impl KeptPairs {
 
     /// Whether no pair can be missing: not where a number is none.
     fn holds(&self, positions_m: &Rows, range_m: f64) -> bool {
-        let free_m = (0.5 * SKIN - ROUNDING) * range_m;
+        let (count, free_m) = (positions_m.nrows(), (0.5 * SKIN - ROUNDING) * range_m);
         self.range_m == range_m
-            && self.searched_m.nrows() == positions_m.nrows()
-            && (0..positions_m.nrows())
-                .all(|i| (row(positions_m, i) - row(&self.searched_m, i)).norm_squared() <= free_m * free_m)
+            && self.searched_m.nrows() == count
+            && (0..count)
+                .step_by(SIDE_BY_SIDE)
+                .all(|first| self.stay_within(free_m, positions_m, first..count.min(first + SIDE_BY_SIDE)))
+    }
+
+    /// Whether these points, at most [`SIDE_BY_SIDE`], are no farther than that from where they were searched.
+    fn stay_within(&self, free_m: f64, positions_m: &Rows, points: Range<usize>) -> bool {
+        let mut squares_m2 = [0.0; SIDE_BY_SIDE];
+        for (now_m, searched_m) in columns(positions_m).into_iter().zip(columns(&self.searched_m)) {
+            let moved_m = now_m[points.clone()].iter().zip(&searched_m[points.clone()]).map(|(now, then)| now - then);
+            squares_m2.iter_mut().zip(moved_m).for_each(|(square, moved)| *square += moved * moved);
+        }
+        squares_m2.iter().fold(true, |all, &square_m2| all & (square_m2 <= free_m * free_m))
     }
 }
 

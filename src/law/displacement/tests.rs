@@ -32,8 +32,10 @@ fn swarms() -> impl Strategy<Value = Swarm> {
     })
 }
 
-fn graphs() -> [Graph; 4] {
-    [Graph::complete(7), Graph::star(7), Graph::ring(7), Graph::path(7)]
+fn graphs() -> [Graph; 5] {
+    let all: Vec<_> = Graph::complete(7).edges().collect();
+    let all_but_one = Graph::from_edges(7, &all[1..]).expect("a simple graph");
+    [Graph::complete(7), Graph::star(7), Graph::ring(7), Graph::path(7), all_but_one]
 }
 
 /// The state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method, with the integral of
@@ -91,6 +93,33 @@ fn the_bound_under_a_push_is_reached_by_the_worst_one() -> Result<(), LawError> 
         assert!((least..=most).contains(&ratio), "w = {gain} zeta v~: {ratio}");
     }
     Ok(())
+}
+
+/// Also where velocities are not damped at all, and beside a pair that is too near.
+#[test]
+fn who_is_not_finite_is_named_wherever_the_number_stands() {
+    let formation = Formation::grid(7, 2.0);
+    for links in graphs() {
+        for a22_per_s in [A22_PER_S, -ZETA_PER_S] {
+            let setting = Setting::new(&links, &formation, DELTA_M, a22_per_s);
+            let mut law = DisplacementLaw::new(&setting, keys()).expect("a law");
+            for (vehicle, axis) in (0..7).flat_map(|vehicle| (0..3).map(move |axis| (vehicle, axis))) {
+                for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                    let mut lost = Swarm::at_rest(formation.slots_m.clone());
+                    lost.positions_m[(vehicle, axis)] = number;
+                    let mut wild = Swarm::at_rest(formation.slots_m.clone());
+                    wild.velocities_m_s[(vehicle, axis)] = number;
+                    let mut touching = wild.clone();
+                    let beside_m = row(&touching.positions_m, 2) + Vector3::new(0.5, 0.0, 0.0);
+                    set_row(&mut touching.positions_m, 5, beside_m);
+                    for swarm in [lost, wild, touching] {
+                        let found = command(&mut law, &Observation::exact(&swarm, &links, &formation));
+                        assert_eq!(found.err(), Some(LawError::NotFinite { vehicle }), "{links:?} {axis} {number}");
+                    }
+                }
+            }
+        }
+    }
 }
 
 proptest! {
