@@ -4,6 +4,7 @@
 //! and on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
 
 mod pinning;
+mod random;
 mod spectrum;
 
 use std::ops::Range;
@@ -123,7 +124,17 @@ impl Graph {
     /// The first vehicle senses all others and is sensed by them; they do not sense each other.
     #[must_use]
     pub fn star(count: usize) -> Self {
-        Self::from_sorted(count, (1..count).map(|j| (0, j)))
+        Self::star_about(count, 0)
+    }
+
+    /// The vehicle `hub` senses all others and is sensed by them; they do not sense each other.
+    ///
+    /// # Panics
+    /// If there are vehicles, and the hub is none of them.
+    #[must_use]
+    pub fn star_about(count: usize, hub: usize) -> Self {
+        assert!(count == 0 || hub < count, "the hub is one of the vehicles");
+        Self::from_sorted(count, (0..hub).map(|i| (i, hub)).chain((hub + 1..count).map(|j| (hub, j))))
     }
 
     /// Each vehicle senses the one before and the one after it, and the last senses the first.

@@ -4,16 +4,17 @@
 //! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
 //! it; [`super::validate`] judges the rest.
 
-use super::document::{Document, GraphKind, PlantKind, PlantTable, StartShape, StartTable};
+use super::chance;
+use super::document::{Document, PlantKind, PlantTable, StartShape, StartTable};
 use super::error::ScenarioError;
+use super::graph::{edge_count, graph};
 use super::legs::{check_slots, legs, listed_slots};
-use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memory, pair_count};
+use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memory};
 use super::reference::ReferenceTable;
 use super::slots::is_flat;
 use super::spec::{PlantSpec, Precision, Scenario, Space};
 use super::start;
-use super::values::{Edge, PerVehicle, Point, rows};
-use crate::graph::{Graph, GraphError};
+use super::values::{PerVehicle, Point, rows};
 use crate::swarm::{Rows, Swarm, set_row};
 use crate::vehicle::Quadrotor;
 use crate::wind::WindSpec;
@@ -22,7 +23,7 @@ use crate::wind::WindSpec;
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
-    check_memory(count, edge_count(&document, count))?;
+    check_memory(count, edge_count(&document.graph.kind, document.law.kind.keeps_edges(), count))?;
     check_lists(&document, count)?;
     let space = space(&document)?;
     let (a22_per_s, of_velocity_per_s) = (document.a22_per_s(), document.velocity_coefficient_per_s());
@@ -142,7 +143,7 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
 
 /// Positions and velocities at time 0.
 fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result<Swarm, ScenarioError> {
-    let mut random = start::random(table.seed);
+    let mut random = chance::random(table.seed);
     let mut positions_m = match (&table.positions_m, &table.shape) {
         (Some(points), None) => rows(points),
         (None, Some(shape)) => start::positions(shape, count, space, delta_m, &mut random)?,
@@ -165,46 +166,6 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
         start::shuffle(&mut swarm, &mut random);
     }
     Ok(swarm)
-}
-
-/// Number of edges, at most, that memory will be taken for, without making them.
-fn edge_count(document: &Document, count: usize) -> u128 {
-    match &document.graph.kind {
-        GraphKind::Complete {} if !document.law.kind.keeps_edges() => 0,
-        GraphKind::Complete {} => pair_count(count),
-        GraphKind::Star {} | GraphKind::Ring {} | GraphKind::Path {} => count as u128,
-        GraphKind::Edges { edges } => edges.len() as u128,
-    }
-}
-
-fn graph(kind: &GraphKind, count: usize) -> Result<Graph, ScenarioError> {
-    match kind {
-        GraphKind::Complete {} => Ok(Graph::complete(count)),
-        GraphKind::Star {} => Ok(Graph::star(count)),
-        GraphKind::Ring {} => Ok(Graph::ring(count)),
-        GraphKind::Path {} => Ok(Graph::path(count)),
-        GraphKind::Edges { edges } => listed_graph(edges, count),
-    }
-}
-
-fn listed_graph(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
-    let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
-    let indices = edges.iter().enumerate().map(|(entry, Edge([a, b]))| {
-        index(*a).zip(index(*b)).ok_or_else(|| {
-            ScenarioError::new(format!("edge {} names vehicle 0", entry + 1))
-                .with_help("vehicles are counted from 1")
-                .at_entry("graph.edges", entry)
-        })
-    });
-    let indices = indices.collect::<Result<Vec<_>, _>>()?;
-    Graph::from_edges(count, &indices).map_err(|error| {
-        let (GraphError::SelfLoop { edge, .. }
-        | GraphError::OutOfRange { edge, .. }
-        | GraphError::Duplicate { edge, .. }) = error;
-        ScenarioError::new(error.to_string())
-            .with_help("list each pair of different vehicles once, in either order")
-            .at_entry("graph.edges", edge)
-    })
 }
 
 fn per_vehicle(numbers: PerVehicle, count: usize) -> Vec<f64> {

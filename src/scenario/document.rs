@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::actuation::ActuationTable;
 use super::failure::Failure;
+use super::graph::GraphTable;
 use super::laws::Laws;
 use super::network::NetworkSpec;
 use super::noise::NoiseTable;
@@ -21,7 +22,7 @@ use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
 use super::shapes::{HelixKeys, SpacingKeys, VKeys};
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
 use super::time_table::TimeTable;
-use super::values::{Edge, PerVehicle, Point};
+use super::values::{LegStart, PerVehicle, Point};
 use super::vehicle_table::VehicleTable;
 use super::wind::WindTable;
 use crate::law::LawSpec;
@@ -209,8 +210,8 @@ pub(super) struct FormationTable {
     #[serde(default, skip_serializing_if = "is_default")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
     pub(super) yaw_deg: f64,
-    /// Then they are moved by this in m.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Then they are moved by this in m. `offset_m` is another name of it.
+    #[serde(alias = "offset_m", default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "Point"))]
     pub(super) move_m: Option<Point>,
     #[cfg_attr(feature = "schema", schemars(flatten))]
@@ -222,9 +223,11 @@ pub(super) struct FormationTable {
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct LegTable {
-    /// Time at which it begins in s, or when the one before it begins if that is later; once that one is reached unless given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) start_s: Option<f64>,
+    /// Time at which it begins in s, or when the one before it begins if that is later; `"reached"`, once that one is reached,
+    /// unless given. `start` is another name of it.
+    #[serde(alias = "start", skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "LegStart"))]
+    pub(super) start_s: Option<LegStart>,
     /// Who flies to which slot, from the slots before.
     #[serde(default, skip_serializing_if = "is_default")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = "given")))]
@@ -237,8 +240,8 @@ pub(super) struct LegTable {
     #[serde(default, skip_serializing_if = "is_default")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
     pub(super) yaw_deg: f64,
-    /// Then they are moved by this in m.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Then they are moved by this in m. `offset_m` is another name of it.
+    #[serde(alias = "offset_m", default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "Point"))]
     pub(super) move_m: Option<Point>,
     #[cfg_attr(feature = "schema", schemars(flatten))]
@@ -271,7 +274,8 @@ pub(super) enum FormationShape {
         /// Side d in m.
         side_m: f64,
     },
-    /// Equal angles on a circle in the plane z = 0.
+    /// Equal angles on a circle in the plane z = 0; `ring` is another name of it.
+    #[serde(alias = "ring")]
     Circle {
         /// Radius in m.
         radius_m: f64,
@@ -307,11 +311,13 @@ pub(super) enum FormationShape {
     /// An SVG drawing, in the plane z = 0.
     #[cfg(feature = "shapes")]
     Svg(SvgKeys),
-    /// The dark or opaque part of a picture, in the plane z = 0.
+    /// The dark or opaque part of a picture, in the plane z = 0; `mask` is another name of it.
     #[cfg(feature = "shapes")]
+    #[serde(alias = "mask")]
     Image(ImageKeys),
-    /// A list of slots in a file.
+    /// A list of slots in a file; `points-file` is another name of it.
     #[cfg(feature = "shapes")]
+    #[serde(alias = "points-file")]
     File(FileKeys),
     /// A list of slots.
     Points {
@@ -320,8 +326,8 @@ pub(super) enum FormationShape {
     },
 }
 
-/// The law that is flown where `[law]` names none.
-pub(super) const DEFAULT_LAW: &str = "edge-tension";
+/// The kinds of tables that name none.
+pub(super) const DEFAULT_KINDS: [(&str, &str); 2] = [("law", "edge-tension"), ("reference", "rest")];
 
 /// The control law and the safety distance.
 #[derive(Debug, Deserialize, Serialize)]
@@ -334,35 +340,6 @@ pub(super) struct LawTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "f64"))]
     pub(super) delta_m: Option<f64>,
-}
-
-/// Which vehicles sense each other.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub(super) struct GraphTable {
-    #[cfg_attr(feature = "schema", schemars(flatten))]
-    pub(super) kind: GraphKind,
-}
-
-/// An undirected, connected graph.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(tag = "kind"))]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) enum GraphKind {
-    /// Every pair.
-    Complete {},
-    /// Vehicle 1 with every other.
-    Star {},
-    /// Each vehicle with the next, and the last with the first.
-    Ring {},
-    /// Each vehicle with the next.
-    Path {},
-    /// A list of pairs.
-    Edges {
-        /// Pairs of vehicles, counted from 1.
-        edges: Vec<Edge>,
-    },
 }
 
 /// The bodies that carry out the commands.
@@ -405,12 +382,6 @@ impl Default for SwarmTable {
             hull_radius_m: PerVehicle::All(DEFAULT_HULL_RADIUS_M),
             a22_per_s: 0.0,
         }
-    }
-}
-
-impl Default for GraphTable {
-    fn default() -> Self {
-        Self { kind: GraphKind::Complete {} }
     }
 }
 

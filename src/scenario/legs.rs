@@ -7,7 +7,7 @@ use super::error::ScenarioError;
 use super::limits::{positive, require_finite};
 use super::slots::formation;
 use super::spec::Scenario;
-use super::values::Point;
+use super::values::{LegStart, Point};
 use crate::formation::{Freedom, most_assigned, optimal_slots};
 use crate::swarm::{Rows, row, set_row};
 use crate::target::{Begins, Leg};
@@ -42,7 +42,7 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
             .as_ref()
             .map_or_else(|| Ok(before.clone()), |shape| formation(shape, count, delta_m))
             .map_err(|error| error.on_leg(number + 1))?;
-        let begins = table.start_s.map_or(Begins::Reached, Begins::At);
+        let begins = table.start_s.map_or(Begins::Reached, LegStart::begins);
         let interchangeable = interchangeable(scenario, number + 1, table.assignment)?;
         let mut leg = placement.place(Leg { formation, begins, interchangeable });
         assign(&mut leg, table.assignment, &before.slots_m, freedom);

@@ -10,6 +10,8 @@ mod actuation;
 mod build;
 #[cfg(feature = "files")]
 pub mod builtin;
+#[cfg(feature = "files")]
+mod chance;
 #[cfg(feature = "shapes")]
 mod columns;
 #[cfg(feature = "files")]
@@ -22,6 +24,8 @@ mod error;
 mod failure;
 #[cfg(feature = "files")]
 mod files;
+#[cfg(feature = "files")]
+mod graph;
 mod imperfections;
 #[cfg(feature = "files")]
 mod laws;
@@ -79,6 +83,8 @@ mod weather;
 mod wind;
 
 pub use actuation::ActuationSpec;
+#[cfg(feature = "reports")]
+pub(crate) use chance::random;
 pub use error::{Field, Place, ScenarioError};
 pub use failure::{Failure, FailureKind};
 pub use limits::{
@@ -98,7 +104,7 @@ pub use sensing::SensingSpec;
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Safety, Scenario, Space};
 #[cfg(feature = "reports")]
-pub(crate) use start::{offset, random, scatter};
+pub(crate) use start::{offset, scatter};
 #[cfg(feature = "files")]
 pub use template::{Draw, NamedLaw, Template};
 pub use time::TimeSpec;

@@ -7,16 +7,17 @@ use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
-    Assignment, Document, FormationShape, FormationTable, GraphKind, GraphTable, LawTable, LegTable, PlantKind,
-    PlantTable, StartTable, SwarmTable,
+    Assignment, Document, FormationShape, FormationTable, LawTable, LegTable, PlantKind, PlantTable, StartTable,
+    SwarmTable,
 };
+use super::graph::{GraphKind, GraphTable};
 use super::laws::Laws;
 use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::safety::SafetyTable;
 use super::spec::{PlantSpec, Scenario, Space};
-use super::values::{Edge, PerVehicle, Point};
+use super::values::{Edge, LegStart, PerVehicle, Point};
 use super::vehicle_table::VehicleTable;
 use super::wind::WindTable;
 use crate::swarm::Rows;
@@ -49,7 +50,7 @@ impl Scenario {
     fn leg_table(&self, leg: &Leg) -> LegTable {
         LegTable {
             start_s: match leg.begins {
-                Begins::At(start_s) => Some(start_s),
+                Begins::At(start_s) => Some(LegStart::At(start_s)),
                 Begins::Reached => None,
             },
             assignment: assignment(leg),

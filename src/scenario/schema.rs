@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::document::{DEFAULT_LAW, Document};
+use super::document::{DEFAULT_KINDS, Document};
 use super::overrides::{ARRIVAL, OLD_ARRIVAL};
 use crate::law::LawSpec;
 
@@ -42,9 +42,11 @@ pub fn schema() -> Value {
     tidy(&mut schema, &bounds.collect());
     schema["properties"][OLD_ARRIVAL] =
         json!({ "$ref": "#/$defs/Arrival", "deprecated": true, "description": "The old name of `arrival`." });
-    for law in schema["$defs"]["LawTable"]["oneOf"].as_array_mut().into_iter().flatten() {
-        if law["properties"]["kind"]["const"] == DEFAULT_LAW {
-            law["required"] = json!([]);
+    for (table, (_, default)) in ["LawTable", "ReferenceTable"].into_iter().zip(DEFAULT_KINDS) {
+        for kind in schema["$defs"][table]["oneOf"].as_array_mut().into_iter().flatten() {
+            if kind["properties"]["kind"]["const"] == default {
+                kind["required"] = json!([]);
+            }
         }
     }
     // The name of `[laws.NAME]` stands for a kind that is not given.

@@ -1,12 +1,9 @@
 //! Start positions from a shape and from random numbers.
-//!
-//! Random numbers are `ChaCha8` words turned into doubles by exact arithmetic, so a seed means the same start on every
-//! machine.
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
+use super::chance::{below, unit};
 use super::document::StartShape;
 use super::error::ScenarioError;
 use super::limits::positive;
@@ -20,11 +17,6 @@ const DEFAULT_SEPARATION: f64 = 1.5;
 
 /// Random positions tried for one vehicle before the square or cube is called full.
 const TRIES: u32 = 1000;
-
-/// The random numbers of a seed.
-pub(crate) fn random(seed: u64) -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed)
-}
 
 /// Positions \[m\] of a shape.
 pub(super) fn positions(
@@ -86,18 +78,6 @@ pub(super) fn shuffle(swarm: &mut Swarm, random: &mut ChaCha8Rng) {
     }
 }
 
-/// A whole number below `end`, each as likely as any other: words that would favour the smaller ones are drawn again.
-#[expect(clippy::cast_possible_truncation, reason = "it is below a number of vehicles")]
-fn below(end: u64, random: &mut ChaCha8Rng) -> usize {
-    let fair = u64::MAX - u64::MAX % end;
-    loop {
-        let word = random.next_u64();
-        if word < fair {
-            return (word % end) as usize;
-        }
-    }
-}
-
 /// Uniform positions, one after the other, each tried again until it keeps its distance from those before it.
 pub(crate) fn scatter(
     count: usize,
@@ -131,10 +111,4 @@ pub(crate) fn offset(half_extent_m: f64, space: Space, random: &mut ChaCha8Rng) 
     let mut along = || half_extent_m * (2.0 * unit(random) - 1.0);
     let (x, y) = (along(), along());
     Vector3::new(x, y, if space == Space::Volume { along() } else { 0.0 })
-}
-
-/// Uniform in \[0, 1), a multiple of 2^-53.
-fn unit(random: &mut ChaCha8Rng) -> f64 {
-    const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
-    (random.next_u64() >> 11) as f64 * SCALE
 }

@@ -11,7 +11,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, map::Map};
 
 use super::deserializer::{CHOICES, KeyError, Unknown, Value};
-use super::document::{DEFAULT_LAW, Document};
+use super::document::{DEFAULT_KINDS, Document};
 use super::error::{Field, Place, ScenarioError};
 use super::overrides::{ARRIVAL, OLD_ARRIVAL, Override};
 #[cfg(feature = "schema")]
@@ -126,7 +126,7 @@ impl<'a> Text<'a> {
         self.tree().ok().and_then(is_it).is_some()
     }
 
-    /// The text as a tree, overrides applied, `[judge]` under its new name, a law without a kind under the default one, one of
+    /// The text as a tree, overrides applied, `[judge]` under its new name, tables without a kind under the default one, one of
     /// `[laws.NAME]` under its name.
     fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
@@ -149,13 +149,15 @@ impl<'a> Text<'a> {
             set.apply(&mut root, base)?;
             base += set.text().len() + 1;
         }
-        if let DeValue::Table(tables) = root.get_mut()
-            && let Some(law) = tables.get_mut("law")
-        {
-            let span = law.span();
-            if let DeValue::Table(keys) = law.get_mut() {
-                let kind = Spanned::new(span.clone(), DeValue::String(DEFAULT_LAW.into()));
-                keys.entry(Spanned::new(span, Cow::from("kind"))).or_insert(kind);
+        for (table, kind) in DEFAULT_KINDS {
+            if let DeValue::Table(tables) = root.get_mut()
+                && let Some(table) = tables.get_mut(table)
+            {
+                let span = table.span();
+                if let DeValue::Table(keys) = table.get_mut() {
+                    let kind = Spanned::new(span.clone(), DeValue::String(kind.into()));
+                    keys.entry(Spanned::new(span, Cow::from("kind"))).or_insert(kind);
+                }
             }
         }
         if let DeValue::Table(tables) = root.get_mut()

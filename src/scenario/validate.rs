@@ -75,6 +75,7 @@ impl Scenario {
 
     fn check_breathing(&self) -> Result<(), ScenarioError> {
         let scale = positive("breathing.scale", "the scale of a breath", self.breathing.scale)?;
+        at_least_zero("breathing.hold_s", "the time for which spread slots are held", self.breathing.hold_s)?;
         if self.breathing.mode == BreathingMode::Start
             && let Ok(law) = self.law()
             && law.settling_rate_per_s().is_none()

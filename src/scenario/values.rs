@@ -8,6 +8,7 @@ use serde::de::{SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::swarm::{Rows, set_row};
+use crate::target::Begins;
 
 /// One number for all vehicles or a list with one for each.
 #[derive(Clone, Debug, Serialize)]
@@ -64,6 +65,67 @@ pub(super) enum Vehicles {
 pub(super) enum All {
     /// All of them.
     All,
+}
+
+/// When a leg begins.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(untagged)]
+pub(super) enum LegStart {
+    /// Once the one before it is reached.
+    When(Reached),
+    /// At this time in s.
+    At(f64),
+}
+
+/// The word `reached`.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Reached {
+    /// Once the one before it is reached.
+    Reached,
+}
+
+impl LegStart {
+    pub(super) fn begins(self) -> Begins {
+        match self {
+            Self::When(Reached::Reached) => Begins::Reached,
+            Self::At(start_s) => Begins::At(start_s),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for LegStart {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct LegStartVisitor;
+
+        impl Visitor<'_> for LegStartVisitor {
+            type Value = LegStart;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a time in s, or \"reached\"")
+            }
+
+            fn visit_f64<E>(self, start_s: f64) -> Result<LegStart, E> {
+                Ok(LegStart::At(start_s))
+            }
+
+            fn visit_i64<E>(self, start_s: i64) -> Result<LegStart, E> {
+                Ok(LegStart::At(start_s as f64))
+            }
+
+            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<LegStart, E> {
+                if word == "reached" {
+                    Ok(LegStart::When(Reached::Reached))
+                } else {
+                    Err(E::invalid_value(serde::de::Unexpected::Str(word), &self))
+                }
+            }
+        }
+
+        deserializer.deserialize_any(LegStartVisitor)
+    }
 }
 
 impl<'de> Deserialize<'de> for Vehicles {

@@ -64,7 +64,7 @@ impl KeptPairs {
             let moved_m = now_m[points.clone()].iter().zip(&searched_m[points.clone()]).map(|(now, then)| now - then);
             squares_m2.iter_mut().zip(moved_m).for_each(|(square, moved)| *square += moved * moved);
         }
-        squares_m2.iter().fold(true, |all, &square_m2| all & (square_m2 <= free_m * free_m))
+        squares_m2.iter().filter(|&&square_m2| square_m2 <= free_m * free_m).count() == SIDE_BY_SIDE
     }
 }
 

@@ -14,12 +14,15 @@ use crate::swarm::{Rows, Swarm, mean_row, row};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum BreathingMode {
-    /// When the swarm is stalled, under a law whose promise is renewed then.
+    /// When the swarm is stalled, under a law whose promise is renewed then; `stalled` is another name of it.
     #[default]
+    #[serde(alias = "stalled")]
     Auto,
-    /// From the start of every leg, and when the swarm is stalled.
+    /// From the start of every leg, and when the swarm is stalled; `always` is another name of it.
+    #[serde(alias = "always")]
     Start,
-    /// Never.
+    /// Never; `never` is another name of it.
+    #[serde(alias = "never")]
     Off,
 }
 
@@ -28,17 +31,26 @@ pub enum BreathingMode {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Breathing {
-    /// When.
+    /// When; `when` is another name of it.
+    #[serde(alias = "when")]
     pub mode: BreathingMode,
     /// By how much the first time, about their centre; each time by one more.
     pub scale: f64,
     /// How often on a leg, at most.
     pub most: u32,
+    /// How long spread slots are held at least in s.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub hold_s: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(hold_s: &f64) -> bool {
+    *hold_s == 0.0
 }
 
 impl Default for Breathing {
     fn default() -> Self {
-        Self { mode: BreathingMode::Auto, scale: 2.0, most: 8 }
+        Self { mode: BreathingMode::Auto, scale: 2.0, most: 8, hold_s: 0.0 }
     }
 }
 
@@ -85,8 +97,8 @@ const CLOSED: f64 = 0.01;
 enum Phase {
     /// Slots are those of the leg; no progress has been made since this time \[s\].
     Flying { idle_since_s: Option<f64> },
-    /// Slots are spread; no progress towards them has been made since this time \[s\].
-    Spread { scale: f64, idle_since_s: Option<f64> },
+    /// Slots are spread since the one time, and no progress towards them has been made since the other \[s\].
+    Spread { scale: f64, since_s: f64, idle_since_s: Option<f64> },
     /// Slots come together since this time \[s\].
     Closing { scale: f64, since_s: f64 },
 }
@@ -180,14 +192,14 @@ impl Breather {
     }
 
     /// Spreads the slots of a leg, once more.
-    fn breathe(&mut self, leg: &Leg, target: &mut CurrentTarget) {
+    fn breathe(&mut self, since_s: f64, leg: &Leg, target: &mut CurrentTarget) {
         if self.breaths >= self.breathing.most {
             return;
         }
         let scale = self.breathing.scale + f64::from(self.breaths);
         self.breaths += 1;
         self.change = Some(Change::Spread { scale });
-        self.phase = Phase::Spread { scale, idle_since_s: None };
+        self.phase = Phase::Spread { scale, since_s, idle_since_s: None };
         target.spread_formation(&leg.formation, scale, self.leader);
     }
 
@@ -214,16 +226,17 @@ impl Breather {
                 self.phase = Phase::Flying { idle_since_s: since_s };
                 let stalled = since_s.is_some_and(|since_s| time_s - since_s >= STALLED_S);
                 if first || (stalled && !self.assign(sensed, leg, target)) {
-                    self.breathe(leg, target);
+                    self.breathe(time_s, leg, target);
                 }
             }
-            Phase::Spread { scale, idle_since_s } => {
+            Phase::Spread { scale, since_s, idle_since_s } => {
                 let slots_m = leg.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m);
-                let since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
-                self.phase = Phase::Spread { scale, idle_since_s: since_s };
+                let idle_since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
+                self.phase = Phase::Spread { scale, since_s, idle_since_s };
                 // Those who come no nearer to spread slots either are not in each other's way.
-                let gives_up = since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S);
-                if errors.max_m < SETTLED * slots_m || gives_up {
+                let gives_up = idle_since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S);
+                let is_held = time_s - since_s >= self.breathing.hold_s;
+                if is_held && (errors.max_m < SETTLED * slots_m || gives_up) {
                     self.phase = Phase::Closing { scale, since_s: time_s };
                 }
             }
@@ -308,6 +321,15 @@ mod tests {
         // Settled at 6 s: from then on 1 + exp(-t/2), until that is 1.01.
         assert!((found[14] - (1.0 + libm::exp(-0.5))).abs() < 1e-15, "{found:?}");
         assert!(found[15..].windows(2).all(|pair| pair[1] <= pair[0]) && found[39] == 1.0);
+    }
+
+    #[test]
+    fn spread_slots_are_held_as_long_as_is_asked_for() {
+        let breathing = Breathing { hold_s: 9.0, ..Breathing::default() };
+        let found = spreads(breathing, |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 60);
+        // Spread at 2 s, settled at 6 s, held to 11 s.
+        assert!(found[4..=22].iter().all(|&spread| spread == 2.0), "{found:?}");
+        assert!((found[23] - (1.0 + libm::exp(-0.25))).abs() < 1e-15, "{found:?}");
     }
 
     #[test]

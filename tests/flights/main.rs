@@ -21,6 +21,7 @@ mod rivals;
 mod safety;
 mod scenario_bytes;
 mod scenario_files;
+mod scenario_keys;
 mod schema;
 mod shapes;
 mod simulation;

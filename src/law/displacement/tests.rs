@@ -235,7 +235,7 @@ fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
 /// rises above its start, as a share of it, where the force is made by `push`.
 fn highest_rise(law: &DisplacementLaw, angle: f64, push: &dyn Fn(Vector3<f64>) -> Vector3<f64>) -> f64 {
     const STEP_S: f64 = 2e-4;
-    let potential = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").1;
+    let potential = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").map_or(0.0, |(_, of_pair)| of_pair);
     let (mut r, mut v) = (Vector3::new(1.2, 0.0, 4.0 * angle.sin()), Vector3::new(-1.0, 0.0, -3.0 * angle.cos()));
     let energy = |r, v: Vector3<f64>| 0.25 * v.norm_squared() + potential(r);
     let (start, mut most) = (energy(r, v), 0.0_f64);
@@ -255,7 +255,8 @@ fn the_push_between_ellipsoids_is_a_gradient_and_with_one_factor_too_few_it_feed
     let metric = Metric::of_ratio(3.0);
     let setting = Setting { metric, ..Setting::new(&links, &formation, DELTA_M, 0.0) };
     let law = DisplacementLaw::new(&setting, keys()).expect("a law");
-    let right = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").0;
+    let right =
+        |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").map_or_else(Vector3::zeros, |(pushed, _)| pushed);
     // S once: -V' S dp/l.
     let wrong = |r: Vector3<f64>| {
         let push = right(r);
@@ -271,7 +272,7 @@ fn the_push_between_ellipsoids_is_a_gradient_and_with_one_factor_too_few_it_feed
         let slope = |axis: usize| {
             let mut by = Vector3::zeros();
             by[axis] = 1e-6;
-            let value = |r| law.push(0, 1, r).expect("clear of delta").1;
+            let value = |r| law.push(0, 1, r).expect("clear of delta").map_or(0.0, |(_, of_pair)| of_pair);
             (value(r + by) - value(r - by)) / 2e-6
         };
         assert!((right(r) + Vector3::new(slope(0), slope(1), slope(2))).norm() < 1e-6);

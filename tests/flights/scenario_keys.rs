@@ -1,0 +1,125 @@
+//! Keys that have two names, keys that may be left out, and graphs from their keys.
+
+use tautline::graph::Graph;
+use tautline::scenario::ScenarioError;
+
+use crate::scenario_files::{RIGHT, read, read_builtin};
+
+const MISSION: &str = r#"name = "mission"
+[start]
+positions_m = [[0, 0], [4, 0.1], [8, 0]]
+[formation]
+shape = "circle"
+radius_m = 3.0
+move_m = [1, 2]
+[law]
+kind = "displacement"
+delta_m = 1.0
+[[leg]]
+shape = "line"
+spacing_m = 3.0
+start_s = 20
+move_m = [0, 5]
+[[leg]]
+yaw_deg = 90
+start_s = "reached"
+[reference]
+kind = "way-points"
+points_m = [[0, 0], [5, 0]]
+times_s = [0, 10]
+[breathing]
+mode = "start"
+hold_s = 3
+[time]
+duration_s = 60.0
+"#;
+
+fn refusal(text: &str) -> ScenarioError {
+    read(text).expect_err("it is wrong")
+}
+
+#[test]
+fn a_key_means_the_same_under_its_other_name() {
+    let resolved = |text: &str| read(text).expect("it is right").resolved_toml();
+    let plain = resolved(MISSION);
+    let others = [
+        ("move_m", "offset_m"),
+        ("start_s", "start"),
+        ("\"circle\"", "\"ring\""),
+        ("\"way-points\"", "\"waypoints\""),
+        ("mode", "when"),
+        ("\"start\"", "\"always\""),
+    ];
+    for (name, other) in others {
+        assert!(MISSION.contains(name));
+        assert_eq!(resolved(&MISSION.replace(name, other)), plain, "{other}");
+    }
+    let all = others.iter().fold(MISSION.to_owned(), |text, (name, other)| text.replace(name, other));
+    assert_eq!(resolved(&all), plain);
+    for (mode, other) in [("auto", "stalled"), ("off", "never")] {
+        let of = |word: &str| resolved(&MISSION.replace("\"start\"", &format!("\"{word}\"")));
+        assert_eq!(of(mode), of(other));
+        assert_ne!(of(mode), plain);
+    }
+    // Another place, another time and another hold are another mission.
+    for (part, other) in [("[0, 5]", "[0, 6]"), ("start_s = 20", "start_s = 21"), ("hold_s = 3", "hold_s = 4")] {
+        assert_ne!(resolved(&MISSION.replace(part, other)), plain, "{other}");
+    }
+}
+
+#[test]
+fn both_names_of_a_key_at_once_and_other_words_are_refused() {
+    let both = refusal(&MISSION.replace("move_m = [0, 5]", "move_m = [0, 5]\noffset_m = [0, 5]"));
+    assert!(both.to_string().contains("duplicate"), "{both}");
+    let soon = refusal(&MISSION.replace("\"reached\"", "\"soon\""));
+    assert!(soon.to_string().contains("expected a time in s, or \"reached\""), "{soon}");
+    assert_eq!(soon.place().map(|place| (place.line, place.column)), Some((18, 11)));
+    let hold = refusal(&MISSION.replace("hold_s = 3", "hold_s = -3"));
+    assert!(hold.to_string().contains("spread slots are held is -3"), "{hold}");
+    assert_eq!(hold.place().map(|place| (place.line, place.column)), Some((25, 10)));
+}
+
+#[test]
+fn a_reference_without_a_kind_is_at_rest() {
+    let resting = |keys: &str| read(&format!("{RIGHT}[reference]\n{keys}").replace("edge-tension", "displacement"));
+    let (named, bare) = (resting("kind = \"rest\"\nleader = 2\n"), resting("leader = 2\n"));
+    let resolved = named.expect("right").resolved_toml();
+    assert!(resolved.contains("leader = 2"));
+    assert_eq!(bare.expect("right").resolved_toml(), resolved);
+    let moving = resting("velocity_m_s = [1, 0]\n").expect_err("one at rest has no velocity");
+    assert!(moving.to_string().contains("unknown key `velocity_m_s`"), "{moving}");
+}
+
+#[test]
+fn a_star_has_the_hub_that_it_is_given() {
+    let graph = |sets: &[&str]| read_builtin("pentagon", sets).map(|scenario| scenario.graph);
+    assert_eq!(graph(&["graph.kind=star"]).expect("right"), Graph::star(5));
+    let third = Graph::from_edges(5, &[(2, 0), (2, 1), (2, 3), (2, 4)]).expect("a graph");
+    assert_eq!(graph(&["graph={kind=\"star\", hub=3}"]).expect("right"), third);
+    assert_eq!(Graph::star_about(5, 4), Graph::from_edges(5, &[(4, 0), (4, 1), (4, 2), (4, 3)]).expect("a graph"));
+    for hub in [0, 6] {
+        let wrong = graph(&[&format!("graph={{kind=\"star\", hub={hub}}}")]).expect_err("no such vehicle");
+        assert!(wrong.to_string().contains(&format!("there is no vehicle {hub}")), "{wrong}");
+        assert_eq!(wrong.place().map(|place| place.column), Some(25));
+    }
+}
+
+#[test]
+fn a_random_graph_is_connected_drawn_from_its_seed_and_as_dense_as_is_asked_for() {
+    let graph = |keys: &str| {
+        let set = format!("graph={{kind=\"random\"{keys}}}");
+        read_builtin("thousand", &["law.kind=displacement", &set]).map(|scenario| scenario.graph)
+    };
+    let plain = graph("").expect("right");
+    assert_eq!((plain.edge_count(), plain.is_connected()), (2000, true));
+    assert_eq!(graph(", degree=4, seed=0").expect("right"), plain);
+    assert_ne!(graph(", seed=1").expect("right"), plain);
+    assert_eq!(graph(", degree=2").expect("right").edge_count(), 1000);
+    assert!(graph(", degree=999").expect("right").is_complete());
+    let few = read(&format!("{RIGHT}[graph]\nkind = \"random\"\n")).expect("right").graph;
+    assert!(few.is_complete(), "two vehicles are each other's only link");
+    for degree in [0, 1, 1000, u64::MAX / 2] {
+        let wrong = graph(&format!(", degree={degree}")).expect_err("no such graph");
+        assert!(wrong.to_string().contains(&format!("{degree} links of each of 1000 vehicles")), "{wrong}");
+    }
+}
