@@ -225,7 +225,7 @@ pub(super) struct FormationTable {
 pub(super) struct LegTable {
     /// Time at which it begins in s, or when the one before it begins if that is later; `"reached"`, once that one is reached,
     /// unless given. `start` is another name of it.
-    #[serde(alias = "start", skip_serializing_if = "Option::is_none")]
+    #[serde(alias = "start", default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "LegStart"))]
     pub(super) start_s: Option<LegStart>,
     /// Who flies to which slot, from the slots before.

@@ -40,6 +40,7 @@ pub struct Breathing {
     pub most: u32,
     /// How long spread slots are held at least in s.
     #[serde(skip_serializing_if = "is_zero")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
     pub hold_s: f64,
 }
 
@@ -108,7 +109,7 @@ enum Phase {
 /// Stalled is a swarm whose vehicles are more than twice the limit of arrival from their slots and for 2 s move slower, root
 /// mean square, than 0.2 of the law's rate times their root mean square error. Slots are then scaled about their centre, or
 /// about a leader's slot, held until every vehicle is within a quarter of the smallest slot distance of its own or no progress
-/// is made for 10 s, and come together with an e-folding time of 2 s.
+/// is made for 10 s, but at least for `hold_s`, and come together with an e-folding time of 2 s.
 ///
 /// Where vehicles are interchangeable, they are first given the slots with the shortest ways from where they are; slots are
 /// spread where they have them already, or have been given others `most` times on the leg.
