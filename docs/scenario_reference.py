@@ -163,6 +163,7 @@ class Reference:
         for one in table.get("anyOf", []):
             options = options or one.get("oneOf", [])
         options = options or table.get("anyOf", [])
+        options = [one for one in options if not one.get("deprecated")]
         return options if options and all("properties" in one for one in options) else []
 
     def same(self, name: str, variants: list[Schema]) -> bool:
@@ -174,7 +175,7 @@ class Reference:
         return next(name for name, key in variant["properties"].items() if "const" in key)
 
     def words(self, kind: Schema) -> list[Schema]:
-        options = kind.get("oneOf", [])
+        options = [one for one in kind.get("oneOf", []) if not one.get("deprecated")]
         return options if all("const" in one for one in options) else []
 
     def is_table(self, key: Schema) -> bool:

@@ -1,28 +1,58 @@
 //! Graphs that are drawn at random, and connected whatever is drawn.
 
-use std::collections::BTreeSet;
-
 use super::{Graph, pair_count};
 
 impl Graph {
     /// A connected graph with so many edges: a tree in which each vehicle is joined to one before it, and pairs that are drawn
     /// until there are enough, each as likely as any other. At least the tree's N - 1 edges, at most every pair.
     ///
-    /// `below(n)` draws a whole number below n.
+    /// `below(n)` draws a whole number below n. What is drawn takes 8 bytes for each edge, or for each pair that is no edge
+    /// where these are fewer.
     #[must_use]
     pub fn random(count: usize, edge_count: usize, mut below: impl FnMut(usize) -> usize) -> Self {
-        if edge_count >= pair_count(count) {
+        let pairs = pair_count(count);
+        if edge_count >= pairs {
             return Self::complete(count);
         }
-        let mut edges: BTreeSet<_> = (1..count).map(|later| (below(later), later)).collect();
-        while edges.len() < edge_count {
-            let (a, b) = (below(count), below(count));
-            if a != b {
-                edges.insert((a.min(b), a.max(b)));
-            }
+        // Of each later vehicle the one before it that it is joined to.
+        let tree: Vec<usize> = (1..count).map(&mut below).collect();
+        let is_of_tree = |(i, j): (usize, usize)| tree[j - 1] == i;
+        let (beside, absent) = (edge_count.saturating_sub(tree.len()), pairs - edge_count.max(tree.len()));
+        let drawn = draw(count, beside.min(absent), &mut below, is_of_tree);
+        let is_drawn = |pair: (usize, usize)| drawn.binary_search(&code(count, pair)).is_ok();
+        if beside <= absent {
+            let mut edges = drawn;
+            edges.extend(tree.iter().enumerate().map(|(before, &i)| code(count, (i, before + 1))));
+            edges.sort_unstable();
+            return Self::from_sorted(count, edges.into_iter().map(|code| (code / count, code % count)));
         }
-        Self::from_sorted(count, edges.into_iter())
+        let all = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+        Self::from_sorted(count, all.filter(|&pair| !is_drawn(pair)))
     }
+}
+
+/// A pair as one number, in row order.
+fn code(count: usize, (i, j): (usize, usize)) -> usize {
+    i * count + j
+}
+
+/// So many different pairs, in row order, none of them left out.
+fn draw(
+    count: usize,
+    pairs: usize,
+    mut below: impl FnMut(usize) -> usize,
+    is_left_out: impl Fn((usize, usize)) -> bool,
+) -> Vec<usize> {
+    let mut drawn = Vec::with_capacity(pairs);
+    // At most about half of the pairs are ever drawn, so each round leaves half as many to draw, or fewer.
+    while drawn.len() < pairs {
+        let missing = pairs - drawn.len();
+        let some = (0..missing).map(|_| (below(count), below(count))).map(|(a, b)| (a.min(b), a.max(b)));
+        drawn.extend(some.filter(|&(a, b)| a != b && !is_left_out((a, b))).map(|pair| code(count, pair)));
+        drawn.sort_unstable();
+        drawn.dedup();
+    }
+    drawn
 }
 
 #[cfg(test)]
@@ -41,7 +71,10 @@ mod tests {
     #[test]
     fn a_random_graph_is_connected_and_has_the_edges_that_are_asked_for() {
         for count in [1, 2, 3, 7, 40] {
-            for edges in [0, count - 1, count, 2 * count, pair_count(count) - usize::from(count > 3), usize::MAX] {
+            let all = pair_count(count);
+            for edges in
+                [0, count - 1, count, 2 * count, all / 2, all - all / 3, all - usize::from(count > 3), usize::MAX]
+            {
                 let graph = Graph::random(count, edges, numbers(count as u64));
                 assert!(graph.is_connected(), "{count} {edges}");
                 assert_eq!(
@@ -57,21 +90,34 @@ mod tests {
 
     #[test]
     fn extra_edges_join_any_two_alike() {
-        // Beyond the tree: how often each of the pairs of 6 vehicles is joined in 2,000 graphs of 8 edges.
-        let (mut below, mut joined) = (numbers(3), [0; 36]);
-        for _ in 0..2000 {
-            let graph = Graph::random(6, 8, &mut below);
-            graph.edges().for_each(|(i, j)| joined[6 * i + j] += 1);
+        // How often each of the pairs of 6 vehicles is joined in 2,000 graphs of 8 edges, which are drawn, and of 12, of which
+        // those that are missing are drawn.
+        for edges in [8, 12] {
+            let (mut below, mut joined) = (numbers(3), [0; 36]);
+            for _ in 0..2000 {
+                Graph::random(6, edges, &mut below).edges().for_each(|(i, j)| joined[6 * i + j] += 1);
+            }
+            // 0-1 is always in the tree; each other pair is in it with the chance 1/later, and drawn otherwise.
+            assert_eq!(joined[1], 2000);
+            for later in 2..6 {
+                let of_later = (0..later).map(|i| joined[6 * i + later]);
+                let (least, most) = (of_later.clone().min(), of_later.max());
+                let is_even = most.zip(least).is_some_and(|(most, least)| most - least < 200 && least > 500);
+                assert!(is_even, "{edges} edges, {later}: {least:?} to {most:?}");
+            }
         }
-        // 0-1 is always in the tree; each other pair is in it with the chance 1/later, and drawn otherwise.
-        assert_eq!(joined[1], 2000);
-        let others: Vec<_> =
-            (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j))).filter(|&pair| pair != (0, 1)).collect();
-        for later in 2..6 {
-            let of_later: Vec<_> =
-                others.iter().filter(|pair| pair.1 == later).map(|&(i, j)| joined[6 * i + j]).collect();
-            let (least, most) = (of_later.iter().min().copied(), of_later.iter().max().copied());
-            assert!(most.zip(least).is_some_and(|(most, least)| most - least < 200), "{later}: {of_later:?}");
-        }
+    }
+
+    #[test]
+    fn a_graph_that_lacks_few_pairs_is_drawn_by_them() {
+        let drawn = std::cell::Cell::new(0);
+        let mut numbers = numbers(5);
+        let counted = |end: usize| {
+            drawn.set(drawn.get() + 1);
+            numbers(end)
+        };
+        let graph = Graph::random(300, pair_count(300) - 10, counted);
+        assert_eq!(graph.edge_count(), pair_count(300) - 10);
+        assert!(graph.is_connected() && drawn.get() < 400, "{} numbers", drawn.get());
     }
 }

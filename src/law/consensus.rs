@@ -101,10 +101,11 @@ pub(super) fn check_observation(count: usize, at: &Observation<'_>, command: &Ro
     check_tables(count, at, command)
 }
 
-/// Whether an observation is of `count` vehicles, what they hold of others finite, and the table of accelerations of as many.
+/// Whether an observation is of `count` vehicles, finite unless all share one state, and the table of accelerations of as many.
 pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
     check_rows(count, at.own)?;
     if let Others::Held(held) = at.others {
+        check_state(count, at.own)?;
         if !held.is_of(count) {
             return Err(LawError::Pictures { count });
         }

@@ -320,7 +320,7 @@ impl Law for DisplacementLaw {
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         let count = self.pulls.graph.count();
         check_tables(count, at, command)?;
-        // No state that is not finite has a finite command: who is to blame is looked for where there is none.
+        // No shared state that is not finite has a finite command: who is to blame is looked for where there is none.
         self.try_command(at, command).map_err(|fault| check_state(count, at.own).err().unwrap_or(fault))
     }
 

@@ -210,8 +210,8 @@ pub(super) struct FormationTable {
     #[serde(default, skip_serializing_if = "is_default")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
     pub(super) yaw_deg: f64,
-    /// Then they are moved by this in m. `offset_m` is another name of it.
-    #[serde(alias = "offset_m", default, skip_serializing_if = "Option::is_none")]
+    /// Then they are moved by this in m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "Point"))]
     pub(super) move_m: Option<Point>,
     #[cfg_attr(feature = "schema", schemars(flatten))]
@@ -224,8 +224,8 @@ pub(super) struct FormationTable {
 #[serde(deny_unknown_fields)]
 pub(super) struct LegTable {
     /// Time at which it begins in s, or when the one before it begins if that is later; `"reached"`, once that one is reached,
-    /// unless given. `start` is another name of it.
-    #[serde(alias = "start", default, skip_serializing_if = "Option::is_none")]
+    /// unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "LegStart"))]
     pub(super) start_s: Option<LegStart>,
     /// Who flies to which slot, from the slots before.
@@ -240,8 +240,8 @@ pub(super) struct LegTable {
     #[serde(default, skip_serializing_if = "is_default")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
     pub(super) yaw_deg: f64,
-    /// Then they are moved by this in m. `offset_m` is another name of it.
-    #[serde(alias = "offset_m", default, skip_serializing_if = "Option::is_none")]
+    /// Then they are moved by this in m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "Point"))]
     pub(super) move_m: Option<Point>,
     #[cfg_attr(feature = "schema", schemars(flatten))]
@@ -274,7 +274,7 @@ pub(super) enum FormationShape {
         /// Side d in m.
         side_m: f64,
     },
-    /// Equal angles on a circle in the plane z = 0; `ring` is another name of it.
+    /// Equal angles on a circle in the plane z = 0.
     #[serde(alias = "ring")]
     Circle {
         /// Radius in m.
@@ -311,11 +311,11 @@ pub(super) enum FormationShape {
     /// An SVG drawing, in the plane z = 0.
     #[cfg(feature = "shapes")]
     Svg(SvgKeys),
-    /// The dark or opaque part of a picture, in the plane z = 0; `mask` is another name of it.
+    /// The dark or opaque part of a picture, in the plane z = 0.
     #[cfg(feature = "shapes")]
     #[serde(alias = "mask")]
     Image(ImageKeys),
-    /// A list of slots in a file; `points-file` is another name of it.
+    /// A list of slots in a file.
     #[cfg(feature = "shapes")]
     #[serde(alias = "points-file")]
     File(FileKeys),

@@ -42,10 +42,11 @@ pub(super) enum GraphKind {
     Path {},
     /// A random tree, and as many random pairs more as it takes.
     Random {
-        /// Links of a vehicle in the mean; 4 unless given, or as many as there are others.
-        #[cfg_attr(feature = "schema", schemars(range(min = 2)))]
+        /// Links of a vehicle in the mean, but at least those of a tree; 4 unless given, or as many as there are others.
+        #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
         degree: Option<u64>,
-        /// Seed of the random numbers (`ChaCha8`, the same on every machine).
+        /// Seed of the random numbers (`ChaCha8`, the same on every machine). Every run of a campaign has the same graph unless
+        /// its `[vary]` says `"graph.seed" = "run"`.
         #[serde(default)]
         #[cfg_attr(feature = "schema", schemars(extend("default" = 0)))]
         seed: u64,
@@ -67,14 +68,15 @@ fn first() -> u64 {
     1
 }
 
-/// Number of edges, at most, that memory will be taken for, without making them.
+/// Number of edges, at most, that memory will be taken for, without making them; what a random graph is drawn in counts as so
+/// many again.
 pub(super) fn edge_count(kind: &GraphKind, law_keeps_edges: bool, count: usize) -> u128 {
     match kind {
         GraphKind::Complete {} if !law_keeps_edges => 0,
         GraphKind::Complete {} => pair_count(count),
         GraphKind::Star { .. } | GraphKind::Ring {} | GraphKind::Path {} => count as u128,
         GraphKind::Random { degree, .. } => {
-            random_edge_count(degree.unwrap_or(DEFAULT_DEGREE), count).min(pair_count(count))
+            2 * random_edge_count(degree.unwrap_or(DEFAULT_DEGREE), count).min(pair_count(count))
         }
         GraphKind::Edges { edges } => edges.len() as u128,
     }
@@ -87,7 +89,7 @@ pub(super) fn graph(kind: &GraphKind, count: usize) -> Result<Graph, ScenarioErr
         GraphKind::Star { hub } => star(hub, count),
         GraphKind::Ring {} => Ok(Graph::ring(count)),
         GraphKind::Path {} => Ok(Graph::path(count)),
-        GraphKind::Random { degree, seed } => random(degree, seed, count),
+        GraphKind::Random { degree, seed } => drawn(degree, seed, count),
         GraphKind::Edges { ref edges } => listed(edges, count),
     }
 }
@@ -109,14 +111,14 @@ fn star(hub: u64, count: usize) -> Result<Graph, ScenarioError> {
     })
 }
 
-fn random(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, ScenarioError> {
-    let most = count.saturating_sub(1).max(2) as u64;
+fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, ScenarioError> {
+    let most = count.saturating_sub(1).max(1) as u64;
     let degree = degree.unwrap_or(DEFAULT_DEGREE.min(most));
-    if !(2..=most).contains(&degree) {
-        return Err(ScenarioError::new(format!("{degree} links of each of {count} vehicles in the mean"))
-            .with_help(format!("a connected graph needs about 2, and there are no more than {most} others"))
-            .at("graph.degree")
-            .at("graph.kind"));
+    if !(1..=most).contains(&degree) {
+        let others = if most == 1 { "1 other".to_owned() } else { format!("{most} others") };
+        return Err(ScenarioError::new(format!("{degree} links of a vehicle in the mean, where each has {others}"))
+            .with_help(format!("it is from 1 to {most}; a graph has at least the links of a tree, about 2 in the mean"))
+            .at("graph.degree"));
     }
     let edges = usize::try_from(random_edge_count(degree, count)).unwrap_or(usize::MAX);
     let mut numbers = chance::random(seed);

@@ -6,6 +6,7 @@
 //! holds the embedded scenarios.
 
 mod actuation;
+mod breathing;
 #[cfg(feature = "files")]
 mod build;
 #[cfg(feature = "files")]

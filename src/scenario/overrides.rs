@@ -15,6 +15,21 @@ const SOURCE: &str = "--set";
 pub(super) const ARRIVAL: &str = "arrival";
 pub(super) const OLD_ARRIVAL: &str = "judge";
 
+/// Tables, other names of their keys, and the names that these are read under; tables of the file itself first.
+pub(super) const OTHER_NAMES: [(Option<&str>, &str, &str); 5] = [
+    (None, OLD_ARRIVAL, ARRIVAL),
+    (Some("formation"), "offset_m", "move_m"),
+    (Some("leg"), "offset_m", "move_m"),
+    (Some("leg"), "start", "start_s"),
+    (Some("breathing"), "when", "mode"),
+];
+
+/// The name that a key is read under, of the file itself or of a table of it.
+fn name_of<'a>(table: Option<&str>, key: &'a str) -> &'a str {
+    let found = OTHER_NAMES.iter().find(|(of, other, _)| *of == table && *other == key);
+    found.map_or(key, |&(_, _, name)| name)
+}
+
 /// One key of the scenario set to another value, whatever the file says.
 ///
 /// The path is dotted: `law.delta_m=1.5`. Keys and tables that the file does not have are made:
@@ -93,10 +108,16 @@ impl Override {
     pub(super) fn apply<'a>(&'a self, root: &mut Spanned<DeValue<'a>>, base: usize) -> Result<(), ScenarioError> {
         let value = self.value().map_err(|error| self.refuse(&self.value, error.message()))?;
         let mut target = root;
+        let table = name_of(None, &self.text[self.path[0].clone()]);
+        // The entries of a list of tables are tables, whose keys are one deeper.
+        let depth_of_keys =
+            if target.get_ref().get(table).is_some_and(|table| table.get_ref().is_array()) { 2 } else { 1 };
         for (depth, part) in self.path.iter().enumerate() {
-            let name = match &self.text[part.clone()] {
-                OLD_ARRIVAL if depth == 0 => ARRIVAL,
-                name => name,
+            let written = &self.text[part.clone()];
+            let name = match depth {
+                0 => table,
+                _ if depth == depth_of_keys => name_of(Some(table), written),
+                _ => written,
             };
             target = match target.get_mut() {
                 DeValue::Table(table) => {

@@ -73,7 +73,7 @@ pub(super) enum ReferenceKind {
         /// Time of one turn in s; below zero clockwise.
         period_s: f64,
     },
-    /// From rest to rest between points along straight lines; `waypoints` is another name of it.
+    /// From rest to rest between points along straight lines.
     #[serde(alias = "waypoints")]
     WayPoints {
         /// The points in m.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::document::{DEFAULT_KINDS, Document};
-use super::overrides::{ARRIVAL, OLD_ARRIVAL};
+use super::overrides::OTHER_NAMES;
 use crate::law::LawSpec;
 
 /// Keys, of any table, whose number is positive.
@@ -32,6 +32,20 @@ const POSITIVE: [&str; 18] = [
 /// Keys, of any table, whose number is 0 or positive.
 const FROM_ZERO: [&str; 3] = ["hold_s", "jitter_m", "margin_m"];
 
+/// Definitions, the key of theirs that holds a choice, choices and other names of these.
+const OTHER_CHOICES: [(&str, &str, &str, &str); 10] = [
+    ("FormationTable", "shape", "circle", "ring"),
+    ("FormationTable", "shape", "image", "mask"),
+    ("FormationTable", "shape", "file", "points-file"),
+    ("LegTable", "shape", "circle", "ring"),
+    ("LegTable", "shape", "image", "mask"),
+    ("LegTable", "shape", "file", "points-file"),
+    ("ReferenceTable", "kind", "way-points", "waypoints"),
+    ("BreathingMode", "", "auto", "stalled"),
+    ("BreathingMode", "", "start", "always"),
+    ("BreathingMode", "", "off", "never"),
+];
+
 /// The JSON Schema of the scenario file, with descriptions, units, bounds and defaults.
 #[must_use]
 pub fn schema() -> Value {
@@ -40,8 +54,18 @@ pub fn schema() -> Value {
     let gains = gains.map(|gain| (gain.key.trim_start_matches("law."), gain.may_be_zero));
     let bounds = POSITIVE.map(|key| (key, false)).into_iter().chain(FROM_ZERO.map(|key| (key, true))).chain(gains);
     tidy(&mut schema, &bounds.collect());
-    schema["properties"][OLD_ARRIVAL] =
-        json!({ "$ref": "#/$defs/Arrival", "deprecated": true, "description": "The old name of `arrival`." });
+    for (table, other, name) in OTHER_NAMES {
+        let of = match table {
+            None => &mut schema,
+            Some("formation") => &mut schema["$defs"]["FormationTable"],
+            Some("leg") => &mut schema["$defs"]["LegTable"],
+            Some(_) => &mut schema["$defs"]["Breathing"],
+        };
+        add_name(of, name, other);
+    }
+    for (definition, tag, name, other) in OTHER_CHOICES {
+        add_choice(&mut schema["$defs"][definition], tag, name, other);
+    }
     for (table, (_, default)) in ["LawTable", "ReferenceTable"].into_iter().zip(DEFAULT_KINDS) {
         for kind in schema["$defs"][table]["oneOf"].as_array_mut().into_iter().flatten() {
             if kind["properties"]["kind"]["const"] == default {
@@ -56,8 +80,41 @@ pub fn schema() -> Value {
         kinds.as_array_mut().into_iter().flatten().for_each(|kind| kind["required"] = json!([]));
         law.insert("anyOf".to_owned(), kinds);
     }
-    schema["not"] = json!({ "required": [ARRIVAL, OLD_ARRIVAL] });
     schema
+}
+
+/// Another name of a key, which is not given beside it.
+fn add_name(table: &mut Value, name: &str, other: &str) {
+    let Some(mut key) = table["properties"].get(name).cloned() else { return };
+    key["deprecated"] = true.into();
+    key["description"] = format!("Another name of `{name}`.").into();
+    table["properties"][other] = key;
+    let both = json!({ "required": [name, other] });
+    match table.pointer_mut("/not/anyOf").and_then(Value::as_array_mut) {
+        Some(refused) => refused.push(both),
+        None => table["not"] = json!({ "anyOf": [both] }),
+    }
+}
+
+/// Another name of a choice: a choice like it.
+fn add_choice(value: &mut Value, tag: &str, name: &str, other: &str) {
+    for alternative in value.get_mut("anyOf").and_then(Value::as_array_mut).into_iter().flatten() {
+        add_choice(alternative, tag, name, other);
+    }
+    let Some(choices) = value.get_mut("oneOf").and_then(Value::as_array_mut) else { return };
+    let word = if tag.is_empty() { "/const".to_owned() } else { format!("/properties/{tag}/const") };
+    let is_it = |choice: &&mut Value| choice.pointer(&word).is_some_and(|word| word == name);
+    let Some(choice) = choices.iter_mut().find(is_it) else { return };
+    let mut another = choice.clone();
+    if let Some(Value::String(description)) = choice.get_mut("description") {
+        *description = format!("{description} `{other}` is another name of it.");
+    }
+    if let Some(word) = another.pointer_mut(&word) {
+        *word = other.into();
+    }
+    another["deprecated"] = true.into();
+    another["description"] = format!("Another name of `{name}`.").into();
+    choices.push(another);
 }
 
 /// TOML has no null: a key that may be left out has the type that it has when it is there. The defaults of a table stand
@@ -118,11 +175,11 @@ pub(super) fn tables_with(key: &str) -> Vec<String> {
 
 /// Adds the places of a key in a table, or in one of its choices.
 fn collect(definition: &Value, key: &str, table: &str, found: &mut Vec<String>) {
-    if definition["properties"].get(key).is_some() {
+    if definition["properties"].get(key).is_some_and(|key| key["deprecated"] != true) {
         found.push(format!("[{table}]{}", chosen(&definition["properties"])));
     }
     let alternatives = ["oneOf", "anyOf"].iter().filter_map(|of| definition[of].as_array()).flatten();
-    for alternative in alternatives {
+    for alternative in alternatives.filter(|alternative| alternative["deprecated"] != true) {
         collect(alternative, key, table, found);
     }
 }

@@ -13,7 +13,7 @@ use toml::{Spanned, map::Map};
 use super::deserializer::{CHOICES, KeyError, Unknown, Value};
 use super::document::{DEFAULT_KINDS, Document};
 use super::error::{Field, Place, ScenarioError};
-use super::overrides::{ARRIVAL, OLD_ARRIVAL, Override};
+use super::overrides::{OTHER_NAMES, Override};
 #[cfg(feature = "schema")]
 use super::schema::tables_with;
 use super::suggest::suggest;
@@ -126,7 +126,7 @@ impl<'a> Text<'a> {
         self.tree().ok().and_then(is_it).is_some()
     }
 
-    /// The text as a tree, overrides applied, `[judge]` under its new name, tables without a kind under the default one, one of
+    /// The text as a tree, overrides applied, keys under one name each, tables without a kind under the default one, one of
     /// `[laws.NAME]` under its name.
     fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
@@ -134,21 +134,15 @@ impl<'a> Text<'a> {
                 .with_help("a scenario is `key = value` lines below `[table]` headers")
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
-        let mut tables = parsed.into_inner();
-        if let Some((old, table)) = tables.remove_entry(OLD_ARRIVAL) {
-            if tables.contains_key(ARRIVAL) {
-                return Err(ScenarioError::new("both [arrival] and [judge] are given")
-                    .with_help("[judge] is the old name of [arrival]: keep one of them")
-                    .with_place(self.locate(old.span())));
-            }
-            tables.insert(Spanned::new(old.span(), ARRIVAL.into()), table);
-        }
-        let mut root = Spanned::new(0..0, DeValue::Table(tables));
+        let mut root = Spanned::new(0..0, DeValue::Table(parsed.into_inner()));
+        self.name_keys(&mut root)?;
         let mut base = self.toml.len() + 1;
         for set in self.overrides {
             set.apply(&mut root, base)?;
             base += set.text().len() + 1;
         }
+        // Tables that an override gives whole have other names too.
+        self.name_keys(&mut root)?;
         for (table, kind) in DEFAULT_KINDS {
             if let DeValue::Table(tables) = root.get_mut()
                 && let Some(table) = tables.get_mut(table)
@@ -171,6 +165,35 @@ impl<'a> Text<'a> {
             }
         }
         Ok(root)
+    }
+
+    /// Puts keys that have another name under the one that they are read under.
+    fn name_keys(&self, root: &mut Spanned<DeValue<'a>>) -> Result<(), ScenarioError> {
+        for (table, other, name) in OTHER_NAMES {
+            let Some(tables) = keys_of(root) else { continue };
+            let places = match table {
+                None => vec![tables],
+                Some(table) => match tables.get_mut(table).map(Spanned::get_mut) {
+                    Some(DeValue::Table(keys)) => vec![keys],
+                    Some(DeValue::Array(list)) => list.iter_mut().filter_map(keys_of).collect(),
+                    _ => Vec::new(),
+                },
+            };
+            for keys in places {
+                let Some((key, value)) = keys.remove_entry(other) else { continue };
+                if keys.contains_key(name) {
+                    let [name, other] = [name, other].map(|key| match table {
+                        None => format!("[{key}]"),
+                        Some(_) => format!("`{key}`"),
+                    });
+                    return Err(ScenarioError::new(format!("both {name} and {other} are given"))
+                        .with_help(format!("{other} is another name of {name}: keep one of them"))
+                        .with_place(self.locate(key.span())));
+                }
+                keys.insert(Spanned::new(key.span(), name.into()), value);
+            }
+        }
+        Ok(())
     }
 
     /// The place of a span of the common address space.
@@ -222,6 +245,14 @@ impl<'a> Text<'a> {
 /// The tables `[laws.NAME]`.
 fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
     root.get_ref().get("laws")?.get_ref().as_table()
+}
+
+/// The keys and values of a table.
+fn keys_of<'t, 'a>(value: &'t mut Spanned<DeValue<'a>>) -> Option<&'t mut DeTable<'a>> {
+    match value.get_mut() {
+        DeValue::Table(keys) => Some(keys),
+        _ => None,
+    }
 }
 
 /// Takes a key out of a table.

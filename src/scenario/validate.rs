@@ -11,7 +11,7 @@ use super::time::TimeSpec;
 use crate::graph::{Graph, Pinning};
 use crate::law::{Controls, Gain, LawSpec, ParameterError};
 use crate::swarm::{Pair, row};
-use crate::target::{Begins, BreathingMode, Guidance, Leg};
+use crate::target::{Begins, Guidance, Leg};
 
 /// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
 const LEADER_ROUNDING: f64 = 1e-9;
@@ -71,26 +71,6 @@ impl Scenario {
         Err(ScenarioError::new(format!("a seed of {}, which a scenario file cannot hold", self.noise_seed))
             .with_help(format!("it is at most {}", i64::MAX))
             .at("noise.seed"))
-    }
-
-    fn check_breathing(&self) -> Result<(), ScenarioError> {
-        let scale = positive("breathing.scale", "the scale of a breath", self.breathing.scale)?;
-        at_least_zero("breathing.hold_s", "the time for which spread slots are held", self.breathing.hold_s)?;
-        if self.breathing.mode == BreathingMode::Start
-            && let Ok(law) = self.law()
-            && law.settling_rate_per_s().is_none()
-        {
-            return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
-                .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
-                .at("breathing.mode")
-                .at("law.kind"));
-        }
-        if scale >= 1.0 {
-            return Ok(());
-        }
-        Err(ScenarioError::new(format!("a breath scales slots by {scale}, which brings them nearer to each other"))
-            .with_help("it must be at least 1; the default is 2")
-            .at("breathing.scale"))
     }
 
     fn check_arrival(&self) -> Result<(), ScenarioError> {

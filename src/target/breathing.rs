@@ -14,14 +14,14 @@ use crate::swarm::{Rows, Swarm, mean_row, row};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum BreathingMode {
-    /// When the swarm is stalled, under a law whose promise is renewed then; `stalled` is another name of it.
+    /// When the swarm is stalled, under a law whose promise is renewed then.
     #[default]
     #[serde(alias = "stalled")]
     Auto,
-    /// From the start of every leg, and when the swarm is stalled; `always` is another name of it.
+    /// From the start of every leg, and when the swarm is stalled.
     #[serde(alias = "always")]
     Start,
-    /// Never; `never` is another name of it.
+    /// Never.
     #[serde(alias = "never")]
     Off,
 }
@@ -31,8 +31,7 @@ pub enum BreathingMode {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Breathing {
-    /// When; `when` is another name of it.
-    #[serde(alias = "when")]
+    /// When.
     pub mode: BreathingMode,
     /// By how much the first time, about their centre; each time by one more.
     pub scale: f64,

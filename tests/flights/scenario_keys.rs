@@ -1,7 +1,7 @@
 //! Keys that have two names, keys that may be left out, and graphs from their keys.
 
 use tautline::graph::Graph;
-use tautline::scenario::ScenarioError;
+use tautline::scenario::{Override, Scenario, ScenarioError, Source};
 
 use crate::scenario_files::{RIGHT, read, read_builtin};
 
@@ -70,13 +70,53 @@ fn a_key_means_the_same_under_its_other_name() {
 #[test]
 fn both_names_of_a_key_at_once_and_other_words_are_refused() {
     let both = refusal(&MISSION.replace("move_m = [0, 5]", "move_m = [0, 5]\noffset_m = [0, 5]"));
-    assert!(both.to_string().contains("duplicate"), "{both}");
+    assert!(both.to_string().contains("both `move_m` and `offset_m` are given"), "{both}");
+    assert_eq!(both.place().map(|place| (place.line, place.column)), Some((16, 1)));
     let soon = refusal(&MISSION.replace("\"reached\"", "\"soon\""));
     assert!(soon.to_string().contains("expected a time in s, or \"reached\""), "{soon}");
     assert_eq!(soon.place().map(|place| (place.line, place.column)), Some((18, 11)));
     let hold = refusal(&MISSION.replace("hold_s = 3", "hold_s = -3"));
     assert!(hold.to_string().contains("spread slots are held is -3"), "{hold}");
     assert_eq!(hold.place().map(|place| (place.line, place.column)), Some((25, 10)));
+}
+
+/// Whichever of the two names the file has, an override may use either, and an error stands at what was written.
+#[test]
+fn an_override_reaches_a_key_by_either_name() {
+    let others = MISSION.replace("move_m", "offset_m").replace("start_s", "start").replace("mode", "when");
+    let resolved = |text: &str, sets: &[&str]| {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
+        let source = Source::Text { name: "test.toml".to_owned(), text: text.to_owned() };
+        Scenario::read(&source, &overrides).map(|scenario| scenario.resolved_toml())
+    };
+    let pairs = [
+        ("leg.1.start_s=7", "leg.1.start=7"),
+        ("leg.1.start_s=reached", "leg.1.start=reached"),
+        ("leg.1.move_m=[0, 1]", "leg.1.offset_m=[0, 1]"),
+        ("formation.move_m.x=4", "formation.offset_m.x=4"),
+        ("breathing.mode=off", "breathing.when=never"),
+        ("breathing={mode=\"off\"}", "breathing={when=\"never\"}"),
+    ];
+    for (name, other) in pairs {
+        let expected = resolved(MISSION, &[name]).expect("right");
+        assert_ne!(expected, resolved(MISSION, &[]).expect("right"), "{name}");
+        for (text, set) in [(MISSION, other), (&*others, name), (&*others, other)] {
+            assert_eq!(resolved(text, &[set]).expect("right"), expected, "{set}");
+        }
+    }
+    for set in ["leg.1.start=nan", "leg.1.start_s=nan", "leg.1.offset_m=[nan, 0]", "breathing.when=sometimes"] {
+        for text in [MISSION, &*others] {
+            let error = resolved(text, &[set]).expect_err("it is wrong");
+            assert_eq!(error.place().map(|place| place.source.as_str()), Some("--set"), "{set}: {error}");
+        }
+    }
+}
+
+#[test]
+fn spread_slots_are_not_held_to_the_end_of_the_flight() {
+    let held = refusal(&MISSION.replace("hold_s = 3", "hold_s = 60"));
+    assert!(held.to_string().contains("held for 60 s of a flight of 60 s"), "{held}");
+    assert!(read(&MISSION.replace("hold_s = 3", "hold_s = 59.9")).is_ok());
 }
 
 #[test]
@@ -118,8 +158,9 @@ fn a_random_graph_is_connected_drawn_from_its_seed_and_as_dense_as_is_asked_for(
     assert!(graph(", degree=999").expect("right").is_complete());
     let few = read(&format!("{RIGHT}[graph]\nkind = \"random\"\n")).expect("right").graph;
     assert!(few.is_complete(), "two vehicles are each other's only link");
-    for degree in [0, 1, 1000, u64::MAX / 2] {
+    assert_eq!(graph(", degree=1").expect("right").edge_count(), 999, "a tree");
+    for degree in [0, 1000, u64::MAX / 2] {
         let wrong = graph(&format!(", degree={degree}")).expect_err("no such graph");
-        assert!(wrong.to_string().contains(&format!("{degree} links of each of 1000 vehicles")), "{wrong}");
+        assert!(wrong.to_string().contains(&format!("{degree} links of a vehicle in the mean, where each has 999")));
     }
 }

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::graph::Graph;
+use crate::observation::{Held, Others};
 use crate::swarm::Swarm;
 use crate::target::{Guidance, Leg, Reference, ReferenceMotion};
 
@@ -67,6 +68,45 @@ fn swarms() -> impl Strategy<Value = Swarm> {
         }
         swarm
     })
+}
+
+/// Whoever knows the reference, and where each vehicle holds a picture of its own.
+#[test]
+fn who_is_not_finite_is_named_behind_a_reference_and_where_pictures_are_held() {
+    let (formation, links) = (Formation::grid(COUNT, 2.0), Graph::star(COUNT));
+    for pinning in pinnings() {
+        let guidance = guidance(&pinning);
+        let mut law = law(&links, &formation, &[], &guidance);
+        for vehicle in 0..COUNT {
+            let (clear, mut lost) =
+                (Swarm::at_rest(formation.slots_m.clone()), Swarm::at_rest(formation.slots_m.clone()));
+            lost.velocities_m_s[(vehicle, 1)] = f64::NAN;
+            let held = Held {
+                heard: vec![clear.clone(); COUNT],
+                ages_s: vec![vec![0.0; COUNT]; COUNT],
+                seen: vec![clear; COUNT],
+            };
+            for others in [Others::Shared, Others::Held(&held)] {
+                let at = Observation { others, ..observation(&lost, &links, &formation, moving()) };
+                assert_eq!(
+                    law.command(&at, &mut Rows::zeros(COUNT)),
+                    Err(LawError::NotFinite { vehicle }),
+                    "{pinning:?}"
+                );
+            }
+        }
+    }
+    // One alone, which hears nobody.
+    let (formation, links) = (Formation::grid(1, 2.0), Graph::complete(1));
+    let setting = Setting::new(&links, &formation, DELTA_M, A22_PER_S);
+    let mut law = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
+    let mut lost = Swarm::at_rest(formation.slots_m.clone());
+    lost.positions_m[(0, 2)] = f64::INFINITY;
+    let held = Held { heard: vec![lost.clone()], ages_s: vec![vec![0.0]], seen: vec![lost.clone()] };
+    for others in [Others::Shared, Others::Held(&held)] {
+        let at = Observation { others, ..Observation::exact(&lost, &links, &formation) };
+        assert_eq!(law.command(&at, &mut Rows::zeros(1)), Err(LawError::NotFinite { vehicle: 0 }));
+    }
 }
 
 proptest! {
