@@ -6,8 +6,7 @@ impl Graph {
     /// A connected graph with so many edges: a tree in which each vehicle is joined to one before it, and pairs that are drawn
     /// until there are enough, each as likely as any other. At least the tree's N - 1 edges, at most every pair.
     ///
-    /// `below(n)` draws a whole number below n. What is drawn takes 8 bytes for each edge, or for each pair that is no edge
-    /// where these are fewer.
+    /// `below(n)` draws a whole number below n. Where most pairs are edges, those that are none are drawn.
     #[must_use]
     pub fn random(count: usize, edge_count: usize, mut below: impl FnMut(usize) -> usize) -> Self {
         let pairs = pair_count(count);
@@ -19,15 +18,16 @@ impl Graph {
         let is_of_tree = |(i, j): (usize, usize)| tree[j - 1] == i;
         let (beside, absent) = (edge_count.saturating_sub(tree.len()), pairs - edge_count.max(tree.len()));
         let drawn = draw(count, beside.min(absent), &mut below, is_of_tree);
-        let is_drawn = |pair: (usize, usize)| drawn.binary_search(&code(count, pair)).is_ok();
+        let mut edges = Vec::with_capacity(edge_count.max(tree.len()));
         if beside <= absent {
-            let mut edges = drawn;
+            edges.extend(drawn);
             edges.extend(tree.iter().enumerate().map(|(before, &i)| code(count, (i, before + 1))));
             edges.sort_unstable();
-            return Self::from_sorted(count, edges.into_iter().map(|code| (code / count, code % count)));
+        } else {
+            let all = (0..count).flat_map(|i| (i + 1..count).map(move |j| code(count, (i, j))));
+            edges.extend(all.filter(|pair| drawn.binary_search(pair).is_err()));
         }
-        let all = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
-        Self::from_sorted(count, all.filter(|&pair| !is_drawn(pair)))
+        Self::from_sorted(count, edges.into_iter().map(|code| (code / count, code % count)))
     }
 }
 

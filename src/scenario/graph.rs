@@ -68,15 +68,14 @@ fn first() -> u64 {
     1
 }
 
-/// Number of edges, at most, that memory will be taken for, without making them; what a random graph is drawn in counts as so
-/// many again.
+/// Number of edges, at most, that memory will be taken for, without making them.
 pub(super) fn edge_count(kind: &GraphKind, law_keeps_edges: bool, count: usize) -> u128 {
     match kind {
         GraphKind::Complete {} if !law_keeps_edges => 0,
         GraphKind::Complete {} => pair_count(count),
         GraphKind::Star { .. } | GraphKind::Ring {} | GraphKind::Path {} => count as u128,
         GraphKind::Random { degree, .. } => {
-            2 * random_edge_count(degree.unwrap_or(DEFAULT_DEGREE), count).min(pair_count(count))
+            random_edge_count(degree.unwrap_or(DEFAULT_DEGREE), count).min(pair_count(count))
         }
         GraphKind::Edges { edges } => edges.len() as u128,
     }
