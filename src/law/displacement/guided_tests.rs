@@ -102,7 +102,8 @@ fn who_is_not_finite_is_named_behind_a_reference_and_where_pictures_are_held() {
     let mut law = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
     let mut lost = Swarm::at_rest(formation.slots_m.clone());
     lost.positions_m[(0, 2)] = f64::INFINITY;
-    let held = Held { heard: vec![lost.clone()], ages_s: vec![vec![0.0]], seen: vec![lost.clone()] };
+    let clear = Swarm::at_rest(formation.slots_m.clone());
+    let held = Held { heard: vec![clear.clone()], ages_s: vec![vec![0.0]], seen: vec![clear] };
     for others in [Others::Shared, Others::Held(&held)] {
         let at = Observation { others, ..Observation::exact(&lost, &links, &formation) };
         assert_eq!(law.command(&at, &mut Rows::zeros(1)), Err(LawError::NotFinite { vehicle: 0 }));
