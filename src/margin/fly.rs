@@ -15,7 +15,7 @@ impl Plan {
     /// [`MarginError`] for the first flight that does not exist.
     pub fn search(&self, threads: usize, watch: Watch<'_>) -> Result<Option<Margin>, MarginError> {
         let mut probes: Vec<Probe> = Vec::new();
-        let found = search(self.range(), &mut |value| {
+        let found = search(self.range(), self.is_whole(), &mut |value| {
             let probe = self.probe(value, threads, watch)?;
             let holds = probe.as_ref().map(Probe::holds);
             probes.extend(probe);

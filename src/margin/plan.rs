@@ -12,6 +12,9 @@ use crate::text::as_toml;
 /// each axis.
 pub(super) const JITTER: f64 = 0.05;
 
+/// Part of the way between two ends at which there is no whole number but by chance.
+const BETWEEN: f64 = 0.381_966;
+
 /// What a flight has to show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -43,6 +46,8 @@ pub struct Plan {
     template: Template,
     key: String,
     range: Range,
+    /// Whether the key takes whole numbers alone.
+    whole: bool,
     asked: Asked,
     /// Overrides for what is drawn in each run.
     jitter: Option<String>,
@@ -107,8 +112,9 @@ impl Plan {
         let predicted = Preflight::of(template.own()).map(|preflight| preflight.margins).unwrap_or_default();
         let predicted = predicted.into_iter().filter(|margin| is_same(margin.key, key)).collect();
         let (overrides, key) = (overrides.to_vec(), key.to_owned());
-        let mut plan = Self { source, overrides, template, key, range, asked, jitter: None, predicted };
+        let mut plan = Self { source, overrides, template, key, range, whole: false, asked, jitter: None, predicted };
         let ends = [plan.scenario(range.from, 0)?, plan.scenario(range.to, 0)?];
+        plan.whole = plan.takes_whole_numbers_alone();
         let is_random = plan.template.start_is_random() || ends.iter().any(Scenario::is_random_in_flight);
         let moves = asked.runs > 1 && !is_random;
         plan.jitter = moves.then(|| format!("start.jitter_m={:?}", JITTER * plan.own().delta_m));
@@ -131,6 +137,21 @@ impl Plan {
     #[must_use]
     pub fn range(&self) -> Range {
         self.range
+    }
+
+    /// Whether whole numbers alone are looked at: the ends are whole, and between them the key takes nothing else.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.whole
+    }
+
+    fn takes_whole_numbers_alone(&self) -> bool {
+        let Range { from, to, .. } = self.range;
+        let between = from + (to - from) * BETWEEN;
+        from.fract() == 0.0
+            && to.fract() == 0.0
+            && self.scenario(between, 0).is_err()
+            && self.scenario(between.round(), 0).is_ok()
     }
 
     /// What is asked.

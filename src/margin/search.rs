@@ -15,13 +15,13 @@ pub struct Range {
     pub logarithmic: bool,
 }
 
-/// How an interval is halved.
+/// Which values lie between two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Halving {
-    /// At the middle.
-    Difference,
-    /// At the geometric middle.
-    Ratio,
+struct Spacing {
+    /// By their ratio, and not by their difference.
+    logarithmic: bool,
+    /// Whole numbers alone.
+    whole: bool,
 }
 
 /// What a search comes to.
@@ -42,33 +42,26 @@ pub(super) enum Found {
     },
 }
 
-impl Range {
-    fn scale(&self) -> Halving {
-        if self.logarithmic { Halving::Ratio } else { Halving::Difference }
-    }
-}
-
-impl Halving {
+impl Spacing {
     /// The place `share` of the way between two values, from 0 to 1.
-    pub(super) fn between(self, from: f64, to: f64, share: f64) -> f64 {
-        match self {
-            Self::Difference => from + (to - from) * share,
-            Self::Ratio => from * libm::pow(to / from, share),
-        }
+    fn between(self, from: f64, to: f64, share: f64) -> f64 {
+        let place = if self.logarithmic { from * libm::pow(to / from, share) } else { from + (to - from) * share };
+        if self.whole { place.round() } else { place }
     }
 }
 
-/// Asks at evenly spaced values, then halves the first interval in which the answer turns. An answer that is not given ends
-/// the search with what is known then; nothing where that is not the answer at both ends of an interval.
-pub(super) fn search<E>(range: Range, ask: &mut dyn FnMut(f64) -> Result<Option<bool>, E>) -> Result<Option<Found>, E> {
-    let (halving, count) = (range.scale(), range.scan.max(2));
-    let mut scanned: Vec<(f64, bool)> = Vec::with_capacity(count);
-    for k in 0..count {
-        let value = match k {
-            0 => range.from,
-            _ if k + 1 == count => range.to,
-            _ => halving.between(range.from, range.to, k as f64 / (count - 1) as f64),
-        };
+/// Asks at evenly spaced values, then halves the first interval in which the answer turns; at `whole` numbers alone, each of
+/// them once, where the ends are whole. An answer that is not given ends the search with what is known then; nothing where that
+/// is not the answer at both ends of an interval.
+pub(super) fn search<E>(
+    range: Range,
+    whole: bool,
+    ask: &mut dyn FnMut(f64) -> Result<Option<bool>, E>,
+) -> Result<Option<Found>, E> {
+    let spacing = Spacing { logarithmic: range.logarithmic, whole };
+    let values = values(range, spacing);
+    let mut scanned: Vec<(f64, bool)> = Vec::with_capacity(values.len());
+    for &value in &values {
         match ask(value)? {
             Some(answer) => scanned.push((value, answer)),
             None => break,
@@ -77,12 +70,12 @@ pub(super) fn search<E>(range: Range, ask: &mut dyn FnMut(f64) -> Result<Option<
     let Some(&(_, was)) = scanned.first() else { return Ok(None) };
     let turns = scanned.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
     let Some(turn) = scanned.windows(2).find(|pair| pair[0].1 != pair[1].1) else {
-        return Ok(Some(Found::Even(was)).filter(|_| scanned.len() == count));
+        return Ok(Some(Found::Even(was)).filter(|_| scanned.len() == values.len()));
     };
     let (mut before, mut after) = (turn[0].0, turn[1].0);
     for _ in 0..range.halvings {
-        let middle = halving.between(before, after, 0.5);
-        // Neighbouring numbers have nothing between them.
+        let middle = spacing.between(before, after, 0.5);
+        // Neighbours have nothing between them.
         if middle == before || middle == after {
             break;
         }
@@ -93,4 +86,18 @@ pub(super) fn search<E>(range: Range, ask: &mut dyn FnMut(f64) -> Result<Option<
         }
     }
     Ok(Some(Found::Turn { before, after, was, turns }))
+}
+
+/// The values that are looked at first, both ends among them.
+fn values(range: Range, spacing: Spacing) -> Vec<f64> {
+    let last = range.scan.max(2) - 1;
+    let mut values: Vec<f64> = (0..=last)
+        .map(|k| match k {
+            0 => range.from,
+            _ if k == last => range.to,
+            _ => spacing.between(range.from, range.to, k as f64 / last as f64),
+        })
+        .collect();
+    values.dedup();
+    values
 }

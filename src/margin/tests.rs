@@ -13,7 +13,7 @@ fn range(from: f64, to: f64, scan: usize, halvings: u32) -> Range {
 
 fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Found>, usize) {
     let mut asked = 0;
-    let found = search(range, &mut |value| {
+    let found = search(range, false, &mut |value| {
         asked += 1;
         Ok::<_, ()>(Some(answer(value)))
     });
@@ -35,7 +35,7 @@ fn the_bracket_holds_the_turn_and_is_as_narrow_as_its_halvings_say() {
 fn values_of_a_logarithmic_range_are_spaced_by_their_ratio() {
     let range = Range { logarithmic: true, ..range(1e-6, 1.0, 4, 0) };
     let mut asked = Vec::new();
-    let found = search(range, &mut |value: f64| {
+    let found = search(range, false, &mut |value: f64| {
         asked.push(value);
         Ok::<_, ()>(Some(value < 1e-3))
     });
@@ -43,6 +43,22 @@ fn values_of_a_logarithmic_range_are_spaced_by_their_ratio() {
         assert!((value / exact - 1.0).abs() < 1e-12, "{value} {exact}");
     }
     assert!(matches!(found, Ok(Some(Found::Turn { was: true, .. }))), "{found:?}");
+}
+
+#[test]
+fn whole_numbers_are_looked_at_once_each_and_the_bracket_ends_at_neighbours() {
+    for (from, to, logarithmic) in [(1.0, 40.0, false), (40.0, 1.0, false), (1.0, 40.0, true), (5.0, 7.0, false)] {
+        let mut asked = Vec::new();
+        let found = search(Range { logarithmic, ..range(from, to, 9, 60) }, true, &mut |value: f64| {
+            asked.push(value);
+            Ok::<_, ()>(Some(value < 6.5))
+        });
+        let Ok(Some(Found::Turn { before, after, .. })) = found else { panic!("{found:?}") };
+        assert_eq!((before.min(after), before.max(after)), (6.0, 7.0));
+        assert!(asked.iter().all(|value| value.fract() == 0.0), "{asked:?}");
+        asked.sort_by(f64::total_cmp);
+        assert!(asked.windows(2).all(|pair| pair[0] < pair[1]), "{asked:?}");
+    }
 }
 
 #[test]
@@ -57,7 +73,7 @@ fn an_answer_that_never_turns_is_said_to_be_even_and_one_that_turns_twice_to_tur
 fn a_search_that_is_broken_off_says_only_what_it_knows() {
     let broken = |after: usize| {
         let mut asked = 0;
-        search(range(0.0, 1.0, 3, 8), &mut |value| {
+        search(range(0.0, 1.0, 3, 8), false, &mut |value| {
             asked += 1;
             Ok::<_, ()>((asked <= after).then_some(value < 0.3))
         })
@@ -105,6 +121,16 @@ fn a_formation_is_reached_from_where_there_is_time_to_fly_there() {
     let csv = String::from_utf8(margin.to_csv().expect("csv")).expect("text");
     assert_eq!(csv.lines().count(), margin.probes.len() + 1);
     assert!(csv.starts_with("time.duration_s,runs,held_count"), "{csv}");
+}
+
+#[test]
+fn a_key_that_takes_whole_numbers_alone_is_halved_at_whole_numbers() {
+    let asked = Asked { question: Question::Clear, runs: 1, seed: 0 };
+    let any = margin_in("time.record_hz", range(1.0, 8.0, 3, 2), asked);
+    assert!(any.probes.iter().any(|probe| probe.value.fract() != 0.0), "record_hz takes any number");
+    let whole = margin_in("start.seed", range(1.0, 8.0, 3, 2), asked);
+    let values: Vec<_> = whole.probes.iter().map(|probe| probe.value).collect();
+    assert_eq!(values, [1.0, 5.0, 8.0]);
 }
 
 #[test]
