@@ -11,7 +11,7 @@ use crate::preflight::Preflight;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Exits with 1 where the flight cannot do what it is for: relative-velocity-unstable, start-on-line, start-in-plane, \
-drift-unresolved. Other warnings leave 0; a scenario that is wrong, such as a desired distance of not more than delta, is 2.")]
+step-too-long, drift-unresolved. Other warnings leave 0; a scenario that is wrong, such as a desired distance of not more than delta, is 2.")]
 pub(super) struct CheckArguments {
     #[command(flatten)]
     what: ScenarioArguments,

@@ -138,7 +138,7 @@ impl LawRow {
         let count = |is: &dyn Fn(&FlightRow) -> bool| flights.iter().filter(|row| is(row)).count() as u64;
         let ended = |outcome: Outcome| count(&|row| row.outcome == outcome);
         let known = |of: fn(&FlightRow) -> Option<f64>| flights.iter().filter_map(of).collect::<Vec<_>>();
-        let (reached_s, min_m) = (known(|row| row.reached_at_s), known(|row| row.min_m));
+        let (reached_s, min_m) = (known(|row| row.reached_at_s.filter(|_| row.reached)), known(|row| row.min_m));
         let peak_m_s2 = known(|row| row.peak_control_m_s2);
         let worst = worst(&flights);
         Self {

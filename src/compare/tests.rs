@@ -48,3 +48,37 @@ fn a_plan_needs_laws_that_it_knows_once_each() {
     assert!(matches!(plan(&["none"], 1), Err(CompareError::Law(_))));
     assert_eq!(plan(&["laplacian"], 4).expect("a plan").steps(), 4 * 360);
 }
+
+/// A mission whose first leg is cut off, and whose second is reached.
+const CUT_SHORT: &str = r#"
+[start]
+positions_m = [[0.0, 0.0], [4.0, 0.1], [8.0, 0.0]]
+[formation]
+shape = "points"
+points_m = [[0.0, 0.0], [3.0, 0.0], [1.5, 2.6]]
+[law]
+kind = "displacement"
+delta_m = 1.0
+[time]
+duration_s = 30
+[[leg]]
+shape = "line"
+spacing_m = 3
+start_s = START_S
+"#;
+
+#[test]
+fn times_to_reach_are_of_flights_that_reached_alone() {
+    let of = |start_s: &str| {
+        let text = CUT_SHORT.replace("START_S", start_s);
+        let template = Template::read(&Source::Text { name: "t".to_owned(), text }, &[]).expect("a scenario");
+        let plan = Plan::new(template, &["displacement"], 1, 0).expect("a plan");
+        let never = AtomicBool::new(false);
+        plan.fly(1, Watch { flown: &|_| {}, interrupted: &never }).expect("a comparison").laws.remove(0)
+    };
+    let [cut, whole] = [of("1"), of("\"reached\"")];
+    assert!(!cut.flights[0].reached && cut.flights[0].reached_at_s.is_some(), "its last leg was");
+    assert_eq!((cut.reached_median_s.value, cut.reached_p95_s.value), (None, None));
+    assert!(whole.flights[0].reached);
+    assert_eq!(whole.reached_median_s.value, whole.flights[0].reached_at_s);
+}

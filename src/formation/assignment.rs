@@ -60,6 +60,22 @@ pub fn optimal_slots(positions_m: &Rows, formation: &Formation, freedom: Freedom
     best.map(|(slots, _)| slots)
 }
 
+/// The same for all but a leader, who keeps its slot: the formation is laid around it, and wherever that is, the same slots are
+/// best for the others.
+#[must_use]
+pub fn optimal_slots_around(positions_m: &Rows, formation: &Formation, leader: usize) -> Option<Vec<usize>> {
+    let count = positions_m.nrows();
+    if count != formation.count() {
+        return None;
+    }
+    let others: Vec<usize> = (0..count).filter(|&i| i != leader).collect();
+    let of_others = |rows: &Rows| Formation::points(rows.clone()).reordered(&others);
+    let found = optimal_slots(&of_others(positions_m).slots_m, &of_others(&formation.slots_m), Freedom::Fixed)?;
+    let mut given: Vec<usize> = (0..count).collect();
+    found.iter().enumerate().for_each(|(i, &slot)| given[others[i]] = others[slot]);
+    Some(given)
+}
+
 /// Assigns to the slots as they lie, lays the formation anew over what was assigned, and so on until nothing changes.
 fn settle(positions_m: &Rows, slots: &Formation, mut placed_m: Rows) -> Option<(Vec<usize>, f64)> {
     let mut found = assign(positions_m, &placed_m)?;
@@ -146,6 +162,27 @@ mod tests {
                     prop_assert!(apart.dot(&(row(&given.slots_m, i) - row(&given.slots_m, j))) > -1e-9);
                 }
             }
+        }
+
+        #[test]
+        fn around_a_leader_no_other_order_of_the_others_has_a_smaller_sum(
+            positions in prop::collection::vec(-5.0..5.0_f64, 15), slots in prop::collection::vec(-5.0..5.0_f64, 15),
+            leader in 0..5_usize,
+        ) {
+            let (positions_m, formation) =
+                (Rows::from_column_slice(&positions), Formation::points(Rows::from_column_slice(&slots)));
+            let sum = |order: &[usize]| {
+                let given = formation.reordered(order);
+                let offset = row(&positions_m, leader) - row(&given.slots_m, leader);
+                let square = |i| (row(&positions_m, i) - row(&given.slots_m, i) - offset).norm_squared();
+                (0..5).map(square).sum::<f64>()
+            };
+            let found = optimal_slots_around(&positions_m, &formation, leader).expect("finite numbers");
+            prop_assert_eq!(found[leader], leader);
+            let orders = orders(5);
+            let of_others = orders.iter().filter(|order| order[leader] == leader);
+            let least = of_others.map(|order| sum(order)).fold(f64::INFINITY, f64::min);
+            prop_assert!((sum(&found) - least).abs() < 1e-9 * (1.0 + least), "{} {}", sum(&found), least);
         }
 
         #[test]

@@ -17,19 +17,45 @@ pub enum Freedom {
     RigidMotion,
 }
 
-/// Root mean square distance \[m\] between the positions and the slots, which are moved by `place_m` \[m\] and then as they
-/// are free to be so that it is least; NaN where there is none. Allocates nothing.
-#[must_use]
-pub fn rms_position_error_m(positions_m: &Rows, formation: &Formation, place_m: Vector3<f64>, freedom: Freedom) -> f64 {
-    let (count, slots_m) = (positions_m.nrows(), &formation.slots_m);
-    let offset_m = match freedom {
-        Freedom::RigidMotion => return procrustes_rms_m(positions_m, formation),
-        _ if count == 0 || slots_m.nrows() != count => return f64::NAN,
-        Freedom::Translation => centre(positions_m) - centre(slots_m),
-        Freedom::Fixed => place_m,
-    };
-    let square = |i: usize| (row(positions_m, i) - row(slots_m, i) - offset_m).norm_squared();
-    ((0..count).map(square).sum::<f64>() / count as f64).sqrt()
+/// How far positions are from the slots that are laid over them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionError {
+    /// Root mean square \[m\].
+    pub rms_m: f64,
+    /// Of the vehicle that is farthest from its slot \[m\].
+    pub max_m: f64,
+}
+
+impl PositionError {
+    /// Of nothing that could be laid over anything.
+    pub const UNKNOWN: Self = Self { rms_m: f64::NAN, max_m: f64::NAN };
+
+    /// Of positions from slots, which are moved by `place_m` \[m\] and then as they are free to be so that the root mean square
+    /// is least; [`PositionError::UNKNOWN`] where there is none. Allocates nothing.
+    #[must_use]
+    pub fn of(positions_m: &Rows, formation: &Formation, place_m: Vector3<f64>, freedom: Freedom) -> Self {
+        let (count, slots_m) = (positions_m.nrows(), &formation.slots_m);
+        let offset_m = match freedom {
+            Freedom::RigidMotion => {
+                let fit = Fit::new(positions_m, formation);
+                return fit.map_or(Self::UNKNOWN, |fit| Self::of_residuals(fit.residuals_m(positions_m, formation)));
+            }
+            _ if count == 0 || slots_m.nrows() != count => return Self::UNKNOWN,
+            Freedom::Translation => centre(positions_m) - centre(slots_m),
+            Freedom::Fixed => place_m,
+        };
+        Self::of_residuals((0..count).map(|i| row(positions_m, i) - row(slots_m, i) - offset_m))
+    }
+
+    /// One that is not a number makes both so: a largest of comparisons would pass it over.
+    fn of_residuals(residuals_m: impl ExactSizeIterator<Item = Vector3<f64>>) -> Self {
+        let count = residuals_m.len();
+        let (sum, most) = residuals_m
+            .map(|residual_m| residual_m.norm_squared())
+            .fold((0.0, 0.0_f64), |(sum, most), square| (sum + square, most.max(square)));
+        let rms_m = (sum / count as f64).sqrt();
+        Self { rms_m, max_m: if rms_m.is_nan() { f64::NAN } else { most.sqrt() } }
+    }
 }
 
 /// An isometry of space: x -> rotation x + translation.
@@ -103,7 +129,7 @@ impl Fit {
         &'a self,
         positions_m: &'a Rows,
         formation: &'a Formation,
-    ) -> impl Iterator<Item = Vector3<f64>> + 'a {
+    ) -> impl ExactSizeIterator<Item = Vector3<f64>> + 'a {
         (0..positions_m.nrows()).map(move |i| {
             let slot = row(&formation.slots_m, i) - self.slots_centre;
             row(positions_m, i) - self.positions_centre - self.rotation * slot

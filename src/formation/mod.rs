@@ -18,11 +18,11 @@ use crate::space::closest_pair;
 use crate::swarm::{Pair, Rows, row, separation, set_row};
 
 #[cfg(feature = "files")]
-pub use assignment::{most_assigned, optimal_slots};
+pub use assignment::{most_assigned, optimal_slots, optimal_slots_around};
 #[cfg(feature = "shapes")]
 pub use drawn::{Drawing, DrawingError, Ink, MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
 pub use edges::{edges_looked_at, largest_edge_error_m};
-pub use fit::{Freedom, RigidMotion, best_rigid_motion, procrustes_rms_m, rms_position_error_m};
+pub use fit::{Freedom, PositionError, RigidMotion, best_rigid_motion, procrustes_rms_m};
 pub use flat::affine_dimension;
 pub use shapes::NARROWEST_V_RAD;
 

@@ -184,7 +184,7 @@ fn what_is_free_to_be_turned_fits_turned_and_what_is_not_does_not() {
     let turned: Vec<f64> = (0..6).flat_map(|i| quarter(formation.slots_m[(i, 0)], formation.slots_m[(i, 1)])).collect();
     let moved = Rows::from_fn(6, |i, axis| formation.slots_m[(i, axis)] + 5.0);
     let place_m = Vector3::repeat(5.0);
-    let error_m = |positions_m: &Rows, freedom| rms_position_error_m(positions_m, &formation, place_m, freedom);
+    let error_m = |positions_m: &Rows, freedom| PositionError::of(positions_m, &formation, place_m, freedom).rms_m;
     let turned = Rows::from_row_slice(&turned);
     assert!(error_m(&turned, Freedom::RigidMotion) < 1e-12 && error_m(&turned, Freedom::Translation) > 1.0);
     assert!(error_m(&moved, Freedom::RigidMotion) < 1e-12 && error_m(&moved, Freedom::Translation) < 1e-12);
@@ -192,6 +192,24 @@ fn what_is_free_to_be_turned_fits_turned_and_what_is_not_does_not() {
     assert!(error_m(&moved, Freedom::Fixed) < 1e-12 && (error_m(&further, Freedom::Fixed) - 2.0).abs() < 1e-12);
     for freedom in [Freedom::Fixed, Freedom::Translation, Freedom::RigidMotion] {
         assert!(error_m(&Rows::zeros(5), freedom).is_nan());
+    }
+}
+
+#[test]
+fn the_largest_position_error_is_that_of_the_farthest_vehicle_and_not_of_a_typical_one() {
+    let count = 400;
+    let formation = Formation::grid(count, 2.0);
+    let mut one_off = formation.slots_m.clone();
+    one_off[(7, 1)] += 0.19;
+    for freedom in [Freedom::Fixed, Freedom::Translation, Freedom::RigidMotion] {
+        let error = PositionError::of(&one_off, &formation, Vector3::zeros(), freedom);
+        assert!((error.rms_m - 0.19 / 20.0).abs() < 1e-4, "{freedom:?} {error:?}");
+        assert!((error.max_m - 0.19).abs() < 2e-3, "{freedom:?} {error:?}");
+    }
+    one_off[(3, 0)] = f64::NAN;
+    for freedom in [Freedom::Fixed, Freedom::Translation, Freedom::RigidMotion] {
+        let error = PositionError::of(&one_off, &formation, Vector3::zeros(), freedom);
+        assert!(error.rms_m.is_nan() && error.max_m.is_nan(), "{freedom:?} {error:?}");
     }
 }
 

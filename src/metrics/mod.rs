@@ -70,6 +70,8 @@ pub struct Summary {
     /// Root mean square distance of the vehicles from the formation in its best place, turned and perhaps mirrored where it
     /// is free to be, at the end \[m\].
     pub rms_position_error_m: f64,
+    /// Distance of the vehicle that is then farthest from its slot \[m\].
+    pub max_position_error_m: f64,
     /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, at the end \[m/s\].
     pub disagreement_m_s: f64,
     /// Speed of the mean velocity at the end \[m/s\].
@@ -231,8 +233,8 @@ impl<'a> Metrics<'a> {
 
     /// The numbers of everything seen.
     ///
-    /// The formation counts as reached at the time of the first sample from which on every sample, to the last, had an
-    /// edge error and a disagreement within the limits, provided that this lasted at least `hold_s` up to the last
+    /// The formation counts as reached at the time of the first sample from which on every sample, to the last, had its
+    /// errors of edges and places and a disagreement within the limits, provided that this lasted at least `hold_s` up to the last
     /// sample. A formation that was held for long and lost again is not reached; one that was regained counts from when
     /// it was regained.
     #[must_use]
@@ -246,6 +248,7 @@ impl<'a> Metrics<'a> {
             held_s,
             max_edge_error_m: self.distance.max_edge_error_m,
             rms_position_error_m: self.distance.rms_position_error_m,
+            max_position_error_m: self.distance.max_position_error_m,
             disagreement_m_s: self.distance.disagreement_m_s,
             common_m_s: self.common_m_s,
             peak_control_m_s2: self.peak_control_m_s2,

@@ -130,6 +130,7 @@ fn the_numbers_are_those_of_the_samples() {
         (s.max_edge_error_m, 0.5),
         // Each of the two is a quarter of a metre from its place in the best fit.
         (s.rms_position_error_m, 0.25),
+        (s.max_position_error_m, 0.25),
         (s.disagreement_m_s, 0.1),
         (s.common_m_s, 3.0_f64.hypot(4.1)),
         (s.peak_control_m_s2, 2.0),

@@ -197,10 +197,10 @@ impl Preflight {
             dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.velocity_coefficient_per_s()).map(
                 |rate_per_s| {
                     let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
-                    honest_rate_dt(scenario) / rate_per_s.hypot(beside.sqrt())
+                    scenario.time.honest_rate_dt() / rate_per_s.hypot(beside.sqrt())
                 },
             ),
-            dt_links_s: links_step_s(law, scenario),
+            dt_links_s: scenario.links_step_s(law),
             margins: margins::margins(law, scenario),
             samples: scenario.time.samples(),
             recording_bytes: scenario.time.samples() * TimeSpec::BYTES_PER_VEHICLE * scenario.count() as u64,
@@ -393,25 +393,11 @@ impl Preflight {
     }
 }
 
-/// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
-/// energy.
-fn honest_rate_dt(scenario: &Scenario) -> f64 {
-    scenario.time.max_rate_dt.min(TimeSpec::DEFAULT_MAX_RATE_DT)
-}
-
-/// Longest step that the links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
-fn links_step_s(law: &dyn Law, scenario: &Scenario) -> Option<f64> {
-    let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), scenario.velocity_coefficient_per_s())?;
-    (scenario.plant.holds_commands() && rate_per_s > 0.0).then(|| honest_rate_dt(scenario) / rate_per_s)
-}
-
 /// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be
 /// shorter still.
 fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
-    let time = &scenario.time;
-    let halvings = i32::try_from(time.max_halvings).unwrap_or(i32::MAX);
-    let shortest_s = time.dt_s * 0.5_f64.powi(halvings);
-    let needed_s = links_step_s(law, scenario)?;
+    let shortest_s = scenario.time.shortest_step_s();
+    let needed_s = scenario.links_step_s(law)?;
     (shortest_s > needed_s).then(|| {
         format!(
             "The law's links ask for steps of {} s, and the shortest that time.dt_s and time.max_halvings allow are {} s: what would \

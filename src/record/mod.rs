@@ -330,6 +330,16 @@ pub struct EnergyRise {
     pub to: f64,
 }
 
+impl EnergyRise {
+    /// Part of the energy that the error of second-order integration at the honest step stays below.
+    pub(crate) const INTEGRATION: f64 = 1e-3;
+
+    /// What integration does not explain \[m^2/s^2\], negative where it explains all.
+    pub(crate) fn unexplained(self) -> f64 {
+        self.to - (1.0 + Self::INTEGRATION) * self.from
+    }
+}
+
 impl Event {
     /// When it happened \[s\].
     #[must_use]

@@ -1,9 +1,10 @@
 //! How far above its start the energy may be by nothing but the integrator's error and rounding.
 
 use crate::metrics::Summary;
+use crate::record::EnergyRise;
 
-/// Part of E(0) that the error of second-order integration at the honest step stays below.
-pub(super) const INTEGRATION: f64 = 1e-3;
+/// Part of an energy, and of what it keeps apart, that the error of integration stays below.
+pub(super) const INTEGRATION: f64 = EnergyRise::INTEGRATION;
 
 /// The largest energy \[m^2/s^2\] that a motion without gain may show, from an energy `initial` on, in numbers that resolve a
 /// part `epsilon` of their size:

@@ -211,6 +211,8 @@ pub struct FormationNumbers {
     pub max_edge_error_m: Option<f64>,
     /// Root mean square distance from the best-placed formation at the end \[m\].
     pub rms_position_error_m: Option<f64>,
+    /// Distance of the vehicle that is then farthest from its slot \[m\].
+    pub max_position_error_m: Option<f64>,
 }
 
 /// The law's energy \[m^2/s^2\].
@@ -300,6 +302,7 @@ impl Report {
                 at_rest: at_rest(findings),
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),
+                max_position_error_m: finite(summary.max_position_error_m),
             },
             legs: legs::legs(findings),
             breaths: findings.breaths.to_vec(),

@@ -131,7 +131,7 @@ impl Report {
             [
                 ("Reached", reached, "and kept from then on to the end"),
                 ("Largest edge error", with_unit(formation.max_edge_error_m, "m"), "at the end"),
-                ("Position error", with_unit(formation.rms_position_error_m, "m"), "root mean square, at the end"),
+                ("Position error", with_unit(formation.max_position_error_m, "m"), "largest of a vehicle, at the end"),
                 ("Velocity disagreement", with_unit(velocity.disagreement_m_s, "m/s"), "at the end"),
                 ("Common velocity", with_unit(velocity.common_m_s, "m/s"), "at the end"),
             ],
@@ -220,7 +220,7 @@ impl Report {
              cast by parry must agree. The engine's own contacts are evidence alone."
                 .to_owned(),
             format!(
-                "Reached means: no edge is wrong by more than {0} m, the vehicles are within {0} m (root mean square) of the \
+                "Reached means: no edge is wrong by more than {0} m, every vehicle is within {0} m of its slot in the \
                  formation, {3}, and none differs from the mean velocity by more than {1} m/s, from \
                  then on to the end, for at least {2} s.",
                 judge.edge_error_m, judge.disagreement_m_s, judge.hold_s, moved

@@ -28,6 +28,7 @@ pub(super) const REACHED: Summary = Summary {
     held_s: Some(83.5),
     max_edge_error_m: 4.5e-14,
     rms_position_error_m: 1e-14,
+    max_position_error_m: 2e-14,
     disagreement_m_s: 1e-13,
     common_m_s: 0.0,
     peak_control_m_s2: 1.03,
@@ -194,6 +195,7 @@ formation
   at_rest
   max_edge_error_m
   rms_position_error_m
+  max_position_error_m
 energy
   initial
   final
@@ -340,9 +342,9 @@ fn the_headline_names_the_number_that_fails() {
             " (largest edge error 0.50 m, still moving)",
         ),
         (
-            Summary { rms_position_error_m: 0.6, ..lost },
-            Some(Fails::RmsPositionErrorM),
-            " (another shape or place, rms position error 0.60 m, at rest elsewhere)",
+            Summary { max_position_error_m: 0.6, ..lost },
+            Some(Fails::MaxPositionErrorM),
+            " (another shape or place, largest position error 0.60 m, at rest elsewhere)",
         ),
         (
             Summary { disagreement_m_s: 0.7, ..lost },

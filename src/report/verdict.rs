@@ -10,6 +10,7 @@ use super::obstacles::Obstacles;
 use crate::audit::Status;
 use crate::metrics::Summary;
 use crate::record::EnergyRise;
+use crate::scenario::TimeSpec;
 use crate::target::Arrival;
 use crate::text::{counted, metres, metres_below, seconds};
 
@@ -61,8 +62,9 @@ pub enum Fails {
     Unknown,
     /// The largest error of a desired distance.
     MaxEdgeErrorM,
-    /// The root mean square distance from the formation: every edge has its length, and the shape is another one.
-    RmsPositionErrorM,
+    /// The distance of a vehicle from its slot: every edge has its length, and the shape is another one, or elsewhere.
+    #[serde(alias = "rms_position_error_m")]
+    MaxPositionErrorM,
     /// The largest speed relative to the mean.
     #[serde(rename = "disagreement_m_s")]
     Disagreement,
@@ -78,8 +80,8 @@ impl Fails {
             Some(Self::Unknown)
         } else if summary.max_edge_error_m > judge.edge_error_m {
             Some(Self::MaxEdgeErrorM)
-        } else if summary.rms_position_error_m > judge.edge_error_m {
-            Some(Self::RmsPositionErrorM)
+        } else if summary.max_position_error_m > judge.edge_error_m {
+            Some(Self::MaxPositionErrorM)
         } else {
             Some(Self::Disagreement)
         }
@@ -206,9 +208,10 @@ fn steps_too_long(findings: &Findings<'_>) -> Option<String> {
     let overlong = findings.run.overlong_steps;
     (overlong > 0).then(|| {
         format!(
-            "{} longer than the law allows in the state that it was in, and could be halved no further: what was flown is not the \
-             motion of the law. Shorten time.dt_s, raise time.max_halvings, or make the law gentler.",
-            counted(overlong, "step was", "steps were")
+            "{} longer than the law allows in the state that it was in, and halved no further: what was flown is not the motion of \
+             the law. Shorten time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the law gentler.",
+            counted(overlong, "step was", "steps were"),
+            TimeSpec::DEFAULT_MAX_RATE_DT
         )
     })
 }
@@ -227,10 +230,10 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
             metres(summary.max_edge_error_m),
             judge.edge_error_m
         ),
-        Fails::RmsPositionErrorM => format!(
+        Fails::MaxPositionErrorM => format!(
             "at the end every edge has its length and the shape is another one, or it is turned or elsewhere where it may not be: \
-             vehicles are {} m (root mean square) from the formation, and {} m are allowed",
-            metres(summary.rms_position_error_m),
+             a vehicle is {} m from its slot, and {} m are allowed",
+            metres(summary.max_position_error_m),
             judge.edge_error_m
         ),
         Fails::Disagreement => format!(

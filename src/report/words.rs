@@ -106,8 +106,8 @@ impl Report {
                 return format!("formation NOT reached (kept for the last {} only)", seconds(held_s));
             }
             Some(Fails::MaxEdgeErrorM) => ("largest edge error", formation.max_edge_error_m, "m"),
-            Some(Fails::RmsPositionErrorM) => {
-                ("another shape or place, rms position error", formation.rms_position_error_m, "m")
+            Some(Fails::MaxPositionErrorM) => {
+                ("another shape or place, largest position error", formation.max_position_error_m, "m")
             }
             Some(Fails::Disagreement) => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
         };
@@ -216,9 +216,9 @@ impl Report {
         let reached =
             formation.reached_at_s.map_or("not reached".to_owned(), |at_s| format!("reached at {}", seconds(at_s)));
         format!(
-            "{reached}, largest edge error {} m, rms position error {} m",
+            "{reached}, largest edge error {} m, largest position error {} m",
             or_dash(formation.max_edge_error_m),
-            or_dash(formation.rms_position_error_m)
+            or_dash(formation.max_position_error_m)
         )
     }
 

@@ -48,6 +48,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
     let mut time = document.time;
     time.control_hz = document.actuation.control_hz(time.control_hz)?;
+    let gives_step = time.gives_step();
     let time = time.complete(count, document.arrival.hold_s, &airframe);
     let mut scenario = Scenario {
         start,
@@ -82,6 +83,9 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         safety,
     };
     legs(&mut scenario, &document.formation, &document.leg)?;
+    if !gives_step {
+        scenario.choose_step();
+    }
     Ok(scenario)
 }
 

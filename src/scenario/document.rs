@@ -256,8 +256,9 @@ pub(super) enum Assignment {
     /// Each vehicle to the slot of its number.
     #[default]
     Given,
-    /// Vehicles are interchangeable: the sum of squared ways is least, once the formation is moved as the law leaves it free;
-    /// and so again where the swarm is stalled. For up to 5000 vehicles, and 500 under a law that holds distances.
+    /// Vehicles are interchangeable: the sum of squared ways is least, once the formation is moved as the law leaves it free, or
+    /// around a leader, who keeps its slot; and so again where the swarm is stalled. For up to 5000 vehicles, and 500 under a law
+    /// that holds distances.
     Optimal,
     /// Vehicles are interchangeable where the swarm is stalled; up to then each goes to the slot of its number. Under the
     /// displacement law.

@@ -8,7 +8,7 @@ use super::limits::{positive, require_finite};
 use super::slots::formation;
 use super::spec::Scenario;
 use super::values::{LegStart, Point};
-use crate::formation::{Freedom, most_assigned, optimal_slots};
+use crate::formation::{Freedom, most_assigned, optimal_slots, optimal_slots_around};
 use crate::swarm::{Rows, row, set_row};
 use crate::target::{Begins, Leg};
 
@@ -33,7 +33,9 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
     let is_interchangeable = interchangeable(scenario, 0, first.assignment)?;
     scenario.legs[0].interchangeable = is_interchangeable;
     let starts_m = scenario.start.positions_m.clone();
-    assign(&mut scenario.legs[0], first.assignment, &starts_m, freedom);
+    let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
+    let assign = |leg: &mut Leg, by: Assignment, from_m: &Rows| assign(leg, by, from_m, (freedom, leader));
+    assign(&mut scenario.legs[0], first.assignment, &starts_m);
     for (number, table) in later.iter().enumerate() {
         let placement = Placement::of(number + 1, (table.scale, table.yaw_deg, table.move_m))?;
         let before = scenario.legs[number].formation.clone();
@@ -45,7 +47,7 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
         let begins = table.start_s.map_or(Begins::Reached, LegStart::begins);
         let interchangeable = interchangeable(scenario, number + 1, table.assignment)?;
         let mut leg = placement.place(Leg { formation, begins, interchangeable });
-        assign(&mut leg, table.assignment, &before.slots_m, freedom);
+        assign(&mut leg, table.assignment, &before.slots_m);
         scenario.legs.push(leg);
     }
     anchor(scenario);
@@ -90,12 +92,15 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
         .at("breathing.mode"))
 }
 
-/// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least.
-fn assign(leg: &mut Leg, assignment: Assignment, from_m: &Rows, freedom: Option<Freedom>) {
-    if let (Assignment::Optimal, Some(freedom)) = (assignment, freedom)
-        // What is not finite is told by validation.
-        && let Some(slots) = optimal_slots(from_m, &leg.formation, freedom)
-    {
+/// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least; a leader keeps its own.
+fn assign(leg: &mut Leg, by: Assignment, from_m: &Rows, (freedom, leader): (Option<Freedom>, Option<usize>)) {
+    let (Assignment::Optimal, Some(freedom)) = (by, freedom) else { return };
+    let slots = match leader {
+        Some(leader) => optimal_slots_around(from_m, &leg.formation, leader),
+        None => optimal_slots(from_m, &leg.formation, freedom),
+    };
+    // What is not finite is told by validation.
+    if let Some(slots) = slots {
         leg.formation = leg.formation.reordered(&slots);
     }
 }

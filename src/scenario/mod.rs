@@ -62,6 +62,7 @@ mod source;
 mod spec;
 #[cfg(feature = "files")]
 mod start;
+mod step;
 #[cfg(feature = "files")]
 mod suggest;
 mod surroundings;

@@ -19,7 +19,7 @@ pub(super) struct TimeTable {
     /// Length of the flight in s.
     pub(super) duration_s: f64,
     /// Physics step in s; the law is asked once a step. A step that is too long for the law is flown in parts. Unless given
-    /// 1/240, and 1/500 for quadrotors.
+    /// 1/240, and 1/500 for quadrotors, halved until its parts can be as short as the law's links ask for.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_DT_S)))]
     dt_s: Option<f64>,
@@ -55,6 +55,11 @@ impl TimeTable {
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
     fn is_default_max_rate_dt(max_rate_dt: &f64) -> bool {
         *max_rate_dt == TimeSpec::DEFAULT_MAX_RATE_DT
+    }
+
+    /// Whether the step is given.
+    pub(super) fn gives_step(&self) -> bool {
+        self.dt_s.is_some()
     }
 
     /// Duration and rates of a flight of so many vehicles of this kind that are to keep what they have reached for `hold_s`

@@ -84,7 +84,8 @@ impl Scenario {
                 arrival.hold_s, time.duration_s
             ))
             .with_help("enlarge time.duration_s or reduce arrival.hold_s")
-            .at("arrival.hold_s"));
+            .at("arrival.hold_s")
+            .at("time.duration_s"));
         }
         if time.record_hz * arrival.hold_s < 1.0 && arrival.hold_s > 0.0 {
             return Err(ScenarioError::new(format!(

@@ -12,6 +12,7 @@ use crate::target::Change;
 pub(super) struct Watch {
     /// That of the target \[m^2/s^2\], by its revision.
     since: Option<(u64, f64)>,
+    /// The rise that integration explains least. What rounding explains is the same for all of them.
     worst: Option<EnergyRise>,
     leg: usize,
     pub(super) breaths: Vec<Breath>,
@@ -58,23 +59,13 @@ impl Watch {
             }
         };
         let rise = EnergyRise { from, to: energy };
-        if self.worst.is_none_or(|worst| is_worse(rise, worst)) {
+        if self.worst.is_none_or(|worst| rise.unexplained() > worst.unexplained()) {
             self.worst = Some(rise);
         }
     }
 
     pub(super) fn worst(&self) -> Option<EnergyRise> {
         self.worst
-    }
-}
-
-/// Whether the energy rose by a larger ratio; from nothing to anything is the largest of all, and more of it larger still.
-fn is_worse(rise: EnergyRise, than: EnergyRise) -> bool {
-    let from_nothing = |rise: EnergyRise| rise.from <= 0.0 && rise.to > 0.0;
-    match (from_nothing(rise), from_nothing(than)) {
-        (true, true) => rise.to > than.to,
-        (one, other) if one != other => one,
-        _ => rise.to * than.from > than.to * rise.from,
     }
 }
 
@@ -90,19 +81,21 @@ mod tests {
         for (revision, energy) in [(0, 4.0), (0, 3.0), (1, 9.0), (1, 8.0), (2, 2.0)] {
             watch.take(revision, Some(energy));
         }
-        assert_eq!(watch.worst(), Some(EnergyRise { from: 4.0, to: 4.0 }));
+        assert_eq!(watch.worst(), Some(EnergyRise { from: 2.0, to: 2.0 }), "it only fell");
         watch.take(2, Some(2.5));
         watch.take(2, Some(2.2));
         assert_eq!(watch.worst(), Some(EnergyRise { from: 2.0, to: 2.5 }));
     }
 
     #[test]
-    fn what_rises_from_nothing_is_the_worst() {
+    fn a_ratio_of_next_to_nothing_does_not_hide_a_rise() {
         let mut watch = Watch::default();
         watch.take(0, Some(0.0));
         watch.take(0, Some(1e-3));
-        watch.take(1, Some(1.0));
-        watch.take(1, Some(5.0));
         assert_eq!(watch.worst(), Some(EnergyRise { from: 0.0, to: 1e-3 }));
+        for (revision, energy) in [(1, 1e-16), (1, 1e-9), (2, 9.0), (2, 12.0), (3, 100.0), (3, 100.05)] {
+            watch.take(revision, Some(energy));
+        }
+        assert_eq!(watch.worst(), Some(EnergyRise { from: 9.0, to: 12.0 }));
     }
 }

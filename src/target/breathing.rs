@@ -1,12 +1,14 @@
 //! Breathing: slots that are spread for a while, so that vehicles that stand in each other's way get past; and before that,
 //! where vehicles are interchangeable, other slots for them.
 
+#[cfg(feature = "files")]
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{Arrival, CurrentTarget, Leg, Target, spread_slots};
-#[cfg(feature = "files")]
-use crate::formation::optimal_slots;
 use crate::formation::{Formation, Freedom};
+#[cfg(feature = "files")]
+use crate::formation::{optimal_slots, optimal_slots_around};
 use crate::swarm::{Rows, Swarm, mean_row, row};
 
 /// When slots are spread, or interchangeable vehicles get others.
@@ -261,19 +263,16 @@ const SHORTER: f64 = 1e-9;
 /// own. Wherever the formation is moved to, the same ones are best.
 #[cfg(feature = "files")]
 fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
-    let free: Vec<usize> = (0..positions_m.nrows()).filter(|&i| Some(i) != leader).collect();
-    let of_free = |rows: &Rows| Formation::points(rows.clone()).reordered(&free);
-    let (from, slots) = (of_free(positions_m), of_free(&formation.slots_m));
-    let found = optimal_slots(&from.slots_m, &slots, Freedom::Fixed)?;
-    let centre_m = mean_row(&from.slots_m) - mean_row(&slots.slots_m);
-    let square = |i: usize, slot: usize| (row(&from.slots_m, i) - row(&slots.slots_m, slot) - centre_m).norm_squared();
-    let before: f64 = (0..free.len()).map(|i| square(i, i)).sum();
-    let now: f64 = found.iter().enumerate().map(|(i, &slot)| square(i, slot)).sum();
-    (now < before * (1.0 - SHORTER)).then(|| {
-        let mut given: Vec<usize> = (0..positions_m.nrows()).collect();
-        found.iter().enumerate().for_each(|(i, &slot)| given[free[i]] = free[slot]);
-        given
-    })
+    let found = match leader {
+        Some(leader) => optimal_slots_around(positions_m, formation, leader)?,
+        None => optimal_slots(positions_m, formation, Freedom::Fixed)?,
+    };
+    let count = positions_m.nrows();
+    let free = || (0..count).filter(|&i| Some(i) != leader);
+    let way = |i: usize, slot: usize| row(positions_m, i) - row(&formation.slots_m, slot);
+    let mean_m = free().map(|i| way(i, i)).sum::<Vector3<f64>>() / free().count().max(1) as f64;
+    let sum = |slot: &dyn Fn(usize) -> usize| free().map(|i| (way(i, slot(i)) - mean_m).norm_squared()).sum::<f64>();
+    (sum(&|i| found[i]) < sum(&|i| i) * (1.0 - SHORTER)).then_some(found)
 }
 
 /// Assignments are made by a crate of the feature `files`.

@@ -164,3 +164,31 @@ fn a_random_graph_is_connected_drawn_from_its_seed_and_as_dense_as_is_asked_for(
         assert!(wrong.to_string().contains(&format!("{degree} links of a vehicle in the mean, where each has 999")));
     }
 }
+
+#[test]
+fn a_step_that_nobody_gives_is_as_short_as_the_links_ask_for_and_one_that_is_given_stays() {
+    let ring = |more: &str| {
+        read(&format!(
+            "[swarm]\ncount = 3000\n[start]\nshape = \"grid\"\nspacing_m = 2\n[formation]\nshape = \"grid\"\nspacing_m = 1.6\n\
+             [law]\nkind = \"displacement\"\ndelta_m = 1\n[graph]\nkind = \"ring\"\n[time]\nduration_s = 1\n{more}"
+        ))
+        .expect("a scenario")
+    };
+    let chosen = ring("");
+    let needed_s = chosen.links_step_s(chosen.law().expect("a law").as_ref()).expect("links");
+    assert!(chosen.time.shortest_step_s() <= needed_s && 2.0 * chosen.time.shortest_step_s() > needed_s);
+    let halvings = (1.0 / 240.0 / chosen.time.dt_s).log2();
+    assert!(halvings >= 1.0 && halvings.fract() == 0.0, "{halvings}");
+    assert_eq!(ring("dt_s = 0.004").time.dt_s, 0.004);
+    assert!(ring("max_halvings = 20").time.dt_s == 1.0 / 240.0, "its parts are short enough");
+    // No flight gets more steps than a flight may have.
+    assert!(ring("max_halvings = 0\n").time.steps() <= 1_000_000_000);
+}
+
+#[test]
+fn a_flight_that_is_shorter_than_the_hold_is_told_of_where_it_was_made_so() {
+    let sets = [Override::parse("time.duration_s=0.5").expect("an override")];
+    let error = Scenario::read(&Source::Builtin("thousand".to_owned()), &sets).expect_err("too short");
+    assert!(error.to_string().contains("to be held"), "{error}");
+    assert!(error.place().is_some_and(|place| place.source == "--set" && place.text.contains("0.5")), "{error}");
+}

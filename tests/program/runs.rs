@@ -91,7 +91,7 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
         "hulls.bounces hulls.passed_through",
         "formation.reached formation.reached_at_s formation.held_s formation.fails formation.at_rest",
-        "formation.max_edge_error_m formation.rms_position_error_m",
+        "formation.max_edge_error_m formation.rms_position_error_m formation.max_position_error_m",
         "energy.initial energy.final energy.max_over_initial energy.max_over_leg_start energy.rose",
         "control.peak_m_s2 control.final_m_s2",
         "velocity.disagreement_m_s velocity.common_m_s",

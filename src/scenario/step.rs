@@ -1,0 +1,42 @@
+//! The step that a law asks for wherever vehicles are, and the one that is chosen where none is given.
+
+use super::limits::MAX_STEPS;
+use super::spec::Scenario;
+use super::time::TimeSpec;
+use crate::law::Law;
+
+impl TimeSpec {
+    /// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
+    /// energy.
+    #[must_use]
+    pub fn honest_rate_dt(&self) -> f64 {
+        self.max_rate_dt.min(Self::DEFAULT_MAX_RATE_DT)
+    }
+
+    /// The shortest part of a step \[s\].
+    #[must_use]
+    pub fn shortest_step_s(&self) -> f64 {
+        self.dt_s * 0.5_f64.powi(i32::try_from(self.max_halvings).unwrap_or(i32::MAX))
+    }
+}
+
+impl Scenario {
+    /// Longest step that a law's links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
+    #[must_use]
+    pub fn links_step_s(&self, law: &dyn Law) -> Option<f64> {
+        let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), self.velocity_coefficient_per_s())?;
+        (self.plant.holds_commands() && rate_per_s > 0.0).then(|| self.time.honest_rate_dt() / rate_per_s)
+    }
+
+    /// Halves a step that nobody gave until it can be made as short as the links of the law ask for, as long as a flight may have
+    /// so many. What is wrong with law or times is left for [`super::validate`] to refuse.
+    #[cfg(feature = "files")]
+    pub(super) fn choose_step(&mut self) {
+        let Ok(law) = self.law() else { return };
+        let Some(needed_s) = self.links_step_s(law.as_ref()) else { return };
+        let half = |time: TimeSpec| TimeSpec { dt_s: 0.5 * time.dt_s, ..time };
+        while self.time.shortest_step_s() > needed_s && self.time.duration_s / half(self.time).dt_s <= MAX_STEPS {
+            self.time = half(self.time);
+        }
+    }
+}
