@@ -3,9 +3,11 @@
 //! The laws sum over the neighbours j in `N_i` of vehicle i; what they promise depends on the graph's Laplacian `L_G`
 //! and on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
 
+mod inverse_iteration;
 mod pinning;
 mod random;
 mod spectrum;
+mod tree;
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -33,11 +35,13 @@ struct Known {
     algebraic: OnceLock<f64>,
     /// Of the pinning that was asked for first.
     pinned: OnceLock<(Pinning, f64)>,
+    /// Set where a bound from below stands in for one of them.
+    bounded: OnceLock<()>,
 }
 
 impl Known {
     const fn nothing() -> Self {
-        Self { algebraic: OnceLock::new(), pinned: OnceLock::new() }
+        Self { algebraic: OnceLock::new(), pinned: OnceLock::new(), bounded: OnceLock::new() }
     }
 }
 

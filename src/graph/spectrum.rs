@@ -3,24 +3,15 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
+use super::inverse_iteration::Operator;
 use super::{Graph, Pinning};
 
 /// Up to here all eigenvalues are computed, in O(N^3).
 const DENSE_UP_TO: usize = 400;
-/// Vectors that are iterated together: the slower ones, which are close to each other, do not hold up the first.
-const BLOCK: usize = 6;
-/// Relative change of the least eigenvalue from one iteration to the next at which it is known: what is left falls in
-/// proportion.
-const SETTLED: f64 = 1e-12;
 /// Relative difference of eigenvalues that are the same one.
 const SAME: f64 = 1e-9;
-const MOST_ITERATIONS: usize = 300;
-/// Residual of a linear system, relative to its right side.
-const SOLVED: f64 = 1e-6;
-/// Most visits of edges and vehicles: some seconds. Long thin graphs of tens of thousands of vehicles ask for more.
-const MOST_VISITS: u64 = 4_000_000_000;
 
 impl Graph {
     /// The algebraic connectivity lambda2, the second smallest eigenvalue of `L_G`: positive exactly where the graph is
@@ -28,9 +19,10 @@ impl Graph {
     ///
     /// In closed form for complete graphs, stars, rings and paths (N, 1, 2 - 2 cos(2 pi/N), 2 - 2 cos(pi/N)), however the
     /// graph was made, and exactly 0 for a disconnected one. Otherwise all eigenvalues are computed for up to 400 vehicles;
-    /// beyond, inverse iteration on a block of vectors, with conjugate gradients in the place of a matrix. That ends at most
-    /// a few parts in 1e9 above lambda2. Where it would take more than some seconds, the bound from below `4/(N (N - 1))`
-    /// stands in for lambda2.
+    /// beyond, inverse iteration on a block of vectors, with conjugate gradients in the place of a matrix, led by a spanning
+    /// tree where the graph is hardly more than one. That ends at most a few parts in 1e9 above lambda2. Where it would take more
+    /// than some ten seconds, the bound from below `4/(N (N - 1))` stands in for lambda2, which
+    /// [`Graph::connectivity_is_bound`] tells.
     #[must_use]
     pub fn algebraic_connectivity(&self) -> f64 {
         self.pinned_connectivity(&Pinning::Nobody)
@@ -51,6 +43,12 @@ impl Graph {
         if first == pinning { *least } else { self.least_eigenvalue(pinning) }
     }
 
+    /// Whether a bound from below stood in for a connectivity that was asked for up to now.
+    #[must_use]
+    pub fn connectivity_is_bound(&self) -> bool {
+        self.known.bounded.get().is_some()
+    }
+
     fn least_eigenvalue(&self, pinning: &Pinning) -> f64 {
         let fewest = if *pinning == Pinning::Nobody { 2 } else { 1 };
         if self.count() < fewest || !self.is_connected() {
@@ -66,6 +64,7 @@ impl Graph {
             return eigenvalues[usize::from(*pinning == Pinning::Nobody)];
         }
         Operator::new(self, pinning, &degrees).inverse_iteration().unwrap_or_else(|| {
+            self.known.bounded.get_or_init(|| ());
             let count = self.count() as f64;
             if *pinning == Pinning::Nobody { 4.0 / (count * (count - 1.0)) } else { 1.0 / (count * count) }
         })
@@ -184,120 +183,6 @@ impl Graph {
     }
 }
 
-/// M as a function of vectors, on those that it maps onto themselves: without a mean where nobody is pinned, and zero at a
-/// leader.
-struct Operator<'a> {
-    graph: &'a Graph,
-    pinning: &'a Pinning,
-    /// M's diagonal.
-    diagonal: Vec<f64>,
-    visits: u64,
-}
-
-impl<'a> Operator<'a> {
-    fn new(graph: &'a Graph, pinning: &'a Pinning, degrees: &[usize]) -> Self {
-        let adds = |i: usize| if pinning.pins(i) { 1.0 } else { 0.0 };
-        let diagonal = degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect();
-        Self { graph, pinning, diagonal, visits: 0 }
-    }
-
-    fn product(&mut self, x: &[f64], out: &mut [f64]) {
-        self.visits += (self.graph.edge_count() + x.len()) as u64;
-        out.fill(0.0);
-        for (i, j) in self.graph.edges() {
-            let difference = x[i] - x[j];
-            out[i] += difference;
-            out[j] -= difference;
-        }
-        if matches!(self.pinning, Pinning::Listed(_)) {
-            (0..x.len()).filter(|&i| self.pinning.pins(i)).for_each(|i| out[i] += x[i]);
-        }
-        if let &Pinning::Leader(leader) = self.pinning {
-            out[leader] = 0.0;
-        }
-    }
-
-    fn project(&self, x: &mut [f64]) {
-        match *self.pinning {
-            Pinning::Nobody => {
-                let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-                for x in x {
-                    *x -= mean;
-                }
-            }
-            Pinning::Leader(leader) => x[leader] = 0.0,
-            Pinning::All | Pinning::Listed(_) => {}
-        }
-    }
-
-    /// The least eigenvalue, from above; none where it takes too long.
-    fn inverse_iteration(&mut self) -> Option<f64> {
-        let count = self.graph.count();
-        // Vectors that no symmetry of a graph is likely to share: the fractions of multiples of irrational numbers.
-        let mut block = DMatrix::from_fn(count, BLOCK, |i, k| {
-            let irrational = ((k + 2) as f64).sqrt() + 0.123_456_789;
-            (irrational * (i + 1) as f64).fract() - 0.5
-        });
-        let (mut images, mut before) = (DMatrix::zeros(count, BLOCK), f64::INFINITY);
-        for _ in 0..MOST_ITERATIONS {
-            block.column_iter_mut().for_each(|mut column| self.project(column.as_mut_slice()));
-            block = block.qr().q();
-            for (x, mut image) in block.column_iter().zip(images.column_iter_mut()) {
-                self.product(x.as_slice(), image.as_mut_slice());
-            }
-            let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(block.tr_mul(&images));
-            let least = eigenvalues.min();
-            if (before - least).abs() <= SETTLED * least {
-                return Some(least);
-            }
-            before = least;
-            block *= eigenvectors;
-            for (k, mut x) in block.column_iter_mut().enumerate() {
-                self.solve(eigenvalues[k], x.as_mut_slice())?;
-            }
-        }
-        None
-    }
-
-    /// Puts the solution y of M y = x in the place of x: conjugate gradients, scaled by the diagonal, from x over its
-    /// Rayleigh quotient.
-    fn solve(&mut self, quotient: f64, x: &mut [f64]) -> Option<()> {
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let mut y: Vec<f64> = x.iter().map(|x| x / quotient).collect();
-        let mut image = vec![0.0; x.len()];
-        self.product(&y, &mut image);
-        let mut residual: Vec<f64> = x.iter().zip(&image).map(|(x, image)| x - image).collect();
-        let mut z = self.scaled(&residual);
-        let mut direction = z.clone();
-        let (mut size, enough) = (dot(&residual, &z), (SOLVED * SOLVED) * dot(x, x));
-        for _ in 0..10 * x.len() {
-            if dot(&residual, &residual) <= enough {
-                break;
-            }
-            if self.visits > MOST_VISITS {
-                return None;
-            }
-            self.product(&direction, &mut image);
-            let step = size / dot(&direction, &image);
-            y.iter_mut().zip(&direction).for_each(|(y, d)| *y += step * d);
-            residual.iter_mut().zip(&image).for_each(|(r, image)| *r -= step * image);
-            z = self.scaled(&residual);
-            let next = dot(&residual, &z);
-            direction.iter_mut().zip(&z).for_each(|(d, z)| *d = z + next / size * *d);
-            size = next;
-        }
-        self.project(&mut y);
-        x.copy_from_slice(&y);
-        Some(())
-    }
-
-    fn scaled(&self, residual: &[f64]) -> Vec<f64> {
-        let mut scaled: Vec<f64> = residual.iter().zip(&self.diagonal).map(|(r, diagonal)| r / diagonal).collect();
-        self.project(&mut scaled);
-        scaled
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -401,14 +286,5 @@ mod tests {
             let off = found / expected - 1.0;
             assert!((-1e-9..1e-8).contains(&off), "{pinning:?}: {found} instead of {expected}");
         }
-    }
-
-    #[test]
-    fn where_the_work_is_too_much_there_is_no_answer() {
-        let graph = random(450, 0);
-        let degrees = graph.degrees();
-        let mut operator = Operator::new(&graph, &Pinning::Nobody, &degrees);
-        operator.visits = MOST_VISITS;
-        assert_eq!(operator.inverse_iteration(), None);
     }
 }

@@ -47,6 +47,8 @@ pub struct Preflight {
     pub half_axes_m: Option<[f64; 3]>,
     /// Second smallest eigenvalue lambda2 of the graph's Laplacian.
     pub algebraic_connectivity: f64,
+    /// Whether a bound from below stands in for it, or for the least eigenvalue of the pinned Laplacian, which would take long.
+    pub connectivity_is_bound: bool,
     /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: for g >= 0 relative
     /// velocities are damped at least at this rate where it is positive, and grow where it is negative. For g < 0 the
     /// largest possible eigenvalue N takes the place of lambda2.
@@ -169,6 +171,7 @@ impl Preflight {
             delta_m: scenario.delta_m,
             half_axes_m: scenario.half_axes_m(),
             algebraic_connectivity: connectivity,
+            connectivity_is_bound: scenario.graph.connectivity_is_bound(),
             velocity_margin_per_s: law
                 .velocity_margin(connectivity, scenario.velocity_coefficient_per_s())
                 .map(|margin| margin.per_s),

@@ -298,6 +298,7 @@ fn the_json_has_the_promised_keys_and_codes() {
     let json = serde_json::to_value(check(&scenario("circle", &["swarm.dimensions=3"]))).expect("plain data");
     let keys = [
         "algebraic_connectivity",
+        "connectivity_is_bound",
         "velocity_margin_per_s",
         "common_mode_rate_per_s",
         "certified_m",

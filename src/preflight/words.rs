@@ -64,9 +64,10 @@ impl Preflight {
     fn stability_line(&self) -> String {
         let margin = self.velocity_margin_per_s.map_or("unknown".to_owned(), rate);
         format!(
-            "margin of relative velocities {margin} 1/s (algebraic connectivity {}), growth of the common \
+            "margin of relative velocities {margin} 1/s (algebraic connectivity {}{}), growth of the common \
              velocity {} 1/s",
             eigenvalue(self.algebraic_connectivity),
+            if self.connectivity_is_bound { ", a bound from below: more takes long" } else { "" },
             self.common_mode_rate_per_s
         )
     }

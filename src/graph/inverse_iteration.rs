@@ -1,0 +1,223 @@
+//! The least eigenvalue of a Laplacian, pinned or not, without a matrix: inverse iteration on a block of vectors, with conjugate
+//! gradients that a spanning tree of the graph, or its diagonal, brings near the solution.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::tree::SpanningTree;
+use super::{Graph, Pinning};
+
+/// Vectors that are iterated together: the slower ones, which are close to each other, do not hold up the first.
+const BLOCK: usize = 6;
+/// Relative change of the least eigenvalue from one iteration to the next at which it is known: what is left falls in
+/// proportion.
+const SETTLED: f64 = 1e-12;
+const MOST_ITERATIONS: usize = 300;
+/// Residual of a linear system, relative to its right side.
+const SOLVED: f64 = 1e-6;
+/// Most visits of edges and vehicles: some ten seconds. Thin graphs of tens of thousands of vehicles that are no trees may ask for more.
+const MOST_VISITS: u64 = 4_000_000_000;
+
+/// Vehicles for each edge beyond those of a tree, from where on the tree is nearer to the graph than its diagonal is.
+const NEARLY_A_TREE: usize = 8;
+
+/// M as a function of vectors, on those that it maps onto themselves: without a mean where nobody is pinned, and zero at a
+/// leader.
+pub(super) struct Operator<'a> {
+    graph: &'a Graph,
+    pinning: &'a Pinning,
+    near: Near,
+    visits: u64,
+}
+
+/// What is near M and quick to solve.
+enum Near {
+    Tree(SpanningTree),
+    /// M's diagonal.
+    Diagonal(Vec<f64>),
+}
+
+impl<'a> Operator<'a> {
+    /// Of a connected graph.
+    pub(super) fn new(graph: &'a Graph, pinning: &'a Pinning, degrees: &[usize]) -> Self {
+        let extra = (graph.edge_count() + 1).saturating_sub(graph.count());
+        let near = if NEARLY_A_TREE * extra <= graph.count() {
+            Near::Tree(SpanningTree::new(graph, pinning))
+        } else {
+            let adds = |i: usize| if pinning.pins(i) { 1.0 } else { 0.0 };
+            Near::Diagonal(degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect())
+        };
+        Self { graph, pinning, near, visits: 0 }
+    }
+
+    fn product(&mut self, x: &[f64], out: &mut [f64]) {
+        self.visits += (self.graph.edge_count() + x.len()) as u64;
+        out.fill(0.0);
+        for (i, j) in self.graph.edges() {
+            let difference = x[i] - x[j];
+            out[i] += difference;
+            out[j] -= difference;
+        }
+        if matches!(self.pinning, Pinning::Listed(_)) {
+            (0..x.len()).filter(|&i| self.pinning.pins(i)).for_each(|i| out[i] += x[i]);
+        }
+        if let &Pinning::Leader(leader) = self.pinning {
+            out[leader] = 0.0;
+        }
+    }
+
+    fn project(&self, x: &mut [f64]) {
+        match *self.pinning {
+            Pinning::Nobody => {
+                let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+                for x in x {
+                    *x -= mean;
+                }
+            }
+            Pinning::Leader(leader) => x[leader] = 0.0,
+            Pinning::All | Pinning::Listed(_) => {}
+        }
+    }
+
+    /// X' M X, as sums over edges and pins: products of differences, whose digits are not lost in those of X.
+    fn forms(&mut self, block: &DMatrix<f64>) -> DMatrix<f64> {
+        self.visits += (BLOCK * (self.graph.edge_count() + block.nrows())) as u64;
+        let rows = block.transpose();
+        let mut forms = DMatrix::zeros(BLOCK, BLOCK);
+        let mut add = |of: &dyn Fn(usize) -> f64| {
+            let values: [f64; BLOCK] = std::array::from_fn(of);
+            (0..BLOCK).for_each(|k| (0..=k).for_each(|l| forms[(k, l)] += values[k] * values[l]));
+        };
+        for (i, j) in self.graph.edges() {
+            add(&|k| rows[(k, i)] - rows[(k, j)]);
+        }
+        if matches!(self.pinning, Pinning::Listed(_)) {
+            (0..block.nrows()).filter(|&i| self.pinning.pins(i)).for_each(|i| add(&|k| rows[(k, i)]));
+        }
+        (0..BLOCK).for_each(|k| (0..k).for_each(|l| forms[(l, k)] = forms[(k, l)]));
+        forms
+    }
+
+    /// The least eigenvalue, from above; none where it takes too long.
+    pub(super) fn inverse_iteration(&mut self) -> Option<f64> {
+        let count = self.graph.count();
+        // Vectors that no symmetry of a graph is likely to share: the fractions of multiples of irrational numbers.
+        let mut block = DMatrix::from_fn(count, BLOCK, |i, k| {
+            let irrational = ((k + 2) as f64).sqrt() + 0.123_456_789;
+            (irrational * (i + 1) as f64).fract() - 0.5
+        });
+        let mut before = f64::INFINITY;
+        for _ in 0..MOST_ITERATIONS {
+            block.column_iter_mut().for_each(|mut column| self.project(column.as_mut_slice()));
+            block = block.qr().q();
+            let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(self.forms(&block));
+            let least = eigenvalues.min();
+            if (before - least).abs() <= SETTLED * least {
+                return Some(least);
+            }
+            before = least;
+            block *= eigenvectors;
+            for (k, mut x) in block.column_iter_mut().enumerate() {
+                self.solve(eigenvalues[k], x.as_mut_slice())?;
+            }
+        }
+        None
+    }
+
+    /// Puts the solution y of M y = x in the place of x: conjugate gradients, led by what is near M, from x over its
+    /// Rayleigh quotient.
+    fn solve(&mut self, quotient: f64, x: &mut [f64]) -> Option<()> {
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut y: Vec<f64> = x.iter().map(|x| x / quotient).collect();
+        let mut image = vec![0.0; x.len()];
+        self.product(&y, &mut image);
+        let mut residual: Vec<f64> = x.iter().zip(&image).map(|(x, image)| x - image).collect();
+        let mut z = self.nearly_solved(&residual);
+        let mut direction = z.clone();
+        let (mut size, enough) = (dot(&residual, &z), (SOLVED * SOLVED) * dot(x, x));
+        for _ in 0..10 * x.len() {
+            if dot(&residual, &residual) <= enough {
+                break;
+            }
+            if self.visits > MOST_VISITS {
+                return None;
+            }
+            self.product(&direction, &mut image);
+            let step = size / dot(&direction, &image);
+            y.iter_mut().zip(&direction).for_each(|(y, d)| *y += step * d);
+            residual.iter_mut().zip(&image).for_each(|(r, image)| *r -= step * image);
+            z = self.nearly_solved(&residual);
+            let next = dot(&residual, &z);
+            direction.iter_mut().zip(&z).for_each(|(d, z)| *d = z + next / size * *d);
+            size = next;
+        }
+        self.project(&mut y);
+        x.copy_from_slice(&y);
+        Some(())
+    }
+
+    fn nearly_solved(&mut self, residual: &[f64]) -> Vec<f64> {
+        let mut near = residual.to_vec();
+        match &self.near {
+            Near::Tree(tree) => {
+                self.visits += 2 * residual.len() as u64;
+                tree.solve(&mut near, self.pinning);
+            }
+            Near::Diagonal(diagonal) => near.iter_mut().zip(diagonal).for_each(|(x, diagonal)| *x /= diagonal),
+        }
+        self.project(&mut near);
+        near
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_the_work_is_too_much_there_is_no_answer() {
+        let graph = Graph::ring(450);
+        let degrees = vec![2; 450];
+        let mut operator = Operator::new(&graph, &Pinning::Nobody, &degrees);
+        operator.visits = MOST_VISITS;
+        assert_eq!(operator.inverse_iteration(), None);
+        assert!(!graph.connectivity_is_bound(), "nobody asked");
+    }
+
+    #[test]
+    fn long_thin_graphs_of_thousands_are_solved_and_not_bounded() {
+        let count = 10_000;
+        let path = Graph::path(count);
+        let degrees = vec![2; count];
+        let found = Operator::new(&path, &Pinning::Nobody, &degrees).inverse_iteration().expect("solved");
+        let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / count as f64);
+        assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
+        // A path that is pinned at one end is half of one of twice its length.
+        let pinned = Pinning::Leader(0);
+        let found = Operator::new(&path, &pinned, &degrees).inverse_iteration().expect("solved");
+        let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / (2.0 * count as f64 - 1.0));
+        assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
+        // A ring that one vehicle of is pinned: the even half of a ring is a path that its end pins by half as much; sine and
+        // cosine of half an angle fit at tan = 1 / (2 tan).
+        let ring = Graph::ring(count);
+        let pinned = Pinning::Listed(vec![17]);
+        let found = Operator::new(&ring, &pinned, &degrees).inverse_iteration().expect("solved");
+        let exact = ring_pinned_at_one(count);
+        assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
+    }
+
+    /// x_k = cos(q (N/2 - k)) around the pinned vehicle 0 has (2 - 2 cos q) everywhere but there, where it has
+    /// 2 (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2): with q small solved by bisection.
+    fn ring_pinned_at_one(count: usize) -> f64 {
+        let half = 0.5 * count as f64;
+        let off = |q: f64| {
+            let (at, next) = (libm::cos(q * half), libm::cos(q * (half - 1.0)));
+            3.0 * at - 2.0 * next - (2.0 - 2.0 * libm::cos(q)) * at
+        };
+        let (mut low, mut high) = (1e-9, std::f64::consts::PI / count as f64);
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if off(low).signum() == off(middle).signum() { low = middle } else { high = middle }
+        }
+        2.0 - 2.0 * libm::cos(low)
+    }
+}
