@@ -205,7 +205,7 @@ mod tests {
         assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
     }
 
-    /// x_k = cos(q (N/2 - k)) around the pinned vehicle 0 has (2 - 2 cos q) everywhere but there, where it has
+    /// `x_k = cos(q (N/2 - k))` around the pinned vehicle 0 has (2 - 2 cos q) everywhere but there, where it has
     /// 2 (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2): with q small solved by bisection.
     fn ring_pinned_at_one(count: usize) -> f64 {
         let half = 0.5 * count as f64;

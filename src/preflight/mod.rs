@@ -30,6 +30,16 @@ const MARGIN_ROUNDING: f64 = 1e-12;
 /// A drift is harmless while so many spacings of numbers fit into what counts as reached.
 const FINE_SPACINGS: f64 = 100.0;
 
+/// Where the eigenvalues of a graph come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Connectivity {
+    /// They were solved for.
+    Solved,
+    /// A bound from below stands in for one of them, which would have taken long.
+    Bound,
+}
+
 /// What is known before the first step. SI units; what does not apply or is not known is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Preflight {
@@ -47,8 +57,8 @@ pub struct Preflight {
     pub half_axes_m: Option<[f64; 3]>,
     /// Second smallest eigenvalue lambda2 of the graph's Laplacian.
     pub algebraic_connectivity: f64,
-    /// Whether a bound from below stands in for it, or for the least eigenvalue of the pinned Laplacian, which would take long.
-    pub connectivity_is_bound: bool,
+    /// Where it comes from, or the least eigenvalue of the pinned Laplacian.
+    pub connectivity_is: Connectivity,
     /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: for g >= 0 relative
     /// velocities are damped at least at this rate where it is positive, and grow where it is negative. For g < 0 the
     /// largest possible eigenvalue N takes the place of lambda2.
@@ -171,7 +181,11 @@ impl Preflight {
             delta_m: scenario.delta_m,
             half_axes_m: scenario.half_axes_m(),
             algebraic_connectivity: connectivity,
-            connectivity_is_bound: scenario.graph.connectivity_is_bound(),
+            connectivity_is: if scenario.graph.connectivity_is_bound() {
+                Connectivity::Bound
+            } else {
+                Connectivity::Solved
+            },
             velocity_margin_per_s: law
                 .velocity_margin(connectivity, scenario.velocity_coefficient_per_s())
                 .map(|margin| margin.per_s),

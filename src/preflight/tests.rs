@@ -298,7 +298,7 @@ fn the_json_has_the_promised_keys_and_codes() {
     let json = serde_json::to_value(check(&scenario("circle", &["swarm.dimensions=3"]))).expect("plain data");
     let keys = [
         "algebraic_connectivity",
-        "connectivity_is_bound",
+        "connectivity_is",
         "velocity_margin_per_s",
         "common_mode_rate_per_s",
         "certified_m",
@@ -321,6 +321,7 @@ fn the_json_has_the_promised_keys_and_codes() {
     for key in keys {
         assert!(json.get(key).is_some(), "{key}");
     }
+    assert_eq!(json["connectivity_is"], "solved");
     assert_eq!(json["rigidity"], serde_json::json!({"rank": 9, "needed": 12, "rigid": false}));
     for warning in json["warnings"].as_array().expect("a list") {
         assert_eq!(warning.as_object().expect("a table").keys().collect::<Vec<_>>(), ["code", "message"]);

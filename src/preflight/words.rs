@@ -2,7 +2,7 @@
 
 use super::margins;
 use super::numbers::{rate, significant};
-use super::{LegPromise, Preflight};
+use super::{Connectivity, LegPromise, Preflight};
 use crate::text::{at_least, counted, seconds, table};
 use crate::vehicle::Quadrotor;
 
@@ -67,7 +67,10 @@ impl Preflight {
             "margin of relative velocities {margin} 1/s (algebraic connectivity {}{}), growth of the common \
              velocity {} 1/s",
             eigenvalue(self.algebraic_connectivity),
-            if self.connectivity_is_bound { ", a bound from below: more takes long" } else { "" },
+            match self.connectivity_is {
+                Connectivity::Solved => "",
+                Connectivity::Bound => ", a bound from below: more takes long",
+            },
             self.common_mode_rate_per_s
         )
     }

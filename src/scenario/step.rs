@@ -1,5 +1,6 @@
 //! The step that a law asks for wherever vehicles are, and the one that is chosen where none is given.
 
+#[cfg(feature = "files")]
 use super::limits::MAX_STEPS;
 use super::spec::Scenario;
 use super::time::TimeSpec;
