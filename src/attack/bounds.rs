@@ -57,11 +57,6 @@ impl Variation {
         Ok(Self { key: key.to_owned(), low, high })
     }
 
-    /// Whether both bounds are whole numbers.
-    pub(super) fn is_whole(&self) -> bool {
-        self.low.fract() == 0.0 && self.high.fract() == 0.0
-    }
-
     pub(super) fn bound(&self, whole: bool) -> Bound {
         Bound { key: self.key.clone(), low: self.low, high: self.high, whole }
     }

@@ -2,15 +2,13 @@
 
 use super::bounds::{Bound, Variation};
 use super::method::Method;
-use crate::scenario::{Override, Scenario, ScenarioError, Source};
+use crate::scenario::{Override, Scenario, ScenarioError, Source, between, takes_whole_numbers_alone};
 use crate::sim::SimError;
 use crate::swarm::{Rows, separation};
 use crate::text::as_toml;
 
 /// The axes of a point, as keys have them.
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Part of the way between two bounds at which there is no whole number but by chance.
-const BETWEEN: f64 = 0.381_966;
 
 /// What is asked of a search.
 #[derive(Clone, Debug, PartialEq)]
@@ -251,12 +249,9 @@ impl Plan {
     fn bound(&self, variation: &Variation) -> Result<(Bound, Scenario), AttackError> {
         let Variation { ref key, low, high } = *variation;
         let read = |value: f64| self.with(&[format!("{key}={}", as_toml(value))]);
-        let between = low + (high - low) * BETWEEN;
-        let whole = [false, true].into_iter().filter(|whole| !whole || variation.is_whole());
-        for whole in whole {
-            if let Ok(scenario) = read(if whole { between.round() } else { between }) {
-                return Ok((variation.bound(whole), scenario));
-            }
+        let whole = takes_whole_numbers_alone([low, high], |value| read(value).is_ok());
+        if let Ok(scenario) = read(between([low, high], whole)) {
+            return Ok((variation.bound(whole), scenario));
         }
         // What cannot be flown at one end may be at the other.
         let refused = |error| AttackError::Scenario { set: format!("{key} = {low}"), error };

@@ -4,16 +4,13 @@ use serde::Serialize;
 
 use super::search::Range;
 use crate::preflight::{PredictedMargin, Preflight};
-use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
+use crate::scenario::{Override, Scenario, ScenarioError, Source, Template, takes_whole_numbers_alone};
 use crate::sim::SimError;
 use crate::text::as_toml;
 
 /// Where neither start nor flight has randomness, a start that is flown more than once is moved by up to this part of delta along
 /// each axis.
 pub(super) const JITTER: f64 = 0.05;
-
-/// Part of the way between two ends at which there is no whole number but by chance.
-const BETWEEN: f64 = 0.381_966;
 
 /// What a flight has to show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -114,7 +111,7 @@ impl Plan {
         let (overrides, key) = (overrides.to_vec(), key.to_owned());
         let mut plan = Self { source, overrides, template, key, range, whole: false, asked, jitter: None, predicted };
         let ends = [plan.scenario(range.from, 0)?, plan.scenario(range.to, 0)?];
-        plan.whole = plan.takes_whole_numbers_alone();
+        plan.whole = takes_whole_numbers_alone([range.from, range.to], |value| plan.scenario(value, 0).is_ok());
         let is_random = plan.template.start_is_random() || ends.iter().any(Scenario::is_random_in_flight);
         let moves = asked.runs > 1 && !is_random;
         plan.jitter = moves.then(|| format!("start.jitter_m={:?}", JITTER * plan.own().delta_m));
@@ -143,15 +140,6 @@ impl Plan {
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.whole
-    }
-
-    fn takes_whole_numbers_alone(&self) -> bool {
-        let Range { from, to, .. } = self.range;
-        let between = from + (to - from) * BETWEEN;
-        from.fract() == 0.0
-            && to.fract() == 0.0
-            && self.scenario(between, 0).is_err()
-            && self.scenario(between.round(), 0).is_ok()
     }
 
     /// What is asked.

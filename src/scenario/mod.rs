@@ -98,6 +98,8 @@ pub use network::{LinkFailure, Missing, NearBy, NetworkSpec};
 pub(crate) use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 #[cfg(feature = "files")]
 pub use overrides::Override;
+#[cfg(feature = "reports")]
+pub(crate) use overrides::{between, takes_whole_numbers_alone};
 pub use resolution::Drift;
 #[cfg(feature = "schema")]
 pub use schema::schema;
