@@ -63,7 +63,11 @@ impl Graph {
             eigenvalues.sort_unstable_by(f64::total_cmp);
             return eigenvalues[usize::from(*pinning == Pinning::Nobody)];
         }
-        Operator::new(self, pinning, &degrees).inverse_iteration().unwrap_or_else(|| {
+        self.solved_or_bounded(pinning, &mut Operator::new(self, pinning, &degrees))
+    }
+
+    fn solved_or_bounded(&self, pinning: &Pinning, operator: &mut Operator<'_>) -> f64 {
+        operator.inverse_iteration().unwrap_or_else(|| {
             self.known.bounded.get_or_init(|| ());
             let count = self.count() as f64;
             if *pinning == Pinning::Nobody { 4.0 / (count * (count - 1.0)) } else { 1.0 / (count * count) }
@@ -276,6 +280,22 @@ mod tests {
         let star = Graph::star(9);
         let bounds = [Pinning::Leader(0), Pinning::Leader(3), Pinning::All].map(|p| star.largest_eigenvalue_bound(&p));
         assert_eq!(bounds, [1.0, 9.0, 10.0], "whoever hears a leader in the middle hears nobody else");
+    }
+
+    #[test]
+    fn a_bound_stands_in_where_the_work_is_too_much_and_the_graph_says_so() {
+        let graph = random(420, 0);
+        let exact = graph.algebraic_connectivity();
+        assert!(!graph.connectivity_is_bound());
+        let mut tired = Operator::new(&graph, &Pinning::Nobody, &graph.degrees());
+        tired.tire();
+        let bound = graph.solved_or_bounded(&Pinning::Nobody, &mut tired);
+        assert!(0.0 < bound && bound <= exact && graph.connectivity_is_bound(), "{bound} {exact}");
+        let (leader, exact) = (Pinning::Leader(7), least(&graph, &Pinning::Leader(7)));
+        let mut tired = Operator::new(&graph, &leader, &graph.degrees());
+        tired.tire();
+        let bound = graph.solved_or_bounded(&leader, &mut tired);
+        assert!(0.0 < bound && bound <= exact, "{bound} {exact}");
     }
 
     #[test]

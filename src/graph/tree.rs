@@ -9,7 +9,8 @@ pub(super) struct SpanningTree {
     order: Vec<usize>,
     /// Whom each hangs from; the root from itself.
     parent: Vec<usize>,
-    /// What is left of a vehicle's diagonal once all that hangs from it has been eliminated.
+    /// What is left of a vehicle's diagonal once all that hangs from it has been eliminated; infinite for a root that stays at 0,
+    /// as a leader does, or somebody where nobody is pinned.
     pivot: Vec<f64>,
 }
 
@@ -39,19 +40,21 @@ impl SpanningTree {
             pins[parent[i]] += pin / (1.0 + pin);
             pins[i] = 1.0 + pin;
         }
+        if matches!(pinning, Pinning::Nobody | Pinning::Leader(_)) {
+            pins[root] = f64::INFINITY;
+        }
         Self { order, parent, pivot: pins }
     }
 
-    /// Puts the solution in the place of the right side; that of the root is 0 where it is the leader or nobody is pinned.
-    pub(super) fn solve(&self, x: &mut [f64], pinning: &Pinning) {
-        for &i in self.order.iter().skip(1).rev() {
+    /// Puts the solution in the place of the right side.
+    pub(super) fn solve(&self, x: &mut [f64]) {
+        let Some((&root, others)) = self.order.split_first() else { return };
+        for &i in others.iter().rev() {
             x[self.parent[i]] += x[i] / self.pivot[i];
         }
-        let Some(&root) = self.order.first() else { return };
-        let is_grounded = matches!(pinning, Pinning::Nobody | Pinning::Leader(_));
-        x[root] = if is_grounded { 0.0 } else { x[root] / self.pivot[root] };
-        for &i in self.order.iter().skip(1) {
-            x[i] = x[i] / self.pivot[i] + x[self.parent[i]] / self.pivot[i];
+        x[root] /= self.pivot[root];
+        for &i in others {
+            x[i] = (x[i] + x[self.parent[i]]) / self.pivot[i];
         }
     }
 }
@@ -102,7 +105,7 @@ mod tests {
                 x[leader] = 0.0;
             }
             let b = x.clone();
-            SpanningTree::new(&graph, &pinning).solve(&mut x, &pinning);
+            SpanningTree::new(&graph, &pinning).solve(&mut x);
             for (i, &b) in b.iter().enumerate().filter(|&(i, _)| pinning.leader() != Some(i)) {
                 let near = edges.iter().filter(|&&(j, k)| i == j || i == k);
                 let pull: f64 = near.map(|&(j, k)| x[i] - x[j + k - i]).sum();
