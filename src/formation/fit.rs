@@ -47,7 +47,8 @@ impl PositionError {
         Self::of_residuals((0..count).map(|i| row(positions_m, i) - row(slots_m, i) - offset_m))
     }
 
-    /// One that is not a number makes both so: a largest of comparisons would pass it over.
+    /// Summing residuals keeps the digits that |P|^2 + |H|^2 - 2 tr S would cancel near a perfect fit. One that is not a number
+    /// makes both so: a largest of comparisons would pass it over.
     fn of_residuals(residuals_m: impl ExactSizeIterator<Item = Vector3<f64>>) -> Self {
         let count = residuals_m.len();
         let (sum, most) = residuals_m
@@ -100,10 +101,7 @@ pub fn best_rigid_motion(positions_m: &Rows, formation: &Formation) -> Option<Ri
 /// none. Allocates nothing.
 #[must_use]
 pub fn procrustes_rms_m(positions_m: &Rows, formation: &Formation) -> f64 {
-    let Some(fit) = Fit::new(positions_m, formation) else { return f64::NAN };
-    // Summing the residuals keeps the digits that |P|^2 + |H|^2 - 2 tr S would cancel near a perfect fit.
-    let sum: f64 = fit.residuals_m(positions_m, formation).map(|residual_m| residual_m.norm_squared()).sum();
-    (sum / positions_m.nrows() as f64).sqrt()
+    PositionError::of(positions_m, formation, Vector3::zeros(), Freedom::RigidMotion).rms_m
 }
 
 /// The distances \[m\] of the two positions that are farthest from their slots after [`best_rigid_motion`], added; NaN where

@@ -192,3 +192,29 @@ fn a_flight_that_is_shorter_than_the_hold_is_told_of_where_it_was_made_so() {
     assert!(error.to_string().contains("to be held"), "{error}");
     assert!(error.place().is_some_and(|place| place.source == "--set" && place.text.contains("0.5")), "{error}");
 }
+
+#[test]
+fn around_a_leader_who_keeps_its_slot_the_ways_of_the_others_are_least() {
+    let (starts, slots) = ([[-5.0, 4.0], [-2.0, -2.0], [-3.0, 0.0]], [[5.0, 2.0], [-6.0, -3.0], [2.0, 1.0]]);
+    let scenario = read(&format!(
+        "[start]\npositions_m = {starts:?}\n[formation]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = {slots:?}\n\
+         [law]\nkind = \"displacement\"\ndelta_m = 1.0\n[reference]\nleader = 3\n[time]\nduration_s = 2\n\
+         [[leg]]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = [[0, 9], [9, 0], [0, 0]]\nstart_s = 1\n"
+    ))
+    .expect("a scenario");
+    let ways = |from: [[f64; 2]; 3], slots: [[f64; 2]; 3]| -> f64 {
+        let offset = [0, 1].map(|axis| from[2][axis] - slots[2][axis]);
+        let way = |i: usize| (0..2).map(|axis| (from[i][axis] - slots[i][axis] - offset[axis]).powi(2)).sum::<f64>();
+        (0..3).map(way).sum()
+    };
+    let of_leg = |leg: usize| {
+        let slots_m = &scenario.legs[leg].formation.slots_m;
+        [0, 1, 2].map(|i| [slots_m[(i, 0)], slots_m[(i, 1)]])
+    };
+    for (leg, from, given) in [(0, starts, slots), (1, of_leg(0), [[0.0, 9.0], [9.0, 0.0], [0.0, 0.0]])] {
+        let [kept, swapped] = [given, [given[1], given[0], given[2]]].map(|slots| ways(from, slots));
+        assert!((ways(from, of_leg(leg)) - kept.min(swapped)).abs() < 1e-9, "{leg}: {kept} {swapped}");
+        assert!(swapped < kept, "{leg}: {kept} {swapped}");
+        assert_eq!(of_leg(leg)[2], starts[2], "the leader is where it is on the reference, at the origin");
+    }
+}
