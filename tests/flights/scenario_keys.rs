@@ -199,7 +199,7 @@ fn around_a_leader_who_keeps_its_slot_the_ways_of_the_others_are_least() {
     let scenario = read(&format!(
         "[start]\npositions_m = {starts:?}\n[formation]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = {slots:?}\n\
          [law]\nkind = \"displacement\"\ndelta_m = 1.0\n[reference]\nleader = 3\n[time]\nduration_s = 2\n\
-         [[leg]]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = [[0, 9], [9, 0], [0, 0]]\nstart_s = 1\n"
+         [[leg]]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = [[9, 0], [0, 9], [0, 0]]\nstart_s = 1\n"
     ))
     .expect("a scenario");
     let ways = |from: [[f64; 2]; 3], slots: [[f64; 2]; 3]| -> f64 {
@@ -211,7 +211,7 @@ fn around_a_leader_who_keeps_its_slot_the_ways_of_the_others_are_least() {
         let slots_m = &scenario.legs[leg].formation.slots_m;
         [0, 1, 2].map(|i| [slots_m[(i, 0)], slots_m[(i, 1)]])
     };
-    for (leg, from, given) in [(0, starts, slots), (1, of_leg(0), [[0.0, 9.0], [9.0, 0.0], [0.0, 0.0]])] {
+    for (leg, from, given) in [(0, starts, slots), (1, of_leg(0), [[9.0, 0.0], [0.0, 9.0], [0.0, 0.0]])] {
         let [kept, swapped] = [given, [given[1], given[0], given[2]]].map(|slots| ways(from, slots));
         assert!((ways(from, of_leg(leg)) - kept.min(swapped)).abs() < 1e-9, "{leg}: {kept} {swapped}");
         assert!(swapped < kept, "{leg}: {kept} {swapped}");
