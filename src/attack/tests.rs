@@ -166,6 +166,12 @@ fn keys_take_whole_numbers_where_they_take_no_others() {
 }
 
 #[test]
+fn a_key_is_none_of_whole_numbers_where_a_value_between_is_refused_for_its_size() {
+    let radius = plan(&["law.delta_m=0.9"], varied(&["formation.radius_m=0..2"], 1)).expect("a plan");
+    assert_eq!(radius.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [false]);
+}
+
+#[test]
 fn the_worst_of_several_seeds_counts_and_each_is_a_flight() {
     let radio = ["network={rate_hz=20, loss=0.3}", "noise.seed=5"];
     let seeds = Asked { seeds: 3, ..varied(&["network.loss=0.1..0.6"], 20) };

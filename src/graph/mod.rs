@@ -10,7 +10,7 @@ mod spectrum;
 mod tree;
 
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 
@@ -26,23 +26,17 @@ pub use pinning::Pinning;
 pub struct Graph {
     count: usize,
     edges: Edges,
-    known: Known,
+    known: Arc<Known>,
 }
 
-/// Eigenvalues that have been asked for; no part of what a graph is.
-#[derive(Clone, Debug)]
+/// Eigenvalues that have been asked for, of a graph or of a copy of it; no part of what a graph is.
+#[derive(Debug, Default)]
 struct Known {
     algebraic: OnceLock<f64>,
     /// Of the pinning that was asked for first.
     pinned: OnceLock<(Pinning, f64)>,
     /// Set where a bound from below stands in for one of them.
     bounded: OnceLock<()>,
-}
-
-impl Known {
-    const fn nothing() -> Self {
-        Self { algebraic: OnceLock::new(), pinned: OnceLock::new(), bounded: OnceLock::new() }
-    }
 }
 
 impl PartialEq for Known {
@@ -121,8 +115,8 @@ pub enum GraphError {
 impl Graph {
     /// Every vehicle senses every other.
     #[must_use]
-    pub const fn complete(count: usize) -> Self {
-        Self { count, edges: Edges::All, known: Known::nothing() }
+    pub fn complete(count: usize) -> Self {
+        Self { count, edges: Edges::All, known: Arc::default() }
     }
 
     /// The first vehicle senses all others and is sensed by them; they do not sense each other.
@@ -194,7 +188,7 @@ impl Graph {
         for i in 0..count {
             offsets[i + 1] += offsets[i];
         }
-        Self { count, edges: Edges::Listed { offsets, neighbours }, known: Known::nothing() }
+        Self { count, edges: Edges::Listed { offsets, neighbours }, known: Arc::default() }
     }
 
     /// Number of vehicles N.

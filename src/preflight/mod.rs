@@ -181,11 +181,7 @@ impl Preflight {
             delta_m: scenario.delta_m,
             half_axes_m: scenario.half_axes_m(),
             algebraic_connectivity: connectivity,
-            connectivity_is: if scenario.graph.connectivity_is_bound() {
-                Connectivity::Bound
-            } else {
-                Connectivity::Solved
-            },
+            connectivity_is: Connectivity::Solved,
             velocity_margin_per_s: law
                 .velocity_margin(connectivity, scenario.velocity_coefficient_per_s())
                 .map(|margin| margin.per_s),
@@ -233,6 +229,10 @@ impl Preflight {
             barrier_m: law.barrier_m(),
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
+        // The law has a copy of the graph, and has asked it for the eigenvalues behind its rates by now.
+        if scenario.graph.connectivity_is_bound() {
+            found.connectivity_is = Connectivity::Bound;
+        }
         let undamped = found.relative_velocity_unstable(law, scenario);
         if scenario.wind.is_still()
             && certificate.void == [Void::GraphNotComplete]

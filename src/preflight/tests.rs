@@ -322,7 +322,9 @@ fn the_json_has_the_promised_keys_and_codes() {
         assert!(json.get(key).is_some(), "{key}");
     }
     assert_eq!(json["connectivity_is"], "solved");
-    let bound = Preflight { connectivity_is: Connectivity::Bound, ..check(&scenario("circle", &[])) };
+    let circle = scenario("circle", &[]);
+    circle.graph.clone().pretend_a_bound();
+    let bound = check(&circle);
     assert_eq!(serde_json::to_value(&bound).expect("plain data")["connectivity_is"], "bound");
     assert!(bound.text().contains("a bound from below"), "{}", bound.text());
     assert_eq!(json["rigidity"], serde_json::json!({"rank": 9, "needed": 12, "rigid": false}));

@@ -231,8 +231,8 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
             judge.edge_error_m
         ),
         Fails::MaxPositionErrorM => format!(
-            "at the end every edge has its length and the shape is another one, or it is turned or elsewhere where it may not be: \
-             a vehicle is {} m from its slot, and {} m are allowed",
+            "at the end every edge has its length within what is allowed and the shape is another one all the same, or it is turned \
+             or elsewhere where it may not be: a vehicle is {} m from its slot, and {} m are allowed",
             metres(summary.max_position_error_m),
             judge.edge_error_m
         ),

@@ -81,6 +81,8 @@ mod vehicle;
 #[cfg(feature = "files")]
 mod vehicle_table;
 mod weather;
+#[cfg(feature = "reports")]
+mod whole;
 #[cfg(feature = "files")]
 mod wind;
 
@@ -98,8 +100,6 @@ pub use network::{LinkFailure, Missing, NearBy, NetworkSpec};
 pub(crate) use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 #[cfg(feature = "files")]
 pub use overrides::Override;
-#[cfg(feature = "reports")]
-pub(crate) use overrides::{between, takes_whole_numbers_alone};
 pub use resolution::Drift;
 #[cfg(feature = "schema")]
 pub use schema::schema;
@@ -113,3 +113,5 @@ pub(crate) use start::{offset, scatter};
 pub use template::{Draw, NamedLaw, Template};
 pub use time::TimeSpec;
 pub use vehicle::{DEFAULT_ATTITUDE_HZ, QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
+#[cfg(feature = "reports")]
+pub(crate) use whole::{between, takes_whole_numbers_alone};

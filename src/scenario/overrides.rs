@@ -48,24 +48,6 @@ pub struct Override {
 /// Most parts of a path: `start.positions_m.2.x` has four.
 const MAX_DEPTH: usize = 8;
 
-/// Part of the way between two ends at which there is no whole number but by chance.
-#[cfg(feature = "reports")]
-const BETWEEN: f64 = 0.381_966;
-
-/// A value between two ends, which stands for all of them; a whole one where it is to be.
-#[cfg(feature = "reports")]
-pub(crate) fn between([from, to]: [f64; 2], whole: bool) -> f64 {
-    let value = from + (to - from) * BETWEEN;
-    if whole { value.round() } else { value }
-}
-
-/// Whether a key takes whole numbers alone between two ends, of which it takes some: they are whole, and one between them is taken
-/// when it is rounded.
-#[cfg(feature = "reports")]
-pub(crate) fn takes_whole_numbers_alone(ends: [f64; 2], takes: impl Fn(f64) -> bool) -> bool {
-    ends.iter().all(|end| end.fract() == 0.0) && !takes(between(ends, false)) && takes(between(ends, true))
-}
-
 impl Override {
     /// Reads `key.path=value`.
     ///

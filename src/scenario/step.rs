@@ -29,15 +29,20 @@ impl Scenario {
         (self.plant.holds_commands() && rate_per_s > 0.0).then(|| self.time.honest_rate_dt() / rate_per_s)
     }
 
-    /// Halves a step that nobody gave until it can be made as short as the links of the law ask for, as long as a flight may have
-    /// so many. What is wrong with law or times is left for [`super::validate`] to refuse.
+    /// Halves a step that nobody gave until it can be made as short as the links of the law ask for. It stays where shorter ones are
+    /// of no use: where the law is asked less often than that, where a flight may not have so many parts of steps, and where it has
+    /// no whole step. What is wrong with law or times is left for [`super::validate`] to refuse.
     #[cfg(feature = "files")]
     pub(super) fn choose_step(&mut self) {
         let Ok(law) = self.law() else { return };
         let Some(needed_s) = self.links_step_s(law.as_ref()) else { return };
-        let half = |time: TimeSpec| TimeSpec { dt_s: 0.5 * time.dt_s, ..time };
-        while self.time.shortest_step_s() > needed_s && self.time.duration_s / half(self.time).dt_s <= MAX_STEPS {
-            self.time = half(self.time);
+        let TimeSpec { dt_s, duration_s, control_hz, .. } = self.time;
+        let is_asked_in_time = control_hz.is_none_or(|control_hz| control_hz * needed_s >= 1.0);
+        if !is_asked_in_time || duration_s / needed_s > MAX_STEPS || duration_s < dt_s {
+            return;
+        }
+        while self.time.shortest_step_s() > needed_s {
+            self.time.dt_s *= 0.5;
         }
     }
 }

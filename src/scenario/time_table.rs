@@ -19,7 +19,8 @@ pub(super) struct TimeTable {
     /// Length of the flight in s.
     pub(super) duration_s: f64,
     /// Physics step in s; the law is asked once a step. A step that is too long for the law is flown in parts. Unless given
-    /// 1/240, and 1/500 for quadrotors, halved until its parts can be as short as the law's links ask for.
+    /// 1/240, and 1/500 for quadrotors, halved until its parts can be as short as the law's links ask for, where the law is
+    /// asked so often and a flight of such parts has at most 1e9.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_DT_S)))]
     dt_s: Option<f64>,

@@ -39,8 +39,8 @@ pub struct Flight {
     pub engine_contacts: Vec<Pair>,
     /// Every time that two hulls hit, in order of time: from then on a bounce is flown and not the law's motion alone.
     pub bounces: Vec<Bounce>,
-    /// By how much the law's energy rose between two changes of its target, at most: the largest ratio; none for a law
-    /// without energy.
+    /// By how much the law's energy rose between two changes of its target, at most: the rise that integration
+    /// explains least; none for a law without energy.
     pub energy_rise: Option<EnergyRise>,
     /// Every time that slots were spread, in the order of time.
     pub breaths: Vec<Breath>,

@@ -22,7 +22,7 @@ pub struct Arrival {
     pub edge_error_m: f64,
     /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, in m/s.
     pub disagreement_m_s: f64,
-    /// Shortest time for which both must hold in s.
+    /// Shortest time for which all of it must hold in s.
     pub hold_s: f64,
 }
 

@@ -19,7 +19,7 @@ pub(super) const WORK: u64 = 4 + 3;
 /// Looks at a flight per second \[Hz\].
 const LOOKS_HZ: f64 = 200.0;
 const DURATION_S: f64 = 20.0;
-/// A formation counts as reached while every distance is within this of its slots' \[m\].
+/// Here a formation counts as reached while every distance is within this of its slots' \[m\].
 const REACHED_M: f64 = 0.01;
 
 /// A flight and what an independent integration (DOP853 at a relative tolerance of 1e-11) says of it.

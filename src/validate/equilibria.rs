@@ -32,7 +32,7 @@ const ORDERING_S: f64 = 600.0;
 /// When the 12-gon is looked at \[s\].
 const POLYGON_TIMES_S: [f64; 4] = [60.0, 120.0, 300.0, 1000.0];
 const POLYGON_NAMES: [&str; 4] = ["after_60_s", "after_120_s", "after_300_s", "after_1000_s"];
-/// A formation counts as reached below this largest edge error \[m\].
+/// Here a formation counts as reached below this largest edge error \[m\].
 const REACHED_M: f64 = 0.01;
 /// A swarm is at rest where no vehicle is pulled by more \[m/s^2\].
 const REST_M_S2: f64 = 1e-9;

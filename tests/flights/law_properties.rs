@@ -1,6 +1,7 @@
 //! What the laws promise for every swarm, shape and graph.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
@@ -114,7 +115,7 @@ fn isometries() -> impl Strategy<Value = Matrix3<f64>> {
 
 /// What the vehicles know where they know everything.
 fn exact<'a>(swarm: &'a Swarm, formation: &'a Formation) -> Observation<'a> {
-    static NOBODY: Graph = Graph::complete(0);
+    static NOBODY: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
     Observation::exact(swarm, &NOBODY, formation)
 }
 

@@ -1,6 +1,7 @@
 //! Keys that have two names, keys that may be left out, and graphs from their keys.
 
 use tautline::graph::Graph;
+use tautline::preflight::{Code, Preflight};
 use tautline::scenario::{Override, Scenario, ScenarioError, Source};
 
 use crate::scenario_files::{RIGHT, read, read_builtin};
@@ -181,8 +182,27 @@ fn a_step_that_nobody_gives_is_as_short_as_the_links_ask_for_and_one_that_is_giv
     assert!(halvings >= 1.0 && halvings.fract() == 0.0, "{halvings}");
     assert_eq!(ring("dt_s = 0.004").time.dt_s, 0.004);
     assert!(ring("max_halvings = 20").time.dt_s == 1.0 / 240.0, "its parts are short enough");
-    // No flight gets more steps than a flight may have.
-    assert!(ring("max_halvings = 0\n").time.steps() <= 1_000_000_000);
+    assert!(ring("max_halvings = 0\n").time.dt_s <= needed_s);
+    assert_eq!(ring("control_hz = 25").time.dt_s, 1.0 / 240.0, "the law is not asked more often");
+}
+
+#[test]
+fn a_step_that_no_flight_can_make_short_enough_stays_and_is_refused() {
+    let stiff = |more: &str, zeta_per_s: f64| {
+        read(&format!(
+            "[swarm]\ncount = 5\n[start]\nshape = \"circle\"\nradius_m = 5\n[formation]\nshape = \"circle\"\nradius_m = 3\n\
+             [law]\nkind = \"displacement\"\ndelta_m = 1\nk_per_s2 = 1e3\nzeta_per_s = {zeta_per_s}\n[time]\nduration_s = 100\n{more}"
+        ))
+        .expect("a scenario")
+    };
+    let refused = |scenario: &Scenario| {
+        Preflight::of(scenario).expect("a law").warnings.iter().any(|warning| warning.code == Code::StepTooLong)
+    };
+    let short = stiff("", 1e5);
+    assert!(short.time.dt_s < 1.0 / 240.0 && !refused(&short), "parts that a flight can have");
+    let (many, crazyflie) = (stiff("", 1e9), stiff("[vehicle]\nmodel = \"crazyflie\"", 1e6));
+    assert!(many.time.dt_s == 1.0 / 240.0 && refused(&many), "5e9 parts of steps");
+    assert!(crazyflie.time.dt_s == 1.0 / 500.0 && refused(&crazyflie), "asked 100 times a second");
 }
 
 #[test]

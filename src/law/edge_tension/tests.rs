@@ -26,7 +26,7 @@ fn pentagon_start() -> Swarm {
 
 /// Exact knowledge of a swarm: the law asks its own graph and formation.
 fn exact(swarm: &Swarm) -> Observation<'_> {
-    static NOBODY: Graph = Graph::complete(0);
+    static NOBODY: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
     static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
     Observation::exact(swarm, &NOBODY, &NOWHERE)
 }

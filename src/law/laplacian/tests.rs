@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use nalgebra::Vector3;
 
 use super::*;
@@ -8,7 +10,7 @@ const ROUNDING: f64 = 1e-13;
 
 /// Exact knowledge of a swarm on its way to a formation; where it is exact, the law asks its own graph.
 fn exact<'a>(swarm: &'a Swarm, formation: &'a Formation) -> Observation<'a> {
-    static NOBODY: Graph = Graph::complete(0);
+    static NOBODY: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
     Observation::exact(swarm, &NOBODY, formation)
 }
 
