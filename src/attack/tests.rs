@@ -167,8 +167,8 @@ fn keys_take_whole_numbers_where_they_take_no_others() {
 
 #[test]
 fn a_key_is_none_of_whole_numbers_where_a_value_between_is_refused_for_its_size() {
-    let radius = plan(&["law.delta_m=0.9"], varied(&["formation.radius_m=0..2"], 1)).expect("a plan");
-    assert_eq!(radius.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [false]);
+    let scale = plan(&["law.delta_m=3.5"], varied(&["formation.scale=0..2"], 1)).expect("a plan");
+    assert_eq!(scale.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [false]);
 }
 
 #[test]
