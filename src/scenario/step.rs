@@ -38,7 +38,8 @@ impl Scenario {
         let Some(needed_s) = self.links_step_s(law.as_ref()) else { return };
         let TimeSpec { dt_s, duration_s, control_hz, .. } = self.time;
         let is_asked_in_time = control_hz.is_none_or(|control_hz| control_hz * needed_s >= 1.0);
-        if !is_asked_in_time || duration_s / needed_s > MAX_STEPS || duration_s < dt_s {
+        let has_whole_steps = duration_s >= dt_s && duration_s / needed_s <= MAX_STEPS;
+        if !(needed_s > 0.0 && is_asked_in_time && has_whole_steps) {
             return;
         }
         while self.time.shortest_step_s() > needed_s {

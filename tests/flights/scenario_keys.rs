@@ -198,11 +198,23 @@ fn a_step_that_no_flight_can_make_short_enough_stays_and_is_refused() {
     let refused = |scenario: &Scenario| {
         Preflight::of(scenario).expect("a law").warnings.iter().any(|warning| warning.code == Code::StepTooLong)
     };
-    let short = stiff("", 1e5);
+    let short = stiff("", 1e6);
     assert!(short.time.dt_s < 1.0 / 240.0 && !refused(&short), "parts that a flight can have");
     let (many, crazyflie) = (stiff("", 1e9), stiff("[vehicle]\nmodel = \"crazyflie\"", 1e6));
     assert!(many.time.dt_s == 1.0 / 240.0 && refused(&many), "5e9 parts of steps");
     assert!(crazyflie.time.dt_s == 1.0 / 500.0 && refused(&crazyflie), "asked 100 times a second");
+}
+
+#[test]
+fn a_limit_that_is_none_is_refused_where_the_step_is_chosen_by_it() {
+    for none in ["-1", "0", "nan"] {
+        let error = read(&format!(
+            "[start]\npositions_m = [[0, 0], [4, 3]]\n[formation]\nshape = \"line\"\nspacing_m = 3\n\
+             [law]\nkind = \"displacement\"\ndelta_m = 1\n[time]\nduration_s = 100\nmax_rate_dt = {none}\n"
+        ))
+        .expect_err("no limit");
+        assert!(error.to_string().contains("max_rate_dt"), "{none}: {error}");
+    }
 }
 
 #[test]
