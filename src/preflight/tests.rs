@@ -113,7 +113,9 @@ fn a_drift_is_worded_by_what_it_does_and_refused_where_numbers_run_out() {
     let (code, felt) = said(&[single, "time.duration_s=230"]);
     assert!(code == Code::CommonModeUnstable && felt.contains("positions are told to 0.00139 m only"), "{felt}");
     let (end, uncounted) = ("time.duration_s=900", "swarm.a22_per_s=100");
-    for sets in [&[single, "time.duration_s=400"][..], &["swarm.a22_per_s=0.5"], &[end], &[uncounted], &[uncounted, end]] {
+    for sets in
+        [&[single, "time.duration_s=400"][..], &["swarm.a22_per_s=0.5"], &[end], &[uncounted], &[uncounted, end]]
+    {
         let (code, ruinous) = said(sets);
         assert!(code == Code::DriftUnresolved && !ruinous.contains("NaN"), "{ruinous}");
         let found = check(&scenario("pentagon", sets));

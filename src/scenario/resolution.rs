@@ -70,7 +70,8 @@ impl Scenario {
         let carried_m = self.carried_m(duration_s);
         // What no number counts is the largest: nothing times infinity were no number.
         let counted = |value: f64| value.min(f64::MAX);
-        let gained_s = |per_s: f64| if per_s == 0.0 { duration_s } else { counted((per_s * duration_s).exp_m1() / per_s) };
+        let gained_s =
+            |per_s: f64| if per_s == 0.0 { duration_s } else { counted((per_s * duration_s).exp_m1() / per_s) };
         let is_held = self.reference.is_some();
         let air_m_s = if is_held { 0.0 } else { self.wind.fastest_m_s() };
         let blown_m_s = self.drag_per_s * air_m_s * gained_s(rate_per_s);
