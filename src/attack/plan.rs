@@ -256,7 +256,7 @@ impl Plan {
         // What cannot be flown at one end may be at the other.
         let refused = |error| AttackError::Scenario { set: format!("{key} = {low}"), error };
         let scenario = read(low).or_else(|error| read(high).map_err(|_| error)).map_err(refused)?;
-        Ok((variation.bound(false), scenario))
+        Ok((variation.bound(whole), scenario))
     }
 
     /// What `--start` and `--velocity` leave free: each coordinate, positions before velocities.

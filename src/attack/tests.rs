@@ -169,6 +169,9 @@ fn keys_take_whole_numbers_where_they_take_no_others() {
 fn a_key_is_none_of_whole_numbers_where_a_value_between_is_refused_for_its_size() {
     let scale = plan(&["law.delta_m=3.5"], varied(&["formation.scale=0..2"], 1)).expect("a plan");
     assert_eq!(scale.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [false]);
+    // Refused from 21 on, and whole where it is taken.
+    let halvings = plan(&[], varied(&["time.max_halvings=0..100"], 1)).expect("a plan");
+    assert_eq!(halvings.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [true]);
 }
 
 #[test]

@@ -20,7 +20,7 @@ const SOLVED: f64 = 1e-6;
 const MOST_VISITS: u64 = 4_000_000_000;
 
 /// Vehicles for each edge beyond those of a tree, from where on the tree is nearer to the graph than its diagonal is.
-const NEARLY_A_TREE: usize = 8;
+const NEARLY_A_TREE: usize = 2;
 
 /// M as a function of vectors, on those that it maps onto themselves: without a mean where nobody is pinned, and zero at a
 /// leader.

@@ -68,13 +68,12 @@ impl Scenario {
         let (epsilon, duration_s) = (plant.epsilon(), self.time.duration_s);
         let seed_m_s = self.start.mean_velocity_m_s().norm() + epsilon;
         let carried_m = self.carried_m(duration_s);
-        // What no number counts is the largest: nothing times infinity were no number.
-        let counted = |value: f64| value.min(f64::MAX);
-        let gained_s =
-            |per_s: f64| if per_s == 0.0 { duration_s } else { counted((per_s * duration_s).exp_m1() / per_s) };
+        let gained_s = |per_s: f64| if per_s == 0.0 { duration_s } else { (per_s * duration_s).exp_m1() / per_s };
         let is_held = self.reference.is_some();
-        let air_m_s = if is_held { 0.0 } else { self.wind.fastest_m_s() };
-        let blown_m_s = self.drag_per_s * air_m_s * gained_s(rate_per_s);
+        let pull_m_s2 = if is_held { 0.0 } else { self.drag_per_s * self.wind.fastest_m_s() };
+        // Nothing times what no number counts were no number.
+        let blown_m_s = if pull_m_s2 == 0.0 { 0.0 } else { pull_m_s2 * gained_s(rate_per_s) };
+        let counted = |value: f64| value.min(f64::MAX);
         let distance_m = counted(carried_m + seed_m_s * gained_s(rate_per_s) + blown_m_s * duration_s);
         let speed_m_s = counted(seed_m_s * (rate_per_s * duration_s).exp() + blown_m_s);
         Drift { speed_m_s, distance_m, spacing_m: epsilon * (self.extent_m() + distance_m) }

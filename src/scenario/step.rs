@@ -35,15 +35,17 @@ impl Scenario {
     #[cfg(feature = "files")]
     pub(super) fn choose_step(&mut self) {
         let Ok(law) = self.law() else { return };
-        let Some(needed_s) = self.links_step_s(law.as_ref()) else { return };
-        let TimeSpec { dt_s, duration_s, control_hz, .. } = self.time;
-        let is_asked_in_time = control_hz.is_none_or(|control_hz| control_hz * needed_s >= 1.0);
-        let has_whole_steps = duration_s >= dt_s && duration_s / needed_s <= MAX_STEPS;
-        if !(needed_s > 0.0 && is_asked_in_time && has_whole_steps) {
+        let Some(needed_s) = self.links_step_s(law.as_ref()).filter(|&needed_s| needed_s > 0.0) else { return };
+        let is_asked_in_time = self.time.control_hz.is_none_or(|control_hz| control_hz * needed_s >= 1.0);
+        if !is_asked_in_time || self.time.duration_s < self.time.dt_s {
             return;
         }
-        while self.time.shortest_step_s() > needed_s {
-            self.time.dt_s *= 0.5;
+        let mut chosen = self.time;
+        while chosen.shortest_step_s() > needed_s {
+            chosen.dt_s *= 0.5;
+        }
+        if chosen.duration_s <= MAX_STEPS * chosen.shortest_step_s() {
+            self.time = chosen;
         }
     }
 }

@@ -191,17 +191,23 @@ fn a_step_that_no_flight_can_make_short_enough_stays_and_is_refused() {
     let stiff = |more: &str, zeta_per_s: f64| {
         read(&format!(
             "[swarm]\ncount = 5\n[start]\nshape = \"circle\"\nradius_m = 5\n[formation]\nshape = \"circle\"\nradius_m = 3\n\
-             [law]\nkind = \"displacement\"\ndelta_m = 1\nk_per_s2 = 1e3\nzeta_per_s = {zeta_per_s}\n[time]\nduration_s = 100\n{more}"
+             [law]\nkind = \"displacement\"\ndelta_m = 1\nk_per_s2 = 1e3\nzeta_per_s = {zeta_per_s}\n[time]\n{more}"
         ))
         .expect("a scenario")
     };
     let refused = |scenario: &Scenario| {
         Preflight::of(scenario).expect("a law").warnings.iter().any(|warning| warning.code == Code::StepTooLong)
     };
-    let short = stiff("", 1e6);
+    let short = stiff("duration_s = 100", 1e6);
     assert!(short.time.dt_s < 1.0 / 240.0 && !refused(&short), "parts that a flight can have");
-    let (many, crazyflie) = (stiff("", 1e9), stiff("[vehicle]\nmodel = \"crazyflie\"", 1e6));
+    let (many, crazyflie) =
+        (stiff("duration_s = 100", 1e9), stiff("duration_s = 100\n[vehicle]\nmodel = \"crazyflie\"", 1e6));
     assert!(many.time.dt_s == 1.0 / 240.0 && refused(&many), "5e9 parts of steps");
+    // A step of 5e-7 s would be enough; halving comes to 2.5e-7 s.
+    for (duration_s, is_chosen) in [(200, true), (400, false), (499, false), (600, false)] {
+        let whole = stiff(&format!("max_halvings = 0\nduration_s = {duration_s}"), 1e6);
+        assert_eq!((whole.time.dt_s < 5e-7, refused(&whole)), (is_chosen, !is_chosen), "{duration_s}");
+    }
     assert!(crazyflie.time.dt_s == 1.0 / 500.0 && refused(&crazyflie), "asked 100 times a second");
 }
 
