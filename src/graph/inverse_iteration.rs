@@ -19,9 +19,6 @@ const SOLVED: f64 = 1e-6;
 /// Most visits of edges and vehicles: some ten seconds. Thin graphs of tens of thousands of vehicles that are no trees may ask for more.
 const MOST_VISITS: u64 = 4_000_000_000;
 
-/// Vehicles for each edge beyond those of a tree, from where on the tree is nearer to the graph than its diagonal is.
-const NEARLY_A_TREE: usize = 2;
-
 /// M as a function of vectors, on those that it maps onto themselves: without a mean where nobody is pinned, and zero at a
 /// leader.
 pub(super) struct Operator<'a> {
@@ -41,13 +38,13 @@ enum Near {
 impl<'a> Operator<'a> {
     /// Of a connected graph.
     pub(super) fn new(graph: &'a Graph, pinning: &'a Pinning, degrees: &[usize]) -> Self {
-        let extra = (graph.edge_count() + 1).saturating_sub(graph.count());
-        let near = if NEARLY_A_TREE * extra <= graph.count() {
-            Near::Tree(SpanningTree::new(graph, pinning))
-        } else {
-            let adds = |i: usize| if pinning.pins(i) { 1.0 } else { 0.0 };
-            Near::Diagonal(degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect())
-        };
+        let near = SpanningTree::where_it_pays(graph, pinning).map_or_else(
+            || {
+                let adds = |i: usize| if pinning.pins(i) { 1.0 } else { 0.0 };
+                Near::Diagonal(degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect())
+            },
+            Near::Tree,
+        );
         Self { graph, pinning, near, visits: 0 }
     }
 

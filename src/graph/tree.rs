@@ -14,24 +14,24 @@ pub(super) struct SpanningTree {
     pivot: Vec<f64>,
 }
 
+/// Conjugate gradients that a tree leads need about as many iterations, each of some three times the work, as the cube root of the
+/// lengths along the tree of all edges that it lacks, which are at most twice the reach; those that the diagonal leads, about
+/// the reach. The cube of 3, times 2.
+const PAYS: usize = 54;
+
 impl SpanningTree {
+    /// Where it leads conjugate gradients faster than the diagonal does: on long thin graphs and those that lack few edges to be trees.
+    pub(super) fn where_it_pays(graph: &Graph, pinning: &Pinning) -> Option<Self> {
+        let lacks = (graph.edge_count() + 1).saturating_sub(graph.count());
+        let reach = Neighbours::of(graph).reach(pinning);
+        (PAYS.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(graph, pinning))
+    }
+
     /// Of a connected graph of at least one vehicle, breadth first from a leader or from the first.
-    pub(super) fn new(graph: &Graph, pinning: &Pinning) -> Self {
+    fn new(graph: &Graph, pinning: &Pinning) -> Self {
         let count = graph.count();
         let root = pinning.leader().unwrap_or(0);
-        let neighbours = Neighbours::of(graph);
-        let (mut order, mut parent) = (vec![root], vec![usize::MAX; count]);
-        parent[root] = root;
-        let mut next = 0;
-        while let Some(&i) = order.get(next) {
-            next += 1;
-            for &j in neighbours.get(i) {
-                if parent[j] == usize::MAX {
-                    parent[j] = i;
-                    order.push(j);
-                }
-            }
-        }
+        let (order, parent) = Neighbours::of(graph).breadth_first(vec![root]);
         // Pins below a vehicle, as if they were its own: an edge of stiffness 1 in series with s is one of s/(1 + s). No
         // difference is taken, and so no digit lost.
         let mut pins: Vec<f64> = (0..count).map(|i| if pinning.pins(i) { 1.0 } else { 0.0 }).collect();
@@ -88,11 +88,81 @@ impl Neighbours {
     fn get(&self, i: usize) -> &[usize] {
         &self.all[self.offsets[i]..self.offsets[i + 1]]
     }
+
+    /// Vehicles in the order in which they are reached from some of them, and whom each is reached from: these from themselves. Of
+    /// those that are as far, who has most to reach goes first, which keeps short what the edges left out span: a comb on a
+    /// ladder, and not its two rails.
+    fn breadth_first(&self, from: Vec<usize>) -> (Vec<usize>, Vec<usize>) {
+        let mut parent = vec![usize::MAX; self.offsets.len() - 1];
+        from.iter().for_each(|&i| parent[i] = i);
+        let (mut order, mut reached) = (from, 0);
+        while reached < order.len() {
+            let ahead = |&i: &usize| self.get(i).iter().filter(|&&j| parent[j] == usize::MAX).count();
+            order[reached..].sort_by_cached_key(|i| std::cmp::Reverse(ahead(i)));
+            let layer = reached..order.len();
+            reached = order.len();
+            for at in layer {
+                let i = order[at];
+                for &j in self.get(i) {
+                    if parent[j] == usize::MAX {
+                        parent[j] = i;
+                        order.push(j);
+                    }
+                }
+            }
+        }
+        (order, parent)
+    }
+
+    /// Edges between the vehicle that is farthest from those that are pinned, or from the leader or the first, and them.
+    fn reach(&self, pinning: &Pinning) -> usize {
+        let mut from: Vec<usize> = (0..self.offsets.len() - 1).filter(|&i| pinning.pins(i)).collect();
+        if from.is_empty() {
+            from.push(pinning.leader().unwrap_or(0));
+        }
+        let (order, parent) = self.breadth_first(from);
+        let up = |&i: &usize| (parent[i] != i).then_some(parent[i]);
+        std::iter::successors(order.last().copied(), up).skip(1).count()
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::inverse_iteration::Operator;
     use super::*;
+
+    /// Two rails and the rungs between them.
+    fn ladder(rungs: usize) -> Graph {
+        let rails = (2..2 * rungs).map(|i| (i - 2, i));
+        let edges: Vec<_> = rails.chain((0..rungs).map(|k| (2 * k, 2 * k + 1))).collect();
+        Graph::from_edges(2 * rungs, &edges).expect("a ladder")
+    }
+
+    #[test]
+    fn trees_lead_on_long_thin_graphs_alone() {
+        let pays = |graph: &Graph, pinning: &Pinning| SpanningTree::where_it_pays(graph, pinning).is_some();
+        let half = |graph: &Graph| Pinning::Listed((0..graph.count()).step_by(2).collect());
+        let (path, ladder) = (Graph::path(1000), ladder(1000));
+        assert!(pays(&path, &Pinning::Nobody) && pays(&path, &half(&path)), "it is the graph itself");
+        assert!(pays(&Graph::star(1000), &Pinning::Leader(3)));
+        assert!(pays(&ladder, &Pinning::Nobody) && pays(&ladder, &Pinning::Leader(7)));
+        assert!(!pays(&ladder, &half(&ladder)), "nobody is far from who is pinned");
+        let side = 40;
+        let right = (0..side * side).filter(|i| i % side + 1 < side).map(|i| (i, i + 1));
+        let grid: Vec<_> = right.chain((side..side * side).map(|i| (i - side, i))).collect();
+        let grid = Graph::from_edges(side * side, &grid).expect("a grid");
+        assert!(!pays(&grid, &Pinning::Nobody));
+    }
+
+    #[test]
+    fn a_ladder_of_thousands_is_solved() {
+        // The slowest motion of a ladder is that of a rail.
+        let rungs = 3000;
+        let graph = ladder(rungs);
+        let found = Operator::new(&graph, &Pinning::Nobody, &graph.degrees()).inverse_iteration().expect("solved");
+        let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / rungs as f64);
+        assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
+    }
 
     #[test]
     fn the_solution_on_a_tree_is_that_of_its_matrix() {
