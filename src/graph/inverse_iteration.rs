@@ -16,7 +16,8 @@ const SEARCHED: usize = 3 * BLOCK;
 const SETTLED: f64 = 1e-12;
 /// Residual of a linear system, relative to its right side.
 const SOLVED: f64 = 1e-6;
-/// Most visits of edges and vehicles: some ten seconds. Thin graphs of tens of thousands of vehicles that are no trees may ask for more.
+/// Most visits of edges and vehicles: some fifteen seconds, and more where neighbours have numbers far apart. Wide graphs of tens of
+/// thousands of vehicles may ask for more.
 const MOST_VISITS: u64 = 4_000_000_000;
 
 /// M as a function of vectors, on those that it maps onto themselves: without a mean where nobody is pinned, and zero at a

@@ -20,8 +20,8 @@ impl Graph {
     /// In closed form for complete graphs, stars, rings and paths (N, 1, 2 - 2 cos(2 pi/N), 2 - 2 cos(pi/N)), however the
     /// graph was made, and exactly 0 for a disconnected one. Otherwise all eigenvalues are computed for up to 400 vehicles;
     /// beyond, inverse iteration on a block of vectors, with conjugate gradients in the place of a matrix, led by a spanning
-    /// tree where the graph is hardly more than one. That ends at most a few parts in 1e9 above lambda2. Where it would take more
-    /// than some ten seconds, the bound from below `4/(N (N - 1))` stands in for lambda2, which
+    /// tree where the graph is long and thin, or hardly more than a tree. That ends at most a few parts in 1e9 above lambda2. Where it
+    /// would take more than some fifteen seconds (a minute of hundreds of thousands of vehicles), the bound from below `4/(N (N - 1))` stands in for lambda2, which
     /// [`Graph::connectivity_is_bound`] tells.
     #[must_use]
     pub fn algebraic_connectivity(&self) -> f64 {

@@ -94,7 +94,9 @@ impl Neighbours {
     /// ladder, and not its two rails.
     fn breadth_first(&self, from: Vec<usize>) -> (Vec<usize>, Vec<usize>) {
         let mut parent = vec![usize::MAX; self.offsets.len() - 1];
-        from.iter().for_each(|&i| parent[i] = i);
+        for &i in &from {
+            parent[i] = i;
+        }
         let (mut order, mut reached) = (from, 0);
         while reached < order.len() {
             let ahead = |&i: &usize| self.get(i).iter().filter(|&&j| parent[j] == usize::MAX).count();
