@@ -23,15 +23,16 @@ impl SpanningTree {
     /// Where it leads conjugate gradients faster than the diagonal does: on long thin graphs and those that lack few edges to be trees.
     pub(super) fn where_it_pays(graph: &Graph, pinning: &Pinning) -> Option<Self> {
         let lacks = (graph.edge_count() + 1).saturating_sub(graph.count());
-        let reach = Neighbours::of(graph).reach(pinning);
-        (PAYS.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(graph, pinning))
+        let neighbours = Neighbours::of(graph);
+        let reach = neighbours.reach(pinning);
+        (PAYS.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(&neighbours, pinning))
     }
 
     /// Of a connected graph of at least one vehicle, breadth first from a leader or from the first.
-    fn new(graph: &Graph, pinning: &Pinning) -> Self {
-        let count = graph.count();
+    fn new(neighbours: &Neighbours, pinning: &Pinning) -> Self {
         let root = pinning.leader().unwrap_or(0);
-        let (order, parent) = Neighbours::of(graph).breadth_first(vec![root]);
+        let (order, parent) = neighbours.breadth_first(vec![root]);
+        let count = parent.len();
         // Pins below a vehicle, as if they were its own: an edge of stiffness 1 in series with s is one of s/(1 + s). No
         // difference is taken, and so no digit lost.
         let mut pins: Vec<f64> = (0..count).map(|i| if pinning.pins(i) { 1.0 } else { 0.0 }).collect();
@@ -157,6 +158,26 @@ mod tests {
     }
 
     #[test]
+    fn edges_that_the_tree_of_a_ladder_lacks_span_little_however_it_is_numbered() {
+        let rungs = 60;
+        let (interleaved, rail_by_rail) = (ladder(rungs), |i: usize| i / 2 + rungs * (i % 2));
+        let renumbered: Vec<_> = interleaved.edges().map(|(i, j)| (rail_by_rail(i), rail_by_rail(j))).collect();
+        for graph in [interleaved, Graph::from_edges(2 * rungs, &renumbered).expect("a ladder")] {
+            let (_, parent) = Neighbours::of(&graph).breadth_first(vec![0]);
+            let up = |i: usize| std::iter::successors(Some(i), |&i| (parent[i] != i).then_some(parent[i]));
+            let longest = graph.edges().map(|(i, j)| {
+                let above: Vec<usize> = up(i).collect();
+                let (k, l) = up(j)
+                    .enumerate()
+                    .find_map(|(l, at)| Some((above.iter().position(|&of| of == at)?, l)))
+                    .expect("a root");
+                k + l
+            });
+            assert_eq!(longest.max(), Some(3));
+        }
+    }
+
+    #[test]
     fn a_ladder_of_thousands_is_solved() {
         // The slowest motion of a ladder is that of a rail.
         let rungs = 3000;
@@ -177,7 +198,7 @@ mod tests {
                 x[leader] = 0.0;
             }
             let b = x.clone();
-            SpanningTree::new(&graph, &pinning).solve(&mut x);
+            SpanningTree::new(&Neighbours::of(&graph), &pinning).solve(&mut x);
             for (i, &b) in b.iter().enumerate().filter(|&(i, _)| pinning.leader() != Some(i)) {
                 let near = edges.iter().filter(|&&(j, k)| i == j || i == k);
                 let pull: f64 = near.map(|&(j, k)| x[i] - x[j + k - i]).sum();
