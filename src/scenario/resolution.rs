@@ -70,9 +70,9 @@ impl Scenario {
         let carried_m = self.carried_m(duration_s);
         let gained_s = |per_s: f64| if per_s == 0.0 { duration_s } else { (per_s * duration_s).exp_m1() / per_s };
         let is_held = self.reference.is_some();
-        let pull_m_s2 = if is_held { 0.0 } else { self.drag_per_s * self.wind.fastest_m_s() };
-        // Nothing times what no number counts were no number.
-        let blown_m_s = if pull_m_s2 == 0.0 { 0.0 } else { pull_m_s2 * gained_s(rate_per_s) };
+        let air_m_s = if is_held { 0.0 } else { self.wind.fastest_m_s() };
+        let blown_m_s = self.drag_per_s * air_m_s * gained_s(rate_per_s);
+        // The largest number stands for what none counts, be it infinite or nothing times infinity: `min` takes what is a number.
         let counted = |value: f64| value.min(f64::MAX);
         let distance_m = counted(carried_m + seed_m_s * gained_s(rate_per_s) + blown_m_s * duration_s);
         let speed_m_s = counted(seed_m_s * (rate_per_s * duration_s).exp() + blown_m_s);

@@ -30,14 +30,14 @@ impl Scenario {
     }
 
     /// Halves a step that nobody gave until it can be made as short as the links of the law ask for. It stays where shorter ones are
-    /// of no use: where the law is asked less often than that, where a flight may not have so many parts of steps, and where it has
-    /// no whole step. What is wrong with law or times is left for [`super::validate`] to refuse.
+    /// of no use: where the law is asked less often than that, and where a flight may not have so many parts of steps. What is wrong
+    /// with law or times is left for [`super::validate`] to refuse.
     #[cfg(feature = "files")]
     pub(super) fn choose_step(&mut self) {
         let Ok(law) = self.law() else { return };
         let Some(needed_s) = self.links_step_s(law.as_ref()).filter(|&needed_s| needed_s > 0.0) else { return };
         let is_asked_in_time = self.time.control_hz.is_none_or(|control_hz| control_hz * needed_s >= 1.0);
-        if !is_asked_in_time || self.time.duration_s < self.time.dt_s {
+        if !is_asked_in_time {
             return;
         }
         let mut chosen = self.time;
