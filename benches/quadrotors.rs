@@ -10,7 +10,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_ma
 use tautline::formation::Formation;
 use tautline::law::{EdgeTensionKeys, LawSpec};
 use tautline::plant::{Path, rapier};
-use tautline::scenario::{DEFAULT_ATTITUDE_HZ, Precision, Scenario};
+use tautline::scenario::{DEFAULT_ATTITUDE_HZ, Scenario};
 use tautline::sim::{self, Parts};
 use tautline::swarm::{Rows, Swarm};
 use tautline::vehicle::{self, Airframe, MODELS, Quadrotor};
@@ -18,7 +18,7 @@ use tautline::vehicle::{self, Airframe, MODELS, Quadrotor};
 const COUNT: usize = 100;
 
 /// A second of it at a physics rate \[Hz\].
-fn lattice(physics_hz: f64, precision: Precision) -> Scenario {
+fn lattice(physics_hz: f64) -> Scenario {
     let start = Swarm::at_rest(Formation::grid(COUNT, 0.8).slots_m);
     let mut scenario = Scenario::new("lattice", start, Formation::grid(COUNT, 0.7), 0.4, 1.0);
     let model = vehicle::read(MODELS[0].1).expect("a model");
@@ -26,7 +26,6 @@ fn lattice(physics_hz: f64, precision: Precision) -> Scenario {
     scenario.set_airframe(Airframe::Quadrotor(Box::new(quadrotor)));
     scenario.law = LawSpec::EdgeTension(EdgeTensionKeys { alpha: 1e-4 });
     scenario.time.dt_s = 1.0 / physics_hz;
-    scenario.plant = tautline::scenario::PlantSpec::Rapier(precision);
     scenario.arrival.hold_s = 0.0;
     scenario.validate().expect("the lattice can be flown");
     scenario
@@ -34,33 +33,31 @@ fn lattice(physics_hz: f64, precision: Precision) -> Scenario {
 
 fn flights(criterion: &mut Criterion) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    for (precision, name) in [(Precision::Double, "double"), (Precision::Single, "single")] {
-        for physics_hz in [500.0, 1000.0] {
-            let scenario = lattice(physics_hz, precision);
-            let mut group = criterion.benchmark_group(format!("quadrotors/{name}/{physics_hz} Hz"));
-            group.sample_size(10);
-            group.bench_function(BenchmarkId::from_parameter("whole"), |bencher| {
-                bencher.iter_batched(
-                    || Parts::of(&scenario).expect("a law"),
-                    |parts| pool.install(|| sim::fly(&scenario, parts, &mut (), &mut |_| ControlFlow::Continue(()))),
-                    BatchSize::LargeInput,
-                );
-            });
-            group.bench_function(BenchmarkId::from_parameter("vehicles alone"), |bencher| {
-                let (held, mut state, mut path) = (Rows::zeros(COUNT), scenario.start.clone(), Path::default());
-                bencher.iter_batched(
-                    || rapier::plant(&scenario, precision),
-                    |mut plant| {
-                        for _ in 0..scenario.time.steps() {
-                            plant.apply(&held, &mut state);
-                            plant.advance(scenario.time.dt_s, &mut state, &mut path).expect("finite");
-                        }
-                    },
-                    BatchSize::LargeInput,
-                );
-            });
-            group.finish();
-        }
+    for physics_hz in [500.0, 1000.0] {
+        let scenario = lattice(physics_hz);
+        let mut group = criterion.benchmark_group(format!("quadrotors/{physics_hz} Hz"));
+        group.sample_size(10);
+        group.bench_function(BenchmarkId::from_parameter("whole"), |bencher| {
+            bencher.iter_batched(
+                || Parts::of(&scenario).expect("a law"),
+                |parts| pool.install(|| sim::fly(&scenario, parts, &mut (), &mut |_| ControlFlow::Continue(()))),
+                BatchSize::LargeInput,
+            );
+        });
+        group.bench_function(BenchmarkId::from_parameter("vehicles alone"), |bencher| {
+            let (held, mut state, mut path) = (Rows::zeros(COUNT), scenario.start.clone(), Path::default());
+            bencher.iter_batched(
+                || rapier::plant(&scenario),
+                |mut plant| {
+                    for _ in 0..scenario.time.steps() {
+                        plant.apply(&held, &mut state);
+                        plant.advance(scenario.time.dt_s, &mut state, &mut path).expect("finite");
+                    }
+                },
+                BatchSize::LargeInput,
+            );
+        });
+        group.finish();
     }
 }
 

@@ -11,7 +11,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, 
 use tautline::formation::Formation;
 use tautline::law::{DisplacementKeys, LawSpec};
 use tautline::plant::{Path, rapier};
-use tautline::scenario::{Precision, Scenario};
+use tautline::scenario::Scenario;
 use tautline::sim::{self, Simulation};
 use tautline::swarm::{Rows, Swarm};
 
@@ -36,8 +36,6 @@ fn displacement(criterion: &mut Criterion) {
         let mut scenario = lattice(count, steps);
         scenario.law = LawSpec::Displacement(DisplacementKeys::default());
         scenario.arrival.hold_s = 0.0;
-        // Single precision moves nobody slower than 0.013 m/s that far out.
-        scenario.arrival.disagreement_m_s = 0.1;
         self::steps(criterion, &format!("step/displacement/{count}"), &scenario, steps);
     }
 }
@@ -50,7 +48,7 @@ fn steps(criterion: &mut Criterion, name: &str, scenario: &Scenario, steps: u16)
     group.bench_function(BenchmarkId::from_parameter("bare engine"), |bencher| {
         let (held, mut state, mut path) = (Rows::zeros(count), scenario.start.clone(), Path::default());
         bencher.iter_batched(
-            || rapier::plant(scenario, Precision::Single),
+            || rapier::plant(scenario),
             |mut plant| {
                 for _ in 0..steps {
                     plant.apply(&held, &mut state);

@@ -119,7 +119,7 @@ fn report(
     };
     let wall_s = flight.performance.wall.as_secs_f64();
     let in_metres = flight.in_metres.as_ref().unwrap_or(&flight.audit);
-    let hulls = if scenario.engine().is_some() {
+    let hulls = if scenario.has_engine() {
         Hulls::solid(&flight.bounces, in_metres, &scenario.hull_radius_m, scenario.time.dt_s)
     } else {
         Hulls::of_points(in_metres, &scenario.hull_radius_m)
@@ -146,7 +146,7 @@ fn report(
         in_metres: flight.in_metres.as_ref(),
         clearance: flight.clearance.as_ref(),
         obstacles: &scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect::<Vec<_>>(),
-        engine_contact_pairs: scenario.engine().is_some().then_some(flight.engine_contacts.len() as u64),
+        engine_contact_pairs: scenario.has_engine().then_some(flight.engine_contacts.len() as u64),
         hulls: &hulls,
         vehicle: vehicle.as_ref(),
         network: flight.traffic.map(|of| Network { sent: of.sent, lost: of.lost, age_p95_s: of.age_p95_s }),
@@ -159,7 +159,6 @@ fn report(
         assignments: &flight.assignments,
         energy_rise: flight.energy_rise,
         energy_falls: scenario.wind.is_still() && energy_falls(preflight, &flight.certificate),
-        epsilon: scenario.plant.epsilon(),
         run: &Run {
             duration_s: flight.duration_s,
             dt_s: scenario.time.dt_s,

@@ -46,8 +46,8 @@ fn the_pentagon_has_its_golden_bits() {
     let mut pentagon = Scenario::new("pentagon", start, Formation::pentagon(3.0), 2.0, 120.0);
     pentagon.a22_per_s = 0.1;
     let golden = [
-        "cb8600eeaf2d0bdf6cd1d145ef66db49c2f9082475d1cb470bc3ad9fb7f29241",
-        "94c9d6c6d6d7680972e8b661409e572a7b317cd85912e9fa874378c567c2dd7a",
+        "1ef867d816a4b35d28b03a15974b51e54e41794d8fda8a7d4904816baed91ae3",
+        "bf07c1c6d11730270a28df3cd175b78fea174bc925c3fc2895b548d725b0e9b6",
     ];
     assert_eq!(hashes(&pentagon), golden);
 }
@@ -63,8 +63,8 @@ fn a_crowd_has_its_golden_bits() {
     crowd.a22_per_s = 0.1;
     crowd.arrival.hold_s = 0.1;
     let golden = [
-        "7ded5f55f0653343b2984df32e3b6708f150b32cafe005f80ece4f735bceab73",
-        "e7b2327b0433eb1210ee42b545705cdcf6de322140e89169dcbd26c9110bdc05",
+        "2b17cfe925afefe48acab15bf20cd8b97e6ec6b07dd2fcf9ad217d7c494be684",
+        "b526fcb81af0a313acf01fab672b2b0115970dcf2de3af0cb452a46f06043c39",
     ];
     assert_eq!(hashes(&crowd), golden);
 }

@@ -2,9 +2,9 @@
 //! formula for distances or contacts.
 
 use nalgebra::Vector3;
-use parry3d_f64::math::Vector;
-use parry3d_f64::query::PointQuery as _;
-use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace};
+use parry3d::math::Vector;
+use parry3d::query::PointQuery as _;
+use parry3d::shape::{Ball, Capsule, Cuboid, HalfSpace};
 
 use super::enclosure::{Minimum, Search, Target};
 use super::obstacle::Shape;

@@ -1,10 +1,10 @@
 //! The second detector: parry's shape cast on keep-out balls, in double precision. A cross-check of the closed form, on the
 //! relative motion that it is given too.
 
-use parry3d_f64::math::{Pose, Vector};
-use parry3d_f64::query::ShapeCastOptions;
-use parry3d_f64::query::details::cast_shapes_ball_ball;
-use parry3d_f64::shape::Ball;
+use parry3d::math::{Pose, Vector};
+use parry3d::query::ShapeCastOptions;
+use parry3d::query::details::cast_shapes_ball_ball;
+use parry3d::shape::Ball;
 
 use super::sweep::{ClosestPoint, RelativeMotion, Span};
 

@@ -126,7 +126,7 @@ impl Witness {
             ellipsoid_m,
             told: Vec::new(),
             violations: Vec::new(),
-            has_every_step: scenario.engine().is_some(),
+            has_every_step: scenario.has_engine(),
             most_steps: 0,
             other_law: None,
             obstacles: OwnObstacles::of(scenario, scale),

@@ -92,8 +92,6 @@ pub struct Preflight {
     /// Separation below which no pair joined by an edge ever comes \[m\], where the graph is not complete, so that no other
     /// pair is kept apart, and the energy decays.
     pub certified_edges_m: Option<f64>,
-    /// Relative distance between neighbouring numbers of those that positions are computed in.
-    pub epsilon: f64,
     /// How far the swarm's mean is carried by the end, by its own velocity or by rounding \[m\].
     pub drift_m: f64,
     /// Distance between neighbouring numbers there \[m\].
@@ -203,7 +201,6 @@ impl Preflight {
             needs: law.needs().to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             certified_edges_m: None,
-            epsilon: scenario.plant.epsilon(),
             drift_m: drift.distance_m,
             spacing_m: drift.spacing_m,
             dt_s: scenario.time.dt_s,
@@ -375,10 +372,7 @@ impl Preflight {
         } else {
             format!("The mean velocity carries the whole swarm {} m away", numbers::significant(self.drift_m))
         };
-        let precision = if self.epsilon > f64::EPSILON { ", set plant.precision to \"double\"" } else { "" };
-        Some(format!(
-            "{said}, {unresolved}. Shorten time.duration_s{precision}, or reduce what drives the mean velocity."
-        ))
+        Some(format!("{said}, {unresolved}. Shorten time.duration_s, or reduce what drives the mean velocity."))
     }
 
     fn why_common_mode_grows(&self, scenario: &Scenario) -> &'static str {

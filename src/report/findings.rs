@@ -68,8 +68,6 @@ pub struct Findings<'a> {
     pub energy_rise: Option<EnergyRise>,
     /// Whether the law's energy is proved never to grow in this flight.
     pub energy_falls: bool,
-    /// What part of their size the plant's numbers resolve.
-    pub epsilon: f64,
     /// Facts of the run.
     pub run: &'a Run,
     /// Wall-clock times.

@@ -110,7 +110,6 @@ impl Case {
             is_disturbed: false,
             energy_rise: self.energy_rise,
             energy_falls: self.energy_falls,
-            epsilon: f64::from(f32::EPSILON),
             run: &Run {
                 duration_s: 120.0,
                 dt_s: 1.0 / 240.0,
@@ -292,7 +291,7 @@ fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
 
 #[test]
 fn rounding_breaks_no_certificate() {
-    // A swarm that starts in its own formation certifies its own distances, and flies in single precision.
+    // A swarm that starts in its own formation certifies its own distances.
     let void = Vec::new();
     let certificate = Certificate { certified_m: Some(3.0), void, ..Certificate::void(Void::NoBarrier) };
     let case = Case { audit: passing(2.999_999_88), certificate: certificate.clone(), ..Case::good() };

@@ -1,14 +1,10 @@
 //! What flew, in words.
 
-use crate::scenario::{PlantSpec, Precision, Scenario};
+use crate::scenario::{PlantSpec, Scenario};
 use crate::vehicle::Airframe;
 
 /// What the vehicles were taken to be, and what becomes of a command.
 pub(super) fn plant(scenario: &Scenario) -> (String, &'static str) {
-    let bits = |precision: Precision| match precision {
-        Precision::Single => "single precision (32 bits)",
-        Precision::Double => "double precision (64 bits)",
-    };
     match (&scenario.airframe, scenario.plant) {
         (Airframe::Unicycle(_), _) => (
             "The vehicles are unicycles: they go where they look, turn no faster than they can, and never stop. Their way within a \
@@ -17,25 +13,22 @@ pub(super) fn plant(scenario: &Scenario) -> (String, &'static str) {
                 .to_owned(),
             "held over it",
         ),
-        (Airframe::Quadrotor(quadrotor), PlantSpec::Rapier(precision)) => (
+        (Airframe::Quadrotor(quadrotor), PlantSpec::Rapier) => (
             format!(
                 "The vehicles are quadrotors ({}): rigid bodies in Rapier with six degrees of freedom that four rotors lift, under \
                  gravity, with the lag of their motors, drag and an attitude loop at {} Hz; within a step each moves on a straight \
-                 line at constant speed, and hulls that touch push each other. The engine computes in {}, everything else in \
-                 double precision (64 bits).",
+                 line at constant speed, and hulls that touch push each other. Everything is computed \
+                 in double precision.",
                 quadrotor.model.name,
-                quadrotor.attitude_hz,
-                bits(precision)
+                quadrotor.attitude_hz
             ),
             "held until the next one",
         ),
-        (Airframe::Point, PlantSpec::Rapier(precision)) => (
-            format!(
-                "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
-                 at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
-                 so close that they touch. The engine computes in {}, law and audit in double precision (64 bits).",
-                bits(precision)
-            ),
+        (Airframe::Point, PlantSpec::Rapier) => (
+            "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
+             at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
+             so close that they touch. Everything is computed in double precision."
+                .to_owned(),
             "held over it",
         ),
         (Airframe::Quadrotor(quadrotor), PlantSpec::Ideal) => (

@@ -176,12 +176,12 @@ pub(super) fn rises(findings: &Findings<'_>) -> bool {
 fn risen_energy(findings: &Findings<'_>) -> Option<String> {
     let (summary, vehicles) = (findings.summary, findings.run.vehicles);
     let EnergyRise { from: initial, to: most } = findings.energy_rise?;
-    let allowed = highest_honest(initial, summary, vehicles, findings.epsilon);
+    let allowed = highest_honest(initial, summary, vehicles);
     (findings.energy_falls && most > allowed).then(|| {
         format!(
             "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2, \
              where integration and rounding explain {allowed:.4e}: what was flown is not the motion of the law. Shorten \
-             time.dt_s, raise time.max_halvings, or set plant.precision to double.",
+             time.dt_s, or raise time.max_halvings.",
         )
     })
 }

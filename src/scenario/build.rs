@@ -5,21 +5,21 @@
 //! it; [`super::validate`] judges the rest.
 
 use super::chance;
-use super::document::{Document, PlantKind, PlantTable, StartShape, StartTable};
+use super::document::{Document, PlantKind, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::graph::{edge_count, graph};
 use super::legs::{check_slots, legs, listed_slots};
 use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memory};
 use super::reference::ReferenceTable;
 use super::slots::is_flat;
-use super::spec::{PlantSpec, Precision, Scenario, Space};
+use super::spec::{PlantSpec, Scenario, Space};
 use super::start;
 use super::values::{PerVehicle, Point, rows};
 use crate::swarm::{Rows, Swarm, set_row};
 use crate::vehicle::Quadrotor;
 use crate::wind::WindSpec;
 
-/// Completes a scenario, in double precision where none is given. It still has to be validated.
+/// Completes a scenario. It still has to be validated.
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
@@ -61,11 +61,9 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         obstacles,
         reference,
         graph: graph(&document.graph.kind, count)?,
-        plant: match document.plant {
-            PlantTable { kind: PlantKind::Rapier, precision } => {
-                PlantSpec::Rapier(precision.unwrap_or(Precision::Double))
-            }
-            PlantTable { kind: PlantKind::Ideal, .. } => PlantSpec::Ideal,
+        plant: match document.plant.kind {
+            PlantKind::Rapier => PlantSpec::Rapier,
+            PlantKind::Ideal => PlantSpec::Ideal,
         },
         time,
         sensing: document.sensing,

@@ -20,7 +20,7 @@ use super::sensing::SensingSpec;
 #[cfg(feature = "shapes")]
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
 use super::shapes::{HelixKeys, SpacingKeys, VKeys};
-use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, Precision};
+use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG};
 use super::time_table::TimeTable;
 use super::values::{LegStart, PerVehicle, Point};
 use super::vehicle_table::VehicleTable;
@@ -350,10 +350,6 @@ pub(super) struct LawTable {
 pub(super) struct PlantTable {
     /// What moves the vehicles.
     pub(super) kind: PlantKind,
-    /// Floating-point precision of Rapier: 32 or 64 bits. Unless given, 32 where they tell positions apart to the end of
-    /// the flight, and 64 elsewhere. The ideal plant has no choice of it.
-    #[cfg_attr(feature = "schema", schemars(with = "Precision"))]
-    pub(super) precision: Option<Precision>,
 }
 
 /// A plant.
@@ -388,7 +384,7 @@ impl Default for SwarmTable {
 
 impl Default for PlantTable {
     fn default() -> Self {
-        Self { kind: PlantKind::Rapier, precision: None }
+        Self { kind: PlantKind::Rapier }
     }
 }
 

@@ -6,12 +6,10 @@ use super::error::ScenarioError;
 use crate::space::Spaced;
 use crate::swarm::{Pair, Rows, row};
 
-/// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart. Squares of such
-/// numbers stay finite in single precision too.
+/// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart.
 pub const LARGEST: f64 = 1e9;
 
-/// Smallest magnitude of a number that must be positive, in SI units. Squares of such numbers are normal numbers in
-/// single precision too.
+/// Smallest magnitude of a number that must be positive, in SI units.
 pub const SMALLEST: f64 = 1e-9;
 
 /// Most steps of a flight. Up to here the product of step number, step and recording rate is known to better than the

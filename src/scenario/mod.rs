@@ -106,7 +106,7 @@ pub use schema::schema;
 pub use sensing::SensingSpec;
 #[cfg(feature = "files")]
 pub use source::{MAX_FILE_BYTES, Source};
-pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Precision, Safety, Scenario, Space};
+pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
 #[cfg(feature = "reports")]
 pub(crate) use start::{offset, scatter};
 #[cfg(feature = "files")]

@@ -33,7 +33,7 @@ fn name_of<'a>(table: Option<&str>, key: &'a str) -> &'a str {
 /// One key of the scenario set to another value, whatever the file says.
 ///
 /// The path is dotted: `law.delta_m=1.5`. Keys and tables that the file does not have are made:
-/// `plant.precision=double`. Entries of a list are counted from 1, as vehicles are, and `x`, `y`, `z` are other names
+/// `plant.kind=ideal`. Entries of a list are counted from 1, as vehicles are, and `x`, `y`, `z` are other names
 /// for 1, 2, 3: `start.positions_m.4.x=-1` moves vehicle 4. The value is TOML, and a bare word is a string. A whole
 /// table is replaced by an inline table: `formation={shape="circle", radius_m=3}`. Another `kind` or `shape` leaves the
 /// keys behind that it does not have: `law.kind=laplacian` is enough where the file gives `law.alpha`. Which keys these are

@@ -4,26 +4,11 @@
 //! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
 
 use super::actuation::ActuationSpec;
-use super::error::ScenarioError;
 use super::failure::Failure;
-use super::limits::{CONTACT_PREDICTION_M, first_within};
-use super::spec::{PlantSpec, Precision, Scenario};
+use super::spec::{PlantSpec, Scenario};
 use crate::law::{Certificate, Law, Void};
 use crate::swarm::{Rows, mean_row, row};
 use crate::target::BreathingMode;
-
-/// Largest rounding of the surface of an obstacle, as a share of the distance at which the engine looks for contacts.
-const SURFACE_RESOLUTION: f64 = 0.1;
-
-/// Largest error of a22 by the engine's rounding, as a share of a22.
-const DAMPING_RESOLUTION: f64 = 0.01;
-
-/// Single precision is chosen where its numbers are this much finer than what counts as reached: each of some thousand
-/// steps rounds.
-#[cfg(feature = "files")]
-const FINER: f64 = 100.0;
-
-const SINGLE: PlantSpec = PlantSpec::Rapier(Precision::Single);
 
 /// How far the swarm as a whole is carried.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,32 +25,16 @@ impl PlantSpec {
     /// Whether the plant holds a command over a step; continuous time chooses its own steps.
     #[must_use]
     pub fn holds_commands(self) -> bool {
-        matches!(self, Self::Rapier(_))
-    }
-
-    /// Relative distance between neighbouring numbers of those that positions are computed in.
-    #[must_use]
-    pub fn epsilon(self) -> f64 {
-        match self {
-            Self::Rapier(Precision::Single) => f32::EPSILON.into(),
-            #[cfg(feature = "double")]
-            Self::Rapier(Precision::Double) => f64::EPSILON,
-            #[cfg(feature = "ideal")]
-            Self::Ideal => f64::EPSILON,
-        }
+        matches!(self, Self::Rapier)
     }
 }
 
 impl Scenario {
-    /// What the mean velocity, and with it a rounding error of [`PlantSpec::epsilon`] m/s, comes to by the end of the flight
+    /// What the mean velocity, and with it a rounding error of [`f64::EPSILON`] m/s, comes to by the end of the flight
     /// where it grows at this rate \[1/s\] and the wind adds to it, and how far the reference goes.
     #[must_use]
     pub fn drift(&self, rate_per_s: f64) -> Drift {
-        self.drift_in(self.plant, rate_per_s)
-    }
-
-    fn drift_in(&self, plant: PlantSpec, rate_per_s: f64) -> Drift {
-        let (epsilon, duration_s) = (plant.epsilon(), self.time.duration_s);
+        let (epsilon, duration_s) = (f64::EPSILON, self.time.duration_s);
         let seed_m_s = self.start.mean_velocity_m_s().norm() + epsilon;
         let carried_m = self.carried_m(duration_s);
         let gained_s = |per_s: f64| if per_s == 0.0 { duration_s } else { (per_s * duration_s).exp_m1() / per_s };
@@ -85,20 +54,6 @@ impl Scenario {
         let begins_m = guidance.motion.at(0.0).position_m - mean_row(&self.start.positions_m);
         let away_m = self.legs.iter().map(|leg| (mean_row(&leg.formation.slots_m) + begins_m).norm());
         away_m.fold(0.0, f64::max) + guidance.motion.reach_m(duration_s)
-    }
-
-    /// The precision that tells positions apart to the end of the flight, which a scenario file gets where it names none. It is
-    /// double for bodies that turn: an attitude is the sum of many small steps.
-    #[cfg(feature = "files")]
-    #[must_use]
-    pub fn needed_precision(&self) -> Precision {
-        let spacing_m = self.drift_in(SINGLE, self.velocity_coefficient_per_s()).spacing_m;
-        let is_point = self.airframe.is_point();
-        if is_point && self.check_single().is_ok() && FINER * spacing_m <= self.arrival.edge_error_m {
-            Precision::Single
-        } else {
-            Precision::Double
-        }
     }
 
     /// What a law promises from the start of this scenario on through all of its legs, as far as the scenario itself lets it: with
@@ -175,7 +130,7 @@ impl Scenario {
 
     /// Distance between neighbouring numbers where the swarm is meant to be \[m\].
     fn resolution_m(&self) -> f64 {
-        self.plant.epsilon() * (self.extent_m() + self.carried_m(self.time.duration_s))
+        f64::EPSILON * (self.extent_m() + self.carried_m(self.time.duration_s))
     }
 
     /// A distance from delta that is told for certain \[m\].
@@ -187,59 +142,6 @@ impl Scenario {
     fn extent_m(&self) -> f64 {
         let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
         slots_m.fold(extent_m(&self.start.positions_m), f64::max)
-    }
-
-    /// Refuses what single precision would silently not move.
-    pub(super) fn check_resolution(&self) -> Result<(), ScenarioError> {
-        if self.plant == SINGLE { self.check_single() } else { Ok(()) }
-    }
-
-    fn check_single(&self) -> Result<(), ScenarioError> {
-        let refuse = |said: String| {
-            Err(ScenarioError::new(said)
-                .with_help("set plant.precision to \"double\", or enlarge time.dt_s")
-                .at("time.dt_s")
-                .at("plant.precision"))
-        };
-        let (dt_s, half_ulp) = (self.time.dt_s, 0.5 * SINGLE.epsilon());
-        let extent_m = self.extent_m();
-        let stalled_m_s = half_ulp * extent_m / dt_s;
-        if stalled_m_s > self.arrival.disagreement_m_s {
-            return refuse(format!(
-                "in single precision, {extent_m:.3e} m from the middle of the swarm and in steps of {dt_s} s, a vehicle \
-                 slower than {stalled_m_s:.1e} m/s does not move"
-            ));
-        }
-        let drift_per_s = half_ulp / dt_s;
-        let a22_per_s = self.velocity_coefficient_per_s();
-        if a22_per_s != 0.0 && drift_per_s > DAMPING_RESOLUTION * a22_per_s.abs() {
-            return refuse(format!(
-                "in single precision and steps of {dt_s} s, a22 = {a22_per_s} 1/s is off by {drift_per_s:.1e} 1/s"
-            ));
-        }
-        let from_m = mean_row(&self.start.positions_m);
-        for (number, obstacle) in self.obstacles.iter().enumerate() {
-            let reach_m = (obstacle.place_m - from_m).norm() + obstacle.shape.reach_m();
-            let off_m = SINGLE.epsilon() * reach_m;
-            if off_m > SURFACE_RESOLUTION * CONTACT_PREDICTION_M {
-                return Err(ScenarioError::new(format!(
-                    "in single precision the surface of obstacle `{}`, up to {reach_m:.3e} m from the middle of the swarm, may \
-                     be off by {off_m:.1e} m",
-                    obstacle.name
-                ))
-                .with_help("set plant.precision to \"double\"")
-                .at_entry("obstacle", number)
-                .at("plant.precision"));
-            }
-        }
-        let rounded_m = self.delta_m + 4.0 * half_ulp * (self.delta_m + 2.0 * extent_m);
-        match first_within(&self.metric().scaled_rows(&self.start.positions_m), rounded_m) {
-            Some((pair, separation_m)) => refuse(format!(
-                "vehicles {pair} start {separation_m} m apart, which single precision cannot tell from delta = {} m",
-                self.delta_m
-            )),
-            None => Ok(()),
-        }
     }
 }
 

@@ -74,9 +74,9 @@ impl Scenario {
 impl From<&Scenario> for Document {
     fn from(scenario: &Scenario) -> Self {
         let law = scenario.law.clone().complete(scenario.velocity_coefficient_per_s());
-        let (kind, precision) = match scenario.plant {
-            PlantSpec::Rapier(precision) => (PlantKind::Rapier, Some(precision)),
-            PlantSpec::Ideal => (PlantKind::Ideal, None),
+        let kind = match scenario.plant {
+            PlantSpec::Rapier => PlantKind::Rapier,
+            PlantSpec::Ideal => PlantKind::Ideal,
         };
         Self {
             name: Some(scenario.name.clone()),
@@ -118,7 +118,7 @@ impl From<&Scenario> for Document {
                     GraphKind::Edges { edges }
                 },
             },
-            plant: PlantTable { kind, precision },
+            plant: PlantTable { kind },
             time: scenario.time.into(),
             arrival: scenario.arrival,
             breathing: scenario.breathing,

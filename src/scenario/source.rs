@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::document::{Document, PlantKind, PlantTable};
+use super::document::Document;
 use super::error::{Place, ScenarioError};
 use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
 use super::overrides::Override;
-use super::spec::{PlantSpec, Scenario};
+use super::spec::Scenario;
 use super::suggest::suggest;
 use super::text::Text;
 use super::{build, builtin, laws};
@@ -93,7 +93,7 @@ impl Source {
 
 impl Scenario {
     /// Reads, completes and checks a scenario. One without a name has that of its file, in which what a name may not hold
-    /// becomes `-`; where the precision of Rapier is not given, single is taken if it tells positions apart to the end.
+    /// becomes `-`.
     ///
     /// # Errors
     /// [`ScenarioError`] when the source cannot be read, is not TOML, has a key that is unknown, missing or of the
@@ -119,13 +119,9 @@ pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, Scenar
 pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario, ScenarioError> {
     let stem = || Path::new(text.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     document.name = document.name.or_else(|| Some(as_name(&stem())));
-    let precision_is_open = matches!(document.plant, PlantTable { kind: PlantKind::Rapier, precision: None });
     laws::check(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
-    let mut scenario = build::scenario(document).map_err(|error| text.place(error))?;
+    let scenario = build::scenario(document).map_err(|error| text.place(error))?;
     scenario.validate().map_err(|error| text.place(error))?;
-    if precision_is_open {
-        scenario.plant = PlantSpec::Rapier(scenario.needed_precision());
-    }
     Ok(scenario)
 }
 

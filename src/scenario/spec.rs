@@ -2,10 +2,6 @@
 
 use std::sync::LazyLock;
 
-#[cfg(feature = "schema")]
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use super::actuation::ActuationSpec;
 use super::failure::Failure;
 use super::network::NetworkSpec;
@@ -118,28 +114,16 @@ impl Space {
 /// Which plant flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlantSpec {
-    /// Rapier rigid bodies at the given floating-point precision.
-    Rapier(Precision),
-    /// The equation of motion solved in continuous time with the law inside, in double precision.
+    /// Rapier rigid bodies.
+    Rapier,
+    /// The equation of motion solved in continuous time with the law inside.
     #[cfg(feature = "ideal")]
     Ideal,
 }
 
-/// Floating-point precision of the physics engine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Precision {
-    /// 32 bits.
-    Single,
-    /// 64 bits.
-    #[cfg(feature = "double")]
-    Double,
-}
-
 impl Scenario {
     /// A flight with the defaults of the scenario file: the edge-tension law on the complete graph, in the plane if start
-    /// and formation lie in it; in single precision, whatever it needs. Change the fields as needed, then [`Scenario::validate`].
+    /// and formation lie in it. Change the fields as needed, then [`Scenario::validate`].
     #[must_use]
     pub fn new(name: &str, start: Swarm, formation: Formation, delta_m: f64, duration_s: f64) -> Self {
         let count = start.count();
@@ -158,7 +142,7 @@ impl Scenario {
             law: LawSpec::EdgeTension(EdgeTensionKeys::default()),
             delta_m,
             safety: Safety::Ball,
-            plant: PlantSpec::Rapier(Precision::Single),
+            plant: PlantSpec::Rapier,
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
             breathing: Breathing::default(),
@@ -174,13 +158,10 @@ impl Scenario {
         }
     }
 
-    /// Precision of the physics engine, where one moves the vehicles: on straight lines within steps, and off what they hit.
+    /// Whether the physics engine moves the vehicles: on straight lines within steps, and off what they hit.
     #[must_use]
-    pub fn engine(&self) -> Option<Precision> {
-        match (&self.airframe, self.plant) {
-            (Airframe::Point | Airframe::Quadrotor(_), PlantSpec::Rapier(precision)) => Some(precision),
-            _ => None,
-        }
+    pub fn has_engine(&self) -> bool {
+        matches!((&self.airframe, self.plant), (Airframe::Point | Airframe::Quadrotor(_), PlantSpec::Rapier))
     }
 
     /// Number of vehicles N.

@@ -13,7 +13,7 @@ use super::text::Text;
 use crate::law::LawSpec;
 
 /// A scenario file that has been read and found right, to be flown many times: [`Template::scenario`] makes each flight from
-/// the file anew, so that whatever depends on the law or the start (an assignment, the precision) is that of a file which
+/// the file anew, so that whatever depends on the law or the start (an assignment, the step) is that of a file which
 /// says so itself.
 #[derive(Clone, Debug)]
 pub struct Template {

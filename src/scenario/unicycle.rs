@@ -32,7 +32,7 @@ impl Scenario {
                 .at("vehicle.model")
                 .at("swarm.dimensions"));
         }
-        if !matches!(self.plant, PlantSpec::Rapier(_)) {
+        if !matches!(self.plant, PlantSpec::Rapier) {
             return Err(ScenarioError::new("the ideal plant flies points and quadrotors, no unicycles")
                 .with_help("leave out plant.kind: the way of a unicycle is solved in closed form")
                 .at("plant.kind")

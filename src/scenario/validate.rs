@@ -60,8 +60,7 @@ impl Scenario {
         self.check_sensing()?;
         self.check_network()?;
         self.check_actuation()?;
-        self.check_failures()?;
-        self.check_resolution()
+        self.check_failures()
     }
 
     fn check_noise(&self) -> Result<(), ScenarioError> {

@@ -105,18 +105,18 @@ pub enum Breakdown {
         /// The vehicle, from 0.
         vehicle: usize,
     },
-    /// The numbers that positions are computed in no longer tell them apart.
+    /// Rounding may have moved the vehicles by more than what has to be resolved.
     #[error(
-        "step {step}: the swarm is so far from its start that positions are {spacing_m:.1e} m apart from number to \
-         number, and {needed_m} m count"
+        "step {step}: rounding may have moved vehicles by {rounding_m:.1e} m, and {required_m} m has to be resolved: positions or \
+         velocities are too large for steps this short"
     )]
     Unresolved {
         /// The step, from 1.
         step: u64,
-        /// Distance between neighbouring numbers \[m\].
-        spacing_m: f64,
-        /// What is to be told apart: the largest edge error that counts as reached \[m\].
-        needed_m: f64,
+        /// Upper bound of the accumulated rounding error of a coordinate \[m\].
+        rounding_m: f64,
+        /// The position error that counts as reached \[m\].
+        required_m: f64,
     },
     /// The plant could not be solved any further.
     #[error("step {step}: the equation of motion cannot be solved to its tolerances")]

@@ -52,7 +52,7 @@ impl Motion {
             return Unicycles::new(*unicycle, &scenario.start).into();
         }
         match scenario.plant {
-            PlantSpec::Rapier(precision) => Self::Sampled(rapier::plant(scenario, precision)),
+            PlantSpec::Rapier => Self::Sampled(rapier::plant(scenario)),
             #[cfg(feature = "ideal")]
             PlantSpec::Ideal => match scenario.fleet() {
                 Some(fleet) => Self::Sampled(Box::new(Quadrotors::new(fleet))),

@@ -183,7 +183,7 @@ impl Simulation {
             return;
         }
         let step = self.steps + 1;
-        let flown = self.advance(step).and_then(|()| Ok(self.resolution.check(&self.state, step)?));
+        let flown = self.advance(step);
         self.sample_is_due = flown.is_ok() && self.scenario.time.records(step);
         let is_last = step == self.scenario.time.steps();
         self.end_on(flown.and(if is_last { Err(Ending::Completed) } else { Ok(()) }));

@@ -107,9 +107,9 @@ fn across(along: Vector3<f64>) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use parry3d_f64::math::{Pose, Vector};
-    use parry3d_f64::query::PointQuery as _;
-    use parry3d_f64::shape::{Ball, Capsule, Cuboid, HalfSpace};
+    use parry3d::math::{Pose, Vector};
+    use parry3d::query::PointQuery as _;
+    use parry3d::shape::{Ball, Capsule, Cuboid, HalfSpace};
     use proptest::prelude::*;
 
     use super::*;

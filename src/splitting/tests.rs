@@ -11,7 +11,7 @@ use crate::sim::Simulation;
 fn windy(law: &str, speed_m_s: f64, more: &str) -> Scenario {
     let text = format!(
         "[start]\npositions_m = [[0.0, 0.0], [3.0, 0.0], [6.0, 0.0]]\n[formation]\nshape = \"line\"\nspacing_m = 3.0\n\
-         [law]\nkind = \"{law}\"\ndelta_m = 2.0\n[plant]\nprecision = \"double\"\n[vehicle]\ndrag_per_s = 0.5\n\
+         [law]\nkind = \"{law}\"\ndelta_m = 2.0\n[vehicle]\ndrag_per_s = 0.5\n\
          [wind]\nmean_m_s = [2.0, 0.0]\nshared = false\ndryden = {{ speed_20ft_m_s = {speed_m_s:.1}, height_m = 10.0 }}\n\
          [time]\nduration_s = 3.0\n{more}"
     );

@@ -7,7 +7,7 @@ use super::starts::{COUNTS, DELTA_M, random_starts};
 use crate::continuous::{self, IdealError, Tolerances};
 use crate::formation::Formation;
 use crate::law::{EdgeTension, EdgeTensionKeys, Law, LawSpec, ParameterError};
-use crate::scenario::{Precision, Scenario};
+use crate::scenario::Scenario;
 use crate::sim::Ending;
 use crate::swarm::Swarm;
 use crate::text::bound;
@@ -79,7 +79,7 @@ fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, Untried> {
 
     let dt_s = honest_step_s(&scenario, certified_m)?;
     let (mut lowest, mut engine_energy_rise, mut engine_energy_excess) = (energy_initial, 0.0, 0.0);
-    let flight = engine_to_any_end(&with_step(&scenario, Precision::Double, dt_s), law, |sample| {
+    let flight = engine_to_any_end(&with_step(&scenario, dt_s), law, |sample| {
         let energy = sample.energy.unwrap_or(f64::NAN);
         engine_energy_rise = larger(engine_energy_rise, (energy - lowest) / energy_initial);
         engine_energy_excess = larger(engine_energy_excess, (energy - energy_initial) / energy_initial);
@@ -178,7 +178,7 @@ fn in_the_engine(trials: &[Trial]) -> Result<Claim, Untried> {
     let shortest_s = trials.iter().map(|trial| trial.dt_s).fold(f64::INFINITY, f64::min);
     let words = format!(
         "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} m of \
-         continuous time; steps of {:.2} ms to {:.2} ms, double precision",
+         continuous time; steps of {:.2} ms to {:.2} ms",
         population(),
         shortest_s * 1e3,
         LONGEST_STEP_S * 1e3
@@ -245,7 +245,7 @@ mod tests {
             .expect("a promise");
         let trial = |dt_s: f64| {
             let law = scenario.law().expect("a law");
-            let scenario = with_step(&scenario, Precision::Double, dt_s);
+            let scenario = with_step(&scenario, dt_s);
             let flight = engine_to_any_end(&scenario, law, |_| ()).expect("a flight");
             let engine_m = flight.audit.closest.expect("two vehicles").separation_m;
             Trial { certified_m, engine_m, dt_s, ..GOOD }

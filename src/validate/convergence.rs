@@ -9,7 +9,7 @@ use super::flights::{builtin, continuous, engine, larger, relative_speed_squared
 use super::interface::{Judged, Progress, Untried, stated};
 use crate::continuous::Tolerances;
 use crate::plant::{Path, rapier};
-use crate::scenario::{Precision, Scenario};
+use crate::scenario::Scenario;
 use crate::swarm::{Rows, Swarm, row, set_row};
 use crate::text::bound;
 
@@ -26,23 +26,19 @@ const ORDER: std::ops::RangeInclusive<f64> = 1.9..=2.1;
 const FREE_A22_PER_S: [f64; 3] = [-1.0, -0.1, 0.1];
 const FREE_STEPS: usize = 6000;
 const FREE_STEP_S: [f64; 3] = [1.0 / 60.0, 1.0 / 240.0, 1.0 / 1000.0];
-/// Rounding of 6000 steps in single precision, relative: a few eps each.
-const FREE_SINGLE: f64 = 2e-3;
 
 /// One step length and the errors of a flight in such steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Refinement {
     /// Step \[s\].
     pub dt_s: f64,
-    /// Largest distance of a vehicle from its place in continuous time, in double precision \[m\].
-    pub double_m: f64,
-    /// The same in single precision \[m\].
-    pub single_m: f64,
-    /// Observed order from the coarser step before, in double precision; none for the first.
+    /// Largest distance of a vehicle from its place in continuous time \[m\].
+    pub error_m: f64,
+    /// Observed order from the coarser step before; none for the first.
     pub order: Option<f64>,
-    /// Largest difference of E from what the dissipation leaves of E(0), in double precision \[m^2/s^2\].
+    /// Largest difference of E from what the dissipation leaves of E(0) \[m^2/s^2\].
     pub energy_excess_m2_s2: f64,
-    /// Largest rise of E above its lowest value so far, in double precision \[m^2/s^2\].
+    /// Largest rise of E above its lowest value so far \[m^2/s^2\].
     pub energy_rise_m2_s2: f64,
 }
 
@@ -60,8 +56,8 @@ fn largest_distance_m(a: &Swarm, b: &Swarm) -> f64 {
 }
 
 /// Flies with every step recorded and compares with the states of continuous time.
-fn fly(scenario: &Scenario, precision: Precision, steps_hz: f64, reference: &[Swarm]) -> Result<Flown, Untried> {
-    let scenario = with_step(scenario, precision, 1.0 / steps_hz);
+fn fly(scenario: &Scenario, steps_hz: f64, reference: &[Swarm]) -> Result<Flown, Untried> {
+    let scenario = with_step(scenario, 1.0 / steps_hz);
     let every = steps_hz / COMPARED_HZ;
     let mut flown = Flown::default();
     let (mut allowed, mut lowest, mut power) = (f64::NAN, f64::INFINITY, f64::NAN);
@@ -95,21 +91,16 @@ pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, Untrie
     let reference = continuous(&scenario, &times(DURATION_S, COMPARED_HZ), Tolerances::default())?.states;
     let flown = STEPS_HZ
         .par_iter()
-        .map(|&steps_hz| {
-            let fly = |precision| fly(&scenario, precision, steps_hz, &reference).inspect(|_| progress(1));
-            let (double, single) = rayon::join(|| fly(Precision::Double), || fly(Precision::Single));
-            Ok((double?, single?))
-        })
+        .map(|&steps_hz| fly(&scenario, steps_hz, &reference).inspect(|_| progress(1)))
         .collect::<Result<Vec<_>, Untried>>()?;
     let mut refinements: Vec<Refinement> = Vec::new();
-    for (steps_hz, (double, single)) in STEPS_HZ.into_iter().zip(flown) {
+    for (steps_hz, Flown { error_m, excess, rise }) in STEPS_HZ.into_iter().zip(flown) {
         refinements.push(Refinement {
             dt_s: 1.0 / steps_hz,
-            double_m: double.error_m,
-            single_m: single.error_m,
-            order: refinements.last().map(|coarse| order(coarse.double_m, double.error_m)),
-            energy_excess_m2_s2: double.excess,
-            energy_rise_m2_s2: double.rise,
+            error_m,
+            order: refinements.last().map(|coarse| order(coarse.error_m, error_m)),
+            energy_excess_m2_s2: excess,
+            energy_rise_m2_s2: rise,
         });
     }
     Ok(refinements)
@@ -122,8 +113,7 @@ pub(super) fn claims(refinements: &[Refinement]) -> Judged {
     let [of_error, of_excess] =
         [["coarsest_error_m", "finest_error_m"], ["coarsest_excess_m2_s2", "finest_excess_m2_s2"]];
     Ok(vec![
-        of_second_order("order-of-the-engine", refinements, of_error, |one| one.double_m, error)?,
-        single_precision(refinements)?,
+        of_second_order("order-of-the-engine", refinements, of_error, |one| one.error_m, error)?,
         of_second_order("energy-excess-of-the-engine", refinements, of_excess, |one| one.energy_excess_m2_s2, excess)?,
         energy_rise(refinements)?,
     ])
@@ -153,21 +143,6 @@ fn of_second_order(
     Ok(claim.measured(words, values).pass(orders.iter().all(|order| ORDER.contains(order))))
 }
 
-fn single_precision(refinements: &[Refinement]) -> Result<Claim, Untried> {
-    let best = refinements.iter().min_by(|a, b| a.single_m.total_cmp(&b.single_m)).copied().unwrap_or_default();
-    let finest = refinements.last().copied().unwrap_or_default();
-    let (floor_m, finest_m) = (best.single_m, finest.single_m);
-    let claim = stated("single-precision-floor")?;
-    // Rounding to 6e-8 of velocities of some 1 m/s, adding up one-sidedly over the 20000 steps of the best flight, moves a
-    // vehicle by at most 20000 * 6e-8 m.
-    let of_rounding = floor_m <= claim.limit() && floor_m > best.double_m;
-    let pass = of_rounding && finest.dt_s < best.dt_s && finest_m > 2.0 * floor_m;
-    let [best_hz, finest_hz] = [best.dt_s, finest.dt_s].map(f64::recip);
-    let words = format!("floor {floor_m:.1e} m at dt = 1/{best_hz:.0} s; {finest_m:.1e} m at dt = 1/{finest_hz:.0} s");
-    let values = [("floor_m", floor_m), ("floor_dt_s", best.dt_s), ("finest_error_m", finest_m)];
-    Ok(claim.measured(words, values).pass(pass))
-}
-
 fn energy_rise(refinements: &[Refinement]) -> Result<Claim, Untried> {
     let claim = stated("energy-of-the-engine")?;
     let rise = refinements.iter().map(|one| one.energy_rise_m2_s2).fold(0.0, larger);
@@ -176,7 +151,7 @@ fn energy_rise(refinements: &[Refinement]) -> Result<Claim, Untried> {
 }
 
 /// Largest relative error of a free velocity against v(0) exp(a22 t).
-fn free_decay_error(precision: Precision) -> Result<f64, Untried> {
+fn free_decay_error() -> Result<f64, Untried> {
     let mut largest = 0.0;
     for a22_per_s in FREE_A22_PER_S {
         let mut scenario = builtin("pentagon")?;
@@ -185,7 +160,7 @@ fn free_decay_error(precision: Precision) -> Result<f64, Untried> {
             let velocity = Vector3::new(1.0, -0.5, 0.0) * (1.0 + i as f64);
             set_row(&mut scenario.start.velocities_m_s, i, velocity);
         }
-        let (mut plant, mut path) = (rapier::plant(&scenario, precision), Path::default());
+        let (mut plant, mut path) = (rapier::plant(&scenario), Path::default());
         let (mut state, mut time_s) = (scenario.start.clone(), 0.0);
         plant.apply(&Rows::zeros(scenario.count()), &mut state);
         for step in 0..FREE_STEPS {
@@ -205,16 +180,12 @@ fn free_decay_error(precision: Precision) -> Result<f64, Untried> {
 
 /// The claim about free motion.
 pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, Untried> {
-    let (double, single) = rayon::join(|| free_decay_error(Precision::Double), || free_decay_error(Precision::Single));
-    let (double, single) = (double?, single?);
+    let largest = free_decay_error()?;
     progress(1);
     let claim = stated("free-decay")?;
     let words = format!(
-        "largest relative error {} in double and {single:.0e} in single precision after {FREE_STEPS} steps of mixed lengths \
-         with a22 of {FREE_A22_PER_S:?} 1/s",
-        bound(double, claim.limit())
+        "largest relative error {} after {FREE_STEPS} steps of mixed lengths with a22 of {FREE_A22_PER_S:?} 1/s",
+        bound(largest, claim.limit())
     );
-    let pass = double <= claim.limit() && single <= FREE_SINGLE;
-    let values = [("double_relative_error", double), ("single_relative_error", single)];
-    Ok(claim.measured(words, values).pass(pass))
+    Ok(claim.measured(words, [("relative_error", largest)]).within_limit())
 }

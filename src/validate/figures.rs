@@ -8,10 +8,7 @@ use crate::figures::{self, Figure, Step};
 
 /// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
 pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, Untried> {
-    let steps: Vec<Step> = convergence
-        .iter()
-        .map(|&Refinement { dt_s, double_m, single_m, .. }| Step { dt_s, double_m, single_m })
-        .collect();
+    let steps: Vec<Step> = convergence.iter().map(|&Refinement { dt_s, error_m, .. }| Step { dt_s, error_m }).collect();
     let mut drawn = vec![named("figure-1", figures::tension_curve(&tension::of_figure_1()?, "Fig. 1: edge tension"))];
     drawn.extend(of_flight(&flights.pentagon, ["figure-2a", "figure-2b", "figure-2c"], "Fig. 2", "pentagon"));
     drawn.extend(of_flight(&flights.circle, ["figure-3a", "figure-3b", "figure-3c"], "Fig. 3", "circle"));

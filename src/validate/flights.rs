@@ -10,7 +10,7 @@ use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
 use crate::law::Law;
 use crate::record::{Event, RecordError, Sample, Sink};
-use crate::scenario::{PlantSpec, Precision, Scenario, Source};
+use crate::scenario::{PlantSpec, Scenario, Source};
 use crate::sim::{self, Ending, Flight, Parts};
 use crate::swarm::{ClosestApproach, Swarm, mean_row, row};
 
@@ -85,10 +85,10 @@ pub(super) fn engine_to_any_end(
     Ok(sim::fly(scenario, Parts::under(scenario, law), &mut Watch(observe), go_on)?)
 }
 
-/// The same scenario at another precision and step \[s\], with every step recorded and taken as it is.
-pub(super) fn with_step(scenario: &Scenario, precision: Precision, dt_s: f64) -> Scenario {
+/// The same scenario in Rapier at another step \[s\], with every step recorded and taken as it is.
+pub(super) fn with_step(scenario: &Scenario, dt_s: f64) -> Scenario {
     let mut scenario = scenario.clone();
-    scenario.plant = PlantSpec::Rapier(precision);
+    scenario.plant = PlantSpec::Rapier;
     scenario.time.dt_s = dt_s;
     scenario.time.record_hz = 1.0 / dt_s;
     scenario.time.max_halvings = 0;

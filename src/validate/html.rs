@@ -72,14 +72,14 @@ fn row(claim: &Claim) -> [Markup; 3] {
 }
 
 fn convergence(refinements: &[Refinement]) -> Markup {
-    let row = |&Refinement { dt_s, double_m, single_m, order, energy_excess_m2_s2, .. }: &Refinement| {
-        let [double, single, excess] = [double_m, single_m, energy_excess_m2_s2].map(|x| format!("{x:.2e}"));
+    let row = |&Refinement { dt_s, error_m, order, energy_excess_m2_s2, .. }: &Refinement| {
+        let [error, excess] = [error_m, energy_excess_m2_s2].map(|x| format!("{x:.2e}"));
         let order = order.map_or("–".to_owned(), |order| format!("{order:.3}"));
-        [format!("1/{:.0}", 1.0 / dt_s), double, order, single, excess]
+        [format!("1/{:.0}", 1.0 / dt_s), error, order, excess]
     };
     page::numbers(
         "Largest position error of Rapier on the pentagon's flight, by step",
-        &["Step [s]", "Double precision [m]", "Order", "Single precision [m]", "Energy excess [m²/s²]"],
+        &["Step [s]", "Position error [m]", "Order", "Energy excess [m²/s²]"],
         refinements.iter().map(row),
     )
 }

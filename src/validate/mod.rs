@@ -49,8 +49,8 @@ const PARTS: [Part; 8] = [
     ("displacement", "The displacement law", displacement::WORK, displacement::judge),
     ("margins", "Margins of delay and of held commands", margins::WORK, margins::judge),
 ];
-/// Convergence in both precisions, free motion, and three flights.
-const ENGINE_WORK: u64 = 2 * convergence::STEPS_HZ.len() as u64 + 1 + 3;
+/// Convergence, free motion, and three flights.
+const ENGINE_WORK: u64 = convergence::STEPS_HZ.len() as u64 + 1 + 3;
 
 /// Units of work that [`validate`] counts in all.
 #[must_use]

@@ -8,7 +8,7 @@ use super::interface::{Judged, Progress, Untried, stated, try_each};
 use crate::continuous::Tolerances;
 use crate::formation::{Formation, largest_edge_error_m};
 use crate::graph::Graph;
-use crate::scenario::{Precision, Scenario, Space};
+use crate::scenario::{Scenario, Space};
 use crate::sim::Ending;
 use crate::swarm::{Rows, Swarm, mean_row, set_row};
 use crate::text::bound;
@@ -114,7 +114,7 @@ fn common_mode() -> Result<Claim, Untried> {
 }
 
 fn common_mode_in_the_engine() -> Result<Claim, Untried> {
-    let flight = engine(&with_step(&drifting(), Precision::Double, ENGINE_STEP_S), |_| ())?;
+    let flight = engine(&with_step(&drifting(), ENGINE_STEP_S), |_| ())?;
     common_rate("common-mode-in-the-engine", &flight.last, flight.duration_s)
 }
 
@@ -122,7 +122,7 @@ fn lost_to_rounding() -> Result<Claim, Untried> {
     let mut scenario = drifting();
     scenario.start.velocities_m_s.fill(0.0);
     scenario.time.duration_s = LOST_S;
-    let mut scenario = with_step(&scenario, Precision::Double, ENGINE_STEP_S);
+    let mut scenario = with_step(&scenario, ENGINE_STEP_S);
     scenario.time.record_hz = 1.0;
     // Flown on where positions are no longer told apart: that is what is to be seen.
     scenario.arrival.edge_error_m = f64::INFINITY;
@@ -144,7 +144,7 @@ fn lost_to_rounding() -> Result<Claim, Untried> {
     };
     let lost = if lost_at_s.is_nan() { "never lost".to_owned() } else { format!("lost after {lost_at_s:.0} s") };
     let words = format!(
-        "the hexagon, at rest in formation, is {lost} in double precision; the flight is {ending} at {:.0} s with a common \
+        "the hexagon, at rest in formation, is {lost}; the flight is {ending} at {:.0} s with a common \
          speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
         flight.duration_s
     );

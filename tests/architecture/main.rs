@@ -159,7 +159,7 @@ fn a_broken_arrow_is_seen() {
     assert!(seen("read/text.rs", "let reader = csv::Reader::open();"));
     assert!(!seen("read/mod.rs", "mod csv;\nlet table = csv::Table::open();"));
     assert!(!seen("read/text.rs", "let message = csv::<Message>(bytes);"));
-    assert!(!seen("audit/mod.rs", "use crate::swarm::Swarm;\nuse parry3d_f64::query;"));
+    assert!(!seen("audit/mod.rs", "use crate::swarm::Swarm;\nuse parry3d::query;"));
     assert!(!seen("cli/run.rs", "use crate::record::mcap::Header;"));
     assert!(!seen("audit/mod.rs", "// as crate::law::Law does\n"));
     assert!(!seen("cli/mod.rs", "println!(\"hello\");"));

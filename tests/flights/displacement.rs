@@ -87,7 +87,7 @@ fn within_s(log: &Log, scenario: &tautline::scenario::Scenario) -> f64 {
 #[test]
 fn the_pentagon_and_the_circle_are_flown_as_the_reference_says_in_both_plants() {
     for reference in references() {
-        for (plant, exact_m) in [("plant.kind=ideal", 1e-5), ("plant.precision=double", 1e-4)] {
+        for (plant, exact_m) in [("plant.kind=ideal", 1e-5), ("plant.kind=rapier", 1e-4)] {
             let scenario = builtin(reference.scenario, &[reference.sets, &[plant, "time.duration_s=40"]].concat());
             let (flight, log) = fly(&scenario);
             let case = format!("{} {:?} {plant}", reference.scenario, reference.sets);

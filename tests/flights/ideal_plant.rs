@@ -362,7 +362,7 @@ fn the_same_solution_has_the_same_bits() {
 
 #[test]
 fn the_resolved_scenario_names_the_ideal_plant_and_reads_back() {
-    let ideal = scenario("pentagon", &["plant.kind=ideal", "plant.precision=double"]);
+    let ideal = scenario("pentagon", &["plant.kind=ideal"]);
     let text = ideal.resolved_toml();
     assert!(text.contains("[plant]\nkind = \"ideal\"\n"), "{text}");
     let again = Scenario::read(&Source::Text { name: "again.toml".to_owned(), text }, &[]).expect("a scenario");

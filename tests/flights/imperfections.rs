@@ -154,9 +154,7 @@ fn a_lagging_vehicle_flies_the_solution_of_its_equations() {
         (x, v, a) = (x + 0.5 * h * (x1 + x2), v + 0.5 * h * (v1 + v2), a + 0.5 * h * (a1 + a2));
     }
     let off = |dt_s: f64| {
-        let sets = format!(
-            "time = {{ duration_s = 3.0, dt_s = {dt_s} }}\nactuation = {{ lag_s = {lag_s} }}\nplant = {{ precision = \"double\" }}"
-        );
+        let sets = format!("time = {{ duration_s = 3.0, dt_s = {dt_s} }}\nactuation = {{ lag_s = {lag_s} }}");
         let last = fly(&drifting(&sets)).0.last;
         (last.positions_m[(1, 0)] - last.positions_m[(0, 0)] - 5.0 - x).abs()
     };
@@ -165,14 +163,14 @@ fn a_lagging_vehicle_flies_the_solution_of_its_equations() {
     let order = (coarse / fine).log2();
     assert!((1.7..2.3).contains(&order), "second order in the step: {order} ({coarse} {fine})");
     // Without the lag it is another motion.
-    let sets = "time = { duration_s = 3.0, dt_s = 0.01 }\nplant = { precision = \"double\" }";
+    let sets = "time = { duration_s = 3.0, dt_s = 0.01 }";
     let last = fly(&drifting(sets)).0.last;
     assert!((last.positions_m[(1, 0)] - last.positions_m[(0, 0)] - 5.0 - x).abs() > 0.05);
 }
 
 #[test]
 fn a_dead_vehicle_drifts_on_and_a_frozen_one_goes_on_accelerating() {
-    let sets = "time = { duration_s = 2.0, record_hz = 240.0 }\nplant = { precision = \"double\" }";
+    let sets = "time = { duration_s = 2.0, record_hz = 240.0 }";
     for kind in [FailureKind::Dead {}, FailureKind::Frozen {}] {
         let mut scenario = drifting(sets);
         scenario.failures = vec![Failure { vehicle: 2, at_s: 1.0, kind }];

@@ -10,7 +10,7 @@ use tautline::graph::{Graph, Pinning};
 use tautline::law::{DisplacementKeys, LawSpec, Void};
 use tautline::record::Event;
 use tautline::run::run;
-use tautline::scenario::{PlantSpec, Precision, Scenario};
+use tautline::scenario::{PlantSpec, Scenario};
 use tautline::sim::Simulation;
 use tautline::swarm::{Rows, Swarm, row, separation, set_row};
 use tautline::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
@@ -184,7 +184,6 @@ fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_w
             "swarm.a22_per_s=0",
             "graph.kind=star",
             &format!("reference={{kind=\"velocity\", velocity_m_s=[0.5, 0], leader=1, feed_forward={fed}}}"),
-            "plant.precision=double",
             "time.duration_s=40",
             // A lag is not a jam.
             "breathing.mode=off",
@@ -199,7 +198,7 @@ fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_w
         scenario.start.positions_m.copy_from(&scenario.legs[0].formation.slots_m);
         let moved_m = -begins.position_m;
         scenario.legs[0] = scenario.legs[0].clone().placed(1.0, 0.0, moved_m);
-        scenario.plant = PlantSpec::Rapier(Precision::Double);
+        scenario.plant = PlantSpec::Rapier;
         scenario.validate().unwrap_or_else(|error| panic!("{error}"));
         let (flight, _) = fly(&scenario);
         let slots_m = &scenario.formation().slots_m;
@@ -287,7 +286,6 @@ law = { kind = "displacement", delta_m = 1.0, zeta_per_s = 0.1 }
 graph = { kind = "star" }
 breathing = { mode = "MODE", scale = 4.0 }
 time = { duration_s = 60.0 }
-plant = { precision = "double" }
 "#;
 
 /// What a stalled swarm is promised anew holds for the leg that is under way and those after it.

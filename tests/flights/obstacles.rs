@@ -9,7 +9,7 @@ use tautline::formation::Formation;
 use tautline::graph::{Graph, Pinning};
 use tautline::law::{DisplacementKeys, LawSpec, Void};
 use tautline::record::Event;
-use tautline::scenario::{PlantSpec, Precision, Scenario};
+use tautline::scenario::{PlantSpec, Scenario};
 use tautline::sim::{Ending, Flight, Motion, Simulation};
 use tautline::space::{Obstacle, Shape, least_room};
 use tautline::swarm::{Rows, Swarm, separation};
@@ -165,11 +165,7 @@ fn a_hull_does_not_pass_a_wall_that_a_point_passes() {
             _ => 6.0,
         };
         scenario.obstacles = vec![wall(shape, y)];
-        for (plant, passes) in [
-            (PlantSpec::Rapier(Precision::Single), false),
-            (PlantSpec::Rapier(Precision::Double), false),
-            (PlantSpec::Ideal, true),
-        ] {
+        for (plant, passes) in [(PlantSpec::Rapier, false), (PlantSpec::Ideal, true)] {
             let flown = Scenario { plant, ..scenario.clone() };
             let (flight, _) = ignorant(&flown);
             let clearance = flight.clearance.expect("an obstacle");
@@ -188,10 +184,7 @@ fn a_hull_does_not_pass_a_wall_that_a_point_passes() {
 #[test]
 fn the_engine_flies_past_obstacles_as_the_law_does_in_continuous_time() {
     const TOLERANCE_M: f64 = 1e-3;
-    let short =
-        [("time.duration_s", "8"), ("plant.precision", "\"double\"")].map(|(key, value)| format!("{key}={value}"));
-    let short: Vec<_> = short.iter().map(String::as_str).collect();
-    let engine = builtin("obstacles", &short);
+    let engine = builtin("obstacles", &["time.duration_s=8"]);
     let ideal = Scenario { plant: PlantSpec::Ideal, ..engine.clone() };
     let [engine, ideal] = [engine, ideal].map(|scenario| {
         let (flight, _) = fly(&scenario);

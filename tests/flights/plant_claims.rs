@@ -5,7 +5,7 @@ use crate::flight::{builtin, fly};
 use nalgebra::Vector3;
 use tautline::formation::Formation;
 use tautline::plant::{Path, Plant, rapier};
-use tautline::scenario::{PlantSpec, Precision, Scenario, Space};
+use tautline::scenario::{Scenario, Space};
 use tautline::swarm::{Pair, Rows, Swarm, row, separation, set_row};
 
 const DT_S: f64 = 1.0 / 240.0;
@@ -18,27 +18,12 @@ fn step(plant: &mut dyn Plant, command: &Rows, dt_s: f64) {
     plant.advance(dt_s, &mut state, &mut Path::default()).expect("a finite motion");
 }
 
-/// The rigid bodies of a scenario.
-fn bodies(scenario: &Scenario) -> Box<dyn Plant> {
-    let PlantSpec::Rapier(precision) = scenario.plant else { panic!("{:?}", scenario.plant) };
-    rapier::plant(scenario, precision)
-}
-
-/// Rounding of one operation, relative, in the engine's numbers.
-fn epsilon(precision: Precision) -> f64 {
-    match precision {
-        Precision::Single => f64::from(f32::EPSILON),
-        Precision::Double => f64::EPSILON,
-    }
-}
-
 /// Vehicles at these positions \[m\] with these velocities \[m/s\].
-fn scenario(precision: Precision, positions_m: &[f64], velocities_m_s: &[f64]) -> Scenario {
+fn scenario(positions_m: &[f64], velocities_m_s: &[f64]) -> Scenario {
     let start =
         Swarm { positions_m: Rows::from_row_slice(positions_m), velocities_m_s: Rows::from_row_slice(velocities_m_s) };
     let formation = Formation::line(start.count(), 3.0);
     let mut scenario = Scenario::new("plant", start, formation, 2.0 * HULL_RADIUS_M, 10.0);
-    scenario.plant = PlantSpec::Rapier(precision);
     scenario.time.dt_s = DT_S;
     scenario
 }
@@ -53,32 +38,29 @@ fn observed(plant: &dyn Plant, count: usize) -> Swarm {
 fn a_free_velocity_is_exactly_v0_exp_a22_t_whatever_the_sign_of_a22() {
     const STEPS: u32 = 2400;
     let velocity = Vector3::new(0.75, -0.5, 0.25);
-    for precision in [Precision::Single, Precision::Double] {
-        for a22_per_s in [-0.9, -0.1, 0.0, 0.1, 0.7] {
-            let mut scenario =
-                scenario(precision, &[0.0, 0.0, 0.0, 90.0, 0.0, 0.0], &[0.75, -0.5, 0.25, 0.0, 0.0, 0.0]);
-            scenario.a22_per_s = a22_per_s;
-            let mut plant = bodies(&scenario);
-            for _ in 0..STEPS {
-                step(plant.as_mut(), &Rows::zeros(2), DT_S);
-            }
-            let found = row(&observed(plant.as_ref(), 2).velocities_m_s, 0);
-            let expected = velocity * (a22_per_s * f64::from(STEPS) * DT_S).exp();
-            let off = (found - expected).norm() / expected.norm();
-            // Each step rounds the velocity of the drift and the one at its end.
-            let rounding = 3.0 * f64::from(STEPS) * epsilon(precision);
-            assert!(off <= rounding, "a22 = {a22_per_s}, {precision:?}: off by {off}, rounding is {rounding}");
-            if a22_per_s == 0.0 {
-                assert_eq!(found, velocity);
-            }
+    for a22_per_s in [-0.9, -0.1, 0.0, 0.1, 0.7] {
+        let mut scenario = scenario(&[0.0, 0.0, 0.0, 90.0, 0.0, 0.0], &[0.75, -0.5, 0.25, 0.0, 0.0, 0.0]);
+        scenario.a22_per_s = a22_per_s;
+        let mut plant = rapier::plant(&scenario);
+        for _ in 0..STEPS {
+            step(plant.as_mut(), &Rows::zeros(2), DT_S);
+        }
+        let found = row(&observed(plant.as_ref(), 2).velocities_m_s, 0);
+        let expected = velocity * (a22_per_s * f64::from(STEPS) * DT_S).exp();
+        let off = (found - expected).norm() / expected.norm();
+        // Each step rounds the velocity of the drift and the one at its end.
+        let rounding = 3.0 * f64::from(STEPS) * f64::EPSILON;
+        assert!(off <= rounding, "a22 = {a22_per_s}, off by {off}, rounding is {rounding}");
+        if a22_per_s == 0.0 {
+            assert_eq!(found, velocity);
         }
     }
 }
 
 #[test]
 fn within_a_step_motion_is_the_straight_line_that_the_audit_sweeps() {
-    let scenario = scenario(Precision::Double, &[0.0, 0.0, 0.0, 90.0, 0.0, 0.0], &[0.75, -0.5, 0.25, 0.0, 0.0, 0.0]);
-    let mut plant = bodies(&scenario);
+    let scenario = scenario(&[0.0, 0.0, 0.0, 90.0, 0.0, 0.0], &[0.75, -0.5, 0.25, 0.0, 0.0, 0.0]);
+    let mut plant = rapier::plant(&scenario);
     let mut control = Rows::zeros(2);
     set_row(&mut control, 0, Vector3::new(2.0, 4.0, -8.0));
     step(plant.as_mut(), &control, DT_S);
@@ -109,35 +91,33 @@ fn keep_out_balls_see_and_do_not_push() {
 fn hulls_are_solid_and_bounce() {
     // The engine sees a contact coming and stops the hulls at each other's surface, up to rounding over 240 steps.
     const STEPS: u32 = 480;
-    for precision in [Precision::Single, Precision::Double] {
-        // Head-on at 1 m/s each.
-        let scenario = scenario(precision, &[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
-        let mut plant = bodies(&scenario);
-        let mut nearest_m = f64::INFINITY;
-        let mut hits = Vec::new();
-        for _ in 0..STEPS {
-            step(plant.as_mut(), &Rows::zeros(2), DT_S);
-            nearest_m = nearest_m.min(separation(&observed(plant.as_ref(), 2).positions_m, 0, 1));
-            plant.hull_contacts(&mut hits);
-        }
-        let rounding = f64::from(STEPS) * epsilon(precision);
-        assert!((nearest_m - 2.0 * HULL_RADIUS_M).abs() <= rounding, "{nearest_m} m between the centres");
-        let [left, right] = [0, 1].map(|i| observed(plant.as_ref(), 2).velocities_m_s[(i, 0)]);
-        assert!(
-            (left + 0.5).abs() <= rounding && (right - 0.5).abs() <= rounding,
-            "half the speed is kept: {left}, {right}"
-        );
-        let [hit] = hits[..] else { panic!("they hit once: {hits:?}") };
-        assert_eq!(hit.pair, Pair::new(0, 1));
-        assert!((hit.closing_m_s - 2.0).abs() <= rounding, "{} m/s", hit.closing_m_s);
+    // Head-on at 1 m/s each.
+    let scenario = scenario(&[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
+    let mut plant = rapier::plant(&scenario);
+    let mut nearest_m = f64::INFINITY;
+    let mut hits = Vec::new();
+    for _ in 0..STEPS {
+        step(plant.as_mut(), &Rows::zeros(2), DT_S);
+        nearest_m = nearest_m.min(separation(&observed(plant.as_ref(), 2).positions_m, 0, 1));
+        plant.hull_contacts(&mut hits);
     }
+    let rounding = f64::from(STEPS) * f64::EPSILON;
+    assert!((nearest_m - 2.0 * HULL_RADIUS_M).abs() <= rounding, "{nearest_m} m between the centres");
+    let [left, right] = [0, 1].map(|i| observed(plant.as_ref(), 2).velocities_m_s[(i, 0)]);
+    assert!(
+        (left + 0.5).abs() <= rounding && (right - 0.5).abs() <= rounding,
+        "half the speed is kept: {left}, {right}"
+    );
+    let [hit] = hits[..] else { panic!("they hit once: {hits:?}") };
+    assert_eq!(hit.pair, Pair::new(0, 1));
+    assert!((hit.closing_m_s - 2.0).abs() <= rounding, "{} m/s", hit.closing_m_s);
 }
 
 #[test]
 fn hulls_that_pass_beside_each_other_do_not_touch() {
     let apart_m = 2.0 * HULL_RADIUS_M + 1e-3;
     let start = [-1.0, 0.0, 0.0, 1.0, apart_m, 0.0];
-    let mut plant = bodies(&scenario(Precision::Single, &start, &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]));
+    let mut plant = rapier::plant(&scenario(&start, &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]));
     for _ in 0..480 {
         step(plant.as_mut(), &Rows::zeros(2), DT_S);
     }
@@ -149,23 +129,21 @@ fn hulls_that_pass_beside_each_other_do_not_touch() {
 
 #[test]
 fn a_swarm_in_the_plane_never_leaves_it_even_when_it_is_told_to() {
-    for precision in [Precision::Single, Precision::Double] {
-        let mut scenario = scenario(precision, &[-1.0, 0.1, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
-        assert_eq!(scenario.space, Space::Plane);
-        let mut control = Rows::zeros(2);
-        control.column_mut(2).fill(3.0);
-        let lifted = |scenario: &Scenario| {
-            let mut plant = bodies(scenario);
-            (0..480).any(|_| {
-                step(plant.as_mut(), &control, DT_S);
-                let swarm = observed(plant.as_ref(), 2);
-                swarm.positions_m.column(2).iter().chain(swarm.velocities_m_s.column(2).iter()).any(|&z| z != 0.0)
-            })
-        };
-        assert!(!lifted(&scenario), "{precision:?}");
-        scenario.space = Space::Volume;
-        assert!(lifted(&scenario), "the same command lifts a swarm that is free to go");
-    }
+    let mut scenario = scenario(&[-1.0, 0.1, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
+    assert_eq!(scenario.space, Space::Plane);
+    let mut control = Rows::zeros(2);
+    control.column_mut(2).fill(3.0);
+    let lifted = |scenario: &Scenario| {
+        let mut plant = rapier::plant(scenario);
+        (0..480).any(|_| {
+            step(plant.as_mut(), &control, DT_S);
+            let swarm = observed(plant.as_ref(), 2);
+            swarm.positions_m.column(2).iter().chain(swarm.velocities_m_s.column(2).iter()).any(|&z| z != 0.0)
+        })
+    };
+    assert!(!lifted(&scenario));
+    scenario.space = Space::Volume;
+    assert!(lifted(&scenario), "the same command lifts a swarm that is free to go");
 }
 
 #[test]
@@ -183,8 +161,8 @@ fn two_dimensional_flights_stay_in_their_plane_exactly() {
 fn mass_does_not_change_motion() {
     // Rounding of force and inverse mass, carried along for 2400 steps by a flight that does not amplify it.
     const TOLERANCE_M: f64 = 1e-10;
-    let sets = ["plant.precision=double", "time.duration_s=10"];
-    let with = |mass: &str| fly(&builtin("pentagon", &[sets[0], sets[1], mass])).0.last;
+    let sets = ["time.duration_s=10"];
+    let with = |mass: &str| fly(&builtin("pentagon", &[sets[0], mass])).0.last;
     let light = with("swarm.mass_kg=1");
     let off_m = (with("swarm.mass_kg=[0.03,700,5,1e-6,1e6]").positions_m - &light.positions_m).amax();
     assert!(off_m <= TOLERANCE_M, "off by {off_m} m");
@@ -194,7 +172,7 @@ fn mass_does_not_change_motion() {
 #[test]
 fn a_restored_plant_flies_on_as_if_the_refused_step_had_not_been() {
     let scenario = builtin("pentagon", &[]);
-    let mut plant = bodies(&scenario);
+    let mut plant = rapier::plant(&scenario);
     let mut control = Rows::zeros(5);
     control.column_mut(0).copy_from_slice(&[1.0, -2.0, 3.0, -4.0, 5.0]);
     let before = observed(plant.as_ref(), 5);

@@ -81,7 +81,7 @@ fn scenario(seed: u64) -> Scenario {
     scenario.hull_radius_m.fill(0.2 * (delta_m - CONTACT_PREDICTION_M));
     scenario.arrival.edge_error_m = 0.01 * delta_m;
     scenario.arrival.disagreement_m_s = 0.01 * delta_m;
-    scenario.plant = PlantSpec::Rapier(scenario.needed_precision());
+    scenario.plant = PlantSpec::Rapier;
     scenario
 }
 

@@ -11,20 +11,16 @@ use tautline::scenario::Scenario;
 use tautline::sim::{Ending, Flight};
 use tautline::swarm::{Pair, row};
 
-/// Kick, drift, kick at dt = 1/240 s in double precision is off by 1e-6 m after 10 s.
+/// Kick, drift, kick at dt = 1/240 s is off by 1e-6 m after 10 s.
 const POSITION_TOLERANCE_M: f64 = 3e-6;
-/// In single precision velocities are rounded twice a step.
-const SINGLE_POSITION_TOLERANCE_M: f64 = 3e-4;
 /// The table has six decimals.
 const SEPARATION_TOLERANCE_M: f64 = 5e-6;
-/// As positions in single precision.
-const SINGLE_SEPARATION_TOLERANCE_M: f64 = 1e-4;
 /// A few steps of 4 ms; the minimum is flat, so its time is known less well than its depth.
 const TIME_TOLERANCE_S: f64 = 0.02;
 /// The circle passes its minimum at 0.1 m/s or less, and its table gives two decimals.
 const CIRCLE_TIME_TOLERANCE_S: f64 = 0.05;
-/// Start positions in single precision are off by up to 5e-7 m, which is all that E(0) and the certificate feel.
-const START_TOLERANCE: f64 = 1e-5;
+/// The reference has six decimals of E(0) and of the certificate.
+const START_TOLERANCE: f64 = 1e-6;
 /// The error e of a second-order method measured at two steps gives an order of 2 up to terms of the order of dt.
 const ORDER: std::ops::RangeInclusive<f64> = 1.9..=2.1;
 
@@ -63,43 +59,33 @@ fn position_of_first_at(log: &Log, time_s: f64) -> Vector3<f64> {
     row(&sample.swarm.positions_m, 0)
 }
 
-/// Where single precision leaves the pentagon: 6 m from the middle a vehicle slower than half a unit of rounding a step,
-/// 2.4e-7 m * 240 Hz = 5.7e-5 m/s, does not move; the law restores a distance at 2.2/s or more, on both ends of an edge.
-const SINGLE_PRECISION_FLOOR_M: f64 = 2.0 * 5.7e-5 / 2.2;
-
 #[test]
 fn the_pentagon_is_flown_clear_and_reached_as_the_reference_says() {
-    for (precision, position_m, separation_m) in [
-        ("single", SINGLE_POSITION_TOLERANCE_M, SINGLE_SEPARATION_TOLERANCE_M),
-        ("double", POSITION_TOLERANCE_M, SEPARATION_TOLERANCE_M),
-    ] {
-        let scenario = builtin("pentagon", &[&format!("plant.precision={precision}")]);
-        let (flight, log) = fly(&scenario);
-        assert_completed(&scenario, &flight);
+    let scenario = builtin("pentagon", &[]);
+    let (flight, log) = fly(&scenario);
+    assert_completed(&scenario, &flight);
 
-        assert_eq!(flight.audit.status, Status::Clear);
-        let closest = flight.audit.closest.expect("five vehicles have a closest pair");
-        assert_near(closest.separation_m, PENTAGON_MIN_M, separation_m, "smallest separation");
-        assert_near(closest.time_s, PENTAGON_MIN_AT_S, TIME_TOLERANCE_S, "its time");
-        assert!([Pair::new(1, 2), Pair::new(0, 2)].contains(&closest.pair), "{}", closest.pair);
-        assert_near(flight.certificate.certified_m.expect("a certificate"), 2.055_307, START_TOLERANCE, "certified");
-        assert!(flight.certificate.certified_m.is_some_and(|certified_m| closest.separation_m > certified_m));
-        assert!(flight.engine_contacts.is_empty());
+    assert_eq!(flight.audit.status, Status::Clear);
+    let closest = flight.audit.closest.expect("five vehicles have a closest pair");
+    assert_near(closest.separation_m, PENTAGON_MIN_M, SEPARATION_TOLERANCE_M, "smallest separation");
+    assert_near(closest.time_s, PENTAGON_MIN_AT_S, TIME_TOLERANCE_S, "its time");
+    assert!([Pair::new(1, 2), Pair::new(0, 2)].contains(&closest.pair), "{}", closest.pair);
+    assert_near(flight.certificate.certified_m.expect("a certificate"), 2.055_307, START_TOLERANCE, "certified");
+    assert!(flight.certificate.certified_m.is_some_and(|certified_m| closest.separation_m > certified_m));
+    assert!(flight.engine_contacts.is_empty());
 
-        let summary = summary(&scenario, &log);
-        assert_near(summary.energy_initial.expect("an energy"), 3.656_743, START_TOLERANCE, "E(0)");
-        let reached_at_s = summary.reached_at_s.expect("the formation is reached");
-        assert!((36.0..=38.0).contains(&reached_at_s), "reached at {reached_at_s} s");
-        let off_m = (position_of_first_at(&log, 10.0) - Vector3::from(PENTAGON_FIRST_AT_10_S_M)).norm();
-        assert!(off_m <= position_m, "vehicle 1 is off by {off_m} m at t = 10 s in {precision} precision");
-        let floor_m = if precision == "single" { SINGLE_PRECISION_FLOOR_M } else { 1e-5 };
-        assert!(summary.max_edge_error_m < floor_m, "{} m at the end", summary.max_edge_error_m);
-    }
+    let summary = summary(&scenario, &log);
+    assert_near(summary.energy_initial.expect("an energy"), 3.656_743, START_TOLERANCE, "E(0)");
+    let reached_at_s = summary.reached_at_s.expect("the formation is reached");
+    assert!((36.0..=38.0).contains(&reached_at_s), "reached at {reached_at_s} s");
+    let off_m = (position_of_first_at(&log, 10.0) - Vector3::from(PENTAGON_FIRST_AT_10_S_M)).norm();
+    assert!(off_m <= POSITION_TOLERANCE_M, "vehicle 1 is off by {off_m} m at t = 10 s");
+    assert!(summary.max_edge_error_m < 1e-5, "{} m at the end", summary.max_edge_error_m);
 }
 
 #[test]
 fn the_first_command_of_the_pentagon_is_the_reference_command() {
-    let scenario = builtin("pentagon", &["plant.precision=double", "time.duration_s=1"]);
+    let scenario = builtin("pentagon", &["time.duration_s=1"]);
     let (_, log) = fly(&scenario);
     let off_m_s2 = (row(&log.samples[0].control, 0) - Vector3::new(0.860_843_123, -0.021_225_585, 0.0)).norm();
     assert!(off_m_s2 < 1e-9, "off by {off_m_s2} m/s^2, and the reference has nine decimals");
@@ -113,7 +99,7 @@ fn the_circle_is_flown_clear_and_reached_as_the_reference_says() {
 
     assert_eq!(flight.audit.status, Status::Clear);
     let closest = flight.audit.closest.expect("six vehicles have a closest pair");
-    assert_near(closest.separation_m, 1.238_135, SINGLE_SEPARATION_TOLERANCE_M, "smallest separation");
+    assert_near(closest.separation_m, 1.238_135, SEPARATION_TOLERANCE_M, "smallest separation");
     assert_near(closest.time_s, 4.18, CIRCLE_TIME_TOLERANCE_S, "its time");
     assert_eq!(closest.pair, Pair::new(2, 3));
     assert_near(flight.certificate.certified_m.expect("a certificate"), 1.019_476, START_TOLERANCE, "certified");
@@ -163,7 +149,7 @@ fn a_start_on_a_line_stays_on_it_exactly_and_forms_nothing() {
 
     assert_eq!(flight.audit.status, Status::Clear);
     let closest = flight.audit.closest.expect("five vehicles have a closest pair");
-    assert_near(closest.separation_m, 2.458_145, SINGLE_SEPARATION_TOLERANCE_M, "smallest separation");
+    assert_near(closest.separation_m, 2.458_145, SEPARATION_TOLERANCE_M, "smallest separation");
     for sample in &log.samples {
         let leaves = |rows: &tautline::swarm::Rows| rows.columns(1, 2).iter().any(|&x| x != 0.0);
         assert!(!leaves(&sample.swarm.positions_m) && !leaves(&sample.swarm.velocities_m_s), "{} s", sample.time_s);
@@ -175,9 +161,9 @@ fn a_start_on_a_line_stays_on_it_exactly_and_forms_nothing() {
     assert_eq!(scenario.formation().affine_dimension(1e-9), 2);
 }
 
-/// A built-in scenario for so many seconds in steps of 1/`steps_per_s`, in double precision.
+/// A built-in scenario for so many seconds in steps of 1/`steps_per_s` long.
 fn in_steps(name: &str, steps_per_s: u32, duration_s: u32) -> Scenario {
-    let mut scenario = builtin(name, &["plant.precision=double"]);
+    let mut scenario = builtin(name, &[]);
     scenario.time.dt_s = 1.0 / f64::from(steps_per_s);
     scenario.time.duration_s = f64::from(duration_s);
     scenario

@@ -6,7 +6,7 @@ use tautline::graph::Graph;
 use tautline::law::{CbfQpKeys, FlockingKeys, LawSpec, OrcaKeys, OrcaLaw, PotentialKeys, Setting, Void};
 use tautline::observation::Observation;
 use tautline::run::run;
-use tautline::scenario::{PlantSpec, Precision, Scenario};
+use tautline::scenario::{PlantSpec, Scenario};
 use tautline::sim::{Ending, Flight};
 use tautline::space::NearPairs;
 use tautline::swarm::{Rows, Swarm, mean_row, row, separation};
@@ -102,7 +102,7 @@ fn a_hundred_across_a_circle_come_nearer_than_orca_means_to_and_two_and_ten_do_n
 
 fn scenario(name: &str, start: Swarm, slots_m: Rows, duration_s: f64, law: LawSpec) -> Scenario {
     let mut scenario = Scenario::new(name, start, Formation::points(slots_m), 1.0, duration_s);
-    (scenario.law, scenario.plant) = (law, PlantSpec::Rapier(Precision::Double));
+    (scenario.law, scenario.plant) = (law, PlantSpec::Rapier);
     scenario.validate().expect("a valid scenario");
     scenario
 }

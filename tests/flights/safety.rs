@@ -86,7 +86,7 @@ fn a_hundred_random_flights_keep_what_is_certified_of_scaled_lengths() {
 fn five_seconds(start: Swarm, slots: Rows) -> Scenario {
     let mut scenario = Scenario::new("ellipsoids", start, Formation::points(slots), 1.0, 5.0);
     scenario.law = tautline::law::LawSpec::Displacement(tautline::law::DisplacementKeys::default());
-    scenario.plant = tautline::scenario::PlantSpec::Rapier(tautline::scenario::Precision::Double);
+    scenario.plant = tautline::scenario::PlantSpec::Rapier;
     scenario.time.dt_s = 1.0 / 60.0;
     scenario
 }

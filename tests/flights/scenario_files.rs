@@ -3,7 +3,7 @@
 use std::fs;
 
 use tautline::formation::Formation;
-use tautline::scenario::{Override, PlantSpec, Precision, Scenario, ScenarioError, Source, Space, builtin};
+use tautline::scenario::{Override, PlantSpec, Scenario, ScenarioError, Source, Space, builtin};
 use tautline::swarm::{Rows, Swarm, separation};
 
 /// A minimal flight that is right: what the wrong ones below are changed from.
@@ -197,8 +197,8 @@ fn an_override_sets_any_key_and_makes_those_that_are_not_there() {
     let says = |sets: &[&str], line: &str| set(sets).resolved_toml().lines().any(|written| written.trim() == line);
     assert!(says(&["law.delta_m=1.5"], "delta_m = 1.5"));
     assert!(says(&["name=my-run"], "name = \"my-run\""));
-    assert!(says(&["plant.precision=double"], "precision = \"double\""));
-    assert!(says(&["plant = {precision = \"double\"}"], "precision = \"double\""));
+    assert!(says(&[], "kind = \"rapier\"") && says(&["plant.kind=ideal"], "kind = \"ideal\""));
+    assert!(says(&["plant = {kind = \"ideal\"}"], "kind = \"ideal\""));
     assert!(says(&["start.positions_m.4.x=-1"], "[-1.0, 0.05],"));
     assert!(says(&["start.positions_m.4.1=-1"], "[-1.0, 0.05],"));
     assert!(says(&["start.positions_m.4=[-1, 0.5]"], "[-1.0, 0.5],"));
@@ -254,19 +254,11 @@ fn what_is_not_given_has_its_default() {
 }
 
 #[test]
-fn precision_is_chosen_by_need_where_it_is_not_given() {
-    let plant = |sets: &[&str]| read_builtin("pentagon", sets).expect("right").plant;
-    let [single, double] = [Precision::Single, Precision::Double].map(PlantSpec::Rapier);
-    assert_eq!(plant(&[]), single);
-    assert_eq!(plant(&["time.duration_s=400"]), double, "rounding drives the swarm 1e11 m away");
-    assert_eq!(plant(&["time.duration_s=400", "swarm.a22_per_s=0"]), single);
-    assert_eq!(plant(&["time.duration_s=400", "plant.precision=single"]), single, "what is asked for is flown");
-    assert_eq!(plant(&["start.velocities_m_s=[[500,0],[500,0],[500,0],[500,0],[500,0]]"]), double, "drift");
-    assert_eq!(plant(&["arrival.edge_error_m=1e-5"]), double, "tolerance");
-    assert_eq!(plant(&["start.positions_m.4.x=-2000"]), double, "extent");
-    assert_eq!(plant(&["time.dt_s=1e-6"]), double, "steps too short for 32 bits");
-    assert!(read_builtin("pentagon", &["time.dt_s=1e-6", "plant.precision=single"]).is_err());
-    assert_eq!(plant(&["plant.kind=ideal"]), PlantSpec::Ideal);
+fn a_scenario_has_no_choice_of_precision() {
+    let error = read_builtin("pentagon", &["plant.precision=single"]).expect_err("an unknown key");
+    assert!(error.to_string().contains("precision"), "{error}");
+    assert_eq!(read_builtin("pentagon", &[]).expect("right").plant, PlantSpec::Rapier);
+    assert_eq!(read_builtin("pentagon", &["plant.kind=ideal"]).expect("right").plant, PlantSpec::Ideal);
 }
 
 #[test]
@@ -317,7 +309,7 @@ fn the_resolved_scenario_reads_back_to_the_same_bits_and_the_same_hash() {
     let changed: &[&[&str]] = &[
         &["swarm.count=5", random],
         &["start.jitter_m=0.05", "start.seed=3", "swarm.dimensions=3"],
-        &["graph.kind=ring", "plant.precision=double", "law.delta_m=0.9"],
+        &["graph.kind=ring", "law.delta_m=0.9"],
         &["swarm.mass_kg=[0.1,0.2,0.3,0.4,0.7]", "time.dt_s=0.01", "time.record_hz=7", "arrival.hold_s=0"],
         &["formation={shape=\"sphere\", radius_m=4}", "start.velocities_m_s=[[1,0],[0,1],[0.1,0.2,0.3],[0,0],[0,0]]"],
     ];

@@ -13,7 +13,7 @@ use tautline::metrics::Metrics;
 use tautline::observation::{Held, Others};
 use tautline::record::{Event, Sink, StateHash};
 use tautline::run::run;
-use tautline::scenario::{PlantSpec, Precision, Scenario};
+use tautline::scenario::{PlantSpec, Scenario};
 use tautline::sim::{self, Ending, Parts, SimError, Simulation};
 use tautline::swarm::{Rows, Swarm};
 use tautline::target::{Begins, CurrentTarget, Leg, Supervisor};
@@ -51,7 +51,7 @@ fn a_simulation_loaded_at_any_of_fifty_steps_ends_with_the_hash_of_one_that_was_
     let tension = builtin("pentagon", &["time.duration_s=4", "time.record_hz=240"]);
     let ideal = builtin("pentagon", &["time.duration_s=4", "plant.kind=ideal", "time.dt_s=0.05", "time.record_hz=20"]);
     let mut double = bouncing();
-    double.plant = PlantSpec::Rapier(Precision::Double);
+    double.plant = PlantSpec::Rapier;
     for (name, scenario, loads) in
         [("tension", tension, 20), ("bouncing", bouncing(), 20), ("double", double, 5), ("ideal", ideal, 5)]
     {
@@ -118,7 +118,7 @@ fn stepping_is_flying() {
 
 #[test]
 fn commands_from_outside_are_flown_in_the_place_of_the_laws() {
-    let scenario = builtin("pentagon", &["time.duration_s=3", "plant.precision=double", "swarm.a22_per_s=0"]);
+    let scenario = builtin("pentagon", &["time.duration_s=3", "swarm.a22_per_s=0"]);
     let mut by_law = Simulation::new(&scenario).expect("a simulation");
     let mut by_hand = by_law.clone();
     // What comes from outside is held over the step: the law's own commands, held so, are another flight.
@@ -233,7 +233,7 @@ fn head_on() -> Scenario {
     let slots = Rows::from_row_slice(&[0.0, 30.0, 0.0, -5.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
     let mut scenario = Scenario::new("head-on", start, Formation::points(slots), 2.0, 5.0);
     (scenario.law, scenario.graph) = (LawSpec::Potential(PotentialKeys::default()), Graph::star(3));
-    (scenario.plant, scenario.time.dt_s) = (PlantSpec::Rapier(Precision::Double), 0.05);
+    (scenario.plant, scenario.time.dt_s) = (PlantSpec::Rapier, 0.05);
     scenario
 }
 
@@ -357,7 +357,7 @@ fn what_each_vehicle_holds_is_flown_like_what_all_share() {
         LawSpec::Potential(PotentialKeys::default()),
     ];
     for (law, graph) in laws.into_iter().zip([Graph::complete(5), Graph::ring(5), Graph::star(5)]) {
-        let mut scenario = builtin("pentagon", &["time.duration_s=2", "plant.precision=double"]);
+        let mut scenario = builtin("pentagon", &["time.duration_s=2"]);
         (scenario.law, scenario.graph) = (law, graph);
         let shared = fly(&scenario).0;
         let parts = Parts { link: Box::new(Copied(None)), ..Parts::of(&scenario).expect("parts") };

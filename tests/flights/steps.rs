@@ -73,8 +73,7 @@ fn a_law_without_a_barrier_is_never_refused_a_step() {
 
 #[test]
 fn a_step_too_long_for_the_fastest_rate_is_flown_in_parts_and_keeps_the_energy_below_its_start() {
-    let mut scenario =
-        builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10", "plant.precision=double"]);
+    let mut scenario = builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10"]);
     let (honest, log) = fly(&scenario);
     assert!(!refinements(&log).is_empty(), "it is told");
     assert!(honest.audit.steps > honest.steps);
@@ -101,7 +100,7 @@ fn steps_that_no_halving_makes_short_enough_void_the_certificate_and_never_pass(
 #[test]
 fn a_flight_that_is_clear_and_home_does_not_pass_on_steps_too_long_for_the_law() {
     let report = |max_halvings: &str| {
-        let keys = ["law.alpha=100", "time.dt_s=0.01", "plant.precision=double", max_halvings];
+        let keys = ["law.alpha=100", "time.dt_s=0.01", max_halvings];
         let scenario = builtin("pentagon", &keys);
         run::run(&scenario, &mut ()).expect("a report")
     };
@@ -116,16 +115,7 @@ fn a_step_is_short_enough_where_it_leads_to_and_not_only_where_it_began() {
     // Fast contacts that one step lands deep in: the law looks slow before, and the barrier is far.
     for (name, keys) in [
         ("swap", &["law.alpha=5000", "time.dt_s=0.1", "time.record_hz=4", "time.duration_s=5"][..]),
-        (
-            "pentagon",
-            &[
-                "law.kind=displacement",
-                "law.alpha=1e6",
-                "time.record_hz=4",
-                "time.duration_s=10",
-                "plant.precision=double",
-            ],
-        ),
+        ("pentagon", &["law.kind=displacement", "law.alpha=1e6", "time.record_hz=4", "time.duration_s=10"]),
         (
             "pentagon",
             &["law.alpha=400", "time.dt_s=0.045", "time.record_hz=4", "time.max_rate_dt=1e9", "time.duration_s=30"],

@@ -24,7 +24,7 @@ fn relabelled(rows: &Rows, order: &[usize]) -> Rows {
 }
 
 fn small_flight() -> Scenario {
-    builtin("pentagon", &["plant.precision=double", "time.duration_s=4", "swarm.dimensions=3"])
+    builtin("pentagon", &["time.duration_s=4", "swarm.dimensions=3"])
 }
 
 proptest! {

@@ -5,7 +5,7 @@ use tautline::formation::Formation;
 use tautline::law::Void;
 use tautline::plant::{Path, rapier};
 use tautline::record::StateHash;
-use tautline::scenario::{Override, PlantSpec, Precision, Scenario, Source, TimeSpec};
+use tautline::scenario::{Override, PlantSpec, Scenario, Source, TimeSpec};
 use tautline::sim::Simulation;
 use tautline::swarm::{Rows, Swarm, row, separation};
 use tautline::wind::{Gust, WindSpec};
@@ -14,12 +14,12 @@ use crate::flight::{Log, builtin, fly, read};
 
 type Vector = nalgebra::Vector3<f64>;
 
-/// Five vehicles on their way to a line under the displacement law, in double precision.
+/// Five vehicles on their way to a line under the displacement law.
 fn five(more: &str) -> Scenario {
     read(&format!(
         "[swarm]\ndimensions = 3\n[start]\npositions_m = [[0.0, 0.1], [2.0, 0.0, 0.2], [4.0, -0.1], [6.0, 0.2], [8.0, 0.0]]\n\
          [formation]\nshape = \"circle\"\nradius_m = 2.0\n[law]\nkind = \"displacement\"\ndelta_m = 1.0\n\
-         [plant]\nprecision = \"double\"\n{more}"
+         {more}"
     ))
 }
 
@@ -46,11 +46,10 @@ fn distances(log: &Log) -> Vec<f64> {
 #[test]
 fn a_point_drifts_as_fast_as_the_wind_less_what_else_brakes_it() {
     for (a22_per_s, plant) in [(0.0, "rapier"), (-0.2, "rapier"), (-0.2, "ideal")] {
-        let precision = if plant == "rapier" { "precision = \"double\"" } else { "" };
         let toml = format!(
             "[swarm]\na22_per_s = {a22_per_s}\n[vehicle]\ndrag_per_s = 0.5\n[wind]\nmean_m_s = [3.0, -1.0]\n\
              [start]\npositions_m = [[0.0, 0.0], [3.0, 0.0]]\n[formation]\nshape = \"line\"\nspacing_m = 3.0\n\
-             [law]\nkind = \"displacement\"\ndelta_m = 1.0\n[plant]\nkind = \"{plant}\"\n{precision}\n[time]\nduration_s = 30.0\n"
+             [law]\nkind = \"displacement\"\ndelta_m = 1.0\n[plant]\nkind = \"{plant}\"\n[time]\nduration_s = 30.0\n"
         );
         let (_, log) = fly(&read(&toml));
         for sample in &log.samples {
@@ -141,7 +140,7 @@ fn the_ideal_plant_flies_in_the_same_turbulence() {
 fn a_saved_flight_in_turbulence_goes_on_with_the_same_bits_and_another_seed_with_others() {
     let wind = "[vehicle]\ndrag_per_s = 0.4\n[wind]\nshared = false\ndryden = { speed_20ft_m_s = 10.0, height_m = 10.0 }\n\
                 [time]\nduration_s = 4.0";
-    for plant in [PlantSpec::Rapier(Precision::Double), PlantSpec::Ideal] {
+    for plant in [PlantSpec::Rapier, PlantSpec::Ideal] {
         let scenario = Scenario { plant, ..five(wind) };
         let end = |mut simulation: Simulation| {
             while simulation.ending().is_none() {
@@ -167,7 +166,7 @@ fn a_step_taken_back_is_flown_in_the_same_air() {
         "[vehicle]\ndrag_per_s = 0.4\n[wind]\nshared = false\ndryden = { speed_20ft_m_s = 10.0, height_m = 10.0 }\n\
          [time]\nduration_s = 4.0",
     );
-    let mut straight = rapier::plant(&scenario, Precision::Double);
+    let mut straight = rapier::plant(&scenario);
     let mut halting = straight.clone();
     let (mut state, mut path, command) = (scenario.start.clone(), Path::default(), Rows::zeros(5));
     let mut other: Swarm = state.clone();

@@ -79,17 +79,14 @@ fn wrong_input_is_told_apart_from_a_bad_flight() {
 }
 
 #[test]
-fn a_drift_that_numbers_do_not_follow_is_refused_and_precision_is_chosen_by_need() {
+fn a_drift_that_numbers_do_not_follow_is_refused() {
     let check = |sets: &[&str]| json(&sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
-    let epsilon = |found: &Value| found["epsilon"].as_f64().expect("a number");
     let (code, found) = check(&["swarm.a22_per_s=0.5"]);
     assert_eq!((code, codes(&found)[0]), (1, "drift-unresolved"), "{found}");
     let (code, found) = check(&["time.duration_s=400"]);
-    assert!(code == 0 && epsilon(&found) < 1e-15, "64 bits are taken: {found}");
-    let (code, found) = check(&["time.duration_s=400", "plant.precision=single"]);
-    assert_eq!((code, codes(&found)[0]), (1, "drift-unresolved"), "{found}");
+    assert_eq!(code, 0, "{found}");
     let (code, found) = check(&[]);
-    assert!(code == 0 && epsilon(&found) > 1e-8, "32 bits are enough: {found}");
+    assert_eq!(code, 0, "{found}");
     assert!(
         found["warnings"][0]["message"].as_str().expect("words").contains("No distance between vehicles feels that")
     );

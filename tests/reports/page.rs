@@ -103,14 +103,14 @@ fn two_runs_give_the_same_page_and_figures_but_for_the_performance() {
 #[test]
 fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
-    let html = fly(folder.path(), &["pentagon", "--set", "time.duration_s=2", "--set", "plant.precision=\"double\""]);
+    let html = fly(folder.path(), &["pentagon", "--set", "time.duration_s=2"]);
     for part in [
         "CLEAR: never closer than",
         "Certified distance",
         "The certified distance holds for the complete graph",
-        "double precision (64 bits), law and audit",
+        "Everything is computed in double precision",
         "tautline run pentagon --set &#39;time.duration_s=2&#39;",
-        "precision = &quot;double&quot;",
+        "kind = &quot;rapier&quot;",
     ] {
         let part_quoted = part.replace("&#39;", "'");
         assert!(html.contains(part) || html.contains(&part_quoted), "{part}");

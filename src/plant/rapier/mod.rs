@@ -1,4 +1,4 @@
-//! Rigid bodies in Rapier, in single and double precision: the only room that names the engine.
+//! Rigid bodies in Rapier, in double precision: the only room that names the engine.
 //!
 //! Each vehicle is a dynamic body with rotations locked, no gravity and two ball colliders: the **hull** (the vehicle's
 //! real radius; hulls collide and bounce) and the **keep-out** ball of radius delta/2 (reports contacts, never pushes); in an
@@ -45,43 +45,25 @@
 //! The engine looks for contacts before it moves the bodies, so those that it reports after a step are of the state
 //! before that step: evidence that comes one step late, and never the verdict.
 
+mod bodies;
+mod quadrotors;
+mod world;
+
 use crate::plant::{Plant, Quadrotors};
-use crate::scenario::{Precision, Scenario};
+use crate::scenario::Scenario;
 use crate::vehicle::Fleet;
 
-/// Both modules hold the same source, compiled against the engine's two precisions.
-mod single {
-    use rapier3d as engine;
-    include!("bodies.rs");
-    include!("quadrotors.rs");
-}
-
-#[cfg(feature = "double")]
-mod double {
-    use rapier3d_f64 as engine;
-    include!("bodies.rs");
-    include!("quadrotors.rs");
-}
-
-/// A swarm of rigid bodies at the scenario's start.
+/// Returns a swarm of rigid bodies at the scenario's start.
 #[must_use]
-pub fn plant(scenario: &Scenario, precision: Precision) -> Box<dyn Plant> {
-    if let Some(fleet) = scenario.fleet() {
-        return quadrotors(scenario, precision, fleet);
-    }
-    match precision {
-        Precision::Single => Box::new(single::Bodies::new(scenario)),
-        #[cfg(feature = "double")]
-        Precision::Double => Box::new(double::Bodies::new(scenario)),
+pub fn plant(scenario: &Scenario) -> Box<dyn Plant> {
+    match scenario.fleet() {
+        Some(fleet) => quadrotors(scenario, fleet),
+        None => Box::new(bodies::Bodies::new(scenario)),
     }
 }
 
-/// Quadrotors in any state, with the delta and the obstacles of a scenario.
+/// Returns quadrotors in any state, with the delta and the obstacles of a scenario.
 #[must_use]
-pub fn quadrotors(scenario: &Scenario, precision: Precision, fleet: Fleet) -> Box<dyn Quadrotors> {
-    match precision {
-        Precision::Single => Box::new(single::Fliers::new(scenario, fleet)),
-        #[cfg(feature = "double")]
-        Precision::Double => Box::new(double::Fliers::new(scenario, fleet)),
-    }
+pub fn quadrotors(scenario: &Scenario, fleet: Fleet) -> Box<dyn Quadrotors> {
+    Box::new(quadrotors::Fliers::new(scenario, fleet))
 }

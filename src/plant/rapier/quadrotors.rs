@@ -1,4 +1,18 @@
-// Quadrotors in the engine, for whichever one the including module calls `engine`; beside `bodies.rs`, whose world it flies in.
+//! Quadrotors: rigid bodies that turn, lifted by rotors.
+
+use std::time::{Duration, Instant};
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rapier3d::prelude::{MassProperties, PhysicsWorld, Real, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector};
+
+use super::world::{
+    copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
+};
+use crate::plant::{HullContact, Path, Plant, PlantError, Quadrotors};
+use crate::record::Channel;
+use crate::scenario::Scenario;
+use crate::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
+use crate::vehicle::{Drift, Fleet};
 
 /// Friction of hulls that turn: a hit makes them tumble.
 const HULL_FRICTION: Real = 0.5;
@@ -26,10 +40,10 @@ impl Fliers {
         let origin_m = mean_row(&scenario.start.positions_m);
         let (model, inertia_kg_m2) = (fleet.dynamics.model(), fleet.dynamics.inertia_kg_m2());
         let handles = fleet.states.iter().enumerate().map(|(i, state)| {
-            let mass = MassProperties::new(Vector::ZERO, real(model.mass_kg), reals(inertia_kg_m2));
+            let mass = MassProperties::new(Vector::ZERO, model.mass_kg, to_engine(inertia_kg_m2));
             let body = RigidBodyBuilder::dynamic()
-                .translation(reals(state.position_m - origin_m))
-                .linvel(reals(state.velocity_m_s))
+                .translation(to_engine(state.position_m - origin_m))
+                .linvel(to_engine(state.velocity_m_s))
                 .additional_mass_properties(mass)
                 .gyroscopic_forces_enabled(false)
                 .allow_fast_rotation(true)
@@ -65,9 +79,9 @@ impl Fliers {
             let drift = self.fleet.dynamics.begin(&self.fleet.states[i], self.fleet.wrench(i), dt_s);
             let body = &mut self.world.bodies[handle];
             set_row(&mut self.drift_m_s, i, drift.velocity_m_s);
-            set_row(&mut self.began_m, i, doubles(body.translation()));
-            body.set_linvel(reals(drift.velocity_m_s), true);
-            body.set_angvel(reals(drift.turn_rad_s), true);
+            set_row(&mut self.began_m, i, from_engine(body.translation()));
+            body.set_linvel(to_engine(drift.velocity_m_s), true);
+            body.set_angvel(to_engine(drift.turn_rad_s), true);
             self.drifts.push(drift);
         }
     }
@@ -79,11 +93,11 @@ impl Fliers {
             let (body, drift) = (&self.world.bodies[handle], &mut self.drifts[i]);
             let asked_rpm = self.fleet.asked_rpm(i);
             let state = &mut self.fleet.states[i];
-            state.position_m = self.origin_m + doubles(body.translation());
+            state.position_m = self.origin_m + from_engine(body.translation());
             state.attitude = attitude(*body.rotation());
             state.rotors_rpm = lag.after(state.rotors_rpm, asked_rpm);
-            let by_m_s = doubles(body.linvel() - reals(drift.velocity_m_s));
-            let by_rad_s = doubles(body.angvel() - reals(drift.turn_rad_s));
+            let by_m_s = from_engine(body.linvel() - to_engine(drift.velocity_m_s));
+            let by_rad_s = from_engine(body.angvel() - to_engine(drift.turn_rad_s));
             if by_m_s != Vector3::zeros() || by_rad_s != Vector3::zeros() {
                 self.fleet.dynamics.hit(drift, &state.attitude, by_m_s, by_rad_s);
             }
@@ -123,7 +137,7 @@ impl Plant for Fliers {
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
-        self.world.integration_parameters.dt = real(dt_s);
+        self.world.integration_parameters.dt = dt_s;
         let began = Instant::now();
         self.fleet.remember();
         self.fleet.run_attitude();
@@ -155,7 +169,7 @@ impl Plant for Fliers {
         self.fleet.go_back();
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
-            body.set_translation(reals(row(&self.began_m, i)), true);
+            body.set_translation(to_engine(row(&self.began_m, i)), true);
             body.set_rotation(rotation(&self.fleet.states[i].attitude), true);
         }
     }
@@ -187,11 +201,11 @@ impl Plant for Fliers {
 
 /// As the engine has it, which keeps its length: the same numbers go back into it.
 fn attitude(rotation: Rotation) -> UnitQuaternion<f64> {
-    let [x, y, z, w] = rotation.to_array().map(double);
+    let [x, y, z, w] = rotation.to_array();
     UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
 }
 
 fn rotation(attitude: &UnitQuaternion<f64>) -> Rotation {
     let q = attitude.quaternion();
-    Rotation::from_xyzw(real(q.i), real(q.j), real(q.k), real(q.w))
+    Rotation::from_xyzw(q.i, q.j, q.k, q.w)
 }

@@ -100,6 +100,7 @@ impl Simulation {
                 self.time_s = begin_s + seconds(flown);
             }
             std::mem::swap(&mut self.state, &mut self.next);
+            self.resolution.take(&self.state, seconds(part), step)?;
             self.judge_and_command(Some((step, from_s)), flown == whole)?;
             while part < whole && flown.is_multiple_of(2 * part) {
                 part *= 2;
@@ -146,7 +147,7 @@ impl Simulation {
     pub(super) fn judge_and_command(&mut self, step: Option<(u64, f64)>, is_whole: bool) -> Result<(), Ending> {
         let (number, from_s) = step.unwrap_or((0, self.time_s));
         let refused = |why| Ending::from(Breakdown::Audit { step: number, why });
-        let bend_m = self.path.bend_m();
+        let bend_m = self.path.bend_m() + self.resolution.rounding_m();
         for (after_s, positions_m) in self.path.passed() {
             self.judge.sweep(from_s + after_s, positions_m, bend_m, &mut self.events).map_err(refused)?;
         }

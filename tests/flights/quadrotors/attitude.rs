@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use tautline::continuous;
 use tautline::plant::{Quadrotors, rapier};
-use tautline::scenario::Precision;
 use tautline::vehicle::{Model, ModelError, State};
 
 use super::{alone, fly, model, orders, without_drag};
@@ -12,7 +11,7 @@ use super::{alone, fly, model, orders, without_drag};
 fn angles(model: &Model, hz: f64, period_s: f64, samples: usize) -> Vec<f64> {
     let (scenario, mut fleet) = alone(model.clone(), hz);
     fleet.states[0].attitude = UnitQuaternion::from_euler_angles(1e-4, 0.0, 0.0);
-    let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet);
+    let mut plant = rapier::quadrotors(&scenario, fleet);
     (0..samples)
         .map(|_| {
             let state = fly(plant.as_mut(), (period_s, 1.0 / hz), &mut |_, _| Vector3::zeros());
@@ -89,7 +88,7 @@ fn the_engine_comes_to_the_solution_of_order_8_at_second_order() {
         let exact = run(&mut continuous::Quadrotors::new(fleet), 500.0);
         let errors = [500.0, 1000.0, 2000.0, 4000.0, 8000.0].map(|hz| {
             let (scenario, fleet) = start(500.0);
-            let found = run(rapier::quadrotors(&scenario, Precision::Double, fleet).as_mut(), hz);
+            let found = run(rapier::quadrotors(&scenario, fleet).as_mut(), hz);
             (found.position_m - exact.position_m).norm() + (found.velocity_m_s - exact.velocity_m_s).norm()
         });
         assert!(errors[0] <= left, "{name}: {errors:?} m and m/s");

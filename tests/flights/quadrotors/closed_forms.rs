@@ -2,7 +2,6 @@
 
 use nalgebra::{Vector3, Vector4};
 use tautline::plant::rapier;
-use tautline::scenario::Precision;
 use tautline::vehicle::{GRAVITY_M_S2, Model, RotorCurve, State};
 
 use super::{alone, fly, model, open_loop, orders, without_drag};
@@ -76,7 +75,7 @@ fn rotors_hover_at_the_published_speeds_and_the_vehicle_stays() {
     ] {
         let (scenario, fleet) = alone(model(name), 500.0);
         assert!((fleet.dynamics.hover_rpm() - expected_rpm).abs() <= 0.01, "{}", fleet.dynamics.hover_rpm());
-        let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet);
+        let mut plant = rapier::quadrotors(&scenario, fleet);
         let state = fly(plant.as_mut(), (10.0, 1.0 / 500.0), &mut |_, _| Vector3::zeros());
         assert!(state.position_m.norm() <= 1e-9, "{name}: {}", state.position_m);
     }
@@ -152,7 +151,7 @@ fn in_a_steady_wind_it_hovers_at_the_tilt_whose_tangent_is_drag_over_weight() {
         fleet.wind_m_s[(0, 0)] = wind_m_s;
         let expected = tilt_in_wind(&model, fleet.dynamics.hover_rpm(), wind_m_s);
         let hold = &mut |_, state: &State| -state.position_m - 2.0 * state.velocity_m_s;
-        let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet.clone());
+        let mut plant = rapier::quadrotors(&scenario, fleet.clone());
         let state = fly(plant.as_mut(), (100.0, 1.0 / 500.0), hold);
         let up = state.attitude * Vector3::z();
         assert!((-up.x / up.z - expected).abs() <= 1e-9, "{} at {wind_m_s} m/s, {expected}", -up.x / up.z);
@@ -160,7 +159,7 @@ fn in_a_steady_wind_it_hovers_at_the_tilt_whose_tangent_is_drag_over_weight() {
         let [along, across, axial] = model.rotor_drag_n_s_m;
         let (scenario, mut flipped) = alone(Model { rotor_drag_n_s_m: [-along, -across, axial], ..model }, 500.0);
         flipped.wind_m_s[(0, 0)] = wind_m_s;
-        let mut plant = rapier::quadrotors(&scenario, Precision::Double, flipped);
+        let mut plant = rapier::quadrotors(&scenario, flipped);
         let up = fly(plant.as_mut(), (20.0, 1.0 / 500.0), hold).attitude * Vector3::z();
         assert!(-up.x / up.z < 0.0, "a drag of the wrong sign tilts it with the wind");
     }

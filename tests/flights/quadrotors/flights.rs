@@ -6,7 +6,7 @@ use tautline::formation::{Formation, largest_edge_error_m};
 use tautline::law::Void;
 use tautline::plant::{Path, Quadrotors, rapier};
 use tautline::record::Event;
-use tautline::scenario::{Precision, Scenario, Space};
+use tautline::scenario::{Scenario, Space};
 use tautline::sim::{Ending, Simulation};
 use tautline::swarm::{Rows, Swarm, row};
 use tautline::vehicle::{Airframe, Downwash, Fleet, GRAVITY_M_S2, Ground, Quadrotor, State};
@@ -73,9 +73,7 @@ fn the_flight_of_points_is_the_pentagons_to_scale_and_keeps_more_apart() {
 
 #[test]
 fn a_loaded_flight_of_quadrotors_goes_on_with_the_same_bits() {
-    for sets in
-        [&["time.control_hz=70", "vehicle.attitude_hz=300"][..], &["plant.kind=ideal"], &["plant.precision=single"]]
-    {
+    for sets in [&["time.control_hz=70", "vehicle.attitude_hz=300"][..], &["plant.kind=ideal"]] {
         let mut simulation = Simulation::new(&builtin("crazyflies", sets)).expect("a flight");
         let run = |simulation: &mut Simulation, steps: u32| {
             let mut samples = Vec::new();
@@ -98,7 +96,7 @@ fn a_loaded_flight_of_quadrotors_goes_on_with_the_same_bits() {
 fn a_step_that_is_taken_back_leaves_nothing_behind() {
     let (scenario, mut fleet) = two(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0], &[0.0; 6], &|_| {});
     fleet.states[0].rates_rad_s = Vector3::new(1.0, 2.0, 3.0);
-    let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet);
+    let mut plant = rapier::quadrotors(&scenario, fleet);
     let hard = Rows::from_row_slice(&[3.0, -2.0, 1.0, 0.0, 4.0, -3.0]);
     (0..50).for_each(|_| drop(step(plant.as_mut(), &hard)));
     let before = plant.fleet().states.clone();
@@ -112,25 +110,23 @@ fn a_step_that_is_taken_back_leaves_nothing_behind() {
 fn hulls_that_meet_make_quadrotors_tumble_and_the_flight_goes_on() {
     let apart = [-0.5, 0.04, 0.0, 0.5, -0.04, 0.0];
     let (scenario, fleet) = two(&apart, &[2.0, 0.0, 0.0, -2.0, 0.0, 0.0], &|_| {});
-    for precision in [Precision::Single, Precision::Double] {
-        let mut plant = rapier::quadrotors(&scenario, precision, fleet.clone());
-        let (mut hits, mut spin_rad_s, mut lowest_m) = (Vec::new(), 0.0_f64, 0.0_f64);
-        let mut nearest_m = f64::INFINITY;
-        for _ in 0..1500 {
-            let swarm = step(plant.as_mut(), &Rows::zeros(2));
-            plant.hull_contacts(&mut hits);
-            assert_eq!(swarm.first_not_finite(), None);
-            nearest_m = nearest_m.min((row(&swarm.positions_m, 0) - row(&swarm.positions_m, 1)).norm());
-            for State { rates_rad_s, position_m, .. } in &plant.fleet().states {
-                spin_rad_s = spin_rad_s.max(rates_rad_s.norm());
-                lowest_m = lowest_m.min(position_m.z);
-            }
+    let mut plant = rapier::quadrotors(&scenario, fleet);
+    let (mut hits, mut spin_rad_s, mut lowest_m) = (Vec::new(), 0.0_f64, 0.0_f64);
+    let mut nearest_m = f64::INFINITY;
+    for _ in 0..1500 {
+        let swarm = step(plant.as_mut(), &Rows::zeros(2));
+        plant.hull_contacts(&mut hits);
+        assert_eq!(swarm.first_not_finite(), None);
+        nearest_m = nearest_m.min((row(&swarm.positions_m, 0) - row(&swarm.positions_m, 1)).norm());
+        for State { rates_rad_s, position_m, .. } in &plant.fleet().states {
+            spin_rad_s = spin_rad_s.max(rates_rad_s.norm());
+            lowest_m = lowest_m.min(position_m.z);
         }
-        let [hit, ..] = hits[..] else { panic!("they hit") };
-        // At the ends of steps, in which they close by up to 8 mm.
-        assert!(hit.closing_m_s > 2.0 && (0.14..0.148).contains(&nearest_m), "{hit:?}, {nearest_m} m");
-        assert!(spin_rad_s > 10.0 && lowest_m < -0.05, "{spin_rad_s} rad/s, {lowest_m} m");
     }
+    let [hit, ..] = hits[..] else { panic!("they hit") };
+    // At the ends of steps, in which they close by up to 8 mm.
+    assert!(hit.closing_m_s > 2.0 && (0.14..0.148).contains(&nearest_m), "{hit:?}, {nearest_m} m");
+    assert!(spin_rad_s > 10.0 && lowest_m < -0.05, "{spin_rad_s} rad/s, {lowest_m} m");
 }
 
 #[test]
@@ -159,7 +155,7 @@ fn crossing(scenario: &Scenario) -> Swarm {
 
 #[test]
 fn continuous_time_flies_the_same_flight() {
-    let sets = ["time.duration_s=4", "plant.precision=double"];
+    let sets = ["time.duration_s=4"];
     let bodies = fly(&builtin("crazyflies", &sets)).0.last;
     let ideal = fly(&builtin("crazyflies", &[sets[0], "plant.kind=ideal"])).0.last;
     let off_m = (bodies.positions_m - ideal.positions_m).amax();
@@ -237,9 +233,9 @@ fn the_engine_and_continuous_time_fly_in_the_same_turbulence() {
     ];
     let last = |more: &str| fly(&builtin("crazyflies", &[&sets[..], &[more]].concat())).0.last.positions_m;
     let (bodies, ideal, still) = (
-        last("plant.precision=double"),
+        last("plant.kind=rapier"),
         last("plant.kind=ideal"),
-        fly(&builtin("crazyflies", &["time.duration_s=3", "plant.precision=double"])).0.last.positions_m,
+        fly(&builtin("crazyflies", &["time.duration_s=3"])).0.last.positions_m,
     );
     let off_m = (&bodies - &ideal).amax();
     assert!(off_m <= 1e-4 && (&bodies - &still).amax() > 0.5, "{off_m} m from each other");

@@ -9,7 +9,7 @@ mod scenarios;
 use nalgebra::{Vector3, Vector4};
 use tautline::formation::Formation;
 use tautline::plant::{Path, Quadrotors, rapier};
-use tautline::scenario::{Precision, Scenario};
+use tautline::scenario::Scenario;
 use tautline::swarm::{Rows, Swarm, set_row};
 use tautline::vehicle::{self, Airframe, Fleet, MODELS, Model, Quadrotor, State};
 
@@ -55,7 +55,7 @@ fn fly(
     plant.fleet().states[0]
 }
 
-/// The same in the engine, in double precision, with rotors that turn at these speeds \[rpm\] and no attitude loop.
+/// The same in the engine, with rotors that turn at these speeds \[rpm\] and no attitude loop.
 fn open_loop(
     model: Model,
     from: &dyn Fn(&mut State),
@@ -65,7 +65,7 @@ fn open_loop(
     let (scenario, mut fleet) = alone(model, 500.0);
     from(&mut fleet.states[0]);
     fleet.open_loop(&[asked_rpm]);
-    let mut plant = rapier::quadrotors(&scenario, Precision::Double, fleet);
+    let mut plant = rapier::quadrotors(&scenario, fleet);
     fly(plant.as_mut(), (duration_s, dt_s), &mut |_, _| Vector3::zeros())
 }
 

@@ -1,7 +1,7 @@
 //! Torque-free rotation: symmetric and triaxial tops, in the plant and as the engine turns bodies by itself.
 
 use nalgebra::Vector3;
-use rapier3d_f64::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder, Vector};
+use rapier3d::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder, Vector};
 use tautline::vehicle::{Model, State};
 
 use super::{open_loop, orders, without_drag};
