@@ -162,7 +162,7 @@ fn judged(
             more = recording.read(&mut items)?;
         }
         if first && recording.clock().by_steps {
-            arguments.refuse_guessed_seconds(recording.clock().unit)?;
+            arguments.refuse_guessed_seconds(recording.clock().unit, &items)?;
         }
         first = false;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));

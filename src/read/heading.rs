@@ -204,7 +204,7 @@ pub(crate) fn is_read(name: &str) -> bool {
 }
 
 /// The name of a column of time in lower case without its unit, and the unit.
-fn time_and_unit(name: &str) -> (String, Option<String>) {
+pub(super) fn time_and_unit(name: &str) -> (String, Option<String>) {
     let name = name.to_lowercase();
     let (stem, unit) = units::bracketed(&name);
     let longer = ["min", "mins", "minute", "minutes", "h", "hr", "hrs", "hour", "hours", "day", "days"];
@@ -222,7 +222,9 @@ pub(super) fn is_clock(name: &str) -> bool {
 }
 
 pub(super) fn is_time(name: &str) -> bool {
-    matches!(time_and_unit(name).0.as_str(), "t" | "time" | "timestamp" | "stamp")
+    const NAMES: [&str; 10] =
+        ["t", "time", "timestamp", "stamp", "datetime", "date_time", "utc", "time_utc", "utc_time", "timestamp_utc"];
+    NAMES.contains(&time_and_unit(name).0.as_str())
 }
 
 /// Whether a column counts pictures or steps.

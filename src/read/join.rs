@@ -74,16 +74,21 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     notes.extend(left_out);
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
-        for note in tracks.notes() {
-            if !notes.contains(note) {
-                notes.push(note.clone());
-            }
-        }
+        note_new(&mut notes, tracks.notes());
         let shift_s = own.epoch_ns.saturating_sub(clock.epoch_ns) as f64 / 1e9;
         let waiting = Vec::new().into_iter().peekable();
         joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
     Ok(Box::new(Joined { vehicles, parts: joined, clock, notes }))
+}
+
+/// Appends notes that are not there yet.
+fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
+    for note in of_part {
+        if !notes.contains(note) {
+            notes.push(note.clone());
+        }
+    }
 }
 
 impl Part {
@@ -125,7 +130,11 @@ impl Tracks for Joined {
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
         for (vehicle, part) in self.parts.iter_mut().enumerate() {
+            let had_ended = part.until_s == f64::INFINITY;
             part.fill(vehicle)?;
+            if part.until_s == f64::INFINITY && !had_ended {
+                note_new(&mut self.notes, part.tracks.notes());
+            }
         }
         // Up to here nothing can come between what is known.
         let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);

@@ -5,10 +5,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::axes;
 use super::clock::TimeUnit;
+use super::conventions::Convention;
 use super::error::{Fault, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::options::{ColumnNames, ReadOptions};
+use super::time_columns::{self, Rest};
 use super::units;
 
 /// The columns of a position, and of what else is known of a vehicle.
@@ -25,6 +28,8 @@ pub(super) struct Body {
 pub(super) struct Layout {
     /// The column of time; none where the number of the row is the time.
     pub(super) time: Option<usize>,
+    /// The column of the rest of the time below a unit of the first.
+    pub(super) rest: Option<Rest>,
     /// The unit in the name of the column of time.
     pub(super) unit: Option<TimeUnit>,
     /// The column of the vehicle in a long table.
@@ -37,6 +42,8 @@ pub(super) struct Layout {
     pub(super) metres: Vec<f64>,
     /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
     pub(super) on_earth: bool,
+    /// What the names of the columns say of frames and of programs.
+    pub(super) convention: Convention,
     /// What a person should know about the columns.
     pub(super) notes: Vec<String>,
 }
@@ -65,6 +72,10 @@ fn missing(header: &[String], role: Role, of: &str) -> Fault {
 impl Layout {
     /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
+        let convention = Convention::of(header, options)?;
+        if convention.has_directions {
+            axes::refuse_known(options, "its header")?;
+        }
         let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new(), place: POSITION };
         for (role, name) in options.columns.given() {
             let column = header.iter().position(|column| column == name);
@@ -77,14 +88,24 @@ impl Layout {
             columns.units.extend(unit.map(|unit| (column, unit)));
         }
         let first = |is: fn(&str) -> bool| header.iter().position(|name| is(name));
-        let time = columns.get("", TIME).or_else(|| first(heading::is_time)).or_else(|| first(heading::is_frame));
-        let time = time.ok_or_else(|| missing(header, TIME, ""))?;
-        let unit = unit_of_time(&header[time], options)?;
-        let may_be_id = || if options.one_vehicle { first(heading::may_be_id) } else { None };
+        let found = match columns.get("", TIME) {
+            Some(given) => Some((given, None)),
+            None => time_columns::find(header, options)?,
+        };
+        let (time, rest) = found.ok_or_else(|| missing(header, TIME, ""))?;
+        let unit = match rest {
+            Some(rest) => Some(rest.unit),
+            None => {
+                unit_of_time(&header[time], options)?.or(convention.counts_from_boot.then_some(TimeUnit::Microseconds))
+            }
+        };
+        let may_be_id = || if options.is_joined { first(heading::may_be_id) } else { None };
         let id = columns.get("", ID).or_else(|| first(heading::is_id)).or_else(may_be_id);
 
-        let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
-        let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
+        let is_taken = |column| column == time || id == Some(column) || rest.is_some_and(|rest| rest.column == column);
+        let others = (0..header.len()).filter(|&column| !is_taken(column));
+        let names = &convention.header;
+        let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
         // Metres go before degrees where a table has both.
         let gives = |role: Role| {
             headings.iter().any(|(_, of)| of.role == role) || options.columns.given().any(|(given, _)| given == role)
@@ -111,18 +132,47 @@ impl Layout {
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
-        let mut layout =
-            Self { time: Some(time), unit, id, names, bodies, metres: Vec::new(), on_earth, notes: Vec::new() };
+        let mut layout = Self {
+            time: Some(time),
+            rest,
+            unit,
+            id,
+            names,
+            bodies,
+            metres: Vec::new(),
+            on_earth,
+            convention: Convention::default(),
+            notes: Vec::new(),
+        };
         let used = layout.columns();
         layout.metres = columns.metres(&used, options.scale)?;
+        layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
+        layout.convention = convention;
+        let (convention, used) = (&layout.convention, layout.columns());
+        if convention.reference.is_some() && options.scale != 1.0 {
+            let problem = format!("its positions are in metres, and --scale {} says another unit", options.scale);
+            return Err(Fault::content(problem, "leave --scale away"));
+        }
+        let is_one_vehicle = options.one_vehicle || convention.is_one_vehicle;
+        layout.notes.extend(convention.note.clone());
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
-        if id.is_none() && one && !options.one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
-            return Err(missing(header, ID, ""));
+        if id.is_none() && one && !is_one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+            return Err(match missing(header, ID, "") {
+                Fault::Content { problem, remedy } => {
+                    let remedy = format!("{remedy}; where all rows are of one vehicle, say so with --one-vehicle");
+                    Fault::content(problem, remedy)
+                }
+                fault => fault,
+            });
         }
         if layout.bodies.iter().any(|body| body.position[2].is_none()) {
             let what = if on_earth { "the height" } else { "z" };
             layout.notes.push(format!("there is no column for {what}: it is taken as 0"));
+        }
+        if let Some(rest) = rest {
+            let (whole, rest) = (quoted(&header[time]), quoted(&header[rest.column]));
+            layout.notes.push(format!("a time is {whole} and, below a unit of that, {rest}"));
         }
         if !unused.is_empty() {
             layout.notes.push(format!("columns not used: {}", unused.join(", ")));
@@ -139,8 +189,15 @@ impl Layout {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
-        let columns: BTreeSet<_> = self.bodies.iter().flat_map(of).chain(self.time).chain(self.id).collect();
+        let beside = self.convention.reference.into_iter().flatten().chain(self.convention.valid.iter().copied());
+        let columns: BTreeSet<_> =
+            self.bodies.iter().flat_map(of).chain(self.of_time()).chain(self.id).chain(beside).collect();
         columns.into_iter().collect()
+    }
+
+    /// The columns of the time.
+    pub(super) fn of_time(&self) -> impl Iterator<Item = usize> {
+        self.time.into_iter().chain(self.rest.map(|rest| rest.column))
     }
 }
 
@@ -152,7 +209,9 @@ fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, F
     if heading::is_frame(name) {
         return Err(Fault::frames(format!("its times are the numbers of frames in column {}", quoted(name))));
     }
-    let Some(unit) = heading::said_unit(name) else { return Ok(None) };
+    // `time (utc)` says a zone.
+    let is_zone = |unit: &String| matches!(unit.as_str(), "utc" | "gmt" | "iso8601" | "iso 8601");
+    let Some(unit) = heading::said_unit(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} says a unit of time that is not known, {}", quoted(name), quoted(&unit));
         let remedy =

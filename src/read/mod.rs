@@ -13,12 +13,15 @@
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
 mod archive;
+mod axes;
 mod bag;
 mod capture;
 mod clock;
+mod conventions;
 mod crazyflie;
 mod csv;
 mod curves;
+mod dates;
 mod earth;
 mod error;
 mod folder;
@@ -41,18 +44,20 @@ mod skybrush;
 mod source;
 mod stranger;
 mod table;
+mod time_columns;
 mod units;
 mod vicon;
 mod vviz;
 
 #[cfg(feature = "parquet")]
 pub use self::parquet::is_guarded;
+pub use axes::Axes;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
 pub use format::Format;
 pub(crate) use heading::is_read;
 pub use mcap::Channels;
-pub use options::{AxisOrder, ColumnNames, Dimensions, ReadOptions};
+pub use options::{AxisOrder, ColumnNames, Dimensions, Duplicates, ReadOptions};
 pub use order::Recording;
 
 use std::fs;
@@ -73,7 +78,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened.map_err(|error| error.of(path))
+    opened.map(|recording| axes::turned(recording, options)).map_err(|error| error.of(path))
 }
 
 /// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
@@ -93,7 +98,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.map_err(|error| error.of(Path::new(&called(paths))))
+    opened.map(|recording| axes::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
 }
 
 /// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
@@ -166,7 +171,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     if !folder.folders.is_empty() {
         return Err(folder.of_folders().into());
     }
-    let options = ReadOptions { one_vehicle: true, ..options.clone() };
+    let options = ReadOptions { one_vehicle: true, is_joined: true, ..options.clone() };
     let open = |file: Source| {
         let shown = file.shown();
         Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))

@@ -1,5 +1,6 @@
 //! `run.mcap`.
 
+use super::super::axes;
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
 use super::super::names::Names;
@@ -10,6 +11,7 @@ use crate::record::mcap::{Entry, McapRecording};
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let recording = McapRecording::open(&source.path)?;
+    axes::refuse_known(options, "a recording of tautline")?;
     let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
