@@ -46,12 +46,12 @@ pub(super) struct ReadArguments {
     /// Numbers of a vehicle in a table without a header: x and y, x, y and z, or those and their velocities.
     #[arg(long, value_name = "NUMBERS", value_parser = dimensions())]
     dimensions: Option<Dimensions>,
-    /// Metres per unit of length of the recording; three numbers, with signs, are of its x, y and z.
-    #[arg(long, value_name = "METRES", default_value = "1", value_parser = scale, allow_hyphen_values = true)]
-    scale: Scale,
+    /// Metres per unit of length of the recording; three numbers, with signs, are of its x, y and z [default: 1].
+    #[arg(long, value_name = "METRES", value_parser = scale, allow_hyphen_values = true)]
+    scale: Option<Scale>,
     /// Directions of the axes of the recording: enu, ned, nwu and the like, or what becomes x, y and z, such as y,x,-z.
     #[arg(long, value_name = "AXES", value_parser = axes, allow_hyphen_values = true)]
-    pub(super) axes: Option<Axes>,
+    axes: Option<Axes>,
     /// Name of a column: t, id, x, y, z, vx, vy, vz, radius, or lat, lon, alt. In NPZ, t and x name the arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
     columns: Vec<(String, String)>,
@@ -122,10 +122,21 @@ impl ReadArguments {
         std::iter::once(&self.recording).chain(&self.more).map(PathBuf::as_path)
     }
 
+    /// Fills what is not given of the axes and of their scale, as a file of settings says it.
+    ///
+    /// # Errors
+    /// What is wrong with the text of either.
+    pub(super) fn fill(&mut self, axes_as: Option<&str>, scale_as: Option<&str>) -> Result<(), String> {
+        self.axes = self.axes.or(axes_as.map(axes).transpose()?);
+        self.scale = self.scale.or(scale_as.map(scale).transpose()?);
+        Ok(())
+    }
+
     /// The options of the library, with the format if it is given.
     pub(super) fn options(&self, format: Option<Format>) -> Result<ReadOptions, Failure> {
-        if !(self.scale.metres > 0.0 && self.scale.metres.is_finite()) {
-            let message = format!("--scale is {}", self.scale.metres);
+        let scale = self.scale.unwrap_or(Scale { metres: 1.0, each: [1.0; 3] });
+        if !(scale.metres > 0.0 && scale.metres.is_finite()) {
+            let message = format!("--scale is {}", scale.metres);
             return Err(Failure::input(message, "give a positive number of metres, such as 0.001 for millimetres"));
         }
         for (option, value) in [("--fps", self.frames_per_s), ("--time-scale", self.time_scale)] {
@@ -143,8 +154,8 @@ impl ReadArguments {
             times_per_second: self.frames_per_s.or(self.time_scale.map(f64::recip)),
             sort: self.sort,
             duplicates: self.duplicates,
-            scale: self.scale.metres,
-            axes: self.axes.unwrap_or_default().scaled(self.scale.each),
+            scale: scale.metres,
+            axes: self.axes.unwrap_or_default().scaled(scale.each),
             dimensions: self.dimensions,
             one_vehicle: self.one_vehicle,
             starts: self.starts.iter().cloned().collect(),
@@ -260,9 +271,12 @@ pub(super) fn format() -> impl TypedValueParser<Value = Format> {
     let help = |format| match format {
         Format::Csv => "A table in text with a header",
         Format::Text => "Numbers between blanks: t x y z x y z ...",
+        Format::Trajnet => "Numbers between blanks: frame, vehicle, x and y",
+        Format::Jsonl => "An object of JSON in each line",
         Format::Parquet => "A table in Parquet",
         Format::Npz => "Arrays t and positions, as numpy.savez saves them",
         Format::Mcap => "MCAP: our own, Foxglove or ROS 2 messages",
+        Format::Ulog => "A log of PX4",
         Format::Crazyflie => "A folder of Crazyflie polynomials",
         Format::Skybrush => "A Skybrush show",
         Format::Vviz => "A VVIZ show of Verge Aero or Finale 3D",

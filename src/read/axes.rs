@@ -2,11 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, ReadError};
-use super::options::ReadOptions;
-use super::order::Recording;
-use crate::track::{Clock, Item, Tracks};
-
 /// Which axis of a recording becomes x, y and z, and by what it is multiplied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
@@ -91,86 +86,19 @@ impl Axes {
         self.factors.iter().all(|factor| factor.is_finite() && *factor != 0.0)
     }
 
-    fn turn(&self, vector: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn turn(&self, vector: Vector3<f64>) -> Vector3<f64> {
         // Adding 0 makes a zero positive.
         Vector3::from_fn(|axis, _| self.factors[axis] * vector[self.from[axis]] + 0.0)
     }
 
-    fn note(&self) -> String {
+    /// What a person should know.
+    pub(super) fn note(&self) -> String {
         let named = |axis: usize| match self.factors[axis] {
             1.0 => ["x", "y", "z"][self.from[axis]].to_owned(),
             -1.0 => format!("-{}", ["x", "y", "z"][self.from[axis]]),
             factor => format!("{factor:?} {}", ["x", "y", "z"][self.from[axis]]),
         };
         format!("axes are turned: x, y, z are {}, {}, {} of the recording", named(0), named(1), named(2))
-    }
-}
-
-/// A recording whose axes are turned as the user says.
-pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Recording {
-    if options.axes.is_identity() {
-        return recording;
-    }
-    let notes = [recording.notes(), &[options.axes.note()]].concat();
-    Box::new(Turned { recording, axes: options.axes, notes })
-}
-
-/// Refuses to turn axes whose directions are known, in what is called so.
-pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Fault> {
-    if options.axes.is_identity() {
-        return Ok(());
-    }
-    Err(Fault::content(format!("{what} gives the directions of its axes"), "leave --axes and signs of --scale away"))
-}
-
-struct Turned {
-    recording: Recording,
-    axes: Axes,
-    notes: Vec<String>,
-}
-
-impl Tracks for Turned {
-    type Error = ReadError;
-
-    fn vehicles(&self) -> &[String] {
-        self.recording.vehicles()
-    }
-
-    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        let before = items.len();
-        let more = self.recording.read(items)?;
-        for item in &mut items[before..] {
-            match item {
-                Item::Sample(sample) => {
-                    if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
-                        let problem = "its axes are scaled by different numbers, and vehicles have a radius";
-                        return Err(Fault::content(problem, "give one number of metres with --scale").into());
-                    }
-                    sample.position_m = self.axes.turn(sample.position_m);
-                    sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));
-                }
-                Item::Piece(piece) => {
-                    piece.coefficients.iter_mut().for_each(|coefficient| *coefficient = self.axes.turn(*coefficient));
-                }
-            }
-        }
-        if !more {
-            let turned = self.axes.note();
-            self.notes = [self.recording.notes(), &[turned]].concat();
-        }
-        Ok(more)
-    }
-
-    fn clock(&self) -> &Clock {
-        self.recording.clock()
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn assumed(&self) -> Option<&str> {
-        self.recording.assumed()
     }
 }
 

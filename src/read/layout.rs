@@ -5,13 +5,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::axes;
 use super::clock::TimeUnit;
 use super::conventions::Convention;
 use super::error::{Fault, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::options::{ColumnNames, ReadOptions};
 use super::time_columns::{self, Rest};
+use super::turned;
 use super::units;
 
 /// The columns of a position, and of what else is known of a vehicle.
@@ -74,7 +74,7 @@ impl Layout {
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
         let convention = Convention::of(header, options)?;
         if convention.has_directions {
-            axes::refuse_known(options, "its header")?;
+            turned::refuse_known(options, "its header")?;
         }
         let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new(), place: POSITION };
         for (role, name) in options.columns.given() {

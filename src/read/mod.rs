@@ -35,6 +35,7 @@ mod motive;
 mod names;
 mod npy;
 mod npz;
+mod objects;
 mod options;
 mod order;
 #[cfg(feature = "parquet")]
@@ -45,6 +46,8 @@ mod source;
 mod stranger;
 mod table;
 mod time_columns;
+mod turned;
+mod ulog;
 mod units;
 mod vicon;
 mod vviz;
@@ -78,7 +81,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened.map(|recording| axes::turned(recording, options)).map_err(|error| error.of(path))
+    opened.map(|recording| turned::turned(recording, options)).map_err(|error| error.of(path))
 }
 
 /// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
@@ -98,7 +101,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.map(|recording| axes::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
+    opened.map(|recording| turned::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
 }
 
 /// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
@@ -197,9 +200,11 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
     }
     let source = &source;
     match format {
-        Format::Csv | Format::Text => csv::open(source, format, options),
+        Format::Csv | Format::Text | Format::Trajnet => csv::open(source, format, options),
         Format::Crazyflie => crazyflie::open(vec![(source.stem(), vec![source.clone()])], None, options),
+        Format::Jsonl => objects::open(source, options),
         Format::Mcap => mcap::open(source, options),
+        Format::Ulog => ulog::open(source, options),
         Format::Npz => npz::open(source, options),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::open(source, options),

@@ -146,7 +146,7 @@ pub struct ReadOptions {
     /// What places on the Earth are measured from: latitude and longitude \[degrees\] and height above the ellipsoid
     /// \[m\]; the first place where nothing is said.
     pub origin: Option<[f64; 3]>,
-    /// Whether to accept an MCAP file that was not closed, for what it holds.
+    /// Whether to accept an MCAP file or a log of PX4 that was not closed, for what it holds.
     pub allow_unfinished: bool,
 }
 
@@ -195,8 +195,9 @@ impl ReadOptions {
 
     /// Refuses an option that means nothing for a format.
     pub(super) fn refuse_needless(&self, format: Format) -> Result<(), Fault> {
-        let is_table = matches!(format, Format::Csv | Format::Text | Format::Parquet | Format::Npz);
-        let (is_npz, is_mcap) = (format == Format::Npz, format == Format::Mcap);
+        let is_text = matches!(format, Format::Csv | Format::Text | Format::Trajnet | Format::Jsonl);
+        let is_table = is_text || matches!(format, Format::Parquet | Format::Npz);
+        let (is_npz, is_mcap, is_ulog) = (format == Format::Npz, format == Format::Mcap, format == Format::Ulog);
         let has_curves = matches!(format, Format::Crazyflie | Format::Skybrush);
         let has_axes = matches!(format, Format::Motive | Format::Vviz);
         let given = [
@@ -212,12 +213,16 @@ impl ReadOptions {
             ),
             (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
             (self.axis_order.is_some() && !is_npz, "--axis-order", "has no arrays"),
-            (self.origin.is_some() && !is_mcap && (!is_table || is_npz), "--origin", "has no latitudes and longitudes"),
+            (
+                self.origin.is_some() && !is_mcap && !is_ulog && (!is_table || is_npz),
+                "--origin",
+                "has no latitudes and longitudes",
+            ),
             (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
-            (!self.topics.is_empty() && !is_mcap, "--topic", "has no topics"),
+            (!self.topics.is_empty() && !is_mcap && !is_ulog, "--topic", "has no topics"),
             (!self.axes.is_identity() && has_axes, "--axes", "gives the directions of its axes"),
             (self.one_vehicle && !is_table, "--one-vehicle", "names its vehicles"),
-            (self.allow_unfinished && !is_mcap, "--allow-unfinished", "cannot be read before it is closed"),
+            (self.allow_unfinished && !is_mcap && !is_ulog, "--allow-unfinished", "cannot be read before it is closed"),
         ];
         match given.into_iter().find(|(needless, ..)| *needless) {
             Some((_, option, why)) => {
@@ -227,7 +232,7 @@ impl ReadOptions {
         }
     }
 
-    /// What is to be said of an MCAP file that was not closed, or the fault that it is.
+    /// What is to be said of a file that was not closed, or the fault that it is.
     pub(super) fn accept_unfinished(&self, complete: bool) -> Result<Vec<String>, Fault> {
         let note = "the recording was not closed: it is read up to the last part that was written";
         match (complete, self.allow_unfinished) {

@@ -4,7 +4,6 @@ use std::borrow::Cow;
 
 use nalgebra::Vector3;
 
-use super::axes;
 use super::clock::{Probe, Stamp, TimeUnit};
 use super::conventions::GLOBAL;
 use super::dates::Date;
@@ -15,6 +14,7 @@ use super::names::Names;
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::Source;
+use super::turned;
 
 /// The cells of the current row of a table.
 pub(super) trait Cells {
@@ -148,7 +148,7 @@ fn origin<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Re
         let needless = Fault::content("it has no columns of latitude and longitude", "leave --origin away");
         return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
     }
-    axes::refuse_known(options, "a table of latitudes and longitudes")?;
+    turned::refuse_known(options, "a table of latitudes and longitudes")?;
     cells.restart(&layout.columns(), true)?;
     while cells.advance()? {
         let place = match reference {

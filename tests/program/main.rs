@@ -20,6 +20,7 @@ mod keys;
 mod limits;
 mod margin;
 mod obstacles;
+mod reading;
 mod reads;
 mod references;
 mod refuses;

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::super::axes;
 use super::super::earth::Local;
 use super::super::error::{Fault, ReadError, quoted};
 use super::super::options::ReadOptions;
+use super::super::turned;
 use super::messages::{EARTH, What, Who};
 use super::outline::{Outline, place, refuse_own_frames};
 use super::rigid::{Known, Placed};
@@ -61,7 +61,7 @@ impl Plan {
             outline,
         };
         if first_fix.is_some() {
-            axes::refuse_known(options, "a recording with places on the Earth")?;
+            turned::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
             return Err(Fault::content("it has no place on the Earth", "leave --origin away").into());
