@@ -17,6 +17,12 @@ use super::units;
 pub(super) const GLOBAL: &str =
     "give vehicle_global_position in its place: its lat, lon and alt are measured from one place for all vehicles";
 
+/// What stands between the words of a name.
+const SEPARATORS: [char; 4] = ['_', '.', '/', ' '];
+
+/// Words that name a frame. Others of such letters are words of English, such as `end`.
+const FRAMES: [&str; 5] = ["enu", "ned", "nwu", "seu", "eus"];
+
 /// What the set of columns of a table says.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Convention {
@@ -133,10 +139,12 @@ impl Convention {
         for (column, name) in self.header.iter().enumerate() {
             let (stem, unit) = without_unit(name);
             let Some((rest, axes)) = without_frame(stem) else { continue };
-            let Some(axis) = ["x", "y", "z"].iter().position(|axis| rest.to_lowercase().ends_with(axis)) else {
-                continue;
-            };
-            turned.turn(column, &axes, axis, [&rest[..rest.len() - 1], unit]);
+            let start = rest.rfind(SEPARATORS).map_or(0, |at| at + 1);
+            let word = rest[start..].to_lowercase();
+            let axis = ["x", "y", "z"].iter().position(|axis| word.strip_prefix(['v', 'p']).unwrap_or(&word) == *axis);
+            if let Some(axis) = axis {
+                turned.turn(column, &axes, axis, [&rest[..rest.len() - 1], unit]);
+            }
         }
         // `north`, `cf1.east [m]`, `vel_d_m_s`.
         let enu = Axes::default();
@@ -180,19 +188,18 @@ fn without_unit(name: &str) -> (&str, &str) {
 
 /// A name without the word that says a frame, and the axes of that.
 fn without_frame(stem: &str) -> Option<(String, Axes)> {
-    let separators = ['_', '.', '/'];
     let lower = stem.to_lowercase();
     // A name that changes its length in lower case is none of ours.
-    let words = lower.split(separators).filter(|_| lower.len() == stem.len());
+    let words = lower.split(SEPARATORS).filter(|_| lower.len() == stem.len());
     let (at, word, axes) = words
         .map(|word| (word.as_ptr() as usize - lower.as_ptr() as usize, word))
-        .find_map(|(at, word)| Some((at, word, Axes::from_name(word).filter(|_| word.len() == 3)?)))?;
+        .find_map(|(at, word)| Some((at, word, Axes::from_name(word).filter(|_| FRAMES.contains(&word))?)))?;
     let (before, behind) = (&stem[..at], &stem[at + word.len()..]);
     // One of the two separators around it goes with it.
     let rest = if behind.is_empty() {
-        before.strip_suffix(separators)?.to_owned()
+        before.strip_suffix(SEPARATORS)?.to_owned()
     } else {
-        format!("{before}{}", behind.strip_prefix(separators)?)
+        format!("{before}{}", behind.strip_prefix(SEPARATORS)?)
     };
     (!rest.is_empty()).then_some((rest, axes))
 }
@@ -220,8 +227,7 @@ impl<'a> Direction<'a> {
             (&["down"], 2, -1.0),
         ];
         const LETTERS: [(&str, usize, f64); 4] = [("e", 0, 1.0), ("n", 1, 1.0), ("u", 2, 1.0), ("d", 2, -1.0)];
-        let separators = ['_', '.', '/', ' '];
-        let end = stem.rfind(separators).map_or(0, |at| at + 1);
+        let end = stem.rfind(SEPARATORS).map_or(0, |at| at + 1);
         let word = stem[end..].to_lowercase();
         let mut before = &stem[..end];
         let by_word = WORDS.iter().find(|(words, ..)| words.contains(&&*word)).map(|&(_, axis, sign)| (axis, sign));
@@ -238,8 +244,8 @@ impl<'a> Direction<'a> {
             },
         };
         // The quantity before it: `vel_n`, `position_east`.
-        let quantity = before.trim_end_matches(separators);
-        let start = quantity.rfind(separators).map_or(0, |at| at + 1);
+        let quantity = before.trim_end_matches(SEPARATORS);
+        let start = quantity.rfind(SEPARATORS).map_or(0, |at| at + 1);
         match quantity[start..].to_lowercase().as_str() {
             "v" | "vel" | "velocity" => (is_velocity, before) = (true, &before[..start]),
             "p" | "pos" | "position" => before = &before[..start],
@@ -284,8 +290,15 @@ mod tests {
 
     #[test]
     fn other_names_stay() {
-        for header in ["t,x,y,z", "t,x,y,up", "t,e,f,g", "t,n,x,y", "t,lat,lon,vel_n_m_s,vel_e_m_s", "t,x,y,depth,n_e"]
-        {
+        for header in [
+            "t,x,y,z",
+            "t,x,y,up",
+            "t,e,f,g",
+            "t,n,x,y",
+            "t,lat,lon,vel_n_m_s,vel_e_m_s",
+            "t,x,y,depth,n_e",
+            "t,end_x,end_y,max_ned",
+        ] {
             let found = convention(header);
             assert_eq!((found.header.join(","), found.has_directions), (header.to_owned(), false), "{header}");
         }

@@ -153,6 +153,12 @@ impl Layout {
             let problem = format!("its positions are in metres, and --scale {} says another unit", options.scale);
             return Err(Fault::content(problem, "leave --scale away"));
         }
+        let several = id
+            .map(|id| format!("column {}", quoted(&header[id])))
+            .or_else(|| (layout.names.len() > 1).then(|| "its header".to_owned()));
+        if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
+            return Err(Fault::content(format!("{namer} names the vehicles"), "leave --one-vehicle away"));
+        }
         let is_one_vehicle = options.one_vehicle || convention.is_one_vehicle;
         layout.notes.extend(convention.note.clone());
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());

@@ -8,8 +8,8 @@
 //! not is sorted, in memory, and says so in [`Tracks::notes`](crate::track::Tracks::notes).
 //!
 //! # What is refused
-//! Numbers that are not finite, a vehicle that is in two places at a time, time that runs backwards where each time is a
-//! row, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
+//! Numbers that are not finite, a vehicle that is in two places at a time or goes back in time, two columns of time that are
+//! no parts of one, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
 mod archive;

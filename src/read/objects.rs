@@ -117,9 +117,8 @@ struct Flat<'a> {
 }
 
 impl Flat<'_> {
-    fn push<E>(self, cell: Cell) -> Result<(), E> {
+    fn push(self, cell: Cell) {
         self.flat.push((self.key, cell));
-        Ok(())
     }
 }
 
@@ -139,27 +138,33 @@ impl<'de> Visitor<'de> for Flat<'_> {
     }
 
     fn visit_unit<E>(self) -> Result<(), E> {
-        self.push(Cell::Empty)
+        self.push(Cell::Empty);
+        Ok(())
     }
 
     fn visit_bool<E>(self, value: bool) -> Result<(), E> {
-        self.push(Cell::Text(value.to_string()))
+        self.push(Cell::Text(value.to_string()));
+        Ok(())
     }
 
     fn visit_i64<E>(self, value: i64) -> Result<(), E> {
-        self.push(Cell::Whole(value))
+        self.push(Cell::Whole(value));
+        Ok(())
     }
 
     fn visit_u64<E>(self, value: u64) -> Result<(), E> {
-        self.push(i64::try_from(value).map_or(Cell::Real(value as f64), Cell::Whole))
+        self.push(i64::try_from(value).map_or(Cell::Real(value as f64), Cell::Whole));
+        Ok(())
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<(), E> {
-        self.push(Cell::Real(value))
+        self.push(Cell::Real(value));
+        Ok(())
     }
 
     fn visit_str<E>(self, value: &str) -> Result<(), E> {
-        self.push(Cell::Text(value.to_owned()))
+        self.push(Cell::Text(value.to_owned()));
+        Ok(())
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {

@@ -270,29 +270,20 @@ impl Log {
     }
 
     fn rows(&self, fixes: &[Fix], local: &Local) -> Result<Vec<Row>, ReadError> {
-        let mut there: Option<Local> = None;
-        let mut rows = Vec::with_capacity(fixes.len());
-        for fix in fixes {
-            let row = || {
-                let of = match there.filter(|there| there.is_at(fix.origin)) {
-                    Some(there) => there,
-                    None => *there.insert(Local::at(fix.origin)?),
-                };
-                let time_us =
-                    i64::try_from(fix.time_us).ok().and_then(|time| time.checked_add(self.boot_us.unwrap_or(0)));
-                Ok(Row {
-                    stamp: Stamp::Whole(time_us.ok_or_else(Fault::out_of_range)?),
-                    place: fix.at,
-                    vehicle: 0,
-                    position: local.place_from(&of, fix.position),
-                    velocity: None,
-                    radius: None,
-                })
-            };
-            let mut row = row;
-            rows.push(row().map_err(|fault: Fault| fault.at(Place::Byte(fix.at)))?);
+        let mut there = *local;
+        let row = |fix: &Fix| self.row(fix, local, &mut there).map_err(|fault| fault.at(Place::Byte(fix.at)));
+        fixes.iter().map(row).collect()
+    }
+
+    /// A position in the frame `local`; `there` is the last frame that one was measured in.
+    fn row(&self, fix: &Fix, local: &Local, there: &mut Local) -> Result<Row, Fault> {
+        if !there.is_at(fix.origin) {
+            *there = Local::at(fix.origin)?;
         }
-        Ok(rows)
+        let time_us = i64::try_from(fix.time_us).ok().and_then(|time| time.checked_add(self.boot_us.unwrap_or(0)));
+        let stamp = Stamp::Whole(time_us.ok_or_else(Fault::out_of_range)?);
+        let position = local.place_from(there, fix.position);
+        Ok(Row { stamp, place: fix.at, vehicle: 0, position, velocity: None, radius: None })
     }
 }
 

@@ -42,6 +42,13 @@ fn a_table_of_one_vehicle_needs_no_folder() {
     let two = "t_s,x,y,z,mode\n0,1,2,3,4\n0,5,6,7,4\n";
     let error = read_bytes("cf1.csv", two.as_bytes(), &one).expect_err("two");
     assert!(error.to_string().contains("a second time"), "{error}");
+    for several in ["t,id,x,y\n0,a,1,2\n", "t,x1,y1,x2,y2\n0,1,2,3,4\n"] {
+        let error = read_bytes("f.csv", several.as_bytes(), &one).expect_err("named");
+        assert!(
+            error.to_string().contains("names the vehicles") && error.help().contains("leave --one-vehicle"),
+            "{error}"
+        );
+    }
     let mcap = ReadOptions { one_vehicle: true, format: Some(Format::Skybrush), ..ReadOptions::default() };
     assert!(read_bytes("a.json", b"{}", &mcap).expect_err("a show").help().contains("leave --one-vehicle away"));
 }
