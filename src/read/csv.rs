@@ -66,6 +66,7 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
     if format == Format::Text && !text.named && is_trajnet(source, text.separator)? {
         text = Text::open(source, Format::Trajnet)?;
     }
+    let header_row = text.row();
     text.take_units()?;
     let (stem, first) = (source.stem(), &text.first);
     let numbers = || {
@@ -81,7 +82,7 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
     };
-    let layout = layout.map_err(|fault| fault.at(Text::place(text.row())))?;
+    let layout = layout.map_err(|fault| fault.at(Text::place(header_row)))?;
     table::open(source, text, layout, None, 0, options)
 }
 

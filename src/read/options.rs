@@ -221,7 +221,7 @@ impl ReadOptions {
             (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
             (!self.topics.is_empty() && !is_mcap && !is_ulog, "--topic", "has no topics"),
             (!self.axes.is_identity() && has_axes, "--axes", "gives the directions of its axes"),
-            (self.one_vehicle && !is_table, "--one-vehicle", "names its vehicles"),
+            (self.one_vehicle && !self.is_joined && !is_table, "--one-vehicle", "names its vehicles"),
             (self.allow_unfinished && !is_mcap && !is_ulog, "--allow-unfinished", "cannot be read before it is closed"),
         ];
         match given.into_iter().find(|(needless, ..)| *needless) {

@@ -55,6 +55,11 @@ pub(super) trait Rows {
     /// The place that a row's number means.
     fn place(&self, number: u64) -> Place;
 
+    /// The file that a row is in, of a recording in several files: within one, rows of a vehicle do not go back in time.
+    fn file(&self, _number: u64) -> usize {
+        0
+    }
+
     /// Whether each time is a row of the file, so that time can only run forwards.
     fn is_wide(&self) -> bool {
         true
@@ -93,7 +98,7 @@ fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -> Result<()
             last.resize(row.vehicle + 1, None);
         }
         let Some(before) = last[row.vehicle].replace(row) else { continue };
-        if row.stamp.compare(before.stamp).is_lt() {
+        if row.stamp.compare(before.stamp).is_lt() && of.file(row.place) == of.file(before.place) {
             let name = quoted(of.vehicles().get(row.vehicle).map_or("", String::as_str));
             let (time_s, before_s) = (timing.seconds(row.stamp), timing.seconds(before.stamp));
             let problem = format!(

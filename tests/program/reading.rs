@@ -92,7 +92,7 @@ fn heights_are_along_the_axis_that_is_up() {
 
 #[test]
 fn rows_out_of_order_and_twice_are_read_as_the_user_says() {
-    let text = "t_s,id,x,y,z\n0,a,0,0,0\n2,a,2,0,0\n1,a,1,0,0\n1,a,1,0.5,0\n0,b,0,9,0\n2,b,0,9,0\n";
+    let text = "t_s,id,x,y,z\n0,a,0,0,0\n2,a,2,0,0\n1,a,1,0,0\n1,a,1,0.5,0\n0,b,0,9,0\n1,b,0,9,0\n2,b,0,9,0\n";
     for (words, exit, expected) in [
         (&[][..], 2, "goes back in time"),
         (&["--sort"], 2, "there a second time at 1 s"),
@@ -110,7 +110,7 @@ fn one_vehicle_alone_is_judged_by_its_limits() {
     let text = "t_s,x,y,z,mode\n0,0,0,0,4\n1,1,0,0,4\n2,2,0,1,4\n";
     for (words, exit, expected) in [
         (&["--limit", "speed=2"][..], 2, "--one-vehicle"),
-        (&["--one-vehicle", "--limit", "speed=2"], 0, "speed at most 1.414 m/s"),
+        (&["--one-vehicle", "--limit", "speed=2"], 0, "speed at most 1.415 m/s"),
         (&["--one-vehicle", "--limit", "speed=1"], 1, "VIOLATION"),
         (&["--one-vehicle", "--delta", "1"], 2, "1 vehicle to judge, and nothing to keep apart"),
     ] {

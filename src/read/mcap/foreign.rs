@@ -2,7 +2,7 @@
 
 use super::super::clock::TimeUnit;
 use super::super::error::{Place, ReadError};
-use super::super::options::ReadOptions;
+use super::super::options::{Duplicates, ReadOptions};
 use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use super::plan::Plan;
@@ -15,8 +15,10 @@ use crate::record::mcap::topic::Part;
 pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {
     let plan = Plan::of(&mut splits, options)?;
     let none = plan.none();
-    let about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
-    let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new() };
+    let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
+    // Messages that are there twice are those of a bag that is.
+    about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
+    let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
     Ok(Box::new(Ordered::open(foreign, about)?))
 }
 
@@ -28,6 +30,8 @@ struct Foreign {
     listed: bool,
     /// The names of the vehicles as they are shown.
     shown: Vec<String>,
+    /// Messages before each file.
+    starts: Vec<u64>,
 }
 
 impl Rows for Foreign {
@@ -35,6 +39,7 @@ impl Rows for Foreign {
         let (before, poses, listed) = (rows.len(), &mut self.poses, &mut self.listed);
         let mut more = true;
         while more && rows.len() < before + BATCH {
+            let (files, messages) = (self.splits.opened_files(), poses.messages);
             more = self.splits.visit(|part| {
                 match part {
                     Part::Message(message) => poses.take(&message, rows)?,
@@ -43,6 +48,9 @@ impl Rows for Foreign {
                 }
                 Ok(())
             })?;
+            if self.splits.opened_files() > files {
+                self.starts.push(messages);
+            }
         }
         Ok(rows.len() > before)
     }
@@ -50,6 +58,7 @@ impl Rows for Foreign {
     fn rewind(&mut self) -> Result<(), ReadError> {
         self.splits.rewind();
         self.poses.rewind();
+        self.starts.clear();
         Ok(())
     }
 
@@ -86,6 +95,10 @@ impl Rows for Foreign {
 
     fn place(&self, number: u64) -> Place {
         Place::Part(format!("message {number} with positions"))
+    }
+
+    fn file(&self, number: u64) -> usize {
+        self.starts.partition_point(|start| *start < number)
     }
 
     fn is_wide(&self) -> bool {
