@@ -15,6 +15,7 @@ use crate::read::{
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Reading")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct ReadArguments {
     /// The recording: a file, the folder of a run or of a ROS 2 bag, or a folder or archive with a file for each vehicle.
     #[arg(index = 1, value_name = "RECORDING", value_parser = recording())]

@@ -39,6 +39,7 @@ const TRAJNET: [&str; 4] = ["frame", "id", "x", "y"];
 const TUPLES: Separator = Separator::Any(b" \t(),");
 
 /// A table in text.
+#[expect(clippy::struct_excessive_bools, reason = "each says something else of the lines")]
 pub(super) struct Text {
     source: Source,
     lines: Lines,

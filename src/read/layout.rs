@@ -148,22 +148,30 @@ impl Layout {
         layout.metres = columns.metres(&used, options.scale)?;
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
         layout.convention = convention;
-        let (convention, used) = (&layout.convention, layout.columns());
+        layout.check(header, options, one)?;
+        Ok(layout)
+    }
+
+    /// Refuses what the columns do not say of the vehicles, and notes what a person should know. `one`: the columns of a position
+    /// name no vehicle.
+    fn check(&mut self, header: &[String], options: &ReadOptions, one: bool) -> Result<(), Fault> {
+        let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.scale != 1.0 {
             let problem = format!("its positions are in metres, and --scale {} says another unit", options.scale);
             return Err(Fault::content(problem, "leave --scale away"));
         }
-        let several = id
+        let several = self
+            .id
             .map(|id| format!("column {}", quoted(&header[id])))
-            .or_else(|| (layout.names.len() > 1).then(|| "its header".to_owned()));
+            .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
             return Err(Fault::content(format!("{namer} names the vehicles"), "leave --one-vehicle away"));
         }
         let is_one_vehicle = options.one_vehicle || convention.is_one_vehicle;
-        layout.notes.extend(convention.note.clone());
+        self.notes.extend(convention.note.clone());
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
-        if id.is_none() && one && !is_one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+        if self.id.is_none() && one && !is_one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
             return Err(match missing(header, ID, "") {
                 Fault::Content { problem, remedy } => {
                     let remedy = format!("{remedy}; where all rows are of one vehicle, say so with --one-vehicle");
@@ -172,21 +180,21 @@ impl Layout {
                 fault => fault,
             });
         }
-        if layout.bodies.iter().any(|body| body.position[2].is_none()) {
-            let what = if on_earth { "the height" } else { "z" };
-            layout.notes.push(format!("there is no column for {what}: it is taken as 0"));
+        if self.bodies.iter().any(|body| body.position[2].is_none()) {
+            let what = if self.on_earth { "the height" } else { "z" };
+            self.notes.push(format!("there is no column for {what}: it is taken as 0"));
         }
-        if let Some(rest) = rest {
+        if let Some((time, rest)) = self.time.zip(self.rest) {
             let (whole, rest) = (quoted(&header[time]), quoted(&header[rest.column]));
-            layout.notes.push(format!("a time is {whole} and, below a unit of that, {rest}"));
+            self.notes.push(format!("a time is {whole} and, below a unit of that, {rest}"));
         }
         if !unused.is_empty() {
-            layout.notes.push(format!("columns not used: {}", unused.join(", ")));
+            self.notes.push(format!("columns not used: {}", unused.join(", ")));
         }
-        if !layout.names.is_empty() && !options.one_vehicle {
-            layout.notes.push(format!("vehicles, going by the names of columns: {}", list(&layout.names, 50)));
+        if !self.names.is_empty() && !options.one_vehicle {
+            self.notes.push(format!("vehicles, going by the names of columns: {}", list(&self.names, 50)));
         }
-        Ok(layout)
+        Ok(())
     }
 
     /// The columns that are read, each once, in rising order.

@@ -109,6 +109,7 @@ impl ColumnNames {
 
 /// What the user knows about a recording that its file does not say.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub struct ReadOptions {
     /// The format, instead of recognising it by the content.
     pub format: Option<Format>,

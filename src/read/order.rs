@@ -279,8 +279,7 @@ impl<R: Rows> Ordered<R> {
     fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
         let says_the_same =
             (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
-        match self.duplicates {
-            None if says_the_same => {}
+        match self.duplicates.or(says_the_same.then_some(Duplicates::First)) {
             Some(Duplicates::First) => {}
             Some(Duplicates::Last) => {
                 let sample = self.sample(row, time_s)?;
