@@ -88,22 +88,28 @@ impl Fails {
     }
 }
 
-/// Speeds relative to the mean, and commanded accelerations over a second, below this part of what counts as reached are
-/// rest.
-const REST: f64 = 0.1;
+/// Vehicles are at rest if what they still lack is farther than they would get in this many times the flight's duration.
+const REST_DURATIONS: f64 = 10.0;
 
-/// Where a formation is not reached: whether the vehicles have come to rest elsewhere; none where that is not known, as of
-/// vehicles that stand while they are commanded, for something may hold against that.
+/// Whether the vehicles of a formation that is not reached have come to rest elsewhere: at the speeds and commanded
+/// accelerations of the end, ten times the flight's duration would not cover the position error that is too much,
+///
+/// ```text
+/// v H + u H^2/2 < e - edge_error_m,    H = 10 T
+/// ```
+///
+/// None where that is not known, as of vehicles that stand while they are commanded and something may hold against that.
 pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
     let Findings { summary, judge, is_disturbed, .. } = findings;
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
-    let is_known = summary.reached_at_s.is_none() && speed_m_s.is_finite() && command_m_s2.is_finite();
-    let rests = [speed_m_s, command_m_s2].map(|number| number <= REST * judge.disagreement_m_s);
-    match rests {
-        _ if !is_known => None,
-        [true, false] if *is_disturbed => None,
-        [stands, is_left_alone] => Some(stands && is_left_alone),
+    let lacking_m = summary.max_edge_error_m.max(summary.max_position_error_m) - judge.edge_error_m;
+    if summary.reached_at_s.is_some() || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
+        return None;
     }
+    let horizon_s = REST_DURATIONS * summary.end_s;
+    let stands = speed_m_s * horizon_s < lacking_m;
+    let is_left_alone = speed_m_s * horizon_s + 0.5 * command_m_s2 * horizon_s.powi(2) < lacking_m;
+    if stands && !is_left_alone && *is_disturbed { None } else { Some(is_left_alone) }
 }
 
 fn refused(findings: &Findings<'_>) -> Option<String> {
@@ -247,7 +253,9 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
         (!findings.failures.is_empty()).then(|| format!(" Failed: {}.", FailedVehicle::line(findings.failures)));
     let then = match at_rest(findings) {
         _ if failed.is_some() => "",
-        Some(true) if summary.held_s.is_none() => " The vehicles have come to rest elsewhere: more time does not help.",
+        Some(true) if summary.held_s.is_none() => {
+            " The vehicles have come to rest elsewhere: ten times the duration would not be enough."
+        }
         Some(false) if summary.held_s.is_none() && findings.refused.is_empty() => {
             " The vehicles are still moving: more time may help."
         }
