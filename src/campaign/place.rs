@@ -42,7 +42,7 @@ impl CampaignError {
 /// The bytes of a key, whose tables' names stand before it, each in a table of its own or joined by dots.
 fn find(table: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
     table.iter().find_map(|(name, value)| {
-        let rest = key.strip_prefix(name.get_ref().as_ref())?;
+        let rest = key.strip_prefix(&**name.get_ref())?;
         match (rest.strip_prefix('.'), value.get_ref()) {
             (None, _) => rest.is_empty().then(|| name.span()),
             (Some(below), DeValue::Table(table)) => find(table, below),

@@ -2,7 +2,6 @@
 
 use super::tests::{Case, NOT_REACHED, REACHED, passing};
 use super::*;
-use crate::audit::Status;
 
 fn early() -> Case {
     Case { ended_early: Some("the law is undefined: it failed"), summary: NOT_REACHED, ..Case::good() }
