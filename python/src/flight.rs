@@ -16,7 +16,7 @@ use tautline::sim::{Breakdown, Ending, Parts, SimError};
 
 use crate::audit::Seen;
 use crate::errors::{Raised as _, broken, wrong};
-use crate::law::PythonLaw;
+use crate::law::{PythonLaw, catching};
 use crate::numbers::{by_row, cube};
 use crate::scenario::Scenario;
 use crate::work::{Signals, here};
@@ -133,10 +133,10 @@ pub(crate) fn fly(
 ) -> PyResult<Flown> {
     let scenario = &scenario.scenario;
     let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
-    let raising = law.as_ref().map(PythonLaw::raising);
+    let is_of_python = law.is_some();
     let samples = Samples { is_kept: keep, vehicles: scenario.count(), ..Samples::default() };
     let mut signals = Signals::new();
-    let flown = here(py, || -> Result<_, SimError> {
+    let flight = || -> Result<_, SimError> {
         let preflight = match &law {
             Some(law) => Preflight::under(scenario, law),
             None => Preflight::of(scenario)?,
@@ -159,12 +159,13 @@ pub(crate) fn fly(
         closed?;
         let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));
         Ok((report, ending, (samples, witness), page))
-    })?;
-    if let Some(raised) = signals.raised.or_else(|| raising.as_ref()?.take()) {
+    };
+    let (flown, raised) = here(py, || catching(flight))?;
+    if let Some(raised) = signals.raised.or(raised) {
         return Err(raised);
     }
     let (report, ending, (samples, witness), page) = flown.map_err(SimError::raised)?;
-    if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), Some(_)) = (&ending, &raising) {
+    if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), true) = (&ending, is_of_python) {
         return Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")));
     }
     if let (Some(page), Some(path)) = (page, html) {

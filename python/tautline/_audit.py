@@ -105,6 +105,13 @@ class Audit:
         return Findings(self._report["gaps"])
 
     @property
+    def ended_early(self) -> dict[str, Any] | None:
+        """Where a flight ended before its time: ``at_s``, ``duration_s`` of the scenario and ``reason``. None where what was asked about
+        was flown."""
+        end: dict[str, Any] | None = self._report["ended_early"]
+        return end
+
+    @property
     def obstacles(self) -> Findings:
         """The closest approaches to obstacles: as :attr:`closest`."""
         return Findings(self._report["obstacles"]["closest"])

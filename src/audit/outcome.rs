@@ -32,6 +32,23 @@ impl Status {
             (false, false) => Self::Undecided,
         }
     }
+
+    /// Returns the verdict on two things together: the worse of the two.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        let has = |status: Self| self == status || other == status;
+        Self::new(has(Self::Violation), !has(Self::Undecided))
+    }
+
+    /// Returns the name of the status in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clear => "clear",
+            Self::Violation => "violation",
+            Self::Undecided => "undecided",
+        }
+    }
 }
 
 /// A pair of objects that must keep a distance. Indices count from 0.

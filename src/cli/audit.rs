@@ -118,7 +118,12 @@ pub(super) fn judge_recorded(
         console.warn(&format!("note: {note}"));
     }
     let source = Source { recording: arguments.reading.called(), clock, notes };
+    let early_end = own.as_ref().and_then(|own| own.early_end.clone());
+    // A window that ends before the recording was flown whole.
+    let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
+    let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
     let report = RecordedReport::new(&outcome, &settings, source, between);
+    let report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
 
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));

@@ -10,6 +10,7 @@ use super::own_obstacles::OwnObstacles;
 use crate::audit::recorded::{Told, ToldViolation};
 use crate::record::mcap::{Entry, McapRecording};
 use crate::record::{Event, OwnedSample, RecordError, Sample, Sink};
+use crate::report::recorded::EarlyEnd;
 use crate::scenario::{self, Scenario};
 use crate::swarm::{ClosestApproach, Pair, row};
 
@@ -36,6 +37,8 @@ pub struct OwnRecording {
     pub(super) obstacles: OwnObstacles,
     /// The law that was flown, where it is not the scenario's.
     other_law: Option<String>,
+    /// Where the flight ended before its time.
+    pub(super) early_end: Option<EarlyEnd>,
 }
 
 impl OwnRecording {
@@ -108,6 +111,10 @@ pub struct Witness {
     told_scale: f64,
     before: Option<OwnedSample>,
     near: Near,
+    /// Steps and duration \[s\] that the scenario asks for.
+    planned: (u64, f64),
+    /// Why the flight ended early, as its recording says.
+    reason: Option<String>,
 }
 
 impl Witness {
@@ -129,9 +136,11 @@ impl Witness {
             has_every_step: scenario.has_engine(),
             most_steps: 0,
             other_law: None,
+            early_end: None,
             obstacles: OwnObstacles::of(scenario, scale),
         };
-        Self { own, scale, told_scale, before: None, near: Near::default() }
+        let planned = (scenario.time.steps(), scenario.time.duration_s);
+        Self { own, scale, told_scale, before: None, near: Near::default(), planned, reason: None }
     }
 
     fn note_sample(&mut self, mut sample: OwnedSample) {
@@ -158,6 +167,7 @@ impl Witness {
                 self.near.approach(pair, (separation_m * self.told_scale, time_s));
             }
             Event::OtherLaw { name, .. } => own.other_law = Some(name),
+            Event::EndedEarly { reason, .. } => self.reason = Some(reason),
             event => own.obstacles.note(&event, self.scale),
         }
     }
@@ -165,7 +175,10 @@ impl Witness {
     /// What the flight says of itself, once it is over.
     #[must_use]
     pub fn finish(self) -> OwnRecording {
-        let Self { mut own, before, mut near, .. } = self;
+        let Self { mut own, before, mut near, planned: (steps, duration_s), reason, .. } = self;
+        let at_s = before.as_ref().map_or(0.0, |last| last.time_s);
+        let is_whole = reason.is_none() && before.as_ref().is_some_and(|last| last.step >= steps);
+        own.early_end = (!is_whole).then_some(EarlyEnd { at_s, duration_s, reason });
         own.violations.append(&mut near.ended);
         if let Some(last) = &before {
             own.violations.extend(near.lasting(last, (own.delta_m, own.ellipsoid_m), &own.told));

@@ -74,6 +74,9 @@ pub(super) struct RunArguments {
     /// Threads to use, of which two are of use, by default one a core; the recording has the same bits for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    /// Leave wall-clock times out of the report.
+    #[arg(skip)]
+    untimed: bool,
 }
 
 impl RunArguments {
@@ -83,9 +86,9 @@ impl RunArguments {
         !self.no_snapshots
     }
 
-    /// Everything as by default into a folder, without a word.
+    /// Everything as by default into a folder, without a word and without wall-clock times: the same flight leaves the same bytes.
     pub(super) fn for_folder(out: PathBuf) -> Self {
-        Self { out: Some(out), force: true, quiet: true, ..Self::parse_from(["run"]) }
+        Self { out: Some(out), force: true, quiet: true, untimed: true, ..Self::parse_from(["run"]) }
     }
 
     /// The same, with a summary.
@@ -156,6 +159,7 @@ pub(super) fn fly_into(
     let mut film = Film::new();
     let mut watchers = (&mut history, (&mut film, &mut watched));
     let mut report = threads.install(|| fly(scenario, &preflight, &folder, console, interrupted, &mut watchers))?;
+    report.performance = report.performance.filter(|_| !arguments.untimed);
     if arguments.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
         report.verification = Some(threads.install(|| verify(scenario, &report))?);
     }

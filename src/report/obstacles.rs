@@ -15,7 +15,7 @@ const LISTED: usize = 50;
 /// The judge's findings on a flight past obstacles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Obstacles {
-    /// The verdict on them alone; that of `audit` holds it too.
+    /// The verdict on them alone; that of `audit` holds it too. Undecided at best where the flight ended early.
     pub status: Status,
     /// Every vehicle keeps this much beyond the clearance of every obstacle, by the law's certificate \[m\].
     pub certified_room_m: Option<f64>,
@@ -76,7 +76,7 @@ impl Obstacles {
         };
         let of_closest = |found: &Approach| approach(found.pair, found.limit_m, found.certain_m(), found.time_s);
         Some(Self {
-            status: *status,
+            status: if findings.run.ended_early.is_some() { status.and(Status::Undecided) } else { *status },
             certified_room_m: findings.certificate.certified_room_m.and_then(finite),
             closest: closest.iter().filter_map(of_closest).collect(),
             violations: violations.iter().filter_map(of_violation).collect(),

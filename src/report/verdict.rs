@@ -8,10 +8,8 @@ use super::findings::Findings;
 use super::legs;
 use super::obstacles::Obstacles;
 use crate::audit::Status;
-use crate::metrics::Summary;
 use crate::record::EnergyRise;
 use crate::scenario::TimeSpec;
-use crate::target::Arrival;
 use crate::text::{counted, metres, metres_below, seconds};
 
 /// The judgement.
@@ -56,6 +54,8 @@ impl Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fails {
+    /// The formation was reached, and the flight ended early.
+    EndedEarly,
     /// Everything was within the limits at the end, for too short a time.
     HeldS,
     /// No state at the end is known.
@@ -71,9 +71,10 @@ pub enum Fails {
 }
 
 impl Fails {
-    pub(super) fn of(summary: &Summary, judge: Arrival) -> Option<Self> {
+    pub(super) fn of(findings: &Findings<'_>) -> Option<Self> {
+        let Findings { summary, judge, .. } = findings;
         if summary.reached_at_s.is_some() {
-            None
+            findings.run.ended_early.as_ref().map(|_| Self::EndedEarly)
         } else if summary.held_s.is_some() {
             Some(Self::HeldS)
         } else if !summary.max_edge_error_m.is_finite() {
@@ -103,7 +104,7 @@ pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
     let Findings { summary, judge, is_disturbed, .. } = findings;
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
     let lacking_m = summary.max_edge_error_m.max(summary.max_position_error_m) - judge.edge_error_m;
-    if summary.reached_at_s.is_some() || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
+    if findings.reached_at_s().is_some() || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
         return None;
     }
     let horizon_s = REST_DURATIONS * summary.end_s;
@@ -224,7 +225,9 @@ fn steps_too_long(findings: &Findings<'_>) -> Option<String> {
 
 fn not_reached(findings: &Findings<'_>) -> Option<String> {
     let (summary, judge) = (findings.summary, findings.judge);
-    let why = match Fails::of(summary, judge)? {
+    let why = match Fails::of(findings)? {
+        // The reason is that of the early end.
+        Fails::EndedEarly => return None,
         Fails::HeldS => format!(
             "it was kept for the last {} only, and {} are asked for",
             seconds(summary.held_s.unwrap_or_default()),
@@ -267,7 +270,7 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
 
 /// A start flatter than the formation: forces along the lines between vehicles never leave it.
 fn too_flat(findings: &Findings<'_>) -> Option<String> {
-    if findings.summary.reached_at_s.is_some() {
+    if findings.reached_at_s().is_some() {
         return None;
     }
     let (start, trap) = match findings.trap_dimension? {

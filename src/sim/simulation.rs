@@ -4,7 +4,7 @@ mod step;
 
 use super::channels::Channels;
 use super::controller::Controller;
-use super::ending::{Breakdown, Ending, Flight, Performance, SimError};
+use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
 use super::judge::{Judge, Judged};
 use super::motion::Motion;
 use super::parts::Parts;
@@ -14,7 +14,7 @@ use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Peaks, Sample};
 use crate::scenario::Scenario;
-use crate::swarm::{ClosestApproach, Rows, Swarm, first_row_not_finite};
+use crate::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
 
 /// A flight under way: law, link, supervisor, vehicles and judge, with everything that any of them remembers.
 ///
@@ -165,7 +165,7 @@ impl Simulation {
     /// is flown either. A certificate that the law gave is void from then on.
     pub fn step_with(&mut self, commands: &Rows) -> Result<(), SimError> {
         let count = self.state.count();
-        if commands.nrows() != count || first_row_not_finite(commands).is_some() {
+        if commands.nrows() != count || first_row_beyond(commands, MAX_COMMAND_M_S2).is_some() {
             return Err(SimError::Commands { expected: count, found: commands.nrows() });
         }
         if self.ending.is_none() {

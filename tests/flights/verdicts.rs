@@ -93,9 +93,7 @@ fn a_formation_that_is_left_between_two_samples_is_not_reached_before() {
 fn a_leg_that_only_biased_sensors_have_reached_is_not_reached() {
     let legs = |bias_m: f64| {
         let toml = three(1.0, 60.0);
-        let beside = format!(
-            "arrival.edge_error_m = 0.05\nsensing.position_bias_m = {bias_m}\n[[leg]]\nscale = 1.5\n"
-        );
+        let beside = format!("arrival.edge_error_m = 0.05\nsensing.position_bias_m = {bias_m}\n[[leg]]\nscale = 1.5\n");
         report(&format!("{toml}{beside}"))
     };
     let exact = legs(0.0);

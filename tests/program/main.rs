@@ -8,6 +8,7 @@ mod attack;
 mod audit;
 mod calls;
 mod campaign;
+mod campaign_files;
 mod check;
 mod compare;
 mod determinism;

@@ -10,5 +10,5 @@ mod words;
 
 pub use envelope::OfLimit;
 pub use named::{OfPair, OfVehicle};
-pub use report::{Basis, Between, Clock, Obstacles, RecordedAudit, RecordedReport, Source};
+pub use report::{Basis, Between, Clock, EarlyEnd, Obstacles, RecordedAudit, RecordedReport, Source};
 pub use words::interval;

@@ -43,6 +43,17 @@ pub struct Between {
     pub basis: Basis,
 }
 
+/// Where a recorded flight ended before its time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EarlyEnd {
+    /// Time of the last recorded instant \[s\].
+    pub at_s: f64,
+    /// Duration of the flight that the scenario asks for \[s\].
+    pub duration_s: f64,
+    /// Why the flight ended; none where the recording does not say.
+    pub reason: Option<String>,
+}
+
 /// How it is known what happens between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
@@ -106,6 +117,11 @@ pub struct RecordedReport {
     pub undecided: Vec<OfPair<Undecided<ObjectPair>>>,
     /// Where the recording contradicts the assumed bound on acceleration.
     pub contradiction: Option<OfVehicle<Contradiction>>,
+    /// Where the flight ended before its time, and what was judged did not: nothing is known of the rest.
+    pub ended_early: Option<EarlyEnd>,
+    /// Verdict and finding up to there, where nothing was wrong.
+    #[serde(skip)]
+    pub(super) until_then: Option<String>,
     /// Whether it was asked how close two came, and not single vehicles alone.
     #[serde(skip)]
     pub(super) separation_asked: bool,
@@ -186,6 +202,8 @@ impl RecordedReport {
             },
             violations,
             limits,
+            ended_early: None,
+            until_then: None,
             separation_asked: outcome.separation.is_some(),
             is_else_known: outcome.is_else_known,
             gaps: outcome
@@ -203,6 +221,20 @@ impl RecordedReport {
                 .contradiction
                 .map(|finding| OfVehicle { vehicle: outcome.name(finding.vehicle), finding }),
         }
+    }
+
+    /// Returns the report on a flight that ended before its time: undecided at best.
+    #[must_use]
+    pub fn with_early_end(mut self, end: EarlyEnd) -> Self {
+        self.until_then = (self.status == Status::Clear).then(|| self.headline());
+        self.status = self.status.and(Status::Undecided);
+        self.audit.flight.status = self.audit.flight.status.and(Status::Undecided);
+        self.audit.proved = false;
+        for limit in &mut self.limits {
+            limit.status = limit.status.and(Status::Undecided);
+        }
+        self.ended_early = Some(end);
+        self
     }
 
     /// The verdict on how close any two came alone; none where only single vehicles were asked about.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::envelope::OfLimit;
 use super::named::{OfPair, OfVehicle};
-use super::report::RecordedReport;
+use super::report::{EarlyEnd, RecordedReport};
 use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use crate::audit::{Status, Undecided, Violation};
 use crate::figures::Figure;
@@ -38,8 +38,17 @@ impl RecordedReport {
         }
     }
 
-    /// The headline behind the verdict: of pairs, and of the limits that decide it.
+    /// The headline behind the verdict.
     fn finding(&self) -> String {
+        match (&self.ended_early, &self.until_then) {
+            (None, _) => self.finding_of_motion(),
+            (Some(end), Some(until_then)) => format!("{}; until then {until_then}", end.words()),
+            (Some(end), None) => format!("{}; {}", self.finding_of_motion(), end.words()),
+        }
+    }
+
+    /// The finding on what was recorded: of pairs, and of the limits that decide it.
+    fn finding_of_motion(&self) -> String {
         let decides = |limit: &&OfLimit| limit.status == self.status;
         let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
         let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
@@ -251,6 +260,16 @@ fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
     let rest = lines.len().saturating_sub(most);
     lines.truncate(most);
     lines.into_iter().chain((rest > 0).then(|| format!("and {rest} more")))
+}
+
+impl EarlyEnd {
+    /// Returns where the flight ended and why, in a clause.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let (at, duration) = (seconds(self.at_s), seconds(self.duration_s));
+        let reason = self.reason.as_ref().map(|reason| format!(" ({reason})"));
+        format!("the flight ended early, at {at} of {duration}{}", reason.unwrap_or_default())
+    }
 }
 
 impl OfPair<Violation<ObjectPair>> {

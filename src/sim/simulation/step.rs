@@ -3,14 +3,14 @@
 use std::time::{Duration, Instant};
 
 use super::super::controller::Controller;
-use super::super::ending::{Breakdown, Ending, MAX_BEND_M};
+use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
 use super::super::judge::longest_move_m;
 use super::Simulation;
 use crate::feedback::Feedback as _;
 use crate::law::{Law, Void};
 use crate::record::Event;
 use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
-use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
+use crate::swarm::{Rows, Swarm, first_row_beyond, largest_row_norm};
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
@@ -200,7 +200,10 @@ impl Simulation {
     /// Lets the vehicles hold the command from now on, where there is one.
     fn hold(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
         self.performance.law += took;
-        let checked = commanded.and_then(|()| match first_row_not_finite(&self.control) {
+        let checked = commanded.and_then(|()| match first_row_beyond(&self.control, MAX_COMMAND_M_S2) {
+            Some(vehicle) if self.control.row(vehicle).iter().all(|x| x.is_finite()) => {
+                Err(Breakdown::CommandOutOfRange { step, vehicle }.into())
+            }
             Some(vehicle) => Err(Breakdown::CommandNotFinite { step, vehicle }.into()),
             None => Ok(()),
         });
