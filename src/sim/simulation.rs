@@ -5,6 +5,7 @@ mod step;
 use super::channels::Channels;
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, Performance, SimError};
+use super::integration::IntegrationError;
 use super::judge::{Judge, Judged};
 use super::motion::Motion;
 use super::parts::Parts;
@@ -58,6 +59,8 @@ pub struct Simulation {
     refined_steps: u64,
     /// Steps of which even the shortest part was too long for the law.
     overlong_steps: u64,
+    /// Error of integration since the first of them.
+    error: Option<IntegrationError>,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     watch: Watch,
@@ -119,6 +122,7 @@ impl Simulation {
             shortest: 0,
             refined_steps: 0,
             overlong_steps: 0,
+            error: None,
             energy: None,
             watch: Watch::default(),
             peaks: Peaks::default(),
