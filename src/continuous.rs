@@ -318,7 +318,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         while until_s - self.method.t() > RESOLUTION * until_s {
             let (time_s, free_step_s) = (self.method.t(), self.method.h());
             let step_s = free_step_s.min(until_s - time_s).min(self.flow.smooth_s(time_s));
-            if step_s <= RESOLUTION * until_s {
+            if step_s <= RESOLUTION * until_s || (undefined.is_some() && self.moves_nothing(step_s)) {
                 return Err(
                     undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })
                 );
@@ -345,6 +345,13 @@ impl<'a, 'law> Solver<'a, 'law> {
             observe(self)?;
         }
         Ok(())
+    }
+
+    /// Whether no vehicle moves by more than coordinates resolve in a step \[s\].
+    fn moves_nothing(&self, step_s: f64) -> bool {
+        let (positions_m, velocities_m_s) = self.method.y().split_at(self.method.y().len() / 2);
+        let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, number| most.max(number.abs()));
+        largest(velocities_m_s) * step_s <= 4.0 * f64::EPSILON * largest(positions_m)
     }
 
     /// The state at a time within the last step, solved anew from the beginning of that step.

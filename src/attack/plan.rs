@@ -263,9 +263,7 @@ impl Plan {
         let Variation { ref key, low, high } = *variation;
         let read = |value: f64| self.with(&[format!("{key}={}", as_toml(value))]);
         let whole = takes_whole_numbers_alone(&self.source, &self.overrides, key);
-        let refused = |value: f64| {
-            move |error| AttackError::Scenario { set: format!("{key} = {value}"), error }
-        };
+        let refused = |value: f64| move |error| AttackError::Scenario { set: format!("{key} = {value}"), error };
         if let Some(end) = [low, high].into_iter().find(|end| whole && end.fract() != 0.0) {
             read(end).map_err(refused(end))?;
         }

@@ -162,7 +162,8 @@ impl Simulation {
         self.step_on();
     }
 
-    /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked.
+    /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked. The step
+    /// is not shortened for the barrier or the rate of the law.
     ///
     /// # Errors
     /// [`SimError::Commands`] where there is not a finite row for each vehicle; nothing is flown then. After the end nothing

@@ -293,7 +293,7 @@ fn a_law_that_ends_by_what_a_vehicle_heard_says_so_with_the_true_distance() {
         let scenario = read(&format!(
             "start = {{ positions_m = [[0, 0], [2.5, 0]], velocities_m_s = [[10, 0], [10, 0]] }}\n\
              formation = {{ shape = \"line\", spacing_m = 3.0 }}\nlaw.delta_m = 2.0\nnetwork.latency_s = {latency_s:?}\n\
-             time.duration_s = 1.0"
+             network.missing = \"hold\"\ntime.duration_s = 1.0"
         ));
         fly(&scenario).0
     };

@@ -44,8 +44,8 @@ fn without_halvings_that_step_jumps_the_barrier_which_no_motion_of_the_law_does(
     let said = "UNDECIDED: the step cannot resolve this, as flown vehicles 1-2 came to ";
     assert!(report.headline().starts_with(said), "{}", report.headline());
     let reasons = &report.verdict.reasons;
-    assert!(!report.verdict.pass && reasons[0].starts_with("The step cannot resolve whether"), "{reasons:?}");
-    assert!(reasons.iter().any(|reason| reason.contains("Shorten time.dt_s")), "{reasons:?}");
+    let has = |said: &str| reasons.iter().any(|reason| reason.contains(said));
+    assert!(!report.verdict.pass && has("The step cannot resolve whether") && has("Shorten time.dt_s"), "{reasons:?}");
 }
 
 #[test]
@@ -187,13 +187,15 @@ fn a_linked_pair_is_refined_for_while_others_are_nearer_to_each_other() {
 /// Two without a link that pass each other within the first step, which is too long for the law of their links.
 #[test]
 fn a_violation_that_is_deeper_than_integration_may_err_is_one_whatever_the_step() {
-    let more = "law.alpha = 40.0\ntime.dt_s = 0.05\ntime.max_halvings = 0\ntime.record_hz = 20";
+    let more = "law.alpha = 80.0\ntime.dt_s = 0.05\ntime.max_halvings = 0\ntime.record_hz = 20";
     let scenario = star(0.6, 20.0, "star", more);
     let (flight, _) = fly(&scenario);
     assert!(flight.overlong_steps > 0);
     assert_eq!(flight.audit.status, Status::Violation);
-    // A violation by less than the same steps may err is not known to be one.
-    let (shallow, _) = fly(&star(0.501, 0.05, "star", more));
+    // A violation by a tenth of a millimetre, after one step that may err by more.
+    let mut scenario = star(0.501, 0.021, "star", more);
+    scenario.time.duration_s = 0.05;
+    let (shallow, _) = fly(&scenario);
     assert!(shallow.overlong_steps > 0 && !shallow.audit.violations.is_empty());
     assert_eq!(shallow.audit.status, Status::Undecided);
 }

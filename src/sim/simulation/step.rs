@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M};
+use super::super::integration::Part;
 use super::super::judge::longest_move_m;
 use super::Simulation;
 use crate::feedback::Feedback as _;
@@ -125,7 +126,10 @@ impl Simulation {
             return;
         }
         let moved_m = longest_move_m(&self.state, &self.path, &self.next);
-        let error = self.error.unwrap_or_default().after(length_s, rate_per_s, moved_m, is_overlong);
+        let limits_m_s2 = [self.controller.law.max_command_m_s2(), self.scenario.actuation.max_accel_m_s2];
+        let limit_m_s2 = limits_m_s2.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        let part = Part { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong };
+        let error = self.error.unwrap_or_default().after(part);
         self.error = Some(error);
         self.judge.may_err_by(error.position_m());
     }
@@ -136,8 +140,7 @@ impl Simulation {
         let is_held = self.overruled || self.scenario.time.control_hz.is_some();
         let held = is_held.then_some(&self.control);
         let interval = (step, self.time_s, dt_s);
-        let undefined =
-            self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
+        let undefined = self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
         self.performance.physics += began.elapsed();
         match self.next.first_not_finite() {
             Some(vehicle) => Err(Breakdown::StateNotFinite { step, vehicle }.into()),
@@ -149,8 +152,17 @@ impl Simulation {
     /// too fast for a step of this length \[s\]. Behind it the fastest rate that the law had on the way \[1/s\], at most; that at
     /// its start where the law has no barrier, or is not asked.
     fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
-        let Self { controller: Controller { law, links, .. }, judge, state, path, next, scenario, motion, overruled, .. } =
-            self;
+        let Self {
+            controller: Controller { law, links, .. },
+            judge,
+            state,
+            path,
+            next,
+            scenario,
+            motion,
+            overruled,
+            ..
+        } = self;
         let (of, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
         let Some(barrier_m) = law.barrier_m().filter(|_| !*overruled) else { return (false, at_start_per_s) };
         let moved_m = longest_move_m(state, path, next);
