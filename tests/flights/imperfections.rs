@@ -291,7 +291,7 @@ fn the_time_between_commands_at_which_it_grows_is_the_formulas() {
 fn a_law_that_ends_by_what_a_vehicle_heard_says_so_with_the_true_distance() {
     let flight = |latency_s: f64| {
         let scenario = read(&format!(
-            "start = {{ positions_m = [[0, 0], [2.5, 0]], velocities_m_s = [[10, 0], [10, 0]] }}\n\
+            "start = {{ positions_m = [[0, 0], [2.5, 0]], velocities_m_s = [[100, 0], [100, 0]] }}\n\
              formation = {{ shape = \"line\", spacing_m = 3.0 }}\nlaw.delta_m = 2.0\nnetwork.latency_s = {latency_s:?}\n\
              network.missing = \"hold\"\ntime.duration_s = 1.0"
         ));

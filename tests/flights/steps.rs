@@ -199,3 +199,11 @@ fn a_violation_that_is_deeper_than_integration_may_err_is_one_whatever_the_step(
     assert!(shallow.overlong_steps > 0 && !shallow.audit.violations.is_empty());
     assert_eq!(shallow.audit.status, Status::Undecided);
 }
+
+#[test]
+fn a_barrier_that_the_shortest_part_leaps_is_no_violation_of_the_law() {
+    let stiff = builtin("pentagon", &["law.kind=potential", "law.k_per_s2=1e6", "time.duration_s=2"]);
+    let (flight, _) = fly(&stiff);
+    assert!(flight.overlong_steps > 0 && !flight.audit.violations.is_empty());
+    assert_eq!(flight.audit.status, Status::Undecided, "the law certifies that no two come so near");
+}

@@ -172,9 +172,14 @@ impl Simulation {
         let (room_m, most) = (judge.room_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
         let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, room_m));
         let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
-        let on_the_way_per_s = rate(judge.nearest_over(of, moves, moved_m, enough));
+        let was_outside = judge.nearest_m > barrier_m;
+        let nearest_m = judge.nearest_over(of, moves, moved_m, enough);
+        let on_the_way_per_s = rate(nearest_m);
         let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
-        (is_too_fast || judge.refuses(of, moves, moved_m), on_the_way_per_s)
+        let is_refused = is_too_fast || judge.refuses(of, moves, moved_m);
+        // A law may know no rate at or inside its barrier, and no part is short enough to leap it.
+        let leaps = was_outside && nearest_m <= barrier_m;
+        (is_refused, if leaps { f64::INFINITY } else { on_the_way_per_s })
     }
 
     /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
