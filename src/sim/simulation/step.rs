@@ -122,7 +122,8 @@ impl Simulation {
     /// Bounds the error of integration after a part of a step, and lets the judge know of it, from the first part on that is
     /// too long for the law.
     fn note_error(&mut self, length_s: f64, rate_per_s: f64, is_overlong: bool) {
-        if !is_overlong && self.error.is_none() {
+        // Commands that are made of late or wrong states do not change at the rate that the law has in the true one.
+        if !self.controller.link.is_exact() || (!is_overlong && self.error.is_none()) {
             return;
         }
         let moved_m = longest_move_m(&self.state, &self.path, &self.next);
@@ -172,13 +173,13 @@ impl Simulation {
         let (room_m, most) = (judge.room_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
         let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, room_m));
         let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
-        let was_outside = judge.nearest_m > barrier_m;
+        let may_leap = link.is_exact() && judge.nearest_m > barrier_m;
         let nearest_m = judge.nearest_over(of, moves, moved_m, enough);
         let on_the_way_per_s = rate(nearest_m);
         let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
         let is_refused = is_too_fast || judge.refuses(of, moves, moved_m);
         // A law may know no rate at or inside its barrier, and no part is short enough to leap it.
-        let leaps = was_outside && nearest_m <= barrier_m;
+        let leaps = may_leap && nearest_m <= barrier_m;
         (is_refused, if leaps { f64::INFINITY } else { on_the_way_per_s })
     }
 
