@@ -154,7 +154,7 @@ impl Simulation {
     /// its start where the law has no barrier, or is not asked.
     fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
         let Self {
-            controller: Controller { law, links, .. },
+            controller: Controller { law, links, link, .. },
             judge,
             state,
             path,
