@@ -19,7 +19,8 @@ pub enum Status {
     /// A pair was found closer than it may come, whatever else was found.
     Violation,
     /// No violation was found, yet it cannot be called clear: nothing was judged, something was refused or not seen, the
-    /// two detectors disagree, or a separation could not be resolved.
+    /// two detectors disagree, or a separation could not be resolved. A flight in steps too long for its law is undecided with
+    /// violations that integration may have made.
     #[default]
     Undecided,
 }

@@ -102,6 +102,11 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Largest acceleration that the law commands of a vehicle \[m/s^2\], where it has a limit.
+    fn max_command_m_s2(&self) -> Option<f64> {
+        None
+    }
+
     /// Whether the law keeps vehicles apart in the lengths of its [`Setting`](super::Setting), of which distances between them are then
     /// told, and not in metres alone.
     fn keeps_ellipsoids(&self) -> bool {

@@ -30,6 +30,7 @@ impl Verdict {
         let reasons: Vec<_> = [
             refused(findings),
             violation(findings),
+            unresolved_by_step(findings),
             Obstacles::of(findings).and_then(|obstacles| obstacles.reason()),
             findings.hulls.reason(),
             disagreement(findings),
@@ -141,6 +142,27 @@ fn violation(findings: &Findings<'_>) -> Option<String> {
     ))
 }
 
+/// Whether violations were found that integration may have made: a step was too long for the law before, or in, the first of them.
+pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violations: usize) -> bool {
+    status == Status::Undecided && overlong_steps > 0 && violations > 0
+}
+
+fn unresolved_by_step(findings: &Findings<'_>) -> Option<String> {
+    let audit = findings.audit;
+    if !is_unresolved_by_step(audit.status, findings.run.overlong_steps, audit.violations.len()) {
+        return None;
+    }
+    let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m))?;
+    let [first, second] = deepest.pair.numbers();
+    Some(format!(
+        "The step cannot resolve whether the safety distance of {} m is kept: vehicles {first} and {second} came to {} m of each \
+         other at {} as flown, and after steps that are too long for the law integration may err by more than that.",
+        metres(findings.delta_m),
+        metres_below(deepest.min_m, findings.delta_m),
+        seconds(deepest.min_at_s),
+    ))
+}
+
 fn disagreement(findings: &Findings<'_>) -> Option<String> {
     let parry = &findings.audit.parry;
     let first = parry.first_disagreement.as_ref().map(|first| format!(" First: {first}.")).unwrap_or_default();
@@ -150,6 +172,9 @@ fn disagreement(findings: &Findings<'_>) -> Option<String> {
 }
 
 fn undecided(findings: &Findings<'_>) -> Option<String> {
+    if !findings.audit.violations.is_empty() {
+        return None;
+    }
     if findings.audit.status == Status::Undecided && findings.audit.unresolved > 0 {
         return Some(
             "Two vehicles came so near to delta that the audit cannot tell whether they kept it: rounding, or paths that bend \

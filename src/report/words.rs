@@ -3,7 +3,7 @@
 use super::failures::FailedVehicle;
 use super::findings::Performance;
 use super::flight::Report;
-use super::verdict::{Fails, breaks_certificate};
+use super::verdict::{Fails, breaks_certificate, is_unresolved_by_step};
 use crate::audit::Status;
 use crate::text::{at_least, counted, metres, metres_below, seconds, table};
 
@@ -72,6 +72,13 @@ impl Report {
             Status::Undecided if self.audit.parry.disagreements > 0 => {
                 format!("UNDECIDED: the two detectors disagree (delta {delta} m), {}", self.formation_in_words())
             }
+            Status::Undecided if self.is_unresolved_by_step() => {
+                format!(
+                    "UNDECIDED: the step cannot resolve this, as flown {}, {}",
+                    self.deepest_in_words(),
+                    self.formation_in_words()
+                )
+            }
             Status::Undecided => {
                 format!("UNDECIDED: not everything could be judged (delta {delta} m), {}", self.formation_in_words())
             }
@@ -84,7 +91,11 @@ impl Report {
         let of_obstacles = self.obstacles.as_ref().map_or(0, |of| of.undecided + of.disagreements);
         let is_open = audit.undecided + audit.parry.disagreements + of_obstacles > 0;
         let is_judged = self.run.vehicles < 2 || self.separation.min_m.is_some();
-        self.run.ended_early.is_some() && audit.status == Status::Undecided && is_judged && !is_open
+        self.run.ended_early.is_some()
+            && audit.status == Status::Undecided
+            && is_judged
+            && !is_open
+            && !self.is_unresolved_by_step()
     }
 
     fn clear_in_words(&self) -> String {
@@ -106,6 +117,13 @@ impl Report {
             metres(self.separation.delta_m),
             self.formation_in_words()
         )
+    }
+
+    /// Whether integration may have made all violations.
+    fn is_unresolved_by_step(&self) -> bool {
+        let past_obstacles = self.obstacles.as_ref().map_or(0, |obstacles| obstacles.violations.len());
+        let violations = self.audit.violations.len() + past_obstacles;
+        is_unresolved_by_step(self.audit.status, self.run.overlong_steps, violations)
     }
 
     fn formation_in_words(&self) -> String {

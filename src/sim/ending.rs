@@ -32,7 +32,8 @@ pub struct Flight {
     pub overlong_steps: u64,
     /// The law's promise, made before the first step; void where the steps were too long for it.
     pub certificate: Certificate,
-    /// What the independent judge found.
+    /// What the independent judge found. Its status is undecided where integration may have made all violations: where steps were too
+    /// long for the law, and no violation is deeper than the bound of their error or began before the first of them.
     pub audit: AuditOutcome,
     /// Where that was of scaled lengths ([`crate::space::Metric`]): what it found in metres, by the widest hulls.
     pub in_metres: Option<AuditOutcome>,

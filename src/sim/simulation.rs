@@ -5,6 +5,7 @@ mod step;
 use super::channels::Channels;
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
+use super::integration::IntegrationError;
 use super::judge::{Judge, Judged};
 use super::motion::Motion;
 use super::parts::Parts;
@@ -58,6 +59,8 @@ pub struct Simulation {
     refined_steps: u64,
     /// Steps of which even the shortest part was too long for the law.
     overlong_steps: u64,
+    /// Error of integration since the first of them.
+    error: Option<IntegrationError>,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     watch: Watch,
@@ -119,6 +122,7 @@ impl Simulation {
             shortest: 0,
             refined_steps: 0,
             overlong_steps: 0,
+            error: None,
             energy: None,
             watch: Watch::default(),
             peaks: Peaks::default(),
@@ -158,7 +162,8 @@ impl Simulation {
         self.step_on();
     }
 
-    /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked.
+    /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked. The step
+    /// is not shortened for the barrier or the rate of the law.
     ///
     /// # Errors
     /// [`SimError::Commands`] where there is not a finite row for each vehicle; nothing is flown then. After the end nothing
