@@ -72,6 +72,11 @@ class Audit:
         return assumed
 
     @property
+    def is_planar(self) -> bool:
+        """Whether the height of some vehicle is not known: distances and speeds are those in the plane of x and y then."""
+        return bool(self._report["planar"])
+
+    @property
     def delta_m(self) -> float | None:
         """The safety distance asked about [m] (a scaled distance with an ellipsoid); None where radii alone were."""
         delta: float | None = self._report["separation"]["delta_m"]
@@ -217,7 +222,7 @@ def audit(
     vehicle was not seen; ``notes`` names whoever was not seen from the first instant to the last. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
 
     ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
-    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``scale``, ``dimensions``, ``column``, ``start``, ``axis_order``,
+    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``scale``, ``dimensions``, ``column``, ``start``, ``layout``,
     ``frame``, ``topic``, ``origin``, ``allow_unfinished``.
 
     ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep

@@ -127,7 +127,7 @@ def reading(
     dimensions: str | None = None,
     column: Mapping[str, str] | None = None,
     start: Mapping[str, Iterable[float]] | None = None,
-    axis_order: str | None = None,
+    layout: str | None = None,
     frame: str | None = None,
     topic: str | Sequence[str] | None = None,
     origin: Iterable[float] | None = None,
@@ -142,7 +142,7 @@ def reading(
         time_scale=time_scale,
         scale=scale,
         dimensions=dimensions,
-        axis_order=axis_order,
+        layout=layout,
         frame=frame,
         topic=topic,
     )

@@ -10,7 +10,7 @@ use super::console::{self, Console};
 use super::open::Open;
 use super::own::OwnRecording;
 use super::replays::{self, Instants};
-use crate::audit::recorded::{Outcome, Presence, RecordedError, TrackAuditor};
+use crate::audit::recorded::{Outcome, Presence, RecordedError, Settings, TrackAuditor};
 use crate::read;
 use crate::report::recorded::{Clock, RecordedReport, Source};
 use crate::report::write_atomically;
@@ -75,8 +75,8 @@ pub(super) fn judge_recorded(
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
     let mut instants = arguments.html.as_ref().map(|_| Instants::default());
-    let Judged { mut outcome, clock, mut notes, assumed, curves } =
-        judged(auditor, arguments, open, console, &mut |items, names| {
+    let Judged { mut outcome, clock, mut notes, assumed, curves, is_planar } =
+        judged(auditor, arguments, &settings, open, console, &mut |items, names| {
             if let Some(instants) = &mut instants {
                 instants.note(items, names, &settings);
             }
@@ -117,7 +117,7 @@ pub(super) fn judge_recorded(
     for note in &notes {
         console.warn(&format!("note: {note}"));
     }
-    let source = Source { recording: arguments.reading.called(), clock, notes };
+    let source = Source { recording: arguments.reading.called(), clock, planar: is_planar, notes };
     let early_end = own.as_ref().and_then(|own| own.early_end.clone());
     // A window that ends before the recording was flown whole.
     let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
@@ -143,17 +143,24 @@ struct Judged {
     assumed: Option<String>,
     /// Whether it has curves and no samples.
     curves: bool,
+    /// Whether some height is not known.
+    is_planar: bool,
 }
 
 fn judged(
     mut auditor: TrackAuditor,
     arguments: &AuditArguments,
+    settings: &Settings,
     open: &Open<'_>,
     console: Console,
     note: &mut dyn FnMut(&[Item], &[String]),
 ) -> Result<Judged, Failure> {
     let called = arguments.reading.called();
     let mut recording = open()?;
+    let is_planar = recording.is_planar();
+    if is_planar {
+        arguments.refuse_heights(settings)?;
+    }
     let interrupted = caller::interruption();
     let progress = console.counter(called.clone());
     let mut items = Vec::new();
@@ -181,7 +188,7 @@ fn judged(
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
     let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
     let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
-    Ok(Judged { outcome, clock, notes, assumed, curves })
+    Ok(Judged { outcome, clock, notes, assumed, curves, is_planar })
 }
 
 impl From<RecordedError> for Failure {

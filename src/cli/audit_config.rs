@@ -11,6 +11,7 @@ use super::audit_arguments::AuditArguments;
 use super::text_file;
 use crate::audit::envelope::{Limit, Quantity};
 use crate::audit::recorded::Motion;
+use crate::read::ArrayAxis;
 
 /// What the file is called.
 const NAME: &str = "tautline.toml";
@@ -37,6 +38,7 @@ struct AuditTable {
     above_m: Option<f64>,
     max_gap_s: Option<f64>,
     expect_vehicles: Option<usize>,
+    layout: Option<String>,
     allow_undecided: Option<bool>,
     limits: BTreeMap<String, f64>,
 }
@@ -143,6 +145,10 @@ impl AuditTable {
         arguments.above = arguments.above.or(self.above_m);
         arguments.max_gap = arguments.max_gap.or(self.max_gap_s);
         arguments.expect_vehicles = arguments.expect_vehicles.or(self.expect_vehicles);
+        if let Some(layout) = self.layout.filter(|_| arguments.reading.layout.is_none()) {
+            let layout = ArrayAxis::layout_of(&layout).map_err(|error| wrong(format!("layout: {error}")))?;
+            arguments.reading.layout = Some(layout);
+        }
         arguments.allow_undecided |= self.allow_undecided.unwrap_or(false);
         for (key, allowed) in self.limits {
             let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.key() == key);
@@ -198,6 +204,7 @@ mod tests {
             ("[audit]\nmotion = \"spline\"", "line 2: unknown variant `spline`"),
             ("[audit.limits]\nspeed = 5.0", "`speed` is no limit: the limits are speed_m_s,"),
             ("[audit]\nmax_accel_m_s2 = 2.0", "add motion = \"bounded\""),
+            ("[audit]\nlayout = \"time,axis\"", "layout: `time,axis` is none of time,vehicle,axis "),
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),
         ] {

@@ -74,6 +74,10 @@ impl Tracks for Interruptible {
     fn assumed(&self) -> Option<&str> {
         self.tracks.assumed()
     }
+
+    fn is_planar(&self) -> bool {
+        self.tracks.is_planar()
+    }
 }
 
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {

@@ -8,7 +8,7 @@ use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, Typ
 use super::Failure;
 use super::own::OwnRecording;
 use super::run::RECORDING;
-use crate::read::{self, AxisOrder, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
+use crate::read::{self, ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
 
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]
@@ -44,9 +44,10 @@ pub(super) struct ReadArguments {
     /// Where the curve of a vehicle starts [m], for polynomials that are relative to it; may be given several times.
     #[arg(long = "start", value_name = "NAME=X,Y,Z", value_parser = start, allow_hyphen_values = true)]
     starts: Vec<(String, [f64; 3])>,
-    /// Which axis of the positions of an NPZ archive comes first, where its shape does not tell.
-    #[arg(long, value_name = "ORDER", value_parser = axis_order())]
-    axis_order: Option<AxisOrder>,
+    /// What the axes of the positions of an NPZ archive count, in their order, where their lengths have several meanings:
+    /// the words time, vehicle and axis (of x, y, z), such as time,vehicle,axis.
+    #[arg(long, value_name = "AXES", value_parser = ArrayAxis::layout_of)]
+    pub(super) layout: Option<ArrayLayout>,
     /// The frame that all positions are brought into by the transforms of the recording, where messages give several.
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
@@ -132,7 +133,7 @@ impl ReadArguments {
             one_vehicle: false,
             starts: self.starts.iter().cloned().collect(),
             columns,
-            axis_order: self.axis_order,
+            layout: self.layout,
             frame: self.frame.clone(),
             topics: self.topics.clone(),
             origin: self.origin,
@@ -199,10 +200,6 @@ fn unit() -> impl TypedValueParser<Value = TimeUnit> {
 
 fn dimensions() -> impl TypedValueParser<Value = Dimensions> {
     one_of(Dimensions::ALL.map(|dimensions| (dimensions.name().into(), dimensions)).into())
-}
-
-fn axis_order() -> impl TypedValueParser<Value = AxisOrder> {
-    one_of(vec![("time-first".into(), AxisOrder::TimeFirst), ("vehicle-first".into(), AxisOrder::VehicleFirst)])
 }
 
 /// A format that is read.

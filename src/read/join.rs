@@ -29,6 +29,8 @@ struct Joined {
     parts: Vec<Part>,
     clock: Clock,
     notes: Vec<String>,
+    /// Whether some file has no height: then the heights of the others are not used.
+    is_planar: bool,
 }
 
 /// One recording out of several with a vehicle each, which is called as its file; `left_out` says what else there is.
@@ -72,6 +74,13 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     };
     let mut notes = vec![format!("a file is a vehicle: {}", vehicles.join(", "))];
     notes.extend(left_out);
+    let without: Vec<_> =
+        vehicles.iter().zip(&recordings).filter(|(_, tracks)| tracks.is_planar()).map(|(name, _)| quoted(name)).collect();
+    let is_planar = !without.is_empty();
+    if is_planar && without.len() < vehicles.len() {
+        let without = without.join(", ");
+        notes.push(format!("no height is known of {without}: the heights of the other files are not used"));
+    }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
         for note in tracks.notes() {
@@ -83,12 +92,12 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let waiting = Vec::new().into_iter().peekable();
         joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
-    Ok(Box::new(Joined { vehicles, parts: joined, clock, notes }))
+    Ok(Box::new(Joined { vehicles, parts: joined, clock, notes, is_planar }))
 }
 
 impl Part {
     /// Reads the next items where none are waiting.
-    fn fill(&mut self, vehicle: usize) -> Result<(), ReadError> {
+    fn fill(&mut self, vehicle: usize, is_planar: bool) -> Result<(), ReadError> {
         if self.until_s == f64::INFINITY || self.waiting.peek().is_some() {
             return Ok(());
         }
@@ -101,6 +110,10 @@ impl Part {
             let problem = match item {
                 Item::Sample(sample) if sample.vehicle == 0 => {
                     (sample.vehicle, sample.time_s) = (vehicle, sample.time_s + self.shift_s);
+                    if is_planar {
+                        sample.position_m.z = 0.0;
+                        sample.velocity_m_s.iter_mut().for_each(|velocity| velocity.z = 0.0);
+                    }
                     continue;
                 }
                 Item::Sample(_) => "it holds several vehicles: a column of it names those of its rows",
@@ -125,7 +138,7 @@ impl Tracks for Joined {
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
         for (vehicle, part) in self.parts.iter_mut().enumerate() {
-            part.fill(vehicle)?;
+            part.fill(vehicle, self.is_planar)?;
         }
         // Up to here nothing can come between what is known.
         let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);
@@ -146,5 +159,9 @@ impl Tracks for Joined {
 
     fn assumed(&self) -> Option<&str> {
         self.parts.iter().find_map(|part| part.tracks.assumed())
+    }
+
+    fn is_planar(&self) -> bool {
+        self.is_planar
     }
 }

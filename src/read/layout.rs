@@ -7,8 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted};
-use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
+use super::heading::{
+    self, DEPTH, EARTH, HEIGHT, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
+};
 use super::options::{ColumnNames, ReadOptions};
+use super::order::PLANAR;
 use super::units;
 
 /// The columns of a position, and of what else is known of a vehicle.
@@ -18,6 +21,15 @@ pub(super) struct Body {
     pub(super) position: [Option<usize>; 3],
     pub(super) velocity: Option<[Option<usize>; 3]>,
     pub(super) radius: Option<usize>,
+}
+
+impl Body {
+    /// The same without a height.
+    fn flattened(mut self) -> Self {
+        self.position[2] = None;
+        self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
+        self
+    }
 }
 
 /// The columns of a table.
@@ -37,6 +49,8 @@ pub(super) struct Layout {
     pub(super) metres: Vec<f64>,
     /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
     pub(super) on_earth: bool,
+    /// Whether some vehicle has no column of its height: then no vehicle has one.
+    pub(super) is_planar: bool,
     /// What a person should know about the columns.
     pub(super) notes: Vec<String>,
 }
@@ -65,7 +79,14 @@ fn missing(header: &[String], role: Role, of: &str) -> Fault {
 impl Layout {
     /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
-        let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new(), place: POSITION };
+        let mut columns = Columns {
+            header,
+            found: BTreeMap::new(),
+            units: BTreeMap::new(),
+            downward: BTreeSet::new(),
+            heights: BTreeSet::new(),
+            place: POSITION,
+        };
         for (role, name) in options.columns.given() {
             let column = header.iter().position(|column| column == name);
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
@@ -86,14 +107,15 @@ impl Layout {
         let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
         // Metres go before degrees where a table has both.
-        let gives = |role: Role| {
-            headings.iter().any(|(_, of)| of.role == role) || options.columns.given().any(|(given, _)| given == role)
-        };
+        let gives =
+            |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
-        headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { heading.role < EARTH });
         columns.place = if on_earth { EARTH } else { POSITION };
+        headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { !is_angle(heading.role) });
+        columns.place_heights(&mut headings);
+        let given: BTreeSet<_> = columns.found.keys().map(|(_, role)| *role).collect();
         for (column, heading) in headings.iter().filter(|(_, heading)| heading.vehicle.is_empty()) {
-            if options.columns.given().all(|(known, _)| known != heading.role) {
+            if !given.contains(&heading.role) {
                 columns.claim("", heading, *column)?;
             }
         }
@@ -110,9 +132,12 @@ impl Layout {
             None if one => (vec![String::new()], vec![alone.to_owned()]),
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
-        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
-        let mut layout =
-            Self { time: Some(time), unit, id, names, bodies, metres: Vec::new(), on_earth, notes: Vec::new() };
+        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
+        let without_height = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
+        let without_height: Vec<_> = without_height.map(|(vehicle, _)| vehicle.clone()).collect();
+        let (is_planar, metres, notes) = (!without_height.is_empty(), Vec::new(), Vec::new());
+        let bodies = if is_planar { bodies.into_iter().map(Body::flattened).collect() } else { bodies };
+        let mut layout = Self { time: Some(time), unit, id, names, bodies, metres, on_earth, is_planar, notes };
         let used = layout.columns();
         layout.metres = columns.metres(&used, options.scale)?;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -120,10 +145,15 @@ impl Layout {
         if id.is_none() && one && !options.one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
             return Err(missing(header, ID, ""));
         }
-        if layout.bodies.iter().any(|body| body.position[2].is_none()) {
-            let what = if on_earth { "the height" } else { "z" };
-            layout.notes.push(format!("there is no column for {what}: it is taken as 0"));
+        if is_planar {
+            let of = if without_height.len() < vehicles.len() {
+                format!(" of {}", list(&without_height, 12))
+            } else {
+                String::new()
+            };
+            layout.notes.push(format!("there is no column for the height{of}: {PLANAR}"));
         }
+        layout.notes.extend(columns.heights_used(&layout, options.scale));
         if !unused.is_empty() {
             layout.notes.push(format!("columns not used: {}", unused.join(", ")));
         }
@@ -167,6 +197,10 @@ struct Columns<'a> {
     found: BTreeMap<(String, Role), usize>,
     /// The unit that the name of a column says.
     units: BTreeMap<usize, &'a str>,
+    /// Columns of lengths that count downwards.
+    downward: BTreeSet<usize>,
+    /// Columns whose names are those of heights.
+    heights: BTreeSet<usize>,
     /// The role of the first axis of positions.
     place: Role,
 }
@@ -174,6 +208,53 @@ struct Columns<'a> {
 impl<'a> Columns<'a> {
     fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
         self.found.get(&(vehicle.to_owned(), role)).copied()
+    }
+
+    /// Gives headings of heights and depths the role of the third axis of positions, where their vehicle has the other two and
+    /// no such column of its own. All others are dropped.
+    fn place_heights(&mut self, headings: &mut Vec<(usize, Heading<'a>)>) {
+        let third = self.place + 2;
+        // The user may call the third axis by either name; `z` means the numbers as they are.
+        let [z, alt] = [POSITION + 2, HEIGHT].map(|role| self.found.remove(&(String::new(), role)));
+        let given = if third == HEIGHT { alt.or(z) } else { z.or(alt) };
+        if let Some(column) = given {
+            self.found.insert((String::new(), third), column);
+        }
+        if let Some(column) = alt.filter(|column| given == Some(*column)) {
+            self.heights.insert(column);
+            let is_depth = Heading::of(&self.header[column]).is_some_and(|heading| heading.role == DEPTH);
+            self.downward.extend(is_depth.then_some(column));
+        }
+        let has = |vehicle: &str, role: Role, of: &[(usize, Heading<'_>)]| {
+            of.iter().any(|(_, heading)| (heading.vehicle, heading.role) == (vehicle, role))
+                || self.get(vehicle, role).is_some()
+        };
+        let all = headings.clone();
+        headings.retain(|(_, Heading { vehicle, role, .. })| {
+            let has = |axis: Role| has(vehicle, self.place + axis, &all);
+            !matches!(*role, HEIGHT | DEPTH) || (has(0) && has(1) && (third == HEIGHT || !has(2)))
+        });
+        for (column, heading) in headings.iter_mut().filter(|(_, heading)| matches!(heading.role, HEIGHT | DEPTH)) {
+            self.heights.insert(*column);
+            self.downward.extend((heading.role == DEPTH).then_some(*column));
+            heading.role = third;
+        }
+    }
+
+    /// What a person should know of columns that are read because their names are those of heights.
+    fn heights_used(&self, layout: &Layout, scale: f64) -> Option<String> {
+        let used: BTreeSet<_> = layout.bodies.iter().filter_map(|body| body.position[2]).collect();
+        let used: Vec<_> = used.intersection(&self.heights).copied().collect();
+        let first = *used.first()?;
+        let names: Vec<_> = used.iter().map(|&column| self.header[column].clone()).collect();
+        let turned = if self.downward.contains(&first) { ", with the sign turned" } else { "" };
+        let unit = match self.units.get(&first) {
+            None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m as --scale says"),
+            None if self.place == EARTH => ", in metres: no name says a unit (--scale gives another)".to_owned(),
+            _ => String::new(),
+        };
+        let columns = if used.len() > 1 { "columns" } else { "column" };
+        Some(format!("heights are those of {columns} {}{turned}{unit}", list(&names, 12)))
     }
 
     fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
@@ -260,21 +341,29 @@ impl<'a> Columns<'a> {
                 continue;
             };
             let what = if is_velocity(role) { "velocity" } else { "length" };
-            metres[column] = units::size_of(unit, is_velocity(role)).ok_or_else(|| {
+            let size = units::size_of(unit, is_velocity(role)).ok_or_else(|| {
                 let problem = format!("column {name} says a unit of {what} that is not known, {}", quoted(unit));
                 let remedy =
                     "write it in m, cm, mm, km, ft or in, or name the column with --column and its unit with --scale";
                 Fault::content(problem, remedy)
             })?;
-            if metres[column] != 1.0 {
+            metres[column] = size;
+            if size != 1.0 {
                 other = Some(name);
             }
         }
-        if self.place == EARTH && scale != 1.0 {
-            let problem = format!("places on the Earth are in metres, and --scale {scale} says another unit");
-            return Err(Fault::content(problem, "leave --scale away"));
+        for &column in &self.downward {
+            metres[column] = -metres[column];
         }
-        let Some(other) = other else { return Ok(metres) };
+        let Some(other) = other else {
+            if self.place == EARTH {
+                let is_length = |(_, role): &&(String, Role)| !is_angle(*role) && *role >= POSITION;
+                let lengths: BTreeSet<_> =
+                    self.found.iter().filter(|(key, _)| is_length(key)).map(|(_, column)| *column).collect();
+                lengths.into_iter().for_each(|column| metres[column] *= scale);
+            }
+            return Ok(metres);
+        };
         if let Some(silent) = silent {
             let problem = format!("column {other} says its unit, and column {silent} none");
             return Err(Fault::content(problem, "write the unit of each column into its name, as in `x [mm]`"));

@@ -52,7 +52,7 @@ pub use error::{Fault, Place, ReadError};
 pub use format::Format;
 pub(crate) use heading::is_read;
 pub use mcap::Channels;
-pub use options::{AxisOrder, ColumnNames, Dimensions, ReadOptions};
+pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, ReadOptions};
 pub use order::Recording;
 
 use std::fs;

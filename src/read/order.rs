@@ -13,6 +13,9 @@ use crate::track::{Clock, Item, Sample, Tracks};
 /// Rows given out at a time.
 pub(super) const BATCH: usize = 10_000;
 
+/// What follows for a recording in which some height is not known.
+pub(super) const PLANAR: &str = "the recording is judged in the plane of x and y";
+
 /// A vehicle at an instant, as the file has it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
@@ -92,6 +95,8 @@ pub(super) struct About {
     pub(super) epoch_ns: i64,
     /// Metres per unit of length.
     pub(super) scale: f64,
+    /// Whether its rows have no height.
+    pub(super) is_planar: bool,
     pub(super) notes: Vec<String>,
     /// The fault of a recording without rows.
     pub(super) none: Fault,
@@ -108,7 +113,7 @@ impl About {
     ) -> Self {
         let unit = options.time_unit.or(said);
         let (path, times_per_second) = (source.shown(), options.times_per_second);
-        Self { path, unit, times_per_second, epoch_ns: 0, scale: options.scale, notes, none }
+        Self { path, unit, times_per_second, epoch_ns: 0, scale: options.scale, is_planar: false, notes, none }
     }
 }
 
@@ -122,6 +127,7 @@ pub(super) struct Ordered<R> {
     timing: Timing,
     notes: Vec<String>,
     assumed: Option<String>,
+    is_planar: bool,
     scale: f64,
     /// Rows read that have not been given out.
     batch: std::vec::IntoIter<Row>,
@@ -136,7 +142,7 @@ pub(super) struct Ordered<R> {
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { path, unit, times_per_second, epoch_ns, scale, mut notes, none } = about;
+        let About { path, unit, times_per_second, epoch_ns, scale, is_planar, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -172,7 +178,7 @@ impl<R: Rows> Ordered<R> {
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
         let batch = first.into_iter();
-        Ok(Self { path, rows, timing, notes, assumed, scale, batch, ended, now: None, last: Vec::new() })
+        Ok(Self { path, rows, timing, notes, assumed, is_planar, scale, batch, ended, now: None, last: Vec::new() })
     }
 
     fn error(&self, row: &Row, fault: Fault) -> ReadError {
@@ -272,5 +278,9 @@ impl<R: Rows> Tracks for Ordered<R> {
 
     fn assumed(&self) -> Option<&str> {
         self.assumed.as_deref()
+    }
+
+    fn is_planar(&self) -> bool {
+        self.is_planar
     }
 }

@@ -102,12 +102,14 @@ pub(super) fn open<C: Cells + 'static>(
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
     let mut about = About::new(source, options, unit.or(layout.unit), layout.notes.clone(), Fault::header_only());
-    let names = Names::from_list(layout.names.clone());
+    let (names, is_planar) = (Names::from_list(layout.names.clone()), layout.is_planar);
     let local = origin(&mut cells, &layout, options)?;
     about.notes.extend(local.map(|local| local.note()));
     cells.restart(&layout.columns(), true)?;
+    // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
+    about.scale = if layout.on_earth { 1.0 } else { about.scale };
     let table = Table { cells, layout, names, local, vehicle: 0, count: 0 };
-    Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
+    Ok(Box::new(Ordered::open(table, About { epoch_ns, is_planar, ..about })?))
 }
 
 /// The frame of places on the Earth: where the user says, or at the first place of the table.
@@ -184,6 +186,9 @@ impl<C: Cells> Table<C> {
             let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
             if let Some(local) = &self.local {
                 row.position = local.place(row.position)?;
+                if self.layout.is_planar {
+                    row.position.z = 0.0;
+                }
             }
             rows.push(row);
         }

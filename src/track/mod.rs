@@ -106,4 +106,10 @@ pub trait Tracks {
     fn assumed(&self) -> Option<&str> {
         None
     }
+
+    /// Whether the height of some vehicle is not known. Then z is 0 in every item and has no meaning: only distances in the
+    /// plane of x and y can be judged, and no question about heights has an answer.
+    fn is_planar(&self) -> bool {
+        false
+    }
 }

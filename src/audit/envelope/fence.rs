@@ -121,6 +121,12 @@ impl Fence {
         self.margin_m
     }
 
+    /// Its lowest and highest height \[m\], where it has a floor and a ceiling.
+    #[must_use]
+    pub fn height_m(&self) -> Option<[f64; 2]> {
+        self.height_m
+    }
+
     /// Its corners from above \[m\].
     #[must_use]
     pub fn corners_m(&self) -> &[Vector2<f64>] {

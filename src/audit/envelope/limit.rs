@@ -73,6 +73,12 @@ impl Quantity {
         }
     }
 
+    /// Whether it depends on heights, and has no value in the plane of x and y.
+    #[must_use]
+    pub fn needs_height(self) -> bool {
+        matches!(self, Self::Climb | Self::Descent | Self::Height | Self::Floor)
+    }
+
     /// Whether it must not fall below its limit, where the others must not exceed theirs.
     #[must_use]
     pub fn is_least(self) -> bool {

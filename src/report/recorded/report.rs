@@ -19,6 +19,8 @@ pub struct Source {
     pub recording: String,
     /// How it counts time.
     pub clock: Clock,
+    /// Whether the height of some vehicle is not known: then distances and speeds are those in the plane of x and y.
+    pub planar: bool,
     /// How it was read, a sentence each.
     pub notes: Vec<String>,
 }

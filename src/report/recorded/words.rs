@@ -52,7 +52,9 @@ impl RecordedReport {
         let decides = |limit: &&OfLimit| limit.status == self.status;
         let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
         let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
-        of_pairs.then(|| self.finding_of_pairs()).into_iter().chain(limits).collect::<Vec<_>>().join("; ")
+        let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
+        let pairs = of_pairs.then(|| self.finding_of_pairs());
+        pairs.into_iter().chain(limits).chain(in_plane).collect::<Vec<_>>().join("; ")
     }
 
     fn finding_of_pairs(&self) -> String {
