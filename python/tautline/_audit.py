@@ -218,7 +218,7 @@ def audit(
     """Judges positions over time, of arrays or of a recording of any format.
 
     ``tl.audit(t, positions, delta=1.5)``: ``t`` (T,) times [s], ``positions`` (T, N, 3) or (T, N, 2) [m], both float64 in any
-    order of memory; they are borrowed, not copied, and must not be written to until this returns. NaN in every axis: the
+    order of memory, or laid out as ``layout`` says (``"time,axis,vehicle"``); they are borrowed, not copied, and must not be written to until this returns. NaN in every axis: the
     vehicle was not seen; ``notes`` names whoever was not seen from the first instant to the last. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
 
     ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
@@ -259,9 +259,23 @@ def audit(
     words += [f"--offset={name}={number(seconds, 'offset')}" for name, seconds in by_name(offset, "offset").items()]
     if positions is None:
         return of_files(words + reading(**read_as), t, given, velocities is not None or names is not None)
+    layout = read_as.pop("layout", None)
+    if layout is not None:
+        positions, velocities = (of if of is None else laid_out(of, layout) for of in (positions, velocities))
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
     return with_files(given, lambda: of_arrays(words, t, positions, velocities, names, _seen))
+
+
+def laid_out(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
+    """A view (T, N, 3) of an array whose axes count these, such as ``time,axis,vehicle``."""
+    usual = ("time", "vehicle", "axis")
+    axes = layout.split(",")
+    if sorted(axes) != sorted(usual):
+        raise Error(f"layout: '{layout}' is not time, vehicle and axis between commas, such as 'time,axis,vehicle'")
+    if not isinstance(array, np.ndarray) or array.ndim != len(usual):
+        raise TypeError("layout: it says what the three axes of an array count")
+    return array.transpose([axes.index(axis) for axis in usual])
 
 
 def of_files(words: list[str], t: object, beside: list[str], has_more: bool) -> Audit:

@@ -297,7 +297,8 @@ impl AuditArguments {
             obstacle.map(|obstacle| format!("the obstacle `{}`, which is not upright at height 0,", obstacle.name)),
         ];
         let Some(asked) = asked.into_iter().flatten().next() else { return Ok(()) };
-        let message = format!("{}: the heights of its vehicles are not known, and {asked} needs them", self.reading.called());
+        let message =
+            format!("{}: the heights of its vehicles are not known, and {asked} needs them", self.reading.called());
         let help = "name the column of the height with --column z=NAME, or leave the question out";
         let asked_by = self.asked_by.as_ref().map_or(String::new(), |note| format!(" ({note})"));
         Err(Failure::input(message, format!("{help}{asked_by}")))

@@ -145,10 +145,8 @@ impl AuditTable {
         arguments.above = arguments.above.or(self.above_m);
         arguments.max_gap = arguments.max_gap.or(self.max_gap_s);
         arguments.expect_vehicles = arguments.expect_vehicles.or(self.expect_vehicles);
-        if let Some(layout) = self.layout.filter(|_| arguments.reading.layout.is_none()) {
-            let layout = ArrayAxis::layout_of(&layout).map_err(|error| wrong(format!("layout: {error}")))?;
-            arguments.reading.layout = Some(layout);
-        }
+        let layout = self.layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
+        arguments.reading.usual_layout = layout.map_err(|error| wrong(format!("layout: {error}")))?;
         arguments.allow_undecided |= self.allow_undecided.unwrap_or(false);
         for (key, allowed) in self.limits {
             let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.key() == key);

@@ -8,7 +8,9 @@ use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, Typ
 use super::Failure;
 use super::own::OwnRecording;
 use super::run::RECORDING;
-use crate::read::{self, ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit};
+use crate::read::{
+    self, ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit,
+};
 
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]
@@ -47,7 +49,10 @@ pub(super) struct ReadArguments {
     /// What the axes of the positions of an NPZ archive count, in their order, where their lengths have several meanings:
     /// the words time, vehicle and axis (of x, y, z), such as time,vehicle,axis.
     #[arg(long, value_name = "AXES", value_parser = ArrayAxis::layout_of)]
-    pub(super) layout: Option<ArrayLayout>,
+    layout: Option<ArrayLayout>,
+    /// What a tautline.toml says of that.
+    #[arg(skip)]
+    pub(super) usual_layout: Option<ArrayLayout>,
     /// The frame that all positions are brought into by the transforms of the recording, where messages give several.
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
@@ -134,6 +139,7 @@ impl ReadArguments {
             starts: self.starts.iter().cloned().collect(),
             columns,
             layout: self.layout,
+            usual_layout: self.usual_layout,
             frame: self.frame.clone(),
             topics: self.topics.clone(),
             origin: self.origin,

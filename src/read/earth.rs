@@ -64,6 +64,17 @@ impl Local {
     }
 }
 
+/// Whether a receiver that had no fix wrote this: latitude and longitude are both exactly 0.
+pub(super) fn is_no_fix(place: &Geodetic) -> bool {
+    place.x == 0.0 && place.y == 0.0
+}
+
+/// What a person should know of so many rows or messages without a fix, `of` some vehicles.
+pub(super) fn no_fixes(count: u64, of: &str) -> Option<String> {
+    let is = if count == 1 { "place is no fix and was" } else { "places are no fixes and were" };
+    (count > 0).then(|| format!("{count} {is} left out{of}: latitude and longitude are both exactly 0"))
+}
+
 /// Sine and cosine of latitude and of longitude.
 fn angles(place: Geodetic) -> [(f64, f64); 2] {
     [place.x, place.y].map(|degrees| libm::sincos(degrees.to_radians()))

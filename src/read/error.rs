@@ -231,3 +231,13 @@ pub(super) fn quoted(value: &str) -> String {
     }
     format!("`{shown}`")
 }
+
+/// The first of some names that are not empty.
+pub(super) fn list(names: &[String], shown: usize) -> String {
+    let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
+    match names.len() {
+        0 => "none".to_owned(),
+        count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
+        _ => names.join(", "),
+    }
+}

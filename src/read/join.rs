@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::error::{Fault, ReadError, quoted};
+use super::identity::spelling;
 use super::order::Recording;
 use super::source::Source;
 use crate::track::{Clock, Item, Tracks};
@@ -41,12 +42,13 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     let (paths, recordings): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
     let mut known = BTreeMap::new();
     for (name, path) in vehicles.iter().zip(&paths) {
-        if let Some(first) = known.insert(name, path) {
+        if let Some(first) = known.insert(spelling(name), path) {
             let problem = format!("the vehicle of {} is called {} too", first.display(), quoted(name));
             let remedy = "vehicles are called as their files: give each file another name";
             return Err(ReadError::new(path, Fault::content(problem, remedy)));
         }
     }
+    check_own_names(&recordings, &paths)?;
     let clocks: Vec<Clock> = recordings.iter().map(|tracks| tracks.clock().clone()).collect();
     let Some(first) = clocks.iter().min_by_key(|clock| clock.epoch_ns) else { return Err(Fault::Empty.into()) };
     for ((name, path), clock) in vehicles.iter().zip(&paths).zip(&clocks) {
@@ -74,8 +76,12 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     };
     let mut notes = vec![format!("a file is a vehicle: {}", vehicles.join(", "))];
     notes.extend(left_out);
-    let without: Vec<_> =
-        vehicles.iter().zip(&recordings).filter(|(_, tracks)| tracks.is_planar()).map(|(name, _)| quoted(name)).collect();
+    let without: Vec<_> = vehicles
+        .iter()
+        .zip(&recordings)
+        .filter(|(_, tracks)| tracks.is_planar())
+        .map(|(name, _)| quoted(name))
+        .collect();
     let is_planar = !without.is_empty();
     if is_planar && without.len() < vehicles.len() {
         let without = without.join(", ");
@@ -93,6 +99,27 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
     Ok(Box::new(Joined { vehicles, parts: joined, clock, notes, is_planar }))
+}
+
+/// Refuses files of which some are of one vehicle, going by the names that their rows have. Where all have one name it is no
+/// vehicle's, but what all are.
+fn check_own_names(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadError> {
+    let own = recordings.iter().map(|tracks| match tracks.vehicles() {
+        [only] => Some(only.as_str()),
+        _ => None,
+    });
+    let own: Vec<_> = own.collect();
+    let (mut known, mut twice) = (BTreeMap::new(), None);
+    for (name, path) in own.iter().zip(paths) {
+        let Some(name) = name else { return Ok(()) };
+        if let Some(first) = known.insert(spelling(name), path) {
+            twice = twice.or(Some((*name, first, path)));
+        }
+    }
+    let Some((name, first, path)) = twice.filter(|_| known.len() > 1) else { return Ok(()) };
+    let problem = format!("its rows are of the vehicle {}, and so are those of {}", quoted(name), first.display());
+    let remedy = "put all rows of a vehicle into one file, or take the column out that names it";
+    Err(ReadError::new(path, Fault::content(problem, remedy)))
 }
 
 impl Part {
@@ -146,6 +173,12 @@ impl Tracks for Joined {
             items.extend(std::iter::from_fn(|| part.waiting.next_if(|item| item.time_s() <= until_s)));
         }
         items[before..].sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        if items.len() == before {
+            // Some of what a person should know shows at the end.
+            let late = self.parts.iter().flat_map(|part| part.tracks.notes());
+            let late: Vec<_> = late.filter(|note| !self.notes.contains(note)).cloned().collect();
+            self.notes.extend(late);
+        }
         Ok(items.len() > before)
     }
 

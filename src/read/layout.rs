@@ -6,10 +6,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
-use super::error::{Fault, quoted};
-use super::heading::{
-    self, DEPTH, EARTH, HEIGHT, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
-};
+use super::error::{Fault, list, quoted};
+use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
+use super::heights::Heights;
 use super::options::{ColumnNames, ReadOptions};
 use super::order::PLANAR;
 use super::units;
@@ -41,6 +40,12 @@ pub(super) struct Layout {
     pub(super) unit: Option<TimeUnit>,
     /// The column of the vehicle in a long table.
     pub(super) id: Option<usize>,
+    /// Whether the user says that this column is the one.
+    pub(super) is_id_given: bool,
+    /// Other columns of a long table that could name the vehicles, by their names.
+    pub(super) rivals: Vec<usize>,
+    /// Columns that are not read, whose values could name vehicles where there seems to be a single one.
+    pub(super) suspects: Vec<usize>,
     /// The vehicles of a wide table by name; none of a long one.
     pub(super) names: Vec<String>,
     /// The columns of each vehicle of a wide table, or of every row of a long one.
@@ -83,8 +88,7 @@ impl Layout {
             header,
             found: BTreeMap::new(),
             units: BTreeMap::new(),
-            downward: BTreeSet::new(),
-            heights: BTreeSet::new(),
+            heights: Heights::default(),
             place: POSITION,
         };
         for (role, name) in options.columns.given() {
@@ -101,18 +105,24 @@ impl Layout {
         let time = columns.get("", TIME).or_else(|| first(heading::is_time)).or_else(|| first(heading::is_frame));
         let time = time.ok_or_else(|| missing(header, TIME, ""))?;
         let unit = unit_of_time(&header[time], options)?;
-        let may_be_id = || if options.one_vehicle { first(heading::may_be_id) } else { None };
-        let id = columns.get("", ID).or_else(|| first(heading::is_id)).or_else(may_be_id);
+        let named: Vec<_> =
+            (0..header.len()).filter(|&column| column != time && heading::is_id(&header[column])).collect();
+        // Where the user says which column it is, no other is asked.
+        let (id, rivals) = match (columns.get("", ID), named.split_first()) {
+            (Some(given), _) => (Some(given), Vec::new()),
+            (None, Some((&first, rest))) => (Some(first), rest.to_vec()),
+            (None, None) => (None, Vec::new()),
+        };
+        let is_id_given = columns.get("", ID).is_some();
 
         let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
         // Metres go before degrees where a table has both.
-        let gives =
-            |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
+        let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
         columns.place = if on_earth { EARTH } else { POSITION };
         headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { !is_angle(heading.role) });
-        columns.place_heights(&mut headings);
+        columns.heights = Heights::place(columns.place, header, &mut columns.found, &mut headings);
         let given: BTreeSet<_> = columns.found.keys().map(|(_, role)| *role).collect();
         for (column, heading) in headings.iter().filter(|(_, heading)| heading.vehicle.is_empty()) {
             if !given.contains(&heading.role) {
@@ -137,10 +147,32 @@ impl Layout {
         let without_height: Vec<_> = without_height.map(|(vehicle, _)| vehicle.clone()).collect();
         let (is_planar, metres, notes) = (!without_height.is_empty(), Vec::new(), Vec::new());
         let bodies = if is_planar { bodies.into_iter().map(Body::flattened).collect() } else { bodies };
-        let mut layout = Self { time: Some(time), unit, id, names, bodies, metres, on_earth, is_planar, notes };
+        let suspects = Vec::new();
+        let mut layout = Self {
+            time: Some(time),
+            unit,
+            id,
+            is_id_given,
+            rivals,
+            suspects,
+            names,
+            bodies,
+            metres,
+            on_earth,
+            is_planar,
+            notes,
+        };
         let used = layout.columns();
         layout.metres = columns.metres(&used, options.scale)?;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
+        let may_name = |column: &usize| {
+            let name = &header[*column];
+            !heading::is_clock(name) && !heading::tells_no_vehicle(name) && Heading::of(name).is_none()
+        };
+        if id.is_some() || one {
+            layout.suspects =
+                unused.clone().filter(may_name).filter(|column| !layout.rivals.contains(column)).collect();
+        }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         if id.is_none() && one && !options.one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
             return Err(missing(header, ID, ""));
@@ -153,7 +185,7 @@ impl Layout {
             };
             layout.notes.push(format!("there is no column for the height{of}: {PLANAR}"));
         }
-        layout.notes.extend(columns.heights_used(&layout, options.scale));
+        layout.notes.extend(columns.heights_used(&layout.bodies, options.scale));
         if !unused.is_empty() {
             layout.notes.push(format!("columns not used: {}", unused.join(", ")));
         }
@@ -161,6 +193,17 @@ impl Layout {
             layout.notes.push(format!("vehicles, going by the names of columns: {}", list(&layout.names, 50)));
         }
         Ok(layout)
+    }
+
+    /// The columns that are read or looked at, each once, in rising order.
+    pub(super) fn columns_to_see(&self) -> Vec<usize> {
+        let columns: BTreeSet<_> = self
+            .columns()
+            .into_iter()
+            .chain(self.rivals.iter().copied())
+            .chain(self.suspects.iter().copied())
+            .collect();
+        columns.into_iter().collect()
     }
 
     /// The columns that are read, each once, in rising order.
@@ -197,10 +240,7 @@ struct Columns<'a> {
     found: BTreeMap<(String, Role), usize>,
     /// The unit that the name of a column says.
     units: BTreeMap<usize, &'a str>,
-    /// Columns of lengths that count downwards.
-    downward: BTreeSet<usize>,
-    /// Columns whose names are those of heights.
-    heights: BTreeSet<usize>,
+    heights: Heights,
     /// The role of the first axis of positions.
     place: Role,
 }
@@ -210,47 +250,15 @@ impl<'a> Columns<'a> {
         self.found.get(&(vehicle.to_owned(), role)).copied()
     }
 
-    /// Gives headings of heights and depths the role of the third axis of positions, where their vehicle has the other two and
-    /// no such column of its own. All others are dropped.
-    fn place_heights(&mut self, headings: &mut Vec<(usize, Heading<'a>)>) {
-        let third = self.place + 2;
-        // The user may call the third axis by either name; `z` means the numbers as they are.
-        let [z, alt] = [POSITION + 2, HEIGHT].map(|role| self.found.remove(&(String::new(), role)));
-        let given = if third == HEIGHT { alt.or(z) } else { z.or(alt) };
-        if let Some(column) = given {
-            self.found.insert((String::new(), third), column);
-        }
-        if let Some(column) = alt.filter(|column| given == Some(*column)) {
-            self.heights.insert(column);
-            let is_depth = Heading::of(&self.header[column]).is_some_and(|heading| heading.role == DEPTH);
-            self.downward.extend(is_depth.then_some(column));
-        }
-        let has = |vehicle: &str, role: Role, of: &[(usize, Heading<'_>)]| {
-            of.iter().any(|(_, heading)| (heading.vehicle, heading.role) == (vehicle, role))
-                || self.get(vehicle, role).is_some()
-        };
-        let all = headings.clone();
-        headings.retain(|(_, Heading { vehicle, role, .. })| {
-            let has = |axis: Role| has(vehicle, self.place + axis, &all);
-            !matches!(*role, HEIGHT | DEPTH) || (has(0) && has(1) && (third == HEIGHT || !has(2)))
-        });
-        for (column, heading) in headings.iter_mut().filter(|(_, heading)| matches!(heading.role, HEIGHT | DEPTH)) {
-            self.heights.insert(*column);
-            self.downward.extend((heading.role == DEPTH).then_some(*column));
-            heading.role = third;
-        }
-    }
-
     /// What a person should know of columns that are read because their names are those of heights.
-    fn heights_used(&self, layout: &Layout, scale: f64) -> Option<String> {
-        let used: BTreeSet<_> = layout.bodies.iter().filter_map(|body| body.position[2]).collect();
-        let used: Vec<_> = used.intersection(&self.heights).copied().collect();
-        let first = *used.first()?;
-        let names: Vec<_> = used.iter().map(|&column| self.header[column].clone()).collect();
-        let turned = if self.downward.contains(&first) { ", with the sign turned" } else { "" };
+    fn heights_used(&self, bodies: &[Body], scale: f64) -> Option<String> {
+        let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
+        let &(first, is_turned) = used.first()?;
+        let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
+        let turned = if is_turned { ", with the sign turned" } else { "" };
         let unit = match self.units.get(&first) {
             None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m as --scale says"),
-            None if self.place == EARTH => ", in metres: no name says a unit (--scale gives another)".to_owned(),
+            None if self.place == EARTH => ", in metres: the name says no unit (--scale gives another)".to_owned(),
             _ => String::new(),
         };
         let columns = if used.len() > 1 { "columns" } else { "column" };
@@ -352,7 +360,7 @@ impl<'a> Columns<'a> {
                 other = Some(name);
             }
         }
-        for &column in &self.downward {
+        for column in self.heights.downward() {
             metres[column] = -metres[column];
         }
         let Some(other) = other else {
@@ -373,16 +381,6 @@ impl<'a> Columns<'a> {
             return Err(Fault::content(problem, "leave --scale away, or take the units out of the header"));
         }
         Ok(metres)
-    }
-}
-
-/// The first of some names that are not empty.
-fn list(names: &[String], shown: usize) -> String {
-    let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
-    match names.len() {
-        0 => "none".to_owned(),
-        count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
-        _ => names.join(", "),
     }
 }
 

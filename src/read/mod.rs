@@ -25,6 +25,8 @@ mod folder;
 mod format;
 mod headerless;
 mod heading;
+mod heights;
+mod identity;
 mod join;
 mod layout;
 pub(crate) mod mcap;

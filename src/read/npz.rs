@@ -52,7 +52,10 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
     }
     let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?.unwrap_or_default();
-    let said = options.layout.map_or_else(|| axes.iter().map_while(|name| axis(name)).collect(), Vec::from);
+    let mut said = options.layout.map_or_else(|| axes.iter().map_while(|name| axis(name)).collect(), Vec::from);
+    if said.is_empty() {
+        said.extend(options.usual_layout.iter().flatten());
+    }
     let table = arrays.table(&positions, times.len(), &said)?;
     let velocities = arrays.optional("velocities", |arrays| arrays.like(&table, "velocities", true))?;
     let seen = arrays.optional("seen", |arrays| arrays.like(&table, "seen", false))?;
@@ -60,7 +63,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let names = arrays.optional("names", |arrays| arrays.names(table.vehicles()))?;
     let epoch_ns = arrays.optional("epoch_ns", |arrays| Ok(arrays.array("epoch_ns")?.next_stamp()?))?;
 
-    let names = names.map_or_else(Names::default, Names::from_list);
+    let names = names.map(Names::from_list).transpose()?.unwrap_or_default();
     let mut notes = Vec::new();
     if table.axes() == 2 {
         notes.push(format!("positions have two axes and no height: {PLANAR}"));

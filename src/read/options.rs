@@ -143,6 +143,8 @@ pub struct ReadOptions {
     pub starts: BTreeMap<String, [f64; 3]>,
     /// What the axes of an array of positions count, where its shape has several meanings.
     pub layout: Option<ArrayLayout>,
+    /// The same for arrays of which nothing else says it; it may be given for recordings of any format.
+    pub usual_layout: Option<ArrayLayout>,
     /// The frame that all poses are brought into, where messages have several; those that no transforms lead from are left
     /// out.
     pub frame: Option<String>,
@@ -168,6 +170,7 @@ impl Default for ReadOptions {
             starts: BTreeMap::new(),
             columns: ColumnNames::default(),
             layout: None,
+            usual_layout: None,
             frame: None,
             topics: Vec::new(),
             origin: None,

@@ -50,6 +50,11 @@ pub(super) trait Rows {
         Vec::new()
     }
 
+    /// What a person should know that shows once all rows have been read.
+    fn late_notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// What was assumed to know positions at their times, if anything was.
     fn assumed(&self) -> Option<String> {
         None
@@ -133,6 +138,8 @@ pub(super) struct Ordered<R> {
     batch: std::vec::IntoIter<Row>,
     /// All rows have been read.
     ended: bool,
+    /// All rows have been given out.
+    finished: bool,
     /// Stamp and time of the last row.
     now: Option<(Stamp, f64)>,
     /// Time of each vehicle's last row, and the row.
@@ -178,7 +185,20 @@ impl<R: Rows> Ordered<R> {
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
         let batch = first.into_iter();
-        Ok(Self { path, rows, timing, notes, assumed, is_planar, scale, batch, ended, now: None, last: Vec::new() })
+        Ok(Self {
+            path,
+            rows,
+            timing,
+            notes,
+            assumed,
+            is_planar,
+            scale,
+            batch,
+            ended,
+            finished: false,
+            now: None,
+            last: Vec::new(),
+        })
     }
 
     fn error(&self, row: &Row, fault: Fault) -> ReadError {
@@ -252,6 +272,10 @@ impl<R: Rows> Ordered<R> {
             && let Some(row) = self.batch.next()
         {
             items.push(Item::Sample(self.sample(&row)?));
+        }
+        if items.len() == before && !self.finished {
+            self.finished = true;
+            self.notes.extend(self.rows.late_notes());
         }
         Ok(items.len() > before)
     }

@@ -61,11 +61,23 @@ class Arrays(Case):
         other[7, 2, 1] += 3.0
         self.assertNotEqual(tl.audit(t, other, delta=0.5).to_dict(), expected)
 
-    def test_a_plane_is_the_plane_z_0_and_is_said(self) -> None:
+    def test_a_plane_has_no_heights_and_is_said(self) -> None:
         t, p = passing()
         flat, space = tl.audit(t, p[:, :, :2], delta=1.5), tl.audit(t, p, delta=1.5)
         self.assertEqual((flat.verdict, flat.separation_m), (space.verdict, space.separation_m))
-        self.assertIn("z is taken as 0", flat.notes[0])
+        self.assertIn("in the plane of x and y", flat.notes[0])
+        self.assertTrue(flat.headline.endswith("in the plane of x and y: no heights are known"), flat.headline)
+        self.assertEqual((flat.is_planar, space.is_planar), (True, False))
+        with self.assertRaisesRegex(tl.Error, "heights of its vehicles are not known"):
+            tl.audit(t, p[:, :, :2], limit={"height": 120})
+
+    def test_a_layout_says_what_the_axes_of_arrays_count(self) -> None:
+        t, p = passing()
+        expected = tl.audit(t, p, delta=0.5).to_dict()
+        for layout, order in (("time,axis,vehicle", (0, 2, 1)), ("axis,vehicle,time", (2, 1, 0))):
+            self.assertEqual(tl.audit(t, p.transpose(order), delta=0.5, layout=layout).to_dict(), expected, layout)
+        with self.assertRaisesRegex(tl.Error, "time, vehicle and axis"):
+            tl.audit(t, p, delta=0.5, layout="t,v,x")
 
     def test_who_was_not_seen_is_a_gap_and_never_clear(self) -> None:
         t, p = passing()

@@ -417,7 +417,8 @@ fn an_array_whose_shape_has_several_meanings_is_asked_about_and_no_other() {
         let [a, b, c] = shape;
         let positions = ("positions.npy", npy("<f8", "False", &format!("({a}, {b}, {c})"), &doubles(&numbers)));
         let letters: Vec<u8> = axes.iter().flat_map(|name| format!("{name:\0<7}").into_bytes()).collect();
-        let axes = (!axes.is_empty()).then(|| ("axes.npy", npy("|S7", "False", &format!("({},)", axes.len()), &letters)));
+        let axes =
+            (!axes.is_empty()).then(|| ("axes.npy", npy("|S7", "False", &format!("({},)", axes.len()), &letters)));
         let arrays: Vec<_> = [t, positions].into_iter().chain(axes).collect();
         read_bytes("flight.npz", &archive(&arrays, false), options)
     };

@@ -11,6 +11,8 @@ mod containers;
 mod earth;
 mod exports;
 mod formats;
+mod heights;
+mod identity;
 mod messages;
 mod own;
 mod own_channels;

@@ -92,7 +92,7 @@ impl Instants {
             if !names.starts_with(self.names.all()) {
                 return Err("the vehicles are not those of before".to_owned());
             }
-            self.names = Names::from_list(names);
+            self.names = Names::from_list(names).map_err(|fault| fault.to_string())?;
             self.epoch_ns = epoch_ns;
         }
         Ok(())
@@ -100,12 +100,7 @@ impl Instants {
 }
 
 /// Appends the rows of an instant of this number, whose positions have so many axes; the error says what is wrong with it.
-fn take(
-    instant: &Instant,
-    axes: usize,
-    vehicles: usize,
-    (number, rows): (u64, &mut Vec<Row>),
-) -> Result<(), String> {
+fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &mut Vec<Row>)) -> Result<(), String> {
     let count = instant.vehicles.len();
     let fits = |length: usize, each: usize| length == each * count;
     let velocities = !instant.velocities_m_s.is_empty();
