@@ -239,14 +239,8 @@ impl<C: Cells> Table<C> {
     fn check_names(&self, id: usize, rows: usize, is_one_instant: bool) -> Result<(), Fault> {
         let header = self.cells.header();
         let called = |column: usize| quoted(&header[column]);
-        if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
-            let (first, other) = (called(id), called(rival.column));
-            let problem = format!("the columns {first} and {other} could both name the vehicle, and do not agree");
-            let [first, other] = [&header[id], &header[rival.column]];
-            let remedy = format!("say which one does with --column id={first} or --column id={other}");
-            return Err(Fault::content(problem, remedy));
-        }
-        if rows > 1 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
+        // Two rows at two times are of vehicles that never meet.
+        if rows > 2 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
             let others: Vec<_> = self.layout.rivals.iter().chain(&self.layout.suspects).copied().map(called).collect();
             let others = if others.is_empty() {
                 String::new()
@@ -256,6 +250,13 @@ impl<C: Cells> Table<C> {
             let problem =
                 format!("column {} has another value in each row, and so names no vehicle{others}", called(id));
             let remedy = "say which column names the vehicle with --column id=NAME, or take this one out";
+            return Err(Fault::content(problem, remedy));
+        }
+        if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
+            let (first, other) = (called(id), called(rival.column));
+            let problem = format!("the columns {first} and {other} could both name the vehicle, and do not agree");
+            let [first, other] = [&header[id], &header[rival.column]];
+            let remedy = format!("say which one does with --column id={first} or --column id={other}");
             return Err(Fault::content(problem, remedy));
         }
         Ok(())
