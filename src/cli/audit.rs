@@ -9,6 +9,7 @@ use super::caller;
 use super::console::{self, Console};
 use super::open::Open;
 use super::own::OwnRecording;
+use super::places;
 use super::replays::{self, Instants};
 use crate::audit::recorded::{Outcome, Presence, RecordedError, Settings, TrackAuditor};
 use crate::read;
@@ -158,9 +159,7 @@ fn judged(
     let called = arguments.reading.called();
     let mut recording = open()?;
     let is_planar = recording.is_planar();
-    if is_planar {
-        arguments.refuse_heights(settings)?;
-    }
+    let level = places::refuse_unknown(arguments, settings, recording.as_ref())?;
     let interrupted = caller::interruption();
     let progress = console.counter(called.clone());
     let mut items = Vec::new();
@@ -177,6 +176,7 @@ fn judged(
             arguments.refuse_guessed_seconds(recording.clock().unit)?;
         }
         first = false;
+        level.check(&called, recording.vehicles(), &items)?;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
         auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
         note(&items, recording.vehicles());

@@ -285,25 +285,6 @@ impl AuditArguments {
         Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")))
     }
 
-    /// Refuses questions about heights of a recording that has none.
-    pub(super) fn refuse_heights(&self, settings: &Settings) -> Result<(), Failure> {
-        let limit = settings.envelope.limits.iter().find(|limit| limit.quantity.needs_height());
-        let obstacle = settings.obstacles.iter().find(|obstacle| !obstacle.is_upright_through_ground());
-        let fence = settings.envelope.fence.as_ref().filter(|fence| fence.height_m().is_some());
-        let asked = [
-            limit.map(|limit| format!("the limit `{}`", limit.quantity.name())),
-            fence.map(|_| "the fence with `height_m`".to_owned()),
-            settings.above_m.map(|_| "`--above`".to_owned()),
-            obstacle.map(|obstacle| format!("the obstacle `{}`, which is not upright at height 0,", obstacle.name)),
-        ];
-        let Some(asked) = asked.into_iter().flatten().next() else { return Ok(()) };
-        let message =
-            format!("{}: the heights of its vehicles are not known, and {asked} needs them", self.reading.called());
-        let help = "name the column of the height with --column z=NAME, or leave the question out";
-        let asked_by = self.asked_by.as_ref().map_or(String::new(), |note| format!(" ({note})"));
-        Err(Failure::input(message, format!("{help}{asked_by}")))
-    }
-
     /// What is taken to happen between samples of a recording of curves alone, or that may be ours; nothing is proved where
     /// the samples themselves are assumed.
     pub(super) fn between(&self, curves: bool, own: Option<&OwnRecording>, assumed: Option<&str>) -> Between {

@@ -14,7 +14,7 @@ use super::{Exit, Failure, outputs};
 use crate::export::{self, ExportOptions, WRITTEN};
 use crate::read::{self, Fault, Format, ReadError, Recording};
 use crate::report::write_atomically_with;
-use crate::track::{Clock, Item, Tracks};
+use crate::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
@@ -77,6 +77,10 @@ impl Tracks for Interruptible {
 
     fn is_planar(&self) -> bool {
         self.tracks.is_planar()
+    }
+
+    fn earth_origin(&self) -> Option<&EarthOrigin> {
+        self.tracks.earth_origin()
     }
 }
 

@@ -36,6 +36,7 @@ mod outputs;
 mod own;
 mod own_obstacles;
 mod pictures;
+mod places;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;

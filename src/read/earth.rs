@@ -6,6 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::{Fault, quoted};
+use crate::track::EarthOrigin;
 
 /// Half the equator's diameter \[m\].
 const EQUATOR_M: f64 = 6_378_137.0;
@@ -53,6 +54,11 @@ impl Local {
     pub(super) fn origin(&self) -> String {
         let [latitude, longitude, height] = self.origin.into();
         format!("{latitude:?},{longitude:?},{height:?}")
+    }
+
+    /// The origin, which is `given` or inferred.
+    pub(super) fn measured_from(&self, given: Option<[f64; 3]>) -> EarthOrigin {
+        EarthOrigin { place: self.origin(), is_inferred: given.is_none() }
     }
 
     /// What a person should know.

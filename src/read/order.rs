@@ -8,7 +8,7 @@ use super::clock::{Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::source::Source;
-use crate::track::{Clock, Item, Sample, Tracks};
+use crate::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 
 /// Rows given out at a time.
 pub(super) const BATCH: usize = 10_000;
@@ -102,6 +102,8 @@ pub(super) struct About {
     pub(super) scale: f64,
     /// Whether its rows have no height.
     pub(super) is_planar: bool,
+    /// What its places on the Earth are measured from.
+    pub(super) earth_origin: Option<EarthOrigin>,
     pub(super) notes: Vec<String>,
     /// The fault of a recording without rows.
     pub(super) none: Fault,
@@ -118,7 +120,17 @@ impl About {
     ) -> Self {
         let unit = options.time_unit.or(said);
         let (path, times_per_second) = (source.shown(), options.times_per_second);
-        Self { path, unit, times_per_second, epoch_ns: 0, scale: options.scale, is_planar: false, notes, none }
+        Self {
+            path,
+            unit,
+            times_per_second,
+            epoch_ns: 0,
+            scale: options.scale,
+            is_planar: false,
+            earth_origin: None,
+            notes,
+            none,
+        }
     }
 }
 
@@ -133,6 +145,7 @@ pub(super) struct Ordered<R> {
     notes: Vec<String>,
     assumed: Option<String>,
     is_planar: bool,
+    earth_origin: Option<EarthOrigin>,
     scale: f64,
     /// Rows read that have not been given out.
     batch: std::vec::IntoIter<Row>,
@@ -149,7 +162,7 @@ pub(super) struct Ordered<R> {
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { path, unit, times_per_second, epoch_ns, scale, is_planar, mut notes, none } = about;
+        let About { path, unit, times_per_second, epoch_ns, scale, is_planar, earth_origin, mut notes, none } = about;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() {
@@ -192,6 +205,7 @@ impl<R: Rows> Ordered<R> {
             notes,
             assumed,
             is_planar,
+            earth_origin,
             scale,
             batch,
             ended,
@@ -306,5 +320,9 @@ impl<R: Rows> Tracks for Ordered<R> {
 
     fn is_planar(&self) -> bool {
         self.is_planar
+    }
+
+    fn earth_origin(&self) -> Option<&EarthOrigin> {
+        self.earth_origin.as_ref()
     }
 }

@@ -112,6 +112,7 @@ pub(super) fn open<C: Cells + 'static>(
     let (names, is_planar) = (Names::from_list(layout.names.clone())?, layout.is_planar);
     let local = origin(&mut cells, &layout, options)?;
     about.notes.extend(local.map(|local| local.note()));
+    about.earth_origin = local.map(|local| local.measured_from(options.origin));
     cells.restart(&layout.columns_to_see(), true)?;
     // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
     about.scale = if layout.on_earth { 1.0 } else { about.scale };

@@ -90,3 +90,33 @@ fn what_needs_no_height_is_judged_in_the_plane_and_the_verdict_says_so() {
     let report: serde_json::Value = serde_json::from_str(&json).expect("a report");
     assert_eq!(report["planar"], true);
 }
+
+#[test]
+fn heights_above_a_first_place_that_nobody_named_are_none() {
+    let folder = recordings();
+    let rows: String = (0..10).map(|t| format!("{t},a,47,8,11826\n{t},b,47.001,8,11826\n")).collect();
+    fs::write(folder.path().join("adsb.csv"), format!("t,id,lat,lon,geoaltitude\n{rows}")).expect("written");
+    for question in [
+        &["--limit", "height=120"][..],
+        &["--limit", "floor=0"],
+        &["--fence", "room.toml"],
+        &["--fence", "field.toml"],
+        &["--delta", "1", "--above", "0.5"],
+        &["--delta", "1", "--obstacles", "ball.toml"],
+    ] {
+        let ran = audit(folder.path(), &[&["adsb.csv"], question].concat());
+        let said = "measured from the first one, 47.0,8.0,11826.0";
+        assert!(ran.exit == Some(2) && ran.err.contains(said) && ran.err.contains("--origin"), "{ran:?}");
+        let asked = audit(folder.path(), &[&["adsb.csv", "--origin", "47,8,0"], question].concat());
+        assert!(asked.exit.is_some_and(|exit| exit < 2), "{asked:?}");
+    }
+    let high = audit(folder.path(), &["adsb.csv", "--origin", "47,8,0", "--limit", "height=120"]);
+    assert!(high.exit == Some(1) && high.out.contains("height of a was 11826.000 m"), "{high:?}");
+    // Far from the origin z is no height: level ground is below its level plane.
+    let far = audit(folder.path(), &["adsb.csv", "--origin", "47.1,8,0", "--limit", "height=120"]);
+    assert!(far.exit == Some(2) && far.err.contains("km from --origin"), "{far:?}");
+    assert_eq!(audit(folder.path(), &["adsb.csv", "--origin", "47.1,8,0", "--delta", "1"]).exit, Some(0));
+    // Differences depend on no origin.
+    let relative = audit(folder.path(), &["adsb.csv", "--delta", "1", "--limit", "climb=2,speed=1"]);
+    assert_eq!(relative.exit, Some(0), "{relative:?}");
+}

@@ -79,6 +79,12 @@ impl Quantity {
         matches!(self, Self::Climb | Self::Descent | Self::Height | Self::Floor)
     }
 
+    /// Whether it depends on what positions are measured from.
+    #[must_use]
+    pub fn needs_origin(self) -> bool {
+        matches!(self, Self::Height | Self::Floor | Self::Fence)
+    }
+
     /// Whether it must not fall below its limit, where the others must not exceed theirs.
     #[must_use]
     pub fn is_least(self) -> bool {

@@ -15,7 +15,8 @@ use crate::record::mcap::topic::Part;
 pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {
     let plan = Plan::of(&mut splits, options)?;
     let none = plan.none();
-    let about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
+    let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
+    about.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
     let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new() };
     Ok(Box::new(Ordered::open(foreign, about)?))
 }
