@@ -66,18 +66,19 @@ impl Asked<'_> {
 }
 
 /// Looks whether z is a height wherever vehicles are, where a question needs that.
-pub(super) struct Level {
+pub(super) struct Level<'a> {
+    settings: &'a Settings,
     /// What is asked; none where nothing is to be looked at.
     asked: Option<String>,
 }
 
 /// Refuses questions about heights where the recording has none, and about places where nobody says what they are measured
 /// from.
-pub(super) fn refuse_unknown(
+pub(super) fn refuse_unknown<'a>(
     arguments: &AuditArguments,
-    settings: &Settings,
+    settings: &'a Settings,
     recording: &dyn Tracks<Error = ReadError>,
-) -> Result<Level, Failure> {
+) -> Result<Level<'a>, Failure> {
     let asked = Asked { settings };
     let of_heights = || {
         let asked = asked.of_heights().filter(|_| recording.is_planar())?;
@@ -92,22 +93,28 @@ pub(super) fn refuse_unknown(
         Some((format!("places are measured from the first one, {place}, and {asked} depends on that"), help))
     };
     let Some((problem, help)) = of_heights().or_else(of_places) else {
-        return Ok(Level { asked: origin.and_then(|_| asked.of_level()) });
+        return Ok(Level { settings, asked: origin.and_then(|_| asked.of_level()) });
     };
     let asked_by = arguments.asked_by.as_ref().map_or(String::new(), |note| format!(" ({note})"));
     Err(Failure::input(format!("{}: {problem}", arguments.reading.called()), format!("{help}{asked_by}")))
 }
 
-impl Level {
-    /// Refuses positions so far from the origin that level ground is well below its level plane.
+impl Level<'_> {
+    /// Refuses positions that are judged and so far from the origin that level ground is well below its level plane.
     pub(super) fn check(&self, path: &str, names: &[String], items: &[Item]) -> Result<(), Failure> {
         let Some(asked) = &self.asked else { return Ok(()) };
+        let Settings { from_s, to_s, only, .. } = self.settings;
+        let is_judged = |name: &str, time_s: f64| {
+            from_s.is_none_or(|from_s| time_s >= from_s)
+                && to_s.is_none_or(|to_s| time_s <= to_s)
+                && only.as_ref().is_none_or(|only| only.contains(name))
+        };
         for item in items {
             let Item::Sample(sample) = item else { continue };
+            let name = names.get(sample.vehicle).map_or("", String::as_str);
             let away_m = sample.position_m.xy().norm();
             let drop_m = away_m * away_m / (2.0 * EARTH_RADIUS_M);
-            if drop_m > MOST_DROP_M {
-                let name = names.get(sample.vehicle).map_or("", String::as_str);
+            if drop_m > MOST_DROP_M && is_judged(name, sample.time_s) {
                 let (time_s, away_km) = (sample.time_s, away_m / 1000.0);
                 let message = format!(
                     "{path}: {name} is {away_km:.1} km from --origin at {time_s:?} s, where level ground is {drop_m:.1} m \
