@@ -261,6 +261,11 @@ pub(super) fn tells_no_vehicle(name: &str) -> bool {
         || stem.rsplit_once(['.', '/', '_']).is_some_and(|(start, _)| start.len() == 1 || says_a_quantity(start))
 }
 
+/// Whether the values of a column of this name could be those of vehicles.
+pub(super) fn may_name(name: &str) -> bool {
+    !is_clock(name) && !tells_no_vehicle(name) && Heading::of(name).is_none()
+}
+
 /// Whether a column would be read as one of a table that names the vehicle of each row: no other may be called so.
 pub(crate) fn is_read(name: &str) -> bool {
     let is_own = |heading: Heading<'_>| {

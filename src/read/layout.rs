@@ -105,14 +105,7 @@ impl Layout {
         let time = columns.get("", TIME).or_else(|| first(heading::is_time)).or_else(|| first(heading::is_frame));
         let time = time.ok_or_else(|| missing(header, TIME, ""))?;
         let unit = unit_of_time(&header[time], options)?;
-        let named: Vec<_> =
-            (0..header.len()).filter(|&column| column != time && heading::is_id(&header[column])).collect();
-        // Where the user says which column it is, no other is asked.
-        let (id, rivals) = match (columns.get("", ID), named.split_first()) {
-            (Some(given), _) => (Some(given), Vec::new()),
-            (None, Some((&first, rest))) => (Some(first), rest.to_vec()),
-            (None, None) => (None, Vec::new()),
-        };
+        let (id, rivals) = naming_columns(header, time, columns.get("", ID));
         let is_id_given = columns.get("", ID).is_some();
 
         let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
@@ -165,13 +158,11 @@ impl Layout {
         let used = layout.columns();
         layout.metres = columns.metres(&used, options.scale)?;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
-        let may_name = |column: &usize| {
-            let name = &header[*column];
-            !heading::is_clock(name) && !heading::tells_no_vehicle(name) && Heading::of(name).is_none()
-        };
         if id.is_some() || one {
-            layout.suspects =
-                unused.clone().filter(may_name).filter(|column| !layout.rivals.contains(column)).collect();
+            layout.suspects = unused
+                .clone()
+                .filter(|column| heading::may_name(&header[*column]) && !layout.rivals.contains(column))
+                .collect();
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         if id.is_none() && one && !options.one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
@@ -215,6 +206,13 @@ impl Layout {
         let columns: BTreeSet<_> = self.bodies.iter().flat_map(of).chain(self.time).chain(self.id).collect();
         columns.into_iter().collect()
     }
+}
+
+/// The column that names the vehicles, and others that could; none where the user says which one it is.
+fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Option<usize>, Vec<usize>) {
+    let is_one = |&column: &usize| column != time && heading::is_id(&header[column]);
+    let mut named = (0..header.len()).filter(is_one);
+    if given.is_some() { (given, Vec::new()) } else { (named.next(), named.collect()) }
 }
 
 /// The unit that the name of a column of time says, where the user says nothing of it.
