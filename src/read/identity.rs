@@ -58,7 +58,9 @@ impl Rival {
         self.contradicts |= **known != *value;
         match self.vehicles.get(value) {
             Some(&first) => self.contradicts |= first != vehicle,
-            None => drop(self.vehicles.insert(value.into(), vehicle)),
+            None => {
+                self.vehicles.insert(value.into(), vehicle);
+            }
         }
     }
 

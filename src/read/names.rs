@@ -21,7 +21,9 @@ impl Names {
     /// Where two differ only in how they are spelled.
     pub(super) fn from_list(names: Vec<String>) -> Result<Self, Fault> {
         let mut all = Self::default();
-        names.into_iter().try_for_each(|name| all.add(name).map(drop))?;
+        for name in names {
+            all.add(name)?;
+        }
         Ok(all)
     }
 
