@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray3};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use tautline::cli::{Film, RunHistory, Witness, flight_page};
+use tautline::cli::{Film, RunHistory, Witness, flight_page, run_verdict};
 use tautline::preflight::Preflight;
 use tautline::record::mcap::{Header, McapRecorder};
 use tautline::record::{Event, RecordError, Sample, Sink};
@@ -85,7 +85,7 @@ impl Flown {
             velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
             commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
             separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
-            seen: Py::new(py, Seen(witness.finish()))?,
+            seen: Py::new(py, Seen(witness.finish(&run_verdict(report))))?,
         })
     }
 }
@@ -154,7 +154,10 @@ pub(crate) fn fly(
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
         let (samples, (witness, Beside { recording, page })) = sinks;
-        let closed = recording.map_or(Ok(()), McapRecorder::finish);
+        let closed = recording.map_or(Ok(()), |recording| match &flown {
+            Ok((report, _)) => recording.close(run_verdict(report)),
+            Err(_) => recording.finish(),
+        });
         let (report, ending) = flown?;
         closed?;
         let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));

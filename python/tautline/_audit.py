@@ -34,7 +34,8 @@ class ViolationError(Error):
 class Audit:
     """What the judge says of a recording."""
 
-    #: ``PROVED CLEAR``, ``CLEAR if straight between samples`` (or as it was asked), ``VIOLATION`` or ``UNDECIDED``.
+    #: ``PROVED CLEAR``, ``CLEAR as the run judged every step``, ``CLEAR if straight between samples`` (or as it was asked),
+    #: ``VIOLATION`` or ``UNDECIDED``.
     verdict: str
     #: The verdict and what it rests on, in a line.
     headline: str
@@ -96,7 +97,7 @@ class Audit:
 
     @property
     def violations(self) -> Findings:
-        """Every violation in order of time: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``."""
+        """Violations in order of time, of many the worst and the first of each pair: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``."""
         return Findings(self._report["violations"])
 
     @property
@@ -177,9 +178,7 @@ class Audit:
         rows = [
             ("finding", self.headline.partition(": ")[2]),
             ("vehicles judged", str(self._report["judged"])),
-            ("violations", str(len(self._report["violations"]))),
-            ("undecided", str(len(self._report["undecided"]))),
-            ("gaps", str(len(self._report["gaps"]))),
+            *((kind, str(self._report["findings"][kind]["count"])) for kind in ("violations", "undecided", "gaps")),
         ]
         drawing = _display.bars(
             [" ".join(near["who"]) for near in closest],
@@ -204,6 +203,7 @@ def audit(
     obstacles: PathLike | None = None,
     limit: Mapping[str, float] | None = None,
     fence: PathLike | None = None,
+    accel_window: float | None = None,
     config: PathLike | Literal[False] | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
@@ -212,6 +212,8 @@ def audit(
     offset: Mapping[str, float] | None = None,
     expect_vehicles: int | None = None,
     max_gap: float | None = None,
+    require_presence: bool = False,
+    independent: bool = False,
     _seen: _native.Seen | None = None,
     **read_as: Any,
 ) -> Audit:
@@ -228,10 +230,12 @@ def audit(
     ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep
     max(delta, r1 + r2). ``ellipsoid`` (3,) [m] are half axes of what must stay empty, with delta scaled by them. ``motion`` says what
     happens between samples: ``linear``, ``hold``, ``polynomial``, ``bounded`` (with ``max_accel`` [m/s^2]). ``obstacles`` is a TOML
-    file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2], ``height`` [m]; ``fence`` is a TOML file of
+    file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2] (with ``accel_window`` [s] its mean over windows of that
+    length), ``height`` [m]; ``fence`` is a TOML file of
     what each must stay within. Of a file, ``config`` is a ``tautline.toml`` that fills what is not asked here; the one beside the
     recording unless given, and none where it is False. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
-    judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap.
+    judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap. With ``require_presence`` it is undecided where a vehicle is not seen over the
+    whole window; with ``independent`` a recording of a flight is judged by its samples alone.
 
     Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
     wrong with the input. docs/audit.md says what each verdict means.
@@ -245,11 +249,13 @@ def audit(
     words += of_each("--max-accel", max_accel, "max_accel") + of_each("--radius", radius, "radius")
     words += [] if ellipsoid is None else [f"--ellipsoid={numbers(ellipsoid, 'ellipsoid')}"]
     words += ["--no-config"] if config is False else []
+    words += ["--require-presence"] if require_presence else []
+    words += ["--independent"] if independent else []
     files = {"obstacles": obstacles, "fence": fence, "config": None if config is False else config}
     given = [path(file, what) for what, file in files.items() if file is not None]
     words += [f"--{what}={path(file, what)}" for what, file in files.items() if file is not None]
     words += [f"--limit={what}={number(most, 'limit')}" for what, most in by_name(limit, "limit").items()]
-    for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap)):
+    for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap), ("accel-window", accel_window)):
         words += [] if value is None else [f"--{option}={number(value, option)}"]
     if ids is not None:
         judged = listed(ids, "ids")

@@ -28,7 +28,7 @@ class Flight:
 
     #: (T,) recorded instants [s].
     t: NDArray[np.float64]
-    #: (T, N, 3) positions [m].
+    #: (T, N, 3) positions [m], read-only.
     positions: NDArray[np.float64]
     #: (T, N, 3) velocities [m/s].
     velocities: NDArray[np.float64]
@@ -49,6 +49,9 @@ class Flight:
         self.t, self.positions, self.velocities = flown.t, flown.positions, flown.velocities
         self.commands, self.separations_m = flown.commands, flown.separations_m
         self._seen = flown.seen
+        # What the run judged: another motion would not be.
+        for judged in (self.t, self.positions):
+            judged.flags.writeable = False
 
     @property
     def status(self) -> str:

@@ -40,6 +40,8 @@ struct AuditTable {
     expect_vehicles: Option<usize>,
     layout: Option<String>,
     allow_undecided: Option<bool>,
+    require_presence: Option<bool>,
+    accel_window_s: Option<f64>,
     limits: BTreeMap<String, f64>,
 }
 
@@ -116,6 +118,7 @@ impl AuditTable {
             ("max_accel_m_s2", self.max_accel_m_s2),
             ("above_m", self.above_m),
             ("max_gap_s", self.max_gap_s),
+            ("accel_window_s", self.accel_window_s),
         ];
         if let Some((key, _)) = numbers.into_iter().find(|(_, value)| value.is_some_and(|value| !value.is_finite())) {
             return Err(wrong(format!("{key} must be a finite number")));
@@ -147,6 +150,8 @@ impl AuditTable {
         arguments.expect_vehicles = arguments.expect_vehicles.or(self.expect_vehicles);
         let layout = self.layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
         arguments.reading.usual_layout = layout.map_err(|error| wrong(format!("layout: {error}")))?;
+        arguments.accel_window = arguments.accel_window.or(self.accel_window_s);
+        arguments.require_presence |= self.require_presence.unwrap_or(false);
         arguments.allow_undecided |= self.allow_undecided.unwrap_or(false);
         for (key, allowed) in self.limits {
             let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.key() == key);

@@ -6,6 +6,7 @@ use super::Failure;
 use super::judgement::Judgement;
 use crate::report::Status;
 use crate::report::recorded::{OfLimit, OfPair, OfVehicle, RecordedReport};
+use crate::text::counted;
 
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
@@ -115,6 +116,12 @@ fn suite(Judgement { report, allows_undecided, .. }: &Judgement) -> TestSuite {
         report.separation().map(|status| TestCase::new("separation", verdict(status, &headline))).into_iter().collect();
     cases
         .extend(report.limits.iter().map(|limit| TestCase::new(limit.quantity, verdict(limit.status, &limit.brief()))));
+    if report.presence.required {
+        let partly = report.presence.partly as u64;
+        let status = if partly == 0 { Status::Clear } else { Status::Undecided };
+        let words = format!("{} not seen throughout", counted(partly, "vehicle is", "vehicles are"));
+        cases.push(TestCase::new("presence", verdict(status, &words)));
+    }
     for OfPair { who: [first, second], finding: v } in &report.violations {
         let words = format!("{:?} below {:?} from {:?} s to {:?} s", v.min_m, v.limit_m, v.from_s, v.to_s);
         cases.push(TestCase::new(format!("{first} and {second} at {:.3} s", v.min_at_s), failed(&words)));

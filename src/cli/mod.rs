@@ -62,6 +62,7 @@ use clap::Parser as _;
 pub use call::{Answer, Held, Refusal, call, judge, open};
 pub use own::{OwnRecording, Witness};
 pub use pictures::flight_page;
+pub use run::run_verdict;
 
 pub use crate::figures::RunHistory;
 pub use crate::replay::Film;

@@ -19,10 +19,10 @@ use super::{Exit, Failure};
 use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
-use crate::record::mcap::{Header, McapRecorder};
+use crate::record::mcap::{Header, McapRecorder, RunVerdict};
 use crate::replay::{Film, PAGE_BYTES};
 use crate::report::page::Picture;
-use crate::report::{INTERRUPTED, Report, RunPage};
+use crate::report::{INTERRUPTED, Report, RunPage, Status};
 use crate::run::{run_while, verify};
 use crate::scenario::Scenario;
 
@@ -217,10 +217,34 @@ fn fly(
     };
     let flown = run_while(scenario, preflight, &mut (&mut recording, watchers), &mut carry_on);
     progress.finish_and_clear();
-    let closed = recording.finish();
+    let closed = match &flown {
+        Ok(report) => recording.close(run_verdict(report)),
+        Err(_) => recording.finish(),
+    };
     let report = flown?;
     closed?;
     Ok(report)
+}
+
+/// What a run says of itself when it closes its recording.
+#[must_use]
+pub fn run_verdict(report: &Report) -> RunVerdict {
+    let status = match report.audit.status {
+        Status::Clear => "clear",
+        Status::Violation => "violation",
+        Status::Undecided => "undecided",
+    };
+    RunVerdict {
+        status: status.to_owned(),
+        ended_early: report.run.ended_early.clone().unwrap_or_default(),
+        separation_m: report.separation.min_m.unwrap_or(f64::NAN),
+        separation_time_s: report.separation.min_at_s.unwrap_or(f64::NAN),
+        pair: report.separation.min_pair.unwrap_or_default().map(|number| number as u64),
+        steps: report.audit.steps,
+        duration_s: report.run.duration_s,
+        state_sha256: report.run.state_hash.clone(),
+        told_sha256: String::new(),
+    }
 }
 
 /// So many threads; 0 for one a core.

@@ -24,6 +24,8 @@ mod layouts;
 mod limits;
 mod margin;
 mod obstacles;
+mod own_recordings;
+mod presence;
 mod reads;
 mod references;
 mod refuses;
