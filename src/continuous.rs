@@ -190,6 +190,10 @@ impl Continuous {
     /// within T/4 times the integral of |p''| of its chord. The integral is taken from the change of velocity in each
     /// solver step.
     ///
+    /// Where vehicles come to the barrier of a law, as they do under limited accelerations, the law has no answer beyond. They then
+    /// keep the accelerations that they have there to the end, so that their way past the barrier is judged, and the law's
+    /// reason is the result.
+    ///
     /// # Errors
     /// [`IdealError`]; the state is then not to be observed.
     pub fn advance(
@@ -198,7 +202,7 @@ impl Continuous {
         feedback: &mut dyn Feedback,
         end: &mut Swarm,
         path: &mut Path,
-    ) -> Result<(), IdealError> {
+    ) -> Result<Option<LawError>, IdealError> {
         if let Some(air) = &mut self.air {
             air.advance(dt_s);
         }
@@ -206,16 +210,34 @@ impl Continuous {
         let flow = Flow::new(feedback, &self.swarm, motion, from_s);
         let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), self.step_s.min(dt_s))?;
         let mut turned_m_s = vec![0.0; self.swarm.count()];
-        solver.advance(dt_s, &mut |solver| {
+        let solved = solver.advance(dt_s, &mut |solver| {
             solver.add_turns(&mut turned_m_s);
             flow.accept(solver.method.t(), solver.method.y());
             Ok(())
-        })?;
+        });
         path.bend(0.25 * dt_s * turned_m_s.into_iter().fold(0.0, f64::max));
-        self.step_s = solver.method.h();
-        self.swarm = solver.swarm();
+        let undefined = match solved {
+            Ok(()) => {
+                self.step_s = solver.method.h();
+                self.swarm = solver.swarm();
+                None
+            }
+            Err(IdealError::Law { time_s, source }) if source.is_at_a_barrier() => {
+                let (now_s, state) = (solver.method.t(), solver.method.y());
+                let coasted = flow.coasted(now_s, state, dt_s - now_s);
+                let (after, bend_m) = coasted.ok_or(IdealError::Law { time_s, source })?;
+                if now_s > 0.0 {
+                    path.pass(now_s, &solver.swarm().positions_m);
+                }
+                path.bend(bend_m);
+                self.step_s = FIRST_STEP_S;
+                self.swarm = flow.swarm_of(&after);
+                Some(source)
+            }
+            Err(error) => return Err(error),
+        };
         end.clone_from(&self.swarm);
-        Ok(())
+        Ok(undefined)
     }
 
     /// Writes the state.
@@ -296,7 +318,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         while until_s - self.method.t() > RESOLUTION * until_s {
             let (time_s, free_step_s) = (self.method.t(), self.method.h());
             let step_s = free_step_s.min(until_s - time_s).min(self.flow.smooth_s(time_s));
-            if step_s <= RESOLUTION * until_s {
+            if step_s <= RESOLUTION * until_s || (undefined.is_some() && self.moves_nothing(step_s)) {
                 return Err(
                     undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })
                 );
@@ -323,6 +345,13 @@ impl<'a, 'law> Solver<'a, 'law> {
             observe(self)?;
         }
         Ok(())
+    }
+
+    /// Whether no vehicle moves by more than coordinates resolve in a step \[s\].
+    fn moves_nothing(&self, step_s: f64) -> bool {
+        let (positions_m, velocities_m_s) = self.method.y().split_at(self.method.y().len() / 2);
+        let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, number| most.max(number.abs()));
+        largest(velocities_m_s) * step_s <= 4.0 * f64::EPSILON * largest(positions_m)
     }
 
     /// The state at a time within the last step, solved anew from the beginning of that step.

@@ -58,11 +58,11 @@ pub fn run_with(
         .carried_by(scenario.reference.as_ref());
     let mut state_hash = StateHash::new();
     let is_beside = scenario.count() >= BESIDE_FROM && rayon::current_num_threads() > 1 && !sink.looks_at_steps();
-    let mut sinks = (sink, (&mut metrics, &mut state_hash));
+    let mut recorders = (sink, &mut state_hash);
     let flight = if is_beside {
-        record_beside(&mut sinks, |sink| sim::fly(scenario, parts, sink, carry_on))?
+        record_beside(&mut recorders, |beside| sim::fly(scenario, parts, &mut (beside, &mut metrics), carry_on))?
     } else {
-        sim::fly(scenario, parts, &mut sinks, carry_on)?
+        sim::fly(scenario, parts, &mut (&mut recorders, &mut metrics), carry_on)?
     };
     let report = report(scenario, preflight, &flight, &metrics, state_hash.finish());
     Ok((report, flight.ending))

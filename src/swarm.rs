@@ -119,12 +119,19 @@ pub fn largest_row_norm(rows: &Rows) -> f64 {
 /// The first row that holds a number that is not finite.
 #[must_use]
 pub fn first_row_not_finite(rows: &Rows) -> Option<usize> {
+    first_row_beyond(rows, f64::MAX)
+}
+
+/// Returns the first row that holds a number beyond a limit in size, or one that is not finite.
+#[must_use]
+pub fn first_row_beyond(rows: &Rows, limit: f64) -> Option<usize> {
+    let is_within = |x: &f64| x.abs() <= limit;
     // Without a branch for each number, and in no order, many are looked at together.
-    let is_any_not_finite = |some: &[f64]| some.iter().fold(false, |any, x| any | !x.is_finite());
-    if !rows.as_slice().chunks(256).any(is_any_not_finite) {
+    let are_within = |some: &[f64]| some.iter().fold(true, |all, x| all & is_within(x));
+    if rows.as_slice().chunks(256).all(are_within) {
         return None;
     }
-    (0..rows.nrows()).find(|&i| rows.row(i).iter().any(|x| !x.is_finite()))
+    (0..rows.nrows()).find(|&i| !rows.row(i).iter().all(is_within))
 }
 
 /// Two different vehicles, the lower index first. Shown from 1: `2-3`, and in JSON `[2, 3]`.
@@ -241,6 +248,12 @@ mod tests {
             }
         }
         assert_eq!(first_row_not_finite(&Rows::zeros(0)), None);
+        let mut rows = Rows::from_element(300, -1e30);
+        assert_eq!(first_row_beyond(&rows, 1e30), None);
+        for number in [-1.1e30, f64::NAN] {
+            rows[(256, 2)] = number;
+            assert_eq!(first_row_beyond(&rows, 1e30), Some(256));
+        }
     }
 
     #[test]

@@ -134,4 +134,8 @@ impl Tracks for Arrays<'_> {
     fn notes(&self) -> &[String] {
         self.notes
     }
+
+    fn is_planar(&self) -> bool {
+        self.positions_m.shape()[2] == 2
+    }
 }

@@ -98,7 +98,8 @@ pub(crate) fn audit<'py>(
     let (times, positions) = (given.times.as_array(), given.positions.as_array());
     let velocities = given.velocities.as_ref().map(PyReadonlyArray3::as_array);
     let is_plane = positions.shape()[2] == 2;
-    let plane = is_plane.then(|| "positions have two columns: z is taken as 0".to_owned());
+    let plane = is_plane
+        .then(|| "positions have two axes and no height: the recording is judged in the plane of x and y".to_owned());
     let notes: Vec<String> = plane.into_iter().chain(notes_of_absence(positions, &names)).collect();
     let arrays = Arrays::new(times, positions, velocities, &names, &notes);
     let own = seen.map(|seen| &seen.0);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray3};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use tautline::cli::{Film, RunHistory, Witness, flight_page};
+use tautline::cli::{Film, RunHistory, Witness, flight_page, run_verdict};
 use tautline::preflight::Preflight;
 use tautline::record::mcap::{Header, McapRecorder};
 use tautline::record::{Event, RecordError, Sample, Sink};
@@ -16,7 +16,7 @@ use tautline::sim::{Breakdown, Ending, Parts, SimError};
 
 use crate::audit::Seen;
 use crate::errors::{Raised as _, broken, wrong};
-use crate::law::PythonLaw;
+use crate::law::{PythonLaw, catching};
 use crate::numbers::{by_row, cube};
 use crate::scenario::Scenario;
 use crate::work::{Signals, here};
@@ -85,7 +85,7 @@ impl Flown {
             velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
             commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
             separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
-            seen: Py::new(py, Seen(witness.finish()))?,
+            seen: Py::new(py, Seen(witness.finish(&run_verdict(report))))?,
         })
     }
 }
@@ -133,10 +133,10 @@ pub(crate) fn fly(
 ) -> PyResult<Flown> {
     let scenario = &scenario.scenario;
     let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
-    let raising = law.as_ref().map(PythonLaw::raising);
+    let is_of_python = law.is_some();
     let samples = Samples { is_kept: keep, vehicles: scenario.count(), ..Samples::default() };
     let mut signals = Signals::new();
-    let flown = here(py, || -> Result<_, SimError> {
+    let flight = || -> Result<_, SimError> {
         let preflight = match &law {
             Some(law) => Preflight::under(scenario, law),
             None => Preflight::of(scenario)?,
@@ -154,17 +154,21 @@ pub(crate) fn fly(
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
         let (samples, (witness, Beside { recording, page })) = sinks;
-        let closed = recording.map_or(Ok(()), McapRecorder::finish);
+        let closed = recording.map_or(Ok(()), |recording| match &flown {
+            Ok((report, _)) => recording.close(run_verdict(report)),
+            Err(_) => recording.finish(),
+        });
         let (report, ending) = flown?;
         closed?;
         let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));
         Ok((report, ending, (samples, witness), page))
-    })?;
-    if let Some(raised) = signals.raised.or_else(|| raising.as_ref()?.take()) {
+    };
+    let (flown, raised) = here(py, || catching(flight))?;
+    if let Some(raised) = signals.raised.or(raised) {
         return Err(raised);
     }
     let (report, ending, (samples, witness), page) = flown.map_err(SimError::raised)?;
-    if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), Some(_)) = (&ending, &raising) {
+    if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), true) = (&ending, is_of_python) {
         return Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")));
     }
     if let (Some(page), Some(path)) = (page, html) {

@@ -1,6 +1,7 @@
 //! Laws that are written in Python.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::cell::RefCell;
+use std::sync::Arc;
 
 use numpy::ndarray::Ix2;
 use numpy::{PyArray1, PyArrayMethods as _, PyUntypedArrayMethods as _};
@@ -23,23 +24,22 @@ pub(crate) struct PythonLaw {
     name: String,
     sensing_range_m: Option<f64>,
     controls: Controls,
-    asked: Arc<Asked>,
+    control: Arc<Py<PyAny>>,
 }
 
-/// The object, and what it raised.
-struct Asked {
-    control: Py<PyAny>,
-    raised: Mutex<Option<PyErr>>,
+thread_local! {
+    /// Exception of a law in the innermost [`catching`] of this thread.
+    static RAISED: RefCell<Option<PyErr>> = const { RefCell::new(None) };
 }
 
-/// What a law raised, to be raised again.
-#[derive(Clone)]
-pub(crate) struct Raising(Arc<Asked>);
-
-impl Raising {
-    pub(crate) fn take(&self) -> Option<PyErr> {
-        self.0.raised.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
+/// Does work that may ask laws, in this thread, and returns the exception that one of them raised beside what was done.
+///
+/// A law is asked in the thread that flies ([`Law::stays_in_its_thread`]), so an exception belongs to the work of its own thread, and no
+/// other simulation finds it. Calls may lie within each other: a law may step another simulation.
+pub(crate) fn catching<T>(work: impl FnOnce() -> T) -> (T, Option<PyErr>) {
+    let outer = RAISED.take();
+    let done = work();
+    (done, RAISED.replace(outer))
 }
 
 impl PythonLaw {
@@ -74,20 +74,14 @@ impl PythonLaw {
                 return Err(wrong(message));
             }
         };
-        let asked = Asked { control: control.unbind(), raised: Mutex::default() };
-        Ok(Self { name, sensing_range_m, controls, asked: Arc::new(asked) })
-    }
-
-    /// Where what it raises is to be found.
-    pub(crate) fn raising(&self) -> Raising {
-        Raising(Arc::clone(&self.asked))
+        Ok(Self { name, sensing_range_m, controls, control: Arc::new(control.unbind()) })
     }
 
     fn ask(&self, py: Python<'_>, at: &observation::Observation<'_>, command: &mut Rows) -> PyResult<()> {
         let count = at.own.count();
         let out = PyArray1::from_vec(py, vec![f64::NAN; 3 * count]).reshape([count, 3])?;
         let seen = Observation::new(py, at, self.sensing_range_m.is_some())?;
-        let returned = self.asked.control.bind(py).call1((seen, &out))?;
+        let returned = self.control.bind(py).call1((seen, &out))?;
         if !returned.is_none() {
             let kind = returned.get_type().qualname()?;
             return Err(wrong_type(format!("control() writes into `out` (out[:] = ...) and returns None, not {kind}")));
@@ -109,7 +103,7 @@ impl Law for PythonLaw {
 
     fn command(&mut self, at: &observation::Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         Python::attach(|py| self.ask(py, at, command)).map_err(|raised| {
-            *self.asked.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
+            RAISED.set(Some(raised));
             LawError::Failed
         })
     }

@@ -18,6 +18,8 @@ use crate::work::away;
 pub(crate) struct Columns {
     vehicles: Vec<String>,
     notes: Vec<String>,
+    /// Whether some height is not known: z is 0 then, and means nothing.
+    planar: bool,
     unit: String,
     epoch_ns: i64,
     /// (M,) which vehicle, from 0.
@@ -43,6 +45,7 @@ pub(crate) struct Columns {
 struct Read {
     vehicles: Vec<String>,
     notes: Vec<String>,
+    planar: bool,
     unit: String,
     epoch_ns: i64,
     samples: Vec<Sample>,
@@ -75,13 +78,14 @@ fn all(words: &[String], interrupted: &AtomicBool) -> PyResult<Read> {
     }
     let clock = recording.clock();
     (read.unit, read.epoch_ns) = (clock.unit.to_owned(), clock.epoch_ns);
+    read.planar = recording.is_planar();
     (read.vehicles, read.notes) = (recording.vehicles().to_vec(), recording.notes().to_vec());
     Ok(read)
 }
 
 impl Read {
     fn columns(self, py: Python<'_>) -> PyResult<Columns> {
-        let Self { vehicles, notes, unit, epoch_ns, samples, pieces } = self;
+        let Self { vehicles, notes, planar, unit, epoch_ns, samples, pieces } = self;
         let index = |vehicle: usize| i64::try_from(vehicle).unwrap_or(i64::MAX);
         let numbers = |of: &dyn Fn(&Sample) -> f64| PyArray1::from_iter(py, samples.iter().map(of)).unbind();
         let most = pieces.iter().map(|piece| piece.coefficients.len()).max().unwrap_or(1);
@@ -100,6 +104,7 @@ impl Read {
             piece_coefficients: cube(py, coefficients.collect(), [pieces.len(), most, 3])?.unbind(),
             vehicles,
             notes,
+            planar,
             unit,
             epoch_ns,
         })

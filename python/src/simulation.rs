@@ -11,7 +11,7 @@ use tautline::sim::{self, Ending, Parts, SimError};
 use tautline::swarm::{Pair, first_row_not_finite};
 
 use crate::errors::{Raised as _, wrong};
-use crate::law::{PythonLaw, Raising};
+use crate::law::{PythonLaw, catching};
 use crate::numbers::{borrowed, shown, table, to_rows};
 use crate::scenario::Scenario;
 use crate::work::here;
@@ -23,7 +23,8 @@ const AT_ONCE: Duration = Duration::from_millis(50);
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Simulation {
     count: usize,
-    raising: Option<Raising>,
+    /// Whether its law is written in Python.
+    is_of_python: bool,
     state: Mutex<sim::Simulation>,
 }
 
@@ -47,10 +48,12 @@ impl Simulation {
     }
 
     /// Raises what the law raised, and what it wrote that is no number.
-    fn raise(&self, py: Python<'_>) -> PyResult<()> {
-        let Some(raising) = &self.raising else { return Ok(()) };
-        if let Some(raised) = raising.take() {
+    fn raise(&self, py: Python<'_>, raised: Option<PyErr>) -> PyResult<()> {
+        if let Some(raised) = raised {
             return Err(raised);
+        }
+        if !self.is_of_python {
+            return Ok(());
         }
         match self.with(py, |simulation| simulation.ending().cloned())? {
             Some(Ending::BrokeDown(why @ sim::Breakdown::CommandNotFinite { .. })) => {
@@ -68,17 +71,18 @@ impl Simulation {
     fn new(py: Python<'_>, scenario: &Scenario, law: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let scenario = &scenario.scenario;
         let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
-        let raising = law.as_ref().map(PythonLaw::raising);
-        let made = here(py, || -> Result<_, SimError> {
+        let is_of_python = law.is_some();
+        let begin = || -> Result<_, SimError> {
             let parts = match law {
                 Some(law) => Parts::under(scenario, Box::new(law)),
                 None => Parts::of(scenario)?,
             };
             sim::Simulation::with(scenario, parts)
-        })?;
+        };
+        let (made, raised) = here(py, || catching(begin))?;
         let state = Mutex::new(made.map_err(SimError::raised)?);
-        let simulation = Self { count: scenario.count(), raising, state };
-        simulation.raise(py)?;
+        let simulation = Self { count: scenario.count(), is_of_python, state };
+        simulation.raise(py, raised)?;
         Ok(simulation)
     }
 
@@ -102,7 +106,7 @@ impl Simulation {
         }
         let mut left = steps;
         while left > 0 {
-            let flown = self.with(py, |simulation| -> Result<u64, SimError> {
+            let some_steps = |simulation: &mut sim::Simulation| -> Result<u64, SimError> {
                 let (began, mut flown) = (Instant::now(), 0);
                 while flown < left && began.elapsed() < AT_ONCE {
                     if simulation.ending().is_some() {
@@ -118,8 +122,9 @@ impl Simulation {
                     flown += 1;
                 }
                 Ok(flown)
-            })?;
-            self.raise(py)?;
+            };
+            let (flown, raised) = self.with(py, |simulation| catching(|| some_steps(simulation)))?;
+            self.raise(py, raised)?;
             left -= flown.map_err(SimError::raised)?;
             py.check_signals()?;
         }
@@ -170,14 +175,14 @@ impl Simulation {
         self.with(py, |simulation| simulation.least_clearance_m())
     }
 
-    /// What the judge has found so far: `clear`, `violation` or `undecided`, and the violations of two vehicles.
+    /// What the judge has found so far, of a flight that has ended of all of it: `clear`, `violation` or `undecided`, and the
+    /// violations of two vehicles.
     fn judged(&self, py: Python<'_>) -> PyResult<(String, Vec<Violation>)> {
-        let flight = self.with(py, |simulation| simulation.clone().finish())?;
+        let (flight, is_over) =
+            self.with(py, |simulation| (simulation.clone().finish(), simulation.ending().is_some()))?;
         let found = flight.audit.violations.iter().map(|of| (numbers(of.pair), of.from_s, of.to_s, of.min_m));
-        let past = flight.clearance.as_ref().map(|clearance| clearance.status);
-        let worst = [Some(flight.audit.status), past].into_iter().flatten().max_by_key(|status| rank(*status));
-        let status = worst.map_or("undecided", word);
-        Ok((status.to_owned(), found.collect()))
+        let status = if is_over { flight.status() } else { flight.status_so_far() };
+        Ok((status.name().to_owned(), found.collect()))
     }
 
     /// How the flight ended, once it has: `completed`, or why before its time.
@@ -196,29 +201,11 @@ impl Simulation {
             }
             copy
         })?;
-        Ok(Self { count: self.count, raising: self.raising.clone(), state: Mutex::new(copied) })
+        Ok(Self { count: self.count, is_of_python: self.is_of_python, state: Mutex::new(copied) })
     }
 }
 
 fn numbers(pair: Pair) -> (usize, usize) {
     let [first, second] = pair.numbers();
     (first, second)
-}
-
-fn rank(status: tautline::audit::Status) -> u8 {
-    use tautline::audit::Status;
-    match status {
-        Status::Clear => 0,
-        Status::Undecided => 1,
-        Status::Violation => 2,
-    }
-}
-
-fn word(status: tautline::audit::Status) -> &'static str {
-    use tautline::audit::Status;
-    match status {
-        Status::Clear => "clear",
-        Status::Undecided => "undecided",
-        Status::Violation => "violation",
-    }
 }

@@ -34,7 +34,8 @@ class ViolationError(Error):
 class Audit:
     """What the judge says of a recording."""
 
-    #: ``PROVED CLEAR``, ``CLEAR if straight between samples`` (or as it was asked), ``VIOLATION`` or ``UNDECIDED``.
+    #: ``PROVED CLEAR``, ``CLEAR as the run judged every step``, ``CLEAR if straight between samples`` (or as it was asked),
+    #: ``VIOLATION`` or ``UNDECIDED``.
     verdict: str
     #: The verdict and what it rests on, in a line.
     headline: str
@@ -72,6 +73,11 @@ class Audit:
         return assumed
 
     @property
+    def is_planar(self) -> bool:
+        """Whether the height of some vehicle is not known: distances and speeds are those in the plane of x and y then."""
+        return bool(self._report["planar"])
+
+    @property
     def delta_m(self) -> float | None:
         """The safety distance asked about [m] (a scaled distance with an ellipsoid); None where radii alone were."""
         delta: float | None = self._report["separation"]["delta_m"]
@@ -91,7 +97,7 @@ class Audit:
 
     @property
     def violations(self) -> Findings:
-        """Every violation in order of time: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``."""
+        """Violations in order of time, of many the worst and the first of each pair: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``."""
         return Findings(self._report["violations"])
 
     @property
@@ -103,6 +109,13 @@ class Audit:
     def gaps(self) -> Findings:
         """When vehicles were not seen: ``vehicle``, ``from_s``, ``to_s``."""
         return Findings(self._report["gaps"])
+
+    @property
+    def ended_early(self) -> dict[str, Any] | None:
+        """Where a flight ended before its time: ``at_s``, ``duration_s`` of the scenario and ``reason``. None where what was asked about
+        was flown."""
+        end: dict[str, Any] | None = self._report["ended_early"]
+        return end
 
     @property
     def obstacles(self) -> Findings:
@@ -165,9 +178,7 @@ class Audit:
         rows = [
             ("finding", self.headline.partition(": ")[2]),
             ("vehicles judged", str(self._report["judged"])),
-            ("violations", str(len(self._report["violations"]))),
-            ("undecided", str(len(self._report["undecided"]))),
-            ("gaps", str(len(self._report["gaps"]))),
+            *((kind, str(self._report["findings"][kind]["count"])) for kind in ("violations", "undecided", "gaps")),
         ]
         drawing = _display.bars(
             [" ".join(near["who"]) for near in closest],
@@ -192,6 +203,7 @@ def audit(
     obstacles: PathLike | None = None,
     limit: Mapping[str, float] | None = None,
     fence: PathLike | None = None,
+    accel_window: float | None = None,
     config: PathLike | Literal[False] | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
@@ -200,26 +212,30 @@ def audit(
     offset: Mapping[str, float] | None = None,
     expect_vehicles: int | None = None,
     max_gap: float | None = None,
+    require_presence: bool = False,
+    independent: bool = False,
     _seen: _native.Seen | None = None,
     **read_as: Any,
 ) -> Audit:
     """Judges positions over time, of arrays or of a recording of any format.
 
     ``tl.audit(t, positions, delta=1.5)``: ``t`` (T,) times [s], ``positions`` (T, N, 3) or (T, N, 2) [m], both float64 in any
-    order of memory; they are borrowed, not copied, and must not be written to until this returns. NaN in every axis: the
+    order of memory, or laid out as ``layout`` says (``"time,axis,vehicle"``); they are borrowed, not copied, and must not be written to until this returns. NaN in every axis: the
     vehicle was not seen; ``notes`` names whoever was not seen from the first instant to the last. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
 
     ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
-    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``sort``, ``duplicates``, ``one_vehicle``, ``scale``, ``axes``, ``dimensions``, ``column``, ``start``, ``axis_order``,
+    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``sort``, ``duplicates``, ``one_vehicle``, ``scale``, ``axes``, ``dimensions``, ``column``, ``start``, ``layout``,
     ``frame``, ``topic``, ``origin``, ``allow_unfinished``.
 
     ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep
     max(delta, r1 + r2). ``ellipsoid`` (3,) [m] are half axes of what must stay empty, with delta scaled by them. ``motion`` says what
     happens between samples: ``linear``, ``hold``, ``polynomial``, ``bounded`` (with ``max_accel`` [m/s^2]). ``obstacles`` is a TOML
-    file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2], ``height`` [m]; ``fence`` is a TOML file of
+    file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2] (with ``accel_window`` [s] its mean over windows of that
+    length), ``height`` [m]; ``fence`` is a TOML file of
     what each must stay within. Of a file, ``config`` is a ``tautline.toml`` that fills what is not asked here; the one beside the
     recording unless given, and none where it is False. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
-    judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap.
+    judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap. With ``require_presence`` it is undecided where a vehicle is not seen over the
+    whole window; with ``independent`` a recording of a flight is judged by its samples alone.
 
     Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
     wrong with the input. docs/audit.md says what each verdict means.
@@ -233,11 +249,13 @@ def audit(
     words += of_each("--max-accel", max_accel, "max_accel") + of_each("--radius", radius, "radius")
     words += [] if ellipsoid is None else [f"--ellipsoid={numbers(ellipsoid, 'ellipsoid')}"]
     words += ["--no-config"] if config is False else []
+    words += ["--require-presence"] if require_presence else []
+    words += ["--independent"] if independent else []
     files = {"obstacles": obstacles, "fence": fence, "config": None if config is False else config}
     given = [path(file, what) for what, file in files.items() if file is not None]
     words += [f"--{what}={path(file, what)}" for what, file in files.items() if file is not None]
     words += [f"--limit={what}={number(most, 'limit')}" for what, most in by_name(limit, "limit").items()]
-    for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap)):
+    for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap), ("accel-window", accel_window)):
         words += [] if value is None else [f"--{option}={number(value, option)}"]
     if ids is not None:
         judged = listed(ids, "ids")
@@ -247,9 +265,23 @@ def audit(
     words += [f"--offset={name}={number(seconds, 'offset')}" for name, seconds in by_name(offset, "offset").items()]
     if positions is None:
         return of_files(words + reading(**read_as), t, given, velocities is not None or names is not None)
+    layout = read_as.pop("layout", None)
+    if layout is not None:
+        positions, velocities = (of if of is None else laid_out(of, layout) for of in (positions, velocities))
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
     return with_files(given, lambda: of_arrays(words, t, positions, velocities, names, _seen))
+
+
+def laid_out(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
+    """A view (T, N, 3) of an array whose axes count these, such as ``time,axis,vehicle``."""
+    usual = ("time", "vehicle", "axis")
+    axes = layout.split(",")
+    if sorted(axes) != sorted(usual):
+        raise Error(f"layout: '{layout}' is not time, vehicle and axis between commas, such as 'time,axis,vehicle'")
+    if not isinstance(array, np.ndarray) or array.ndim != len(usual):
+        raise TypeError("layout: it says what the three axes of an array count")
+    return array.transpose([axes.index(axis) for axis in usual])
 
 
 def of_files(words: list[str], t: object, beside: list[str], has_more: bool) -> Audit:

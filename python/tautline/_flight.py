@@ -28,7 +28,7 @@ class Flight:
 
     #: (T,) recorded instants [s].
     t: NDArray[np.float64]
-    #: (T, N, 3) positions [m].
+    #: (T, N, 3) positions [m], read-only.
     positions: NDArray[np.float64]
     #: (T, N, 3) velocities [m/s].
     velocities: NDArray[np.float64]
@@ -49,11 +49,25 @@ class Flight:
         self.t, self.positions, self.velocities = flown.t, flown.positions, flown.velocities
         self.commands, self.separations_m = flown.commands, flown.separations_m
         self._seen = flown.seen
+        # What the run judged: another motion would not be.
+        for judged in (self.t, self.positions):
+            judged.flags.writeable = False
 
     @property
     def status(self) -> str:
-        """What the judge found: ``clear``, ``violation`` or ``undecided``."""
+        """What the judge found: ``clear``, ``violation`` or ``undecided``. A flight that ended early is never ``clear``."""
         return str(self.report["audit"]["status"])
+
+    @property
+    def ended_early(self) -> str | None:
+        """Why the flight ended before the scenario's duration; None where it did not."""
+        reason: str | None = self.report["run"]["ended_early"]
+        return reason
+
+    @property
+    def reached(self) -> bool:
+        """Whether the formation was reached and kept to the end of the scenario's duration; never of a flight that ended early."""
+        return bool(self.report["formation"]["reached"])
 
     @property
     def separation_m(self) -> float | None:
@@ -78,7 +92,8 @@ class Flight:
 
     def audit(self, **asked: Any) -> Audit:
         """Judges the recorded instants with other questions, as :func:`tautline.audit` judges the flight's recording: what the flight
-        saw between them counts, and delta, ellipsoids and obstacles are the scenario's unless others are asked about."""
+        saw between them counts, and delta, ellipsoids and obstacles are the scenario's unless others are asked about. Of a flight that
+        ended early the verdict is ``UNDECIDED`` unless a violation was seen, or ``to_s`` ends the window before."""
         return audit(self.t, self.positions, _seen=self._seen, **asked)
 
     def plot(self) -> Figure:
@@ -117,6 +132,7 @@ class Flight:
             ("violations", str(len(self.report["audit"]["violations"]))),
             ("formation reached", "no" if reached is None else f"at {reached:.4g} s"),
         ]
+        rows += [] if self.ended_early is None else [("ended early", self.ended_early)]
         tone = "good" if self.passed else "bad" if self.status == "violation" else "open"
         return _display.card(tone, self.headline, rows, _display.paths(self.positions, "Ways seen from above"))
 

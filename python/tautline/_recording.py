@@ -42,6 +42,11 @@ class Recording:
         return self._columns.notes
 
     @property
+    def is_planar(self) -> bool:
+        """Whether the height of some vehicle is not known: z is 0 everywhere then and has no meaning."""
+        return self._columns.planar
+
+    @property
     def epoch_ns(self) -> int:
         """What was taken from every time, so that no digit of a clock in nanoseconds is lost [ns]."""
         return self._columns.epoch_ns
@@ -126,16 +131,17 @@ class Recording:
             out[within] = at
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row a sample in order of time: ``t``, ``id``, ``x``, ``y``, ``z``, and ``vx``, ``vy``, ``vz``, ``radius`` where there are. Imports
+        """A row a sample in order of time: ``t``, ``id``, ``x``, ``y``, ``z`` (not in a plane), and ``vx``, ``vy``, ``vz``, ``radius`` where there are. Imports
         pandas. Raises :class:`Error` where the recording has curves."""
         if self.has_curves:
             raise Error("the recording has curves, which are no rows: take to_numpy(hz=...)")
         columns = self._columns
         rows: dict[str, Any] = {"t": columns.t, "id": np.array(self.vehicles, dtype=object)[columns.vehicle]}
-        for axis, letter in enumerate("xyz"):
+        letters = "xy" if self.is_planar else "xyz"
+        for axis, letter in enumerate(letters):
             rows[letter] = columns.position[:, axis]
         if not np.isnan(columns.velocity).all():
-            rows |= {f"v{letter}": columns.velocity[:, axis] for axis, letter in enumerate("xyz")}
+            rows |= {f"v{letter}": columns.velocity[:, axis] for axis, letter in enumerate(letters)}
         if not np.isnan(columns.radius).all():
             rows["radius"] = columns.radius
         return frame(rows)

@@ -95,7 +95,8 @@ class Simulation:
 
     @property
     def status(self) -> str:
-        """What the judge has found so far: ``clear``, ``violation`` or ``undecided``."""
+        """What the judge has found so far: ``clear``, ``violation`` or ``undecided``. Once the flight has ended, the verdict on all of it:
+        never ``clear`` where it ended early."""
         return self._native.judged()[0]
 
     @property
@@ -110,6 +111,11 @@ class Simulation:
     def ending(self) -> str | None:
         """How the flight ended, once it has: ``completed``, or why before its time."""
         return self._native.ending
+
+    @property
+    def ended_early(self) -> str | None:
+        """Why the flight ended before the scenario's duration; None where it did not, and while it is under way."""
+        return None if self.ending == "completed" else self.ending
 
     @property
     def is_over(self) -> bool:

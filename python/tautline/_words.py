@@ -131,7 +131,7 @@ def reading(
     dimensions: str | None = None,
     column: Mapping[str, str] | None = None,
     start: Mapping[str, Iterable[float]] | None = None,
-    axis_order: str | None = None,
+    layout: str | None = None,
     frame: str | None = None,
     topic: str | Sequence[str] | None = None,
     origin: Iterable[float] | None = None,
@@ -147,7 +147,7 @@ def reading(
         duplicates=duplicates,
         axes=axes,
         dimensions=dimensions,
-        axis_order=axis_order,
+        layout=layout,
         frame=frame,
         topic=topic,
     )

@@ -2,10 +2,13 @@
 
 use super::bounds::{Bound, Variation};
 use super::method::Method;
-use crate::scenario::{Override, Scenario, ScenarioError, Source, between, takes_whole_numbers_alone};
+use crate::scenario::{Override, Scenario, ScenarioError, Source, takes_whole_numbers_alone};
 use crate::sim::SimError;
 use crate::swarm::{Rows, separation};
 use crate::text::as_toml;
+
+/// A place between two bounds, neither an end nor the middle, at which a key is tried.
+const BETWEEN: f64 = 0.381_966;
 
 /// The axes of a point, as keys have them.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -171,7 +174,14 @@ impl Plan {
         self.bounds.iter().zip(places).map(|(bound, &place)| bound.at(place)).collect()
     }
 
-    /// The overrides that fly a candidate of these values with the `k`-th seed of noise, from 0.
+    /// The overrides that every flight has.
+    #[must_use]
+    pub fn overrides(&self) -> &[Override] {
+        &self.overrides
+    }
+
+    /// The overrides that fly a candidate of these values with the `k`-th seed of noise, from 0, on top of those that every
+    /// flight has.
     #[must_use]
     pub fn sets(&self, values: &[f64], k: u64) -> Vec<String> {
         let of_keys = self.asked.vary.len();
@@ -244,19 +254,26 @@ impl Plan {
         if is_asked { Ok(()) } else { Err(AttackError::Apart { apart_m, delta_m, own_m }) }
     }
 
-    /// The bound of a key, and a scenario with a value in it. The key takes whole numbers where it takes no other between bounds
-    /// that are whole.
+    /// The bound of a key, and a scenario with a value in it.
+    ///
+    /// # Errors
+    /// [`AttackError::Scenario`] where neither a value between the bounds nor a bound can be read, and for a bound with a fraction
+    /// of a key that takes whole numbers alone.
     fn bound(&self, variation: &Variation) -> Result<(Bound, Scenario), AttackError> {
         let Variation { ref key, low, high } = *variation;
         let read = |value: f64| self.with(&[format!("{key}={}", as_toml(value))]);
-        let whole = takes_whole_numbers_alone([low, high], |value| read(value).is_ok());
-        if let Ok(scenario) = read(between([low, high], whole)) {
-            return Ok((variation.bound(whole), scenario));
+        let whole = takes_whole_numbers_alone(&self.source, &self.overrides, key);
+        let refused = |value: f64| move |error| AttackError::Scenario { set: format!("{key} = {value}"), error };
+        if let Some(end) = [low, high].into_iter().find(|end| whole && end.fract() != 0.0) {
+            read(end).map_err(refused(end))?;
+        }
+        let bound = variation.bound(whole);
+        if let Ok(scenario) = read(bound.at(BETWEEN)) {
+            return Ok((bound, scenario));
         }
         // What cannot be flown at one end may be at the other.
-        let refused = |error| AttackError::Scenario { set: format!("{key} = {low}"), error };
-        let scenario = read(low).or_else(|error| read(high).map_err(|_| error)).map_err(refused)?;
-        Ok((variation.bound(whole), scenario))
+        let scenario = read(low).or_else(|error| read(high).map_err(|_| error)).map_err(refused(low))?;
+        Ok((bound, scenario))
     }
 
     /// What `--start` and `--velocity` leave free: each coordinate, positions before velocities.

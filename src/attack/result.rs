@@ -9,7 +9,7 @@ use crate::compare::{FlightRow, Outcome};
 use crate::report::{ScenarioIdentity, Tool};
 
 /// Version of the keys of `attack --json`: raised when one is renamed, removed or changes its meaning.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// How a flight went.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -100,7 +100,7 @@ pub struct Attack {
     pub own: Flown,
     /// Candidates that were each worse than all before; the last is the worst.
     pub progress: Vec<Candidate>,
-    /// The overrides that fly the worst again.
+    /// The overrides that fly the worst again by themselves, those of the call first.
     pub sets: Vec<String>,
 }
 
@@ -168,7 +168,10 @@ impl Found {
 impl Attack {
     pub(super) fn new(plan: &Plan, own: Flown, found: Found, restarts: u64, interrupted: bool) -> Self {
         let (scenario, asked) = (plan.own(), plan.asked());
-        let sets = found.progress.last().map(|worst| plan.sets(&worst.values, worst.run));
+        let sets = found.progress.last().map(|worst| {
+            let of_call = plan.overrides().iter().map(|set| set.text().to_owned());
+            of_call.chain(plan.sets(&worst.values, worst.run)).collect()
+        });
         Self {
             schema_version: SCHEMA_VERSION,
             scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },

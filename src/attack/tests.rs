@@ -224,3 +224,15 @@ fn what_is_no_search_is_refused() {
     let both = Asked { start_m: Some(1.0), ..varied(&["start.positions_m.1.x=0..1"], 10) };
     assert!(refused(both).contains("start.positions_m.1.x is varied twice"));
 }
+
+#[test]
+fn whole_numbers_are_those_of_keys_that_count_whatever_their_bounds() {
+    let bound = |key: &str| {
+        let source = Source::Builtin("crazyflies".to_owned());
+        Plan::new(source, &[], varied(&[key], 2)).map(|plan| plan.bounds()[0].whole)
+    };
+    assert_eq!(bound("sensing.latency_s=0..1").expect("a plan"), false);
+    assert_eq!(bound("time.max_halvings=0..4").expect("a plan"), true);
+    let refused = bound("time.max_halvings=0..2.5").expect_err("no whole number").to_string();
+    assert!(refused.contains("time.max_halvings = 2.5") && refused.contains("whole number"), "{refused}");
+}

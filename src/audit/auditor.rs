@@ -103,7 +103,7 @@ impl Auditor {
     pub fn finish(self) -> AuditOutcome {
         let decided = self.time_s.is_some() && self.outcome.refused == 0 && self.ledger.is_decided();
         let Ledger { unresolved, parry, .. } = self.ledger;
-        let (violations, _) = self.ledger.into_lists();
+        let violations = self.ledger.into_lists().violations;
         let status = Status::new(!violations.is_empty(), decided);
         AuditOutcome { status, violations, unresolved, parry, ..self.outcome }
     }

@@ -3,6 +3,7 @@
 use super::auditor::check_instant;
 use super::enclosure::Target;
 use super::error::AuditError;
+use super::ledger::Lists;
 use super::obstacle::{Obstacle, ObstacleError};
 use super::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use super::pair_sweep::PairSweep;
@@ -180,7 +181,7 @@ impl ClearanceAuditor {
     pub fn finish(self) -> ClearanceOutcome {
         let Results { ledger, obstacles, .. } = self.results;
         let (parry, decided) = (ledger.parry, self.time_s.is_some() && self.refused == 0 && ledger.is_decided());
-        let (violations, undecided) = ledger.into_lists();
+        let Lists { violations, undecided, .. } = ledger.into_lists();
         let status = Status::new(!violations.is_empty(), decided);
         let (closest, refused) = (obstacles.kept, self.refused);
         ClearanceOutcome { status, closest, violations, undecided, unresolved: 0, parry, refused }

@@ -1,41 +1,126 @@
 //! What has been found so far: times below a limit, times that cannot be decided, and what the second detector says.
 
-use std::collections::BTreeMap;
+use std::fmt;
 
+use super::episodes::Episodes;
 use super::outcome::{Disagreement, ParryEvidence, Undecided, Violation};
 use super::parry::{CrossCheck, KeepOut};
+use super::shortlist::{Finding, Tally};
 use super::sweep::{ClosestPoint, Interval, RESOLUTION, RelativeMotion};
 
 /// Coarsest resolution, as a fraction of the limit, at which a pair that seems clear by less than the resolution is still
 /// called clear.
 const NEGLIGIBLE_RESOLUTION: f64 = 1e-8;
 
+/// Findings that are kept where the recording itself corrects them at the end.
+const KEPT_FOR_CORRECTION: usize = 1 << 16;
+
 /// The findings on pairs that are named by `P`.
 #[derive(Clone, Debug)]
-pub(super) struct Ledger<P> {
+pub(super) struct Ledger<P: Copy + Ord + fmt::Debug> {
     /// In the order in which they were found.
-    pub(super) violations: Vec<Violation<P>>,
-    /// Indices of each pair's violations, in order of time.
-    of_pair: BTreeMap<P, Vec<usize>>,
-    undecided: BTreeMap<P, Vec<Undecided<P>>>,
+    pub(super) violations: Episodes<Violation<P>>,
+    undecided: Episodes<Undecided<P>>,
+    /// The sampling rate that would decide all that is undecided \[Hz\]; none where there is none that would.
+    deciding_rate_hz: Option<f64>,
     /// Sweeps that seem clear with less room than rounding.
     pub(super) unresolved: u64,
     pub(super) parry: ParryEvidence<P>,
+    is_bounded: bool,
 }
 
-impl<P> Default for Ledger<P> {
+/// Every violation and every undecided time, or the worst and the first of them, and how many there are.
+pub(super) struct Lists<P: Copy + Ord + fmt::Debug> {
+    pub(super) violations: Vec<Violation<P>>,
+    pub(super) undecided: Vec<Undecided<P>>,
+    pub(super) violations_tally: Tally,
+    pub(super) undecided_tally: Tally,
+    pub(super) deciding_rate_hz: Option<f64>,
+}
+
+impl<P: Copy + Ord + fmt::Debug> Finding for Violation<P> {
+    type On = P;
+
+    fn on(&self) -> P {
+        self.pair
+    }
+
+    fn start_s(&self) -> f64 {
+        self.from_s
+    }
+
+    fn end_s(&self) -> f64 {
+        self.to_s
+    }
+
+    fn excess(&self) -> f64 {
+        self.limit_m - self.min_m
+    }
+}
+
+impl<P: Copy + Ord + fmt::Debug> Finding for Undecided<P> {
+    type On = P;
+
+    fn on(&self) -> P {
+        self.pair
+    }
+
+    fn start_s(&self) -> f64 {
+        self.from_s
+    }
+
+    fn end_s(&self) -> f64 {
+        self.to_s
+    }
+
+    fn excess(&self) -> f64 {
+        self.limit_m - self.lower_m
+    }
+}
+
+impl<P: Copy + Ord + fmt::Debug> Default for Ledger<P> {
     fn default() -> Self {
         Self {
-            violations: Vec::new(),
-            of_pair: BTreeMap::new(),
-            undecided: BTreeMap::new(),
+            violations: Episodes::default(),
+            undecided: Episodes::default(),
+            deciding_rate_hz: Some(0.0),
             unresolved: 0,
             parry: ParryEvidence::default(),
+            is_bounded: false,
         }
     }
 }
 
-impl<P: Copy + Ord> Ledger<P> {
+impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
+    /// One that counts what it finds, and lists the worst and the first of it.
+    pub(super) fn bounded() -> Self {
+        let (violations, undecided) = (Episodes::bounded(), Episodes::bounded());
+        Self { violations, undecided, is_bounded: true, ..Self::default() }
+    }
+
+    /// Keeps enough for what the recording itself says to correct it at the end.
+    pub(super) fn expect_corrections(&mut self) {
+        self.violations.expect_corrections(KEPT_FOR_CORRECTION);
+    }
+
+    /// The window that is swept from now on, behind all that were.
+    pub(super) fn begin(&mut self, window: Interval) {
+        self.violations.begin(window);
+        self.undecided.begin(window);
+    }
+
+    /// Settles, now and then, what nothing that is still to be swept can continue. Is called between two pairs.
+    pub(super) fn settle(&mut self) {
+        self.violations.settle();
+        self.undecided.settle();
+    }
+
+    /// Ends the sweep; what is entered from here on corrects what was found.
+    pub(super) fn close(&mut self) {
+        self.violations.close();
+        self.undecided.close();
+    }
+
     /// Judges a straight motion that is below the limit, close to it, or in contact by the cast; returns the index of its
     /// violation, if it is one.
     #[cold]
@@ -62,49 +147,44 @@ impl<P: Copy + Ord> Ledger<P> {
         };
         let (from_s, to_s, min_at_s) = (over.at(span.enter), over.at(span.exit), over.at(approach.at));
         let violation = Violation { pair, from_s, to_s, min_m, min_at_s, limit_m };
+        if self.violations.is_of_before(to_s) {
+            return None;
+        }
         Some(self.violated(violation, motion.from_squared.sqrt() < limit_m))
     }
 
     /// Enters a time below the limit, and says whether it is below from the very start of a segment; returns the index of
     /// the violation that it is a part of. Those of one pair come in order of time, but may come again.
     pub(super) fn violated(&mut self, new: Violation<P>, from_start: bool) -> usize {
-        let (all, known) = (&mut self.violations, self.of_pair.entry(new.pair).or_default());
+        let (all, known) = (&self.violations, self.violations.of(new.pair));
         let mut touching = known.iter().rev().copied().take_while(|&k| all[k].to_s >= new.from_s);
         let repeated = touching.find(|&k| all[k].from_s <= new.from_s && new.to_s <= all[k].to_s);
         let continued = || known.last().copied().filter(|&k| from_start && new.from_s <= all[k].to_s);
-        if let Some(k) = repeated.or_else(continued) {
-            let old = &mut all[k];
+        let found = repeated.or_else(continued);
+        if let Some((k, old)) = found.and_then(|k| Some((k, self.violations.get_mut(k)?))) {
             old.to_s = old.to_s.max(new.to_s);
             if new.min_m < old.min_m {
                 (old.min_m, old.min_at_s) = (new.min_m, new.min_at_s);
             }
             return k;
         }
-        known.push(all.len());
-        all.push(new);
-        all.len() - 1
-    }
-
-    /// Keeps the violations of which something holds.
-    pub(super) fn retain_violations(&mut self, holds: impl FnMut(&Violation<P>) -> bool) {
-        self.violations.retain(holds);
-        self.of_pair.clear();
-        for (index, violation) in self.violations.iter().enumerate() {
-            self.of_pair.entry(violation.pair).or_default().push(index);
-        }
+        self.violations.add(new)
     }
 
     /// Enters a time that cannot be decided; adjacent ones of a pair become one.
     pub(super) fn undecided(&mut self, new: Undecided<P>) {
-        let known = self.undecided.entry(new.pair).or_default();
-        match known.last_mut() {
+        self.deciding_rate_hz = self.deciding_rate_hz.zip(new.rate_hz).map(|(a, b)| a.max(b));
+        let last = self.undecided.of(new.pair).last().copied();
+        match last.and_then(|last| self.undecided.get_mut(last)) {
             Some(last) if new.from_s <= last.to_s && last.from_s <= new.to_s => {
                 last.to_s = last.to_s.max(new.to_s);
                 last.lower_m = last.lower_m.min(new.lower_m);
                 last.upper_m = last.upper_m.min(new.upper_m);
                 last.rate_hz = last.rate_hz.zip(new.rate_hz).map(|(a, b)| a.max(b));
             }
-            _ => known.push(new),
+            _ => {
+                self.undecided.add(new);
+            }
         }
     }
 
@@ -122,18 +202,19 @@ impl<P: Copy + Ord> Ledger<P> {
         }
     }
 
-    /// Whether nothing was left open: no time that cannot be decided, and no contradiction of the two detectors.
+    /// Whether nothing was left open: no time that cannot be decided, no contradiction of the two detectors, and no violation that
+    /// is no longer known and might hold where all that are known were corrected.
     pub(super) fn is_decided(&self) -> bool {
-        self.undecided.is_empty() && self.parry.disagreements == 0
+        let are_all_known = !(self.violations.is_empty() && self.violations.are_some_dropped());
+        self.undecided.is_empty() && self.parry.disagreements == 0 && are_all_known
     }
 
-    /// Every violation and every undecided time, in the order of their beginning and then by pair.
-    pub(super) fn into_lists(self) -> (Vec<Violation<P>>, Vec<Undecided<P>>) {
-        let (mut violations, mut undecided) =
-            (self.violations, self.undecided.into_values().flatten().collect::<Vec<_>>());
-        violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.pair.cmp(&b.pair)));
-        undecided.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.pair.cmp(&b.pair)));
-        (violations, undecided)
+    /// What was found, in the order of its beginning and then by pair.
+    pub(super) fn into_lists(self) -> Lists<P> {
+        let (violations, violations_tally) = self.violations.finish(self.is_bounded);
+        let (undecided, undecided_tally) = self.undecided.finish(self.is_bounded);
+        let deciding_rate_hz = self.deciding_rate_hz.filter(|_| !undecided.is_empty());
+        Lists { violations, undecided, violations_tally, undecided_tally, deciding_rate_hz }
     }
 }
 
@@ -167,7 +248,7 @@ mod tests {
             assert_eq!(ledger.violated(below(pair, span_s, min_m), from_start), index);
         }
         let found: Vec<_> =
-            ledger.into_lists().0.iter().map(|v| (v.pair, v.from_s, v.to_s, v.min_m, v.min_at_s)).collect();
+            ledger.into_lists().violations.iter().map(|v| (v.pair, v.from_s, v.to_s, v.min_m, v.min_at_s)).collect();
         assert_eq!(found, [(c, 0.2, 2.0, 0.1, 1.0), (a, 0.5, 1.5, 1.0, 0.5), (b, 1.3, 1.4, 0.5, 1.3)]);
     }
 

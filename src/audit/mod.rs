@@ -39,7 +39,9 @@ mod clearance;
 mod cross_check;
 mod enclosure;
 pub mod envelope;
+mod episodes;
 mod error;
+mod interruption;
 mod ledger;
 mod limits;
 mod obstacle;
@@ -50,6 +52,7 @@ mod polynomial;
 pub mod recorded;
 mod results;
 mod segment;
+mod shortlist;
 mod slices;
 mod sweep;
 
@@ -60,5 +63,6 @@ pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{
     Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
 };
+pub use shortlist::{LISTED, Tally};
 pub use slices::{Slice, Slices};
 pub use sweep::swept_separation_m;

@@ -113,6 +113,23 @@ impl Obstacle {
         }
     }
 
+    /// Whether its section at height 0 is its outline from above, at all times. Then no height brings a vehicle nearer to it than
+    /// height 0.
+    #[must_use]
+    pub fn is_upright_through_ground(&self) -> bool {
+        let holds_0 = |from: f64, to: f64| from.min(to) <= 0.0 && 0.0 <= from.max(to);
+        self.path.iter().all(|(_, at)| match self.shape {
+            Shape::Ball { .. } => at.z == 0.0,
+            Shape::Box { half_m, .. } => holds_0(at.z - half_m.z, at.z + half_m.z),
+            Shape::Capsule { from_m, to_m, .. } => {
+                let (from, to) = (at.z + from_m.z, at.z + to_m.z);
+                let (is_vertical, is_level) = (from_m.xy() == to_m.xy(), from == to);
+                (is_vertical || is_level) && holds_0(from, to)
+            }
+            Shape::HalfSpace { normal } => normal.z == 0.0,
+        })
+    }
+
     /// The same with all lengths so many times as long.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {

@@ -19,7 +19,8 @@ pub enum Status {
     /// A pair was found closer than it may come, whatever else was found.
     Violation,
     /// No violation was found, yet it cannot be called clear: nothing was judged, something was refused or not seen, the
-    /// two detectors disagree, or a separation could not be resolved.
+    /// two detectors disagree, or a separation could not be resolved. A flight in steps too long for its law is undecided with
+    /// violations that integration may have made.
     #[default]
     Undecided,
 }
@@ -30,6 +31,23 @@ impl Status {
             (true, _) => Self::Violation,
             (false, true) => Self::Clear,
             (false, false) => Self::Undecided,
+        }
+    }
+
+    /// Returns the verdict on two things together: the worse of the two.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        let has = |status: Self| self == status || other == status;
+        Self::new(has(Self::Violation), !has(Self::Undecided))
+    }
+
+    /// Returns the name of the status in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clear => "clear",
+            Self::Violation => "violation",
+            Self::Undecided => "undecided",
         }
     }
 }

@@ -68,6 +68,9 @@ impl PairSweep<'_> {
         let vehicles = matches!(self.target, Target::Origin);
         let mut swept = 0;
         overlaps(first, second, |overlap| {
+            if results.interruption.is_set() {
+                return;
+            }
             if self.is_on_ground(overlap.first, overlap.over) && self.is_on_ground(overlap.second, overlap.over) {
                 return;
             }

@@ -1,5 +1,6 @@
 //! What has been found in segments of motion so far, and who came closest.
 
+use super::interruption::Interruption;
 use super::ledger::Ledger;
 use super::outcome::{Approach, ObjectPair};
 
@@ -85,9 +86,23 @@ pub(super) struct Results {
     pub(super) told: Vec<Approach>,
     /// Segments of pairs that were swept.
     pub(super) swept: u64,
+    /// Says whether the sweep is to stop.
+    pub(super) interruption: Interruption,
 }
 
 impl Results {
+    /// Of a recording: what is found is counted, and the worst and the first of it are listed.
+    pub(super) fn bounded(interruption: Interruption) -> Self {
+        Self { ledger: Ledger::bounded(), interruption, ..Self::default() }
+    }
+
+    /// Whether the sweep goes on with another pair; settles what was found of those before it.
+    #[inline]
+    pub(super) fn goes_on(&mut self) -> bool {
+        self.ledger.settle();
+        !self.interruption.is_set()
+    }
+
     /// Enters what the recording itself told.
     pub(super) fn enter(&mut self, told: Approach) {
         self.closest.offer(told);

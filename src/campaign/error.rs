@@ -34,12 +34,16 @@ pub enum CampaignError {
         why: String,
         /// What to do about it.
         help: String,
+        /// The key of the specification, with its tables before it; empty where it is about none.
+        key: String,
     },
     /// A scenario that cannot be read, or not with these keys.
     #[error("{under}{error}")]
     Scenario {
         /// Which keys, followed by a colon, or nothing.
         under: String,
+        /// The key of the specification, with its tables before it.
+        key: String,
         /// What is wrong.
         error: Box<ScenarioError>,
     },
@@ -73,13 +77,15 @@ pub enum CampaignError {
         /// What to do about it.
         help: String,
     },
-    /// Shards that were not flown.
-    #[error("shards {list} of {shards} are missing")]
+    /// Shards that were not flown, or whose parts are damaged.
+    #[error("shards {list} of {shards} are missing{}", in_words(damaged))]
     Holes {
         /// Which, as `tautline campaign shard --shard` takes them.
         list: String,
         /// Of how many.
         shards: u64,
+        /// Those whose parts are there and damaged.
+        damaged: Vec<DamagedPart>,
     },
     /// Two parts of one shard that say different things.
     #[error("two machines flew shard {shard} with different results: {kept} and {other}")]
@@ -103,9 +109,38 @@ pub enum CampaignError {
     },
 }
 
+/// A part whose contents are not what was written.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{path} is damaged: {why}")]
+pub struct DamagedPart {
+    /// Number of its shard.
+    pub shard: u64,
+    /// The file.
+    pub path: PathBuf,
+    /// What shows the damage.
+    pub why: &'static str,
+}
+
+/// The damaged parts, in clauses behind another.
+fn in_words(damaged: &[DamagedPart]) -> String {
+    damaged.iter().map(|part| format!("; {part}")).collect()
+}
+
 impl CampaignError {
     pub(super) fn plan(why: impl Into<String>, help: impl Into<String>) -> Self {
-        Self::Plan { why: why.into(), help: help.into() }
+        Self::Plan { why: why.into(), help: help.into(), key: String::new() }
+    }
+
+    pub(super) fn scenario(under: &str, key: &str, error: ScenarioError) -> Self {
+        Self::Scenario { under: under.to_owned(), key: key.to_owned(), error: Box::new(error) }
+    }
+
+    /// Names the key of the specification that a [`CampaignError::Plan`] is about.
+    pub(super) fn at(mut self, place: &str) -> Self {
+        if let Self::Plan { key, .. } = &mut self {
+            place.clone_into(key);
+        }
+        self
     }
 
     pub(super) fn reading(path: &Path, source: io::Error) -> Self {
@@ -137,7 +172,10 @@ impl CampaignError {
             Self::Splitting { .. } => "let chance have a part in every step (wind, noise of sensing, loss on the network), and split \
                                        into 2 flights at least, with fewer to end in a round"
                 .to_owned(),
-            Self::Holes { list, .. } => format!("fly them with: tautline campaign shard FOLDER --shard {list}"),
+            Self::Holes { list, damaged, .. } => {
+                let replaced = if damaged.is_empty() { "" } else { ", which replaces damaged parts" };
+                format!("fly them with: tautline campaign shard FOLDER --shard {list}{replaced}")
+            }
             Self::Alarm { .. } => "the same flight has the same bits everywhere: look for a faulty machine, or one whose program \
                                    is another; remove the wrong part to go on"
                 .to_owned(),

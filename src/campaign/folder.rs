@@ -6,7 +6,7 @@ use std::hash::BuildHasher as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::error::CampaignError;
+use super::error::{CampaignError, DamagedPart};
 use super::manifest::{Manifest, Program};
 use super::part::{self, Found};
 use super::plan::Campaign;
@@ -153,16 +153,21 @@ impl Folder {
     /// The row of a run under a law, counted from 0; none where it has not been flown.
     ///
     /// # Errors
-    /// As [`Folder::read`].
+    /// As [`Folder::read`], and [`CampaignError::Holes`] where its part is damaged.
     pub fn row(&self, run: u64, law: usize) -> Result<Option<Row>, CampaignError> {
         let manifest = self.campaign.manifest();
         let Some(shard) = (0..manifest.shards).find(|&shard| manifest.range(shard).contains(&run)) else {
             return Ok(None);
         };
-        Ok(match self.read(shard)? {
-            Found::Whole(rows) => rows.into_iter().find(|row| row.place() == (run, law)),
-            Found::Nothing | Found::Broken => None,
-        })
+        match self.read(shard)? {
+            Found::Whole(rows) => Ok(rows.into_iter().find(|row| row.place() == (run, law))),
+            Found::Nothing => Ok(None),
+            Found::Damaged(why) => Err(CampaignError::Holes {
+                list: shard.to_string(),
+                shards: manifest.shards,
+                damaged: vec![DamagedPart { shard, path: self.part(shard), why }],
+            }),
+        }
     }
 
     /// Shards that are not flown, in their order.
@@ -173,6 +178,17 @@ impl Folder {
         let is_missing = |shard: u64| self.read(shard).map(|found| !matches!(found, Found::Whole(_)));
         let shards = 0..self.campaign.manifest().shards;
         shards.filter_map(|shard| is_missing(shard).map(|missing| missing.then_some(shard)).transpose()).collect()
+    }
+
+    /// The part of a shard, where it is there and damaged.
+    ///
+    /// # Errors
+    /// As [`Folder::read`].
+    pub fn damaged(&self, shard: u64) -> Result<Option<DamagedPart>, CampaignError> {
+        Ok(match self.read(shard)? {
+            Found::Damaged(why) => Some(DamagedPart { shard, path: self.part(shard), why }),
+            Found::Whole(_) | Found::Nothing => None,
+        })
     }
 }
 

@@ -48,8 +48,9 @@ const ASSUMED: [&str; 4] = [
     "A flight violates where the independent judge finds two vehicles closer than delta, or one nearer to an obstacle than its \
      clearance, between steps too. Flights that ended \
      early, or of which the judge cannot tell, count at the upper end of an interval.",
-    "Shares of a number of runs that was fixed beforehand have the interval of Clopper and Pearson; where flying stopped as soon \
-     as enough was known, that of a confidence sequence.",
+    "Shares of a number of runs that was fixed beforehand have the two-sided interval of Clopper and Pearson, which leaves out 2.5 % on \
+     either side; the bound of the verdict is one-sided and leaves out 5 % above. Where flying stopped as soon as enough was known, \
+     both are those of a confidence sequence.",
     "An interval holds the true value in at least 95 of 100 campaigns. Of many intervals on one page some will miss.",
 ];
 
@@ -149,7 +150,7 @@ impl Summary {
                 share(&law.pass),
             ]
         });
-        page::numbers("Flights, with 95 % intervals of their shares", &columns, rows)
+        page::numbers("Flights, with two-sided 95 % intervals of their shares", &columns, rows)
     }
 
     fn histograms(&self) -> Vec<Figure> {
@@ -199,7 +200,7 @@ impl Summary {
             };
             std::iter::once(bin.said.render()).chain(shares.map(cell)).collect::<Vec<_>>()
         });
-        let table = page::numbers("Shares with 95 % intervals", &columns, rows);
+        let table = page::numbers("Shares with two-sided 95 % intervals", &columns, rows);
         let middle = |bin: &super::bins::Bin| Some(f64::midpoint(bin.low?, bin.high?));
         let series = |pick: &dyn Fn(&super::bins::BinShares) -> Proportion| {
             let of_law = |law: usize| {

@@ -31,7 +31,7 @@ impl Folder {
     /// however often interrupted they were flown. Runs after which enough was known are left out, whether they were flown or not.
     ///
     /// # Errors
-    /// [`CampaignError::Holes`] where shards are missing, [`CampaignError::Foreign`] where one is of another campaign,
+    /// [`CampaignError::Holes`] where shards are missing or damaged, [`CampaignError::Foreign`] where one is of another campaign,
     /// [`CampaignError::Alarm`] where one was flown twice with different results, [`CampaignError::Machine`].
     pub fn merge(&self) -> Result<Merged, CampaignError> {
         let path = self.file(RESULTS);
@@ -82,6 +82,7 @@ impl Folder {
 
     fn holes(&self, from: u64) -> Result<CampaignError, CampaignError> {
         let missing: Vec<_> = self.missing()?.into_iter().filter(|&shard| shard >= from).collect();
-        Ok(CampaignError::Holes { list: listed(&missing), shards: self.campaign().manifest().shards })
+        let damaged = missing.iter().filter_map(|&shard| self.damaged(shard).transpose()).collect::<Result<_, _>>()?;
+        Ok(CampaignError::Holes { list: listed(&missing), shards: self.campaign().manifest().shards, damaged })
     }
 }

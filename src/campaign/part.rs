@@ -1,7 +1,7 @@
 //! The rows of a shard as a file, whole and with a seal, and the journal of a shard that is under way.
 //!
 //! A part is lines of JSON: a heading, a row a line in the order of runs and laws, and a seal with the SHA-256 of all before
-//! it. A part whose seal does not fit was torn or changed, and is flown again.
+//! it. A part whose seal does not fit is damaged (truncated or altered), and its shard is flown again.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -37,8 +37,8 @@ struct Seal {
 pub enum Found {
     /// There is none.
     Nothing,
-    /// Torn or changed, and to be flown again.
-    Broken,
+    /// Truncated or altered, and to be flown again: what shows it.
+    Damaged(&'static str),
     /// All rows of the shard.
     Whole(Vec<Row>),
 }
@@ -81,16 +81,18 @@ pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) ->
 }
 
 fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<Found, CampaignError> {
-    let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(Found::Broken) };
-    let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(Found::Broken) };
+    const TRUNCATED: &str = "it is truncated: the SHA-256 of its rows is missing";
+    const ALTERED: &str = "it was altered: its rows do not have the SHA-256 at its end";
+    let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(Found::Damaged(TRUNCATED)) };
+    let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(Found::Damaged(TRUNCATED)) };
     let (sealed, seal) = (&bytes[..=end], &body[end + 1..]);
-    let seal: Option<Seal> = serde_json::from_slice(seal).ok();
-    if seal.as_ref().is_none_or(|seal| seal.sha256 != base16(&Sha256::digest(sealed))) {
-        return Ok(Found::Broken);
+    let Ok(seal) = serde_json::from_slice::<Seal>(seal) else { return Ok(Found::Damaged(TRUNCATED)) };
+    if seal.sha256 != base16(&Sha256::digest(sealed)) {
+        return Ok(Found::Damaged(ALTERED));
     }
     let mut lines = sealed.split_inclusive(|&byte| byte == b'\n');
     let Some(heading) = lines.next().and_then(|line| serde_json::from_slice::<Heading>(line).ok()) else {
-        return Ok(Found::Broken);
+        return Ok(Found::Damaged(ALTERED));
     };
     let is_ours = heading.campaign == manifest.campaign && heading.shards == manifest.shards && heading.shard == shard;
     if !is_ours {
@@ -105,8 +107,8 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     }
     let rows: Vec<Row> = lines.map_while(|line| serde_json::from_slice(line).ok()).collect();
     let places = manifest.range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
-    let is_whole = seal.is_some_and(|seal| seal.rows == rows.len()) && rows.iter().map(Row::place).eq(places);
-    Ok(if is_whole { Found::Whole(rows) } else { Found::Broken })
+    let is_whole = seal.rows == rows.len() && rows.iter().map(Row::place).eq(places);
+    Ok(if is_whole { Found::Whole(rows) } else { Found::Damaged(ALTERED) })
 }
 
 /// Rows as they are flown, of one process: what it flew before it was killed is not flown again.

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::error::CampaignError;
 use super::manifest::{Manifest, Program, SCHEMA_VERSION};
+use super::overlaps::refuse_overlaps;
 use super::spec::{Method, Spec, Stop};
 use super::vary::Variation;
 use crate::scenario::{Override, Scenario, ScenarioError, Source, Template};
@@ -63,7 +64,7 @@ impl Campaign {
         shards: Option<u64>,
         program: Program,
     ) -> Result<Self, CampaignError> {
-        let plain = |error| CampaignError::Scenario { under: String::new(), error: Box::new(error) };
+        let plain = |error| CampaignError::scenario("", "scenario", error);
         let file = folder.join(&spec.scenario);
         let source =
             if file.is_file() { Source::File(file) } else { Source::resolve(&spec.scenario).map_err(plain)? };
@@ -121,7 +122,6 @@ impl Campaign {
     }
 
     fn read(manifest: Manifest, spec: &Spec) -> Result<Self, CampaignError> {
-        let under = |under: String| move |error| CampaignError::Scenario { under, error: Box::new(error) };
         let source = Source::Embedded {
             name: manifest.scenario_name.clone(),
             text: manifest.scenario.clone(),
@@ -137,19 +137,23 @@ impl Campaign {
             return Err(CampaignError::plan(
                 "[splitting] without method = \"splitting\"",
                 "add it, or leave the table out",
-            ));
+            )
+            .at("splitting"));
         }
         let written = |(key, value): (&String, &toml::Value)| Override::parse(&format!("{key}={value}"));
         let base = sets.iter().map(written).collect::<Result<Vec<_>, _>>();
-        let base = base.map_err(under("[set] ".to_owned()))?;
-        let template = Template::read(&source, &base).map_err(under(String::new()))?;
+        let base = base.map_err(|error| CampaignError::scenario("[set] ", "set", error))?;
+        let template =
+            Template::read(&source, &base).map_err(|error| CampaignError::scenario("", "scenario", error))?;
         let laws = spec.laws.iter().map(|name| {
-            let law = template.law(name).map_err(under(String::new()))?;
+            let law = template.law(name).map_err(|error| CampaignError::scenario("", "laws", error))?;
             Ok(Law { name: law.name.clone(), overrides: law.overrides() })
         });
         let mut laws = laws.collect::<Result<Vec<_>, CampaignError>>()?;
         if let Some((_, twice)) = laws.iter().enumerate().find(|&(k, law)| laws[..k].contains(law)) {
-            return Err(CampaignError::plan(format!("the law {} is named twice", twice.name), "name each law once"));
+            return Err(
+                CampaignError::plan(format!("the law {} is named twice", twice.name), "name each law once").at("laws")
+            );
         }
         let own = template.own().clone();
         if laws.is_empty() {
@@ -188,13 +192,15 @@ impl Campaign {
             return Err(CampaignError::plan(
                 "[stop] with a grid: the first runs are those of its first points",
                 "draw the values instead (list, uniform), or leave [stop] out",
-            ));
+            )
+            .at("stop"));
         }
         if self.splitting.is_some() && self.stop.is_some() {
             return Err(CampaignError::plan(
                 "[stop] is about shares of flights, and splitting estimates a probability",
                 "leave [stop] out and fix the number of runs, or leave method out",
-            ));
+            )
+            .at("stop"));
         }
         if self.variations.is_empty() && self.manifest.runs > 1 && self.splitting.is_none() {
             return Err(CampaignError::plan(
@@ -225,7 +231,7 @@ impl Campaign {
                     let mut drawn = self.drawn(run);
                     drawn.insert(key, value.clone());
                     let read = self.read_with(law, &drawn);
-                    read.map_err(|error| CampaignError::Scenario { under: under(&value), error: Box::new(error) })
+                    read.map_err(|error| CampaignError::scenario(&under(&value), &format!("vary.{key}"), error))
                 });
                 let (flown, refused): (Vec<_>, Vec<_>) = tried.partition(Result::is_ok);
                 // What is listed is meant; of a range some may be impossible, which is counted as it is flown.
@@ -362,62 +368,11 @@ impl Campaign {
 
 fn plain_of(law: &Law) -> impl Fn(ScenarioError) -> CampaignError {
     let under = format!("under the law {}: ", law.name);
-    move |error| CampaignError::Scenario { under: under.clone(), error: Box::new(error) }
+    move |error| CampaignError::scenario(&under, "vary", error)
 }
 
 fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {
     drawn.iter().map(|(key, value)| format!("{key}={value}"))
-}
-
-/// Refuses keys of which one is the other, or a part of it, and a varied law where laws are named.
-fn refuse_overlaps(
-    sets: &BTreeMap<String, toml::Value>,
-    variations: &BTreeMap<String, Variation>,
-    names_laws: bool,
-) -> Result<(), CampaignError> {
-    let is_key = |key: &&String| key.split('.').all(|part| !part.is_empty() && part.chars().all(is_word));
-    if let Some(key) = sets.keys().chain(variations.keys()).find(|key| !is_key(key)) {
-        return Err(CampaignError::plan(
-            format!("`{key}` is no key of a scenario"),
-            "write it as for --set: time.dt_s",
-        ));
-    }
-    let plain = |key: &String| {
-        let axis = |part: &str| match part {
-            "x" => "1".to_owned(),
-            "y" => "2".to_owned(),
-            "z" => "3".to_owned(),
-            other => other.to_owned(),
-        };
-        key.split('.').map(axis).collect::<Vec<_>>()
-    };
-    let all: Vec<_> = sets.keys().chain(variations.keys()).collect();
-    for (k, key) in all.iter().enumerate() {
-        let varies = |number: usize| number >= sets.len();
-        let clash = |&number: &usize| {
-            let (one, other) = (plain(key), plain(all[number]));
-            (varies(k) || varies(number)) && (one.starts_with(&other) || other.starts_with(&one))
-        };
-        if let Some(other) = (0..k).find(clash) {
-            let places = if varies(k) && varies(other) { "both in [vary]" } else { "in [set] and in [vary]" };
-            return Err(CampaignError::plan(
-                format!("{} and {key} stand {places}, and one is the other or a part of it", all[other]),
-                "a key either has one value or differs from run to run: take one of them out",
-            ));
-        }
-    }
-    let is_law = |key: &&String| ["law", "law.kind"].contains(&key.as_str());
-    match variations.keys().find(is_law) {
-        Some(key) if names_laws => Err(CampaignError::plan(
-            format!("{key} stands in [vary], and laws are named beside it"),
-            "name laws to fly each of them from the same starts, or vary the law, and not both",
-        )),
-        _ => Ok(()),
-    }
-}
-
-fn is_word(c: char) -> bool {
-    c.is_ascii_alphanumeric() || c == '_' || c == '-'
 }
 
 /// Whether a key of one of these tables is varied, which may bring chance into it.
@@ -434,17 +389,20 @@ fn runs(spec: &Spec) -> Result<u64, CampaignError> {
             format!("the grids have more than {MOST_RUNS} points together"),
             "take fewer values, or draw them: { uniform = [low, high] } with as many runs as can be flown",
         )
+        .at("vary")
     })?;
     match spec.runs {
         None if has_grid => Ok(points),
         None => Err(CampaignError::plan("the number of runs is not given", "add runs = 1000")),
         Some(runs) if runs == 0 || runs > MOST_RUNS => {
-            Err(CampaignError::plan(format!("runs = {runs}"), format!("fly at least 1 run and at most {MOST_RUNS}")))
+            let help = format!("fly at least 1 run and at most {MOST_RUNS}");
+            Err(CampaignError::plan(format!("runs = {runs}"), help).at("runs"))
         }
         Some(runs) if runs % points != 0 => Err(CampaignError::plan(
             format!("{runs} runs do not fly each of the {points} points of the grids equally often"),
             format!("give a multiple of {points}, or leave runs out to fly each once"),
-        )),
+        )
+        .at("runs")),
         Some(runs) => Ok(runs),
     }
 }

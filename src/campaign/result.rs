@@ -8,7 +8,7 @@ use super::bins::{KeyColumn, Varied};
 use super::plan::Campaign;
 use super::row::{Known, Row};
 use super::spec::Asked;
-use super::tally::{Intervals, Tally};
+use super::tally::{Intervals, Tally, UpperBound};
 use super::worst::{WORST, Worst, WorstList};
 use crate::figures::Histogram;
 use crate::splitting::{Repetitions, Splitting};
@@ -61,6 +61,9 @@ pub struct LawSummary {
     pub unknown: u64,
     /// With a violation. Flights of which it is not known count at the upper end of the interval.
     pub violated: Proportion,
+    /// Bound that the share with a violation is below, those of which it is not known counted as violations; null where only grids
+    /// vary, and of no flight.
+    pub violated_below: Option<UpperBound>,
     /// Flights in which two vehicles came closer than their law's certificate; each is a defect.
     pub certificates_broken: u64,
     /// Clear to the end.
@@ -220,6 +223,7 @@ impl Gathered {
             unknown: counts.unknown,
             certificates_broken: counts.certificates_broken,
             violated: counts.violated(intervals),
+            violated_below: counts.violated_below(intervals),
             clear: counts.share(Asked::Clear, intervals),
             reached: counts.share(Asked::Reached, intervals),
             pass: counts.share(Asked::Pass, intervals),

@@ -106,7 +106,7 @@ impl Folder {
             let _ = fs::remove_file(&own);
             return Err(failed(error));
         }
-        if matches!(self.read(shard), Ok(Found::Broken)) {
+        if matches!(self.read(shard), Ok(Found::Damaged(_))) {
             return fs::rename(&own, &path).map_err(failed);
         }
         // A link is made by one process alone; where a file system has none, the last one wins.

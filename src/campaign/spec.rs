@@ -179,11 +179,13 @@ impl Stop {
                 return Err(CampaignError::plan(
                     format!("{key} = {number}"),
                     "it is a share: give a number between 0 and 1, such as 0.01",
-                ));
+                )
+                .at(key));
             }
         }
         if self.width.is_none() && self.decided.is_none() {
-            return Err(CampaignError::plan("[stop] says nothing", "give width or decided, or leave the table out"));
+            let help = "give width or decided, or leave the table out";
+            return Err(CampaignError::plan("[stop] says nothing", help).at("stop"));
         }
         Ok(())
     }

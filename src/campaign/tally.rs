@@ -2,7 +2,7 @@
 
 use super::row::{Known, Row};
 use super::spec::{Asked, Stop};
-use crate::statistics::{Proportion, anytime};
+use crate::statistics::{CONFIDENCE, Proportion, anytime};
 
 /// Runs after which it is first asked whether enough has been flown; then after twice as many, and so on.
 const FIRST_LOOK: u64 = 100;
@@ -35,6 +35,40 @@ impl Intervals {
         let high = at(count.saturating_add(unknown).min(of)).high;
         Proportion { high, ..at(count) }
     }
+
+    /// Returns the bound that the share of `count` of `of` is below, where `unknown` more may count; none of grids and of nothing.
+    #[must_use]
+    pub fn upper_bound(self, count: u64, unknown: u64, of: u64) -> Option<UpperBound> {
+        let count = count.saturating_add(unknown).min(of);
+        let (share, kind) = match self {
+            _ if of == 0 => return None,
+            Self::ClopperPearson => (Proportion::upper_bound(count, of), BoundKind::OneSided),
+            Self::ConfidenceSequence => (anytime(count, of).high, BoundKind::ConfidenceSequence),
+            Self::Exact => return None,
+        };
+        Some(UpperBound { share, confidence: CONFIDENCE, kind })
+    }
+}
+
+/// Bound that a share is below, with the confidence of [`crate::statistics::CONFIDENCE`].
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct UpperBound {
+    /// The bound, from 0 to 1.
+    pub share: f64,
+    /// How often such a bound is above the true share.
+    pub confidence: f64,
+    /// Which bound it is.
+    pub kind: BoundKind,
+}
+
+/// Which bound a share has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BoundKind {
+    /// The one-sided bound of Clopper and Pearson, for a number of runs that was fixed beforehand.
+    OneSided,
+    /// The upper end of a confidence sequence.
+    ConfidenceSequence,
 }
 
 /// How many flights of a law showed what.
@@ -82,6 +116,12 @@ impl Counts {
             Asked::Reached => intervals.share(self.reached, 0, self.flown),
             Asked::Pass => intervals.share(self.pass, 0, self.flown),
         }
+    }
+
+    /// Returns the bound that the share with a violation is below.
+    #[must_use]
+    pub fn violated_below(&self, intervals: Intervals) -> Option<UpperBound> {
+        intervals.upper_bound(self.violated, self.unknown, self.flown)
     }
 
     /// The share with a violation.

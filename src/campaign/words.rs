@@ -1,7 +1,7 @@
 //! The answer of a campaign in words: a sentence, what one must know to read it, and tables for the terminal.
 
 use super::result::{LawSummary, Summary};
-use super::tally::Intervals;
+use super::tally::{BoundKind, Intervals};
 use crate::splitting::Repetitions;
 use crate::statistics::Proportion;
 use crate::text::{aligned, at_least, at_most, counted, fixed, metres, seconds, significant};
@@ -57,13 +57,13 @@ pub(super) fn number(number: u64) -> String {
 }
 
 impl LawSummary {
-    /// Violations in a sentence, such as `0 of 10,000 flights violated: below 0.037 % with 95 % confidence`.
+    /// Violations in a sentence, such as `0 of 10,000 flights violated: below 0.030 % with 95 % confidence (one-sided)`.
     #[must_use]
     pub fn sentence(&self) -> String {
         if let Some(splitting) = &self.splitting {
             return rare(splitting);
         }
-        let Proportion { count, of, low, high, confidence, .. } = self.violated;
+        let Proportion { count, of, confidence, .. } = self.violated;
         if confidence == 1.0 && of > 0 {
             let unknown =
                 if self.unknown > 0 { format!(", of {} it is not known", number(self.unknown)) } else { String::new() };
@@ -73,21 +73,23 @@ impl LawSummary {
                 number(of)
             );
         }
-        let sure = format!("with {:.0} % confidence", 100.0 * confidence);
         if of == 0 {
             return "no flight was flown: nothing is known".to_owned();
         }
-        let range = match count {
-            0 => format!("below {}", up_to(high)),
-            count if count == of => format!("above {}", from(low)),
-            _ => format!("between {} and {}", from(low), up_to(high)),
-        };
+        // A share that may be 1 is below nothing.
+        let bound = self.violated_below.filter(|bound| bound.share < 1.0).map(|bound| {
+            let kind = match bound.kind {
+                BoundKind::OneSided => "one-sided",
+                BoundKind::ConfidenceSequence => "confidence sequence",
+            };
+            format!(": below {} with {:.0} % confidence ({kind})", up_to(bound.share), 100.0 * bound.confidence)
+        });
         let flights = if of == 1 { "flight" } else { "flights" };
         let unknown = match self.unknown {
             0 => String::new(),
             unknown => format!(", of {} it is not known", number(unknown)),
         };
-        format!("{} of {} {flights} violated{unknown}: {range} {sure}", number(count), number(of))
+        format!("{} of {} {flights} violated{unknown}{}", number(count), number(of), bound.unwrap_or_default())
     }
 }
 
@@ -193,9 +195,9 @@ impl Summary {
             "law",
             "flown",
             "violated",
-            "95 % interval",
+            "two-sided 95 % interval",
             "reached",
-            "95 % interval",
+            "two-sided 95 % interval",
             "least clearance [m]",
             "median [m]",
             "reached at, median",

@@ -147,7 +147,7 @@ impl AttackArguments {
     /// The words of the command that flies the worst again.
     fn worst<'a>(&'a self, attack: &'a Attack) -> Option<Vec<&'a str>> {
         attack.worst()?;
-        let sets = self.what.overrides.iter().chain(&attack.sets).flat_map(|set| ["--set", set.as_str()]);
+        let sets = attack.sets.iter().flat_map(|set| ["--set", set.as_str()]);
         Some(["run", &self.what.scenario].into_iter().chain(sets).collect())
     }
 

@@ -8,9 +8,10 @@ use super::audit_arguments::AuditArguments;
 use super::caller;
 use super::console::{self, Console};
 use super::open::Open;
-use super::own::OwnRecording;
+use super::own::{JudgedClear, OwnRecording};
+use super::places;
 use super::replays::{self, Instants};
-use crate::audit::recorded::{Outcome, Presence, RecordedError, TrackAuditor};
+use crate::audit::recorded::{Outcome, Presence, RecordedError, Settings, TrackAuditor};
 use crate::read;
 use crate::report::recorded::{Clock, RecordedReport, Source};
 use crate::report::write_atomically;
@@ -54,6 +55,7 @@ pub(super) fn judge_recorded(
 ) -> Result<RecordedReport, Failure> {
     let mut settings = arguments.settings()?;
     let Recorded { own, own_limit_m, command, open } = recorded;
+    let own = if arguments.independent { own.map(OwnRecording::independent) } else { own };
     let is_silent = arguments.delta.is_none() && arguments.radius.is_empty() && arguments.ellipsoid.is_none();
     let own_delta_m = own.as_ref().map(|own| own.delta_m).or(own_limit_m);
     let own_ellipsoid_m = own.as_ref().and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
@@ -71,12 +73,15 @@ pub(super) fn judge_recorded(
     if arguments.html.is_some() {
         auditor = auditor.with_smallest();
     }
+    if let Some(flag) = caller::interruption() {
+        auditor = auditor.with_interruption(flag);
+    }
     own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
     own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
     own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
     let mut instants = arguments.html.as_ref().map(|_| Instants::default());
-    let Judged { mut outcome, clock, mut notes, assumed, curves } =
-        judged(auditor, arguments, open, console, &mut |items, names| {
+    let Judged { mut outcome, clock, mut notes, assumed, curves, is_planar } =
+        judged(auditor, arguments, &settings, open, console, &mut |items, names| {
             if let Some(instants) = &mut instants {
                 instants.note(items, names, &settings);
             }
@@ -85,7 +90,12 @@ pub(super) fn judge_recorded(
         own.bind(&mut outcome, &settings);
     }
     arguments.check_count(&outcome, &settings)?;
-    let between = arguments.between(curves, own.as_ref(), assumed.as_deref());
+    let judged_clear = own.as_ref().and_then(|own| own.judged_clear.filter(|_| arguments.motion.is_none()));
+    let judged_clear = judged_clear.filter(|judged| judged.answers(&outcome, &settings, own.as_ref()));
+    if let Some(JudgedClear { closest: Some(closest) }) = judged_clear {
+        outcome.raise_to(closest);
+    }
+    let between = arguments.between(curves, own.as_ref(), judged_clear.is_some(), assumed.as_deref());
     let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
@@ -117,8 +127,18 @@ pub(super) fn judge_recorded(
     for note in &notes {
         console.warn(&format!("note: {note}"));
     }
-    let source = Source { recording: arguments.reading.called(), clock, notes };
+    let source = Source { recording: arguments.reading.called(), clock, planar: is_planar, notes };
+    let early_end = own.as_ref().and_then(|own| own.early_end.clone());
+    // A window that ends before the recording was flown whole.
+    let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
+    let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
     let report = RecordedReport::new(&outcome, &settings, source, between);
+    let mut report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
+    let shortened = report.shortened();
+    for note in &shortened {
+        console.warn(&format!("note: {note}"));
+    }
+    report.source.notes.extend(shortened);
 
     // The verdict first: a file that cannot be written does not cost it.
     console.say(&format!("{}\n{}", report.headline(), report.text()));
@@ -138,17 +158,22 @@ struct Judged {
     assumed: Option<String>,
     /// Whether it has curves and no samples.
     curves: bool,
+    /// Whether some height is not known.
+    is_planar: bool,
 }
 
 fn judged(
     mut auditor: TrackAuditor,
     arguments: &AuditArguments,
+    settings: &Settings,
     open: &Open<'_>,
     console: Console,
     note: &mut dyn FnMut(&[Item], &[String]),
 ) -> Result<Judged, Failure> {
     let called = arguments.reading.called();
     let mut recording = open()?;
+    let is_planar = recording.is_planar();
+    let level = places::refuse_unknown(arguments, settings, recording.as_ref())?;
     let interrupted = caller::interruption();
     let progress = console.counter(called.clone());
     let mut items = Vec::new();
@@ -165,6 +190,7 @@ fn judged(
             arguments.refuse_guessed_seconds(recording.clock().unit, &items)?;
         }
         first = false;
+        level.check(&called, recording.vehicles(), &items)?;
         curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
         auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
         note(&items, recording.vehicles());
@@ -176,15 +202,19 @@ fn judged(
     let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
     let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
     let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
-    Ok(Judged { outcome, clock, notes, assumed, curves })
+    Ok(Judged { outcome, clock, notes, assumed, curves, is_planar })
 }
 
 impl From<RecordedError> for Failure {
     fn from(error: RecordedError) -> Self {
         let help = match &error {
+            RecordedError::Interrupted => return Self::machine("interrupted"),
             RecordedError::OutOfRange { .. } | RecordedError::EmptyWindow { .. } => "give another number",
             RecordedError::NoBound { .. } => "give the largest acceleration with --max-accel A or --max-accel NAME=A",
             RecordedError::NoLimit { .. } => "give --delta, or --radius NAME=R; or ask --limit and --fence alone",
+            RecordedError::NoAccelWindow => {
+                "add --limit accel=A and leave --motion bounded out, or leave --accel-window out"
+            }
             RecordedError::LimitOfJumps { .. } => "give --motion linear, or bounded with --max-accel",
             RecordedError::UnknownVehicle { .. } => "name vehicles as the recording does",
             RecordedError::NotACurve { .. } => "give --motion linear, hold or bounded",

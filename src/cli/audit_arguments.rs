@@ -56,6 +56,10 @@ pub(super) struct AuditArguments {
     /// Limits on each vehicle by itself: speed, horizontal, climb and descent [m/s], accel [m/s^2], height and floor [m].
     #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = envelope::limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
     pub(super) limit: Vec<Limit>,
+    /// Hold mean accelerations over this time [s] against --limit accel: the change of velocity over its length, corners of
+    /// curves too.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    pub(super) accel_window: Option<f64>,
     /// TOML file of a fence that every vehicle must stay within.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     pub(super) fence: Option<PathBuf>,
@@ -77,6 +81,12 @@ pub(super) struct AuditArguments {
     /// How many vehicles there must be to judge: another number is wrong input.
     #[arg(long, value_name = "N", help_heading = "Question")]
     pub(super) expect_vehicles: Option<usize>,
+    /// Judge the samples of a recording of tautline alone: take no word of its run for what happened between them.
+    #[arg(long, help_heading = "Question")]
+    pub(super) independent: bool,
+    /// Leave it undecided where a vehicle is not seen over the whole window.
+    #[arg(long, help_heading = "Question")]
+    pub(super) require_presence: bool,
     /// Longest time between two samples that is no gap [s] [default: 1.5 of the vehicle's usual interval].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     pub(super) max_gap: Option<f64>,
@@ -229,6 +239,8 @@ impl AuditArguments {
             to_s: self.to,
             above_m: self.above,
             max_gap_s: self.max_gap,
+            require_presence: self.require_presence,
+            accel_window_s: self.accel_window,
             vehicles,
             only: (!only.is_empty()).then_some(only),
             obstacles: self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)?,
@@ -311,9 +323,15 @@ impl AuditArguments {
         Err(Failure::input(message, "say --time-unit s, or --time-unit ms"))
     }
 
-    /// What is taken to happen between samples of a recording of curves alone, or that may be ours; nothing is proved where
-    /// the samples themselves are assumed.
-    pub(super) fn between(&self, curves: bool, own: Option<&OwnRecording>, assumed: Option<&str>) -> Between {
+    /// What is taken to happen between samples of a recording of curves alone, or that may be ours, whose run may have answered
+    /// the question itself; nothing is proved where the samples themselves are assumed.
+    pub(super) fn between(
+        &self,
+        curves: bool,
+        own: Option<&OwnRecording>,
+        is_judged: bool,
+        assumed: Option<&str>,
+    ) -> Between {
         let most = |accel: &[Named]| {
             let listed = accel.iter().map(|(name, a)| match name {
                 Some(name) => format!("{a:?} m/s^2 for {name}"),
@@ -326,6 +344,7 @@ impl AuditArguments {
             Some(Motion::Bounded) => (format!("accelerations of at most {}", most(&self.max_accel)), Basis::Bounded),
             _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
             _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
+            None if is_judged => ("as the run judged every step".to_owned(), Basis::Run),
             _ => ("straight between samples".to_owned(), Basis::Assumed),
         };
         match assumed {

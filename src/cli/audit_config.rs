@@ -11,6 +11,7 @@ use super::audit_arguments::AuditArguments;
 use super::text_file;
 use crate::audit::envelope::{Limit, Quantity};
 use crate::audit::recorded::Motion;
+use crate::read::ArrayAxis;
 
 /// What the file is called.
 const NAME: &str = "tautline.toml";
@@ -37,9 +38,12 @@ struct AuditTable {
     above_m: Option<f64>,
     max_gap_s: Option<f64>,
     expect_vehicles: Option<usize>,
+    layout: Option<String>,
     allow_undecided: Option<bool>,
     axes: Option<String>,
     scale: Option<Scale>,
+    require_presence: Option<bool>,
+    accel_window_s: Option<f64>,
     limits: BTreeMap<String, f64>,
 }
 
@@ -134,6 +138,7 @@ impl AuditTable {
             ("max_accel_m_s2", self.max_accel_m_s2),
             ("above_m", self.above_m),
             ("max_gap_s", self.max_gap_s),
+            ("accel_window_s", self.accel_window_s),
         ];
         if let Some((key, _)) = numbers.into_iter().find(|(_, value)| value.is_some_and(|value| !value.is_finite())) {
             return Err(wrong(format!("{key} must be a finite number")));
@@ -165,6 +170,10 @@ impl AuditTable {
         arguments.above = arguments.above.or(self.above_m);
         arguments.max_gap = arguments.max_gap.or(self.max_gap_s);
         arguments.expect_vehicles = arguments.expect_vehicles.or(self.expect_vehicles);
+        let layout = self.layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
+        arguments.reading.usual_layout = layout.map_err(|error| wrong(format!("layout: {error}")))?;
+        arguments.accel_window = arguments.accel_window.or(self.accel_window_s);
+        arguments.require_presence |= self.require_presence.unwrap_or(false);
         arguments.allow_undecided |= self.allow_undecided.unwrap_or(false);
         for (key, allowed) in self.limits {
             let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.key() == key);
@@ -222,6 +231,7 @@ mod tests {
             ("[audit]\nmax_accel_m_s2 = 2.0", "add motion = \"bounded\""),
             ("[audit]\naxes = \"nes\"", "`nes` is not three directions"),
             ("[audit]\nscale = [1, 0, 1]", "a scale of 0"),
+            ("[audit]\nlayout = \"time,axis\"", "layout: `time,axis` is none of time,vehicle,axis "),
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),
         ] {

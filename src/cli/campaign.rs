@@ -177,7 +177,12 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
         }
         What::Shard(shard) => fly_shards(shard),
         What::Missing(at) => {
-            let missing = opened(at)?.missing()?;
+            let folder = opened(at)?;
+            let missing = folder.missing()?;
+            let console = Console { data_on_stdout: true, quiet: false };
+            for &shard in &missing {
+                warn_of_damage(&folder, shard, console)?;
+            }
             console::data(&if missing.is_empty() { String::new() } else { listed(&missing) + "\n" })?;
             Ok(if missing.is_empty() { Exit::Good } else { Exit::Bad })
         }
@@ -189,14 +194,16 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
         What::Report(report) => {
             let folder = opened(&report.folder)?;
             let interrupted = interruption()?;
-            answer(&folder, &folder.summary()?, &report.says, None, &interrupted)
+            let summary = folder.summary().map_err(|error| Failure::from(error).naming(&shown(folder.path())))?;
+            answer(&folder, &summary, &report.says, None, &interrupted)
         }
         What::Replay(replay) => fly_again(replay),
     }
 }
 
 impl Asked {
-    fn spec(&self) -> Result<Spec, Failure> {
+    /// Text and keys of the specification.
+    fn spec(&self) -> Result<(String, Spec), Failure> {
         let shown = self.spec.display().to_string();
         let text = std::fs::read_to_string(&self.spec).map_err(|error| {
             Failure::input(
@@ -213,7 +220,7 @@ impl Asked {
                 ..stop
             });
         }
-        Ok(spec)
+        Ok((text, spec))
     }
 
     fn name(&self) -> String {
@@ -231,7 +238,11 @@ fn opened(at: &InFolder) -> Result<Folder, Failure> {
 
 fn planned(asked: &Asked, out: &Path, shards: Option<u64>) -> Result<Folder, Failure> {
     let folder = asked.spec.parent().unwrap_or(Path::new(""));
-    let campaign = Campaign::plan(&asked.spec()?, &asked.name(), folder, shards, Program::running()?)?;
+    let (text, spec) = asked.spec()?;
+    let campaign = Campaign::plan(&spec, &asked.name(), folder, shards, Program::running()?).map_err(|error| {
+        let place = error.place(&shown(&asked.spec), &text);
+        place.into_iter().fold(Failure::from(error), |failure, place| failure.at(&place))
+    })?;
     Ok(Folder::plan(out, campaign, shards.is_some())?)
 }
 
@@ -251,6 +262,7 @@ fn run_whole(arguments: &RunCampaign) -> Result<Exit, Failure> {
         if tally.is_enough() {
             break;
         }
+        bar.suspend(|| warn_of_damage(&folder, shard, console))?;
         let rows =
             match folder.fly(shard, threads, Watch { flown: &|steps| bar.inc(steps), interrupted: &interrupted })? {
                 Shard::Kept(rows) => {
@@ -291,6 +303,7 @@ fn fly_shards(arguments: &ShardCampaign) -> Result<Exit, Failure> {
     let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
     let bar = console.progress(folder.campaign().steps(runs), manifest.name.clone());
     for shard in shards {
+        bar.suspend(|| warn_of_damage(&folder, shard, console))?;
         let watch = Watch { flown: &|steps| bar.inc(steps), interrupted: &interrupted };
         let done = match folder.fly(shard, arguments.threads.into(), watch)? {
             Shard::Kept(rows) => format!("shard {shard}: {} flights had been flown", rows.len()),
@@ -307,6 +320,14 @@ fn fly_shards(arguments: &ShardCampaign) -> Result<Exit, Failure> {
     }
     bar.finish_and_clear();
     Ok(Exit::Good)
+}
+
+/// Says that the part of a shard is damaged: the shard is flown again.
+fn warn_of_damage(folder: &Folder, shard: u64, console: Console) -> Result<(), Failure> {
+    if let Some(part) = folder.damaged(shard)? {
+        console.warn(&format!("{part}; shard {shard} is to be flown again, which replaces it"));
+    }
+    Ok(())
 }
 
 fn merged(folder: &Folder, says: &Says, interrupted: &AtomicBool) -> Result<Exit, Failure> {
@@ -336,8 +357,7 @@ fn answer(
         console.warn("interrupted: no page was written");
         return Ok(Exit::Bad);
     }
-    let (spec, out) = (format!("{}.toml", summary.name), shown(folder.path()));
-    let command = console::command_line(["campaign", "run", &spec, "--out", &out].into_iter());
+    let command = console::command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());
     write_atomically(&path, summary.to_html(&worst.page(&command, &folder.campaign().manifest().spec)).as_bytes())?;
     if let Some(sha256) = sha256 {
         console.say(&format!("{sha256}  {}", folder.file(RESULTS).display()));
@@ -398,7 +418,7 @@ fn fly_again(arguments: &Replay) -> Result<Exit, Failure> {
 impl From<CampaignError> for Failure {
     fn from(error: CampaignError) -> Self {
         match error {
-            CampaignError::Scenario { under, error } => {
+            CampaignError::Scenario { under, error, .. } => {
                 let failure = Self::from(*error);
                 if under.is_empty() { failure } else { failure.under(under.trim_end_matches(": ")) }
             }

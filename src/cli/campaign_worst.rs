@@ -107,13 +107,13 @@ fn bad_again(folder: &Folder, summary: &Summary, looks: &Looks, interrupted: &At
         let place = place_of_bad(folder, &law.name, bad.run, bad.bad);
         fly_bad(folder, law, [bad.run, bad.bad as u64], &place)?;
         let (run, number) = (bad.run.to_string(), bad.bad.to_string());
-        let shown = folder.path().display().to_string();
-        let command = ["campaign", "replay", &shown, "--run", &run, "--law", &law.name, "--bad", &number];
+        // From the folder of the page, so that the page has the same bytes wherever the campaign is.
+        let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
         again.flights.push(WorstFlight {
             run: bad.run,
             law: law.name.clone(),
             said: format!(
-                "Bad flight {} of run {} under {}: {} m below delta in step {}.",
+                "Bad flight {} of run {} under {}: {} m below delta in step {}. To fly it again, in the folder of this page:",
                 bad.bad,
                 bad.run,
                 law.name,

@@ -11,7 +11,7 @@ use crate::law::ParameterError;
 use crate::read::ReadError;
 use crate::record::RecordError;
 use crate::report::ArtefactError;
-use crate::scenario::ScenarioError;
+use crate::scenario::{Place, ScenarioError};
 use crate::sim::SimError;
 
 /// Longest line of a source that is shown in a frame \[bytes\].
@@ -89,6 +89,17 @@ impl Failure {
         self
     }
 
+    /// The same failure, shown at a place in a text.
+    pub(super) fn at(mut self, place: &Place) -> Self {
+        // miette shows whole lines, and none beyond 65,535 columns.
+        if place.text.lines().any(|line| line.len() > LONGEST_LINE) {
+            return self.under(&format!("{}:{}:{}", place.source, place.line, place.column));
+        }
+        self.said.labels = Some(vec![LabeledSpan::underline(place.span.clone())]);
+        self.source = Some(Box::new(NamedSource::new(&place.source, harmless(&place.text))));
+        self
+    }
+
     fn plain(exit: Exit, message: impl Into<String>) -> Self {
         Self { exit, said: Box::new(MietteDiagnostic::new(harmless(&message.into()))), source: None }
     }
@@ -143,11 +154,7 @@ impl From<ScenarioError> for Failure {
         };
         let mut failure = Self::plain(Exit::WrongInput, message);
         failure.said.help = error.help().map(str::to_owned);
-        if let Some(place) = error.place() {
-            failure.said.labels = Some(vec![LabeledSpan::underline(place.span.clone())]);
-            failure.source = Some(Box::new(NamedSource::new(&place.source, harmless(&place.text))));
-        }
-        failure
+        error.place().into_iter().fold(failure, Self::at)
     }
 }
 

@@ -1,7 +1,9 @@
 //! Those who came closest in a recording, as figures.
 
-use super::Failure;
+use std::sync::atomic::Ordering;
+
 use super::open::Open;
+use super::{Failure, caller};
 use crate::audit::Slice;
 use crate::audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
 use crate::figures::{self, Encounter, Figure};
@@ -22,7 +24,11 @@ pub(super) fn figures(
     let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
     let mut recording = open()?;
     let (mut items, mut more) = (Vec::new(), true);
+    let interrupted = caller::interruption();
     while more {
+        if interrupted.as_ref().is_some_and(|interrupted| interrupted.load(Ordering::Relaxed)) {
+            return Err(Failure::machine("interrupted"));
+        }
         items.clear();
         more = recording.read(&mut items)?;
         places.push(&items)?;

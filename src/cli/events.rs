@@ -6,11 +6,13 @@ use super::Failure;
 use super::judgement::Judgement;
 use crate::report::Status;
 use crate::report::recorded::{OfLimit, OfPair, OfVehicle, RecordedReport};
+use crate::text::counted;
 
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
 
-/// Violations, undecided times and gaps of pairs and of single vehicles, a row each, in order of time; where several recordings are asked about `named` puts
+/// Violations, undecided times and gaps of pairs and of single vehicles, and the rest of a flight that ended early, a row each, in
+/// order of time; where several recordings are asked about `named` puts
 /// the recording in front.
 pub(super) fn csv(judged: &[Judgement], named: bool) -> Result<Vec<u8>, Failure> {
     let failed = |error: csv::Error| Failure::machine(format!("cannot write the events: {error}"));
@@ -39,7 +41,9 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
         .gaps
         .iter()
         .map(|OfVehicle { vehicle, finding: gap }| ("gap", [vehicle.as_str(), ""], [gap.from_s, gap.to_s], [None; 5]));
-    let rows = violations.chain(undecided).chain(gaps).map(|(kind, who, span_s, numbers)| {
+    let early_end =
+        report.ended_early.iter().map(|end| ("ended-early", ["", ""], [end.at_s, end.duration_s], [None; 5]));
+    let rows = violations.chain(undecided).chain(gaps).chain(early_end).map(|(kind, who, span_s, numbers)| {
         let words = [kind].into_iter().chain(who).map(str::to_owned);
         (span_s, words.collect::<Vec<_>>(), numbers)
     });
@@ -112,6 +116,12 @@ fn suite(Judgement { report, allows_undecided, .. }: &Judgement) -> TestSuite {
         report.separation().map(|status| TestCase::new("separation", verdict(status, &headline))).into_iter().collect();
     cases
         .extend(report.limits.iter().map(|limit| TestCase::new(limit.quantity, verdict(limit.status, &limit.brief()))));
+    if report.presence.required {
+        let partly = report.presence.partly as u64;
+        let status = if partly == 0 { Status::Clear } else { Status::Undecided };
+        let words = format!("{} not seen throughout", counted(partly, "vehicle is", "vehicles are"));
+        cases.push(TestCase::new("presence", verdict(status, &words)));
+    }
     for OfPair { who: [first, second], finding: v } in &report.violations {
         let words = format!("{:?} below {:?} from {:?} s to {:?} s", v.min_m, v.limit_m, v.from_s, v.to_s);
         cases.push(TestCase::new(format!("{first} and {second} at {:.3} s", v.min_at_s), failed(&words)));
@@ -124,6 +134,8 @@ fn suite(Judgement { report, allows_undecided, .. }: &Judgement) -> TestSuite {
         let words = format!("not seen from {:?} s to {:?} s", gap.from_s, gap.to_s);
         cases.push(TestCase::new(format!("{vehicle} from {:.3} s", gap.from_s), doubtful(&words)));
     }
+    let rest = report.ended_early.iter();
+    cases.extend(rest.map(|end| TestCase::new(format!("the rest from {:.3} s", end.at_s), doubtful(&end.words()))));
     for case in &mut cases {
         case.set_classname("tautline.audit");
     }

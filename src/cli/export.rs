@@ -14,7 +14,7 @@ use super::{Exit, Failure, outputs};
 use crate::export::{self, ExportOptions, WRITTEN};
 use crate::read::{self, Fault, Format, ReadError, Recording};
 use crate::report::write_atomically_with;
-use crate::track::{Clock, Item, Tracks};
+use crate::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
@@ -73,6 +73,14 @@ impl Tracks for Interruptible {
 
     fn assumed(&self) -> Option<&str> {
         self.tracks.assumed()
+    }
+
+    fn is_planar(&self) -> bool {
+        self.tracks.is_planar()
+    }
+
+    fn earth_origin(&self) -> Option<&EarthOrigin> {
+        self.tracks.earth_origin()
     }
 }
 

@@ -36,6 +36,7 @@ mod outputs;
 mod own;
 mod own_obstacles;
 mod pictures;
+mod places;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
@@ -61,6 +62,7 @@ use clap::Parser as _;
 pub use call::{Answer, Held, Refusal, call, judge, open};
 pub use own::{OwnRecording, Witness};
 pub use pictures::flight_page;
+pub use run::run_verdict;
 
 pub use crate::figures::RunHistory;
 pub use crate::replay::Film;

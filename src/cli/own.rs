@@ -2,14 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 use nalgebra::Vector3;
 
-use super::Failure;
 use super::own_obstacles::OwnObstacles;
-use crate::audit::recorded::{Told, ToldViolation};
-use crate::record::mcap::{Entry, McapRecording};
-use crate::record::{Event, OwnedSample, RecordError, Sample, Sink};
+use super::{Failure, caller};
+use crate::audit::Status;
+use crate::audit::recorded::{Outcome, Settings, Told, ToldViolation};
+use crate::record::mcap::{Entry, McapRecording, RunVerdict};
+use crate::record::{Event, OwnedSample, RecordError, Sample, Sink, StateHash};
+use crate::report::recorded::EarlyEnd;
 use crate::scenario::{self, Scenario};
 use crate::swarm::{ClosestApproach, Pair, row};
 
@@ -34,8 +37,41 @@ pub struct OwnRecording {
     pub(super) most_steps: u64,
     /// What it was flown past.
     pub(super) obstacles: OwnObstacles,
+    /// The verdict of the run, where it is clear, finished, and the recording is as the run wrote it.
+    pub(super) judged_clear: Option<JudgedClear>,
+    /// Whether the recording is not what the run wrote.
+    is_altered: bool,
     /// The law that was flown, where it is not the scenario's.
     other_law: Option<String>,
+    /// Where the flight ended before its time.
+    pub(super) early_end: Option<EarlyEnd>,
+}
+
+/// The verdict of a finished run whose judge found it clear at every step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct JudgedClear {
+    /// The closest that any two came; none where that is not known.
+    pub(super) closest: Option<ClosestApproach>,
+}
+
+impl JudgedClear {
+    /// Whether the verdict of the run answers what was asked: nothing but distances, none larger than the smallest that the run
+    /// saw, in its lengths and by its clock, and no obstacles but its own.
+    pub(super) fn answers(&self, outcome: &Outcome, settings: &Settings, own: Option<&OwnRecording>) -> bool {
+        let Some((own, closest)) = own.zip(self.closest) else { return false };
+        let radii_m = settings.radius_m.into_iter().chain(settings.vehicles.values().filter_map(|of| of.radius_m));
+        let by_radii_m = 2.0 * radii_m.fold(0.0, f64::max);
+        let touching = settings.ellipsoid_m.map_or(0.0, |_| TOUCHING_ELLIPSOIDS);
+        let limit_m = settings.delta_m.unwrap_or(touching).max(by_radii_m);
+        let is_by_its_clock = settings.vehicles.values().all(|of| of.offset_s == 0.0);
+        let is_past_its_own = settings.obstacles == own.obstacles.obstacles;
+        outcome.status == Status::Clear
+            && settings.envelope.is_empty()
+            && settings.ellipsoid_m == own.ellipsoid_m
+            && is_by_its_clock
+            && is_past_its_own
+            && limit_m <= closest.separation_m
+    }
 }
 
 impl OwnRecording {
@@ -45,7 +81,9 @@ impl OwnRecording {
     /// # Errors
     /// [`Failure`] where its scenario cannot be read: nobody knows then what was flown past, or in which lengths it tells.
     pub(super) fn read(path: &Path, scale: f64) -> Result<Option<Self>, Failure> {
-        let Some(recording) = path.is_file().then(|| McapRecording::open(path).ok()).flatten() else { return Ok(None) };
+        let Some(mut recording) = path.is_file().then(|| McapRecording::open(path).ok()).flatten() else {
+            return Ok(None);
+        };
         let header = recording.header();
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
@@ -59,18 +97,46 @@ impl OwnRecording {
             Failure::input(message, help)
         })?;
         let mut witness = Witness::new(&scenario, header.delta_m, scale);
-        for entry in recording.map_while(Result::ok) {
+        let (mut states, interrupted) = (StateHash::new(), caller::interruption());
+        for entry in recording.by_ref().map_while(Result::ok) {
+            if interrupted.as_ref().is_some_and(|interrupted| interrupted.load(Ordering::Relaxed)) {
+                return Err(Failure::machine("interrupted"));
+            }
             match entry {
-                Entry::Sample(sample) => witness.note_sample(sample),
+                Entry::Sample(sample) => {
+                    states.observe(&sample.as_sample());
+                    witness.note_sample(sample);
+                }
                 Entry::Event(event) => witness.note_event(event),
             }
         }
-        Ok(Some(witness.finish()))
+        let verdict = recording.verdict().filter(|_| recording.is_complete());
+        let is_as_written = |verdict: &RunVerdict| {
+            verdict.state_sha256 == states.clone().finish() && verdict.told_sha256 == recording.told_sha256()
+        };
+        Ok(Some(match verdict {
+            None => witness.end(),
+            Some(verdict) if is_as_written(verdict) => witness.finish(verdict),
+            Some(_) => witness.end().altered(),
+        }))
+    }
+
+    /// Without what it says of the time between its samples, but for what was too close.
+    fn altered(self) -> Self {
+        Self { told: Vec::new(), is_altered: true, has_every_step: false, ..self }
+    }
+
+    /// Takes no word of the run for what happened between its samples.
+    pub(super) fn independent(mut self) -> Self {
+        self.told.clear();
+        self.violations.clear();
+        self.obstacles.forget_what_was_seen();
+        Self { judged_clear: None, has_every_step: false, ..self }
     }
 
     /// Refuses other lengths than those in which it says what happened between its samples: that would be lost.
     pub(super) fn check_told_in(&self, ellipsoid_m: Option<Vector3<f64>>) -> Result<(), Failure> {
-        let Some(axes) = self.ellipsoid_m.filter(|_| !self.has_every_step && self.ellipsoid_m != ellipsoid_m) else {
+        let Some(axes) = self.ellipsoid_m.filter(|_| !self.told.is_empty() && self.ellipsoid_m != ellipsoid_m) else {
             return Ok(());
         };
         let (x, y, z) = (axes.x, axes.y, axes.z);
@@ -94,8 +160,11 @@ impl OwnRecording {
                  counts{of}"
             )
         });
+        let altered = self.is_altered.then(|| {
+            "the recording is not as the run wrote it: what the run says of the time between samples is not believed".to_owned()
+        });
         let law = self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"));
-        law.into_iter().chain(between)
+        law.into_iter().chain(between.filter(|_| !self.is_altered)).chain(altered)
     }
 }
 
@@ -108,6 +177,10 @@ pub struct Witness {
     told_scale: f64,
     before: Option<OwnedSample>,
     near: Near,
+    /// Steps and duration \[s\] that the scenario asks for.
+    planned: (u64, f64),
+    /// Why the flight ended early, as its recording says.
+    reason: Option<String>,
 }
 
 impl Witness {
@@ -129,9 +202,13 @@ impl Witness {
             has_every_step: scenario.has_engine(),
             most_steps: 0,
             other_law: None,
+            early_end: None,
             obstacles: OwnObstacles::of(scenario, scale),
+            judged_clear: None,
+            is_altered: false,
         };
-        Self { own, scale, told_scale, before: None, near: Near::default() }
+        let planned = (scenario.time.steps(), scenario.time.duration_s);
+        Self { own, scale, told_scale, before: None, near: Near::default(), planned, reason: None }
     }
 
     fn note_sample(&mut self, mut sample: OwnedSample) {
@@ -158,14 +235,33 @@ impl Witness {
                 self.near.approach(pair, (separation_m * self.told_scale, time_s));
             }
             Event::OtherLaw { name, .. } => own.other_law = Some(name),
+            Event::EndedEarly { reason, .. } => self.reason = Some(reason),
             event => own.obstacles.note(&event, self.scale),
         }
     }
 
-    /// What the flight says of itself, once it is over.
+    /// What the flight says of itself, once it is over, with the verdict of its run.
     #[must_use]
-    pub fn finish(self) -> OwnRecording {
-        let Self { mut own, before, mut near, .. } = self;
+    pub fn finish(self, verdict: &RunVerdict) -> OwnRecording {
+        let scale = self.told_scale;
+        let own = self.end();
+        let index = |number: u64| usize::try_from(number).ok()?.checked_sub(1);
+        let pair = index(verdict.pair[0]).zip(index(verdict.pair[1])).filter(|(first, second)| first != second);
+        let closest = pair.filter(|_| verdict.separation_m.is_finite()).map(|(first, second)| ClosestApproach {
+            pair: Pair::new(first, second),
+            separation_m: verdict.separation_m * scale,
+            time_s: verdict.separation_time_s,
+        });
+        let is_clear = verdict.status == "clear" && verdict.ended_early.is_empty();
+        OwnRecording { judged_clear: is_clear.then_some(JudgedClear { closest }), ..own }
+    }
+
+    /// What the flight says of itself, without a verdict.
+    fn end(self) -> OwnRecording {
+        let Self { mut own, before, mut near, planned: (steps, duration_s), reason, .. } = self;
+        let at_s = before.as_ref().map_or(0.0, |last| last.time_s);
+        let is_whole = reason.is_none() && before.as_ref().is_some_and(|last| last.step >= steps);
+        own.early_end = (!is_whole).then_some(EarlyEnd { at_s, duration_s, reason });
         own.violations.append(&mut near.ended);
         if let Some(last) = &before {
             own.violations.extend(near.lasting(last, (own.delta_m, own.ellipsoid_m), &own.told));

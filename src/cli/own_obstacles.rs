@@ -108,7 +108,7 @@ impl OwnObstacles {
                 (None, Some((drawn_m, at_s))) => (drawn_m.min(limit_m.next_down()), at_s),
                 (None, None) => (limit_m.next_down(), from_s),
             };
-            outcome.violations.retain(|found| !lasts(found));
+            outcome.retain_violations(|found| !lasts(found));
             outcome.violate(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m });
         }
         for told in self.closest.iter().filter(|_| settings.above_m.is_none()) {

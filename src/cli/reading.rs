@@ -9,7 +9,8 @@ use super::Failure;
 use super::own::OwnRecording;
 use super::run::RECORDING;
 use crate::read::{
-    self, Axes, AxisOrder, ColumnNames, Dimensions, Duplicates, Format, ReadError, ReadOptions, Recording, TimeUnit,
+    self, ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, ReadError, ReadOptions, Recording,
+    TimeUnit,
 };
 
 /// How a recording is read.
@@ -59,9 +60,13 @@ pub(super) struct ReadArguments {
     /// Where the curve of a vehicle starts [m], for polynomials that are relative to it; may be given several times.
     #[arg(long = "start", value_name = "NAME=X,Y,Z", value_parser = start, allow_hyphen_values = true)]
     starts: Vec<(String, [f64; 3])>,
-    /// Which axis of the positions of an NPZ archive comes first, where its shape does not tell.
-    #[arg(long, value_name = "ORDER", value_parser = axis_order())]
-    axis_order: Option<AxisOrder>,
+    /// What the axes of the positions of an NPZ archive count, in their order, where their lengths have several meanings:
+    /// the words time, vehicle and axis (of x, y, z), such as time,vehicle,axis.
+    #[arg(long, value_name = "AXES", value_parser = ArrayAxis::layout_of)]
+    layout: Option<ArrayLayout>,
+    /// What a tautline.toml says of that.
+    #[arg(skip)]
+    pub(super) usual_layout: Option<ArrayLayout>,
     /// The frame that all positions are brought into by the transforms of the recording, where messages give several.
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
@@ -161,7 +166,8 @@ impl ReadArguments {
             one_vehicle: self.one_vehicle,
             starts: self.starts.iter().cloned().collect(),
             columns,
-            axis_order: self.axis_order,
+            layout: self.layout,
+            usual_layout: self.usual_layout,
             frame: self.frame.clone(),
             topics: self.topics.clone(),
             origin: self.origin,
@@ -261,10 +267,6 @@ fn unit() -> impl TypedValueParser<Value = TimeUnit> {
 
 fn dimensions() -> impl TypedValueParser<Value = Dimensions> {
     one_of(Dimensions::ALL.map(|dimensions| (dimensions.name().into(), dimensions)).into())
-}
-
-fn axis_order() -> impl TypedValueParser<Value = AxisOrder> {
-    one_of(vec![("time-first".into(), AxisOrder::TimeFirst), ("vehicle-first".into(), AxisOrder::VehicleFirst)])
 }
 
 /// A format that is read.

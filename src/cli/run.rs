@@ -19,10 +19,10 @@ use super::{Exit, Failure};
 use crate::figures::RunHistory;
 use crate::preflight::Preflight;
 use crate::record::Sink;
-use crate::record::mcap::{Header, McapRecorder};
+use crate::record::mcap::{Header, McapRecorder, RunVerdict};
 use crate::replay::{Film, PAGE_BYTES};
 use crate::report::page::Picture;
-use crate::report::{INTERRUPTED, Report, RunPage};
+use crate::report::{INTERRUPTED, Report, RunPage, Status};
 use crate::run::{run_while, verify};
 use crate::scenario::Scenario;
 
@@ -74,6 +74,9 @@ pub(super) struct RunArguments {
     /// Threads to use, of which two are of use, by default one a core; the recording has the same bits for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    /// Leave wall-clock times out of the report.
+    #[arg(skip)]
+    untimed: bool,
 }
 
 impl RunArguments {
@@ -83,9 +86,9 @@ impl RunArguments {
         !self.no_snapshots
     }
 
-    /// Everything as by default into a folder, without a word.
+    /// Everything as by default into a folder, without a word and without wall-clock times: the same flight leaves the same bytes.
     pub(super) fn for_folder(out: PathBuf) -> Self {
-        Self { out: Some(out), force: true, quiet: true, ..Self::parse_from(["run"]) }
+        Self { out: Some(out), force: true, quiet: true, untimed: true, ..Self::parse_from(["run"]) }
     }
 
     /// The same, with a summary.
@@ -156,6 +159,7 @@ pub(super) fn fly_into(
     let mut film = Film::new();
     let mut watchers = (&mut history, (&mut film, &mut watched));
     let mut report = threads.install(|| fly(scenario, &preflight, &folder, console, interrupted, &mut watchers))?;
+    report.performance = report.performance.filter(|_| !arguments.untimed);
     if arguments.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
         report.verification = Some(threads.install(|| verify(scenario, &report))?);
     }
@@ -213,10 +217,34 @@ fn fly(
     };
     let flown = run_while(scenario, preflight, &mut (&mut recording, watchers), &mut carry_on);
     progress.finish_and_clear();
-    let closed = recording.finish();
+    let closed = match &flown {
+        Ok(report) => recording.close(run_verdict(report)),
+        Err(_) => recording.finish(),
+    };
     let report = flown?;
     closed?;
     Ok(report)
+}
+
+/// What a run says of itself when it closes its recording.
+#[must_use]
+pub fn run_verdict(report: &Report) -> RunVerdict {
+    let status = match report.audit.status {
+        Status::Clear => "clear",
+        Status::Violation => "violation",
+        Status::Undecided => "undecided",
+    };
+    RunVerdict {
+        status: status.to_owned(),
+        ended_early: report.run.ended_early.clone().unwrap_or_default(),
+        separation_m: report.separation.min_m.unwrap_or(f64::NAN),
+        separation_time_s: report.separation.min_at_s.unwrap_or(f64::NAN),
+        pair: report.separation.min_pair.unwrap_or_default().map(|number| number as u64),
+        steps: report.audit.steps,
+        duration_s: report.run.duration_s,
+        state_sha256: report.run.state_hash.clone(),
+        told_sha256: String::new(),
+    }
 }
 
 /// So many threads; 0 for one a core.

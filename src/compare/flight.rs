@@ -121,7 +121,7 @@ impl FlightRow {
             overlong_steps: report.run.overlong_steps,
             scenario_sha256: report.scenario.sha256,
             state_hash: report.run.state_hash,
-            law_s: report.performance.law_s,
+            law_s: report.performance.map_or(0.0, |times| times.law_s),
         }
     }
 }

@@ -50,7 +50,7 @@ struct Scratch<'law> {
     feedback: &'law mut dyn Feedback,
     swarm: Swarm,
     control: Rows,
-    /// Why the law had no answer, the last time that it had none.
+    /// Why the law had no answer, the first time since this was taken.
     failure: Option<LawError>,
 }
 
@@ -88,12 +88,38 @@ impl<'law> Flow<'law> {
     }
 }
 
+impl Flow<'_> {
+    /// Positions and velocities of a state after `time_s` more under the accelerations of now, which `now_s` of the solver is, and
+    /// how far the way there bends from a straight line \[m\]. None where the law has no answer now.
+    pub(super) fn coasted(&self, now_s: f64, state: &Vec<f64>, time_s: f64) -> Option<(Vec<f64>, f64)> {
+        let mut rates = vec![0.0; state.len()];
+        self.diff(now_s, state, &mut rates);
+        if self.take_failure().is_some() {
+            return None;
+        }
+        let half = state.len() / 2;
+        let (velocities, accelerations) = rates.split_at(half);
+        let mut after = state.clone();
+        for (k, (v, a)) in velocities.iter().zip(accelerations).enumerate() {
+            after[k] += time_s * (v + 0.5 * time_s * a);
+            after[half + k] += time_s * a;
+        }
+        let count = half / 3;
+        let square = |i: usize| (0..3).map(|axis| accelerations[axis * count + i].powi(2)).sum::<f64>();
+        let most_m_s2 = (0..count).map(square).fold(0.0, f64::max).sqrt();
+        Some((after, 0.125 * most_m_s2 * time_s * time_s))
+    }
+}
+
 impl ODE<f64, Vec<f64>> for Flow<'_> {
     fn diff(&self, time_s: f64, state: &Vec<f64>, rates: &mut Vec<f64>) {
         let Scratch { feedback, swarm, control, failure } = &mut *self.scratch.borrow_mut();
-        unpack(state, swarm);
-        if let Err(undefined) = feedback.command(self.from_s + time_s, swarm, control) {
-            *failure = Some(undefined);
+        // The stages after one without an answer are not numbers: the reason is that of the first.
+        if failure.is_none() {
+            unpack(state, swarm);
+            *failure = feedback.command(self.from_s + time_s, swarm, control).err();
+        }
+        if failure.is_some() {
             // An error estimate that is not a number refuses the step.
             rates.fill(f64::NAN);
             return;

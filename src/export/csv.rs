@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 
 use super::error::ExportError;
-use super::source::{About, Column, POSITION, Source};
+use super::source::{About, Column, Source};
 
 /// From here on a reader counts times from an epoch again \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;
@@ -17,7 +17,7 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     let absolute = epoch_s >= EPOCH_FROM_S && rest_ns == 0;
     let epoch_s = if absolute { epoch_s } else { 0 };
     let mut out = BufWriter::new(file);
-    let columns: Vec<&Column> = POSITION.iter().chain(about.optional_columns()).collect();
+    let columns: Vec<&Column> = about.position_columns().iter().chain(about.optional_columns()).collect();
     out.write_all(b"t_s,id")?;
     columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
     for column in about.beside.columns() {

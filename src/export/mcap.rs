@@ -41,11 +41,12 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
 
 fn message(instant: &[Sample], about: &About) -> Instant {
     let unknown = [f64::NAN; 3];
-    let velocities = |sample: &Sample| sample.velocity_m_s.map_or(unknown, Into::into);
+    let velocities = |sample: &Sample| sample.velocity_m_s.map_or(unknown, Into::into).into_iter().take(about.axes);
+    let positions = |sample: &Sample| <[f64; 3]>::from(sample.position_m).into_iter().take(about.axes);
     Instant {
         time_s: instant.first().map_or(f64::NAN, |sample| sample.time_s),
         vehicles: instant.iter().map(|sample| sample.vehicle as u64).collect(),
-        positions_m: instant.iter().flat_map(|sample| <[f64; 3]>::from(sample.position_m)).collect(),
+        positions_m: instant.iter().flat_map(positions).collect(),
         velocities_m_s: if about.velocities { instant.iter().flat_map(velocities).collect() } else { Vec::new() },
         radii_m: if about.radii {
             instant.iter().map(|sample| sample.radius_m.unwrap_or(f64::NAN)).collect()

@@ -1,4 +1,4 @@
-//! An archive of `NumPy` arrays: `t`, `positions` (T x N x 3), `axes`, and where they are known `velocities`, `radii` (T x N),
+//! An archive of `NumPy` arrays: `t`, `positions` (T x N x 3, or x 2 where no height is known), `axes`, and where they are known `velocities`, `radii` (T x N),
 //! `names`, `seen` (T x N) and `epoch_ns`. Each channel is an array of its name (T x N x its columns) beside one of the names
 //! of its columns, such as `attitude` and `attitude_columns`.
 //!
@@ -23,21 +23,21 @@ const OWN: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "seen",
 const ALIGNMENT: usize = 64;
 
 pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
-    let (times, vehicles) = (about.instants, about.names.len());
+    let (times, vehicles, axes) = (about.instants, about.names.len(), about.axes);
     let file = FailsOnce { inner: BufWriter::new(file), failed: false };
     let mut archive = Archive { zip: ZipWriter::new(file), source, vehicles };
     archive.array("t", "<f8", &[times], |instant, _, out| {
         let time_s = instant.first().map_or(f64::NAN, |sample| sample.time_s);
         out.write_all(&time_s.to_le_bytes())
     })?;
-    archive.array("positions", "<f8", &[times, vehicles, 3], |_, slots, out| {
-        slots.iter().try_for_each(|slot| vector(slot.map(|sample| sample.position_m), out))
+    archive.array("positions", "<f8", &[times, vehicles, axes], |_, slots, out| {
+        slots.iter().try_for_each(|slot| vector(slot.map(|sample| sample.position_m), axes, out))
     })?;
     // Where there are as many times as vehicles, the shape would not tell which axis is which.
     archive.texts("axes", &["time", "vehicle", "xyz"].map(str::to_owned))?;
     if about.velocities {
-        archive.array("velocities", "<f8", &[times, vehicles, 3], |_, slots, out| {
-            slots.iter().try_for_each(|slot| vector(slot.and_then(|sample| sample.velocity_m_s), out))
+        archive.array("velocities", "<f8", &[times, vehicles, axes], |_, slots, out| {
+            slots.iter().try_for_each(|slot| vector(slot.and_then(|sample| sample.velocity_m_s), axes, out))
         })?;
     }
     if about.radii {
@@ -65,9 +65,9 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     Ok(())
 }
 
-fn vector(vector: Option<Vector3<f64>>, out: &mut dyn Write) -> io::Result<()> {
+fn vector(vector: Option<Vector3<f64>>, axes: usize, out: &mut dyn Write) -> io::Result<()> {
     let vector = vector.unwrap_or_else(|| Vector3::repeat(f64::NAN));
-    vector.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))
+    vector.iter().take(axes).try_for_each(|x| out.write_all(&x.to_le_bytes()))
 }
 
 /// A writer that swallows everything after its first failure, which its owner was told: an unfinished archive writes its

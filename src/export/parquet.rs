@@ -12,7 +12,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
 use super::error::ExportError;
-use super::source::{About, POSITION, Source};
+use super::source::{About, Source};
 use crate::read::parquet::EPOCH_KEY;
 use crate::track::Sample;
 
@@ -59,7 +59,7 @@ fn schema(about: &About) -> Result<TypePtr, ParquetError> {
         double("t_s", Repetition::REQUIRED)?,
         column("id", Physical::BYTE_ARRAY, Repetition::REQUIRED, Some(LogicalType::String))?,
     ];
-    for position in &POSITION {
+    for position in about.position_columns() {
         columns.push(double(position.name, Repetition::REQUIRED)?);
     }
     for optional in about.optional_columns() {
@@ -81,7 +81,7 @@ fn write_group(
     let time = |sample: &Sample| Some(sample.time_s);
     write_column::<DoubleType, _>(&mut group, rows, time)?;
     write_column::<ByteArrayType, _>(&mut group, rows, |sample| Some(names[sample.vehicle].clone()))?;
-    for column in POSITION.iter().chain(about.optional_columns()) {
+    for column in about.position_columns().iter().chain(about.optional_columns()) {
         write_column::<DoubleType, _>(&mut group, rows, column.of)?;
     }
     let width = about.beside.columns().len();

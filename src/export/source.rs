@@ -23,6 +23,8 @@ pub(super) struct About {
     pub(super) notes: Vec<String>,
     pub(super) samples: u64,
     pub(super) instants: usize,
+    /// Number of axes of positions and velocities: 2 where no height is known.
+    pub(super) axes: usize,
     /// Whether some sample has a velocity.
     pub(super) velocities: bool,
     /// Whether some sample has a radius.
@@ -38,8 +40,7 @@ pub(super) struct Column {
     pub(super) of: fn(&Sample) -> Option<f64>,
 }
 
-/// The columns that every sample fills.
-pub(super) const POSITION: [Column; 3] = [
+const POSITION: [Column; 3] = [
     Column { name: "x", of: |sample| Some(sample.position_m.x) },
     Column { name: "y", of: |sample| Some(sample.position_m.y) },
     Column { name: "z", of: |sample| Some(sample.position_m.z) },
@@ -54,9 +55,14 @@ const VELOCITY: [Column; 3] = [
 const RADIUS: [Column; 1] = [Column { name: "radius", of: |sample| sample.radius_m }];
 
 impl About {
+    /// The columns that every sample fills.
+    pub(super) fn position_columns(&self) -> &'static [Column] {
+        &POSITION[..self.axes]
+    }
+
     /// The columns that some samples fill and others may not.
     pub(super) fn optional_columns(&self) -> impl Iterator<Item = &'static Column> {
-        let velocities: &[_] = if self.velocities { &VELOCITY } else { &[] };
+        let velocities: &[_] = if self.velocities { &VELOCITY[..self.axes] } else { &[] };
         let radii: &[_] = if self.radii { &RADIUS } else { &[] };
         velocities.iter().chain(radii)
     }
@@ -74,6 +80,7 @@ impl Source<'_> {
             Ok(())
         })?;
         about.names = recording.vehicles().to_vec();
+        about.axes = if recording.is_planar() { 2 } else { 3 };
         about.clock = recording.clock().clone();
         about.notes = recording.notes().to_vec();
         if let Some(assumed) = recording.assumed() {

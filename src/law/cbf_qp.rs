@@ -210,6 +210,10 @@ impl Law for CbfQpLaw {
         self.carried.controls()
     }
 
+    fn max_command_m_s2(&self) -> Option<f64> {
+        Some(self.keys.max_accel_m_s2)
+    }
+
     fn sensing_range_m(&self) -> Option<f64> {
         Some(self.range_m)
     }

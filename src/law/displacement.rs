@@ -25,7 +25,7 @@ use crate::graph::Pinning;
 use crate::observation::Observation;
 use crate::space::{Metric, NearPairs, Obstacle};
 use crate::swarm::{Pair, Rows, row, set_row};
-use crate::target::Target;
+use crate::target::{Settling, Target};
 
 /// Keys of `[law]` with `kind = "displacement"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -417,8 +417,14 @@ impl Law for DisplacementLaw {
         Some(omega.max(DAMPED * links * self.damping_per_s()))
     }
 
-    fn settling_rate_per_s(&self) -> Option<f64> {
-        Some(self.keys.k_per_s2.sqrt())
+    /// A mode of the graph with the eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1
+    /// or, towards k/c, for m without bound.
+    fn settling(&self) -> Option<Settling> {
+        let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
+        let half = 0.5 * (c - self.a22_per_s);
+        let first_per_s = if half * half > k { k / (half + (half * half - k).sqrt()) } else { half };
+        let rate_per_s = if c > 0.0 { first_per_s.min(k / c) } else { first_per_s };
+        Some(Settling { rate_per_s, response_s: rate_per_s / k })
     }
 
     fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {

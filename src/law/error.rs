@@ -2,9 +2,14 @@
 
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::swarm::{Pair, first_row_not_finite};
+use crate::space::{Metric, Obstacle};
+use crate::swarm::{Pair, Swarm, first_row_not_finite, row};
 
 use super::tension::TensionError;
+
+/// Distances that differ by no more than this part of them are the same.
+const ROUNDING: f64 = 1e-9;
+
 /// Why a law has no answer for a state.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LawError {
@@ -34,6 +39,40 @@ pub enum LawError {
         obstacle: usize,
         /// Distance from its surface \[m\].
         distance_m: f64,
+        /// What must be kept \[m\].
+        clearance_m: f64,
+    },
+    /// A pair is at or inside the distance where its tension is infinite by what the vehicles know, and not where they are.
+    #[error(
+        "by what they measured or heard of each other, vehicles {pair} are {known_m} m apart, not more than the safety distance \
+         {delta_m} m; their true distance is {true_m} m"
+    )]
+    KnownCollision {
+        /// The first such pair in index order.
+        pair: Pair,
+        /// Its separation by what a vehicle of the pair knows \[m\].
+        known_m: f64,
+        /// Its true separation \[m\].
+        true_m: f64,
+        /// The safety distance delta \[m\].
+        delta_m: f64,
+    },
+    /// A vehicle is at or inside the clearance of an obstacle by what it knows, and not where it is.
+    #[error(
+        "by what it measured, vehicle {} is {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; its true \
+         distance is {true_m} m",
+        vehicle + 1,
+        obstacle + 1
+    )]
+    KnownObstacle {
+        /// The first such vehicle, from 0.
+        vehicle: usize,
+        /// The first such obstacle, from 0.
+        obstacle: usize,
+        /// Distance from its surface by what the vehicle knows \[m\].
+        known_m: f64,
+        /// True distance from its surface \[m\].
+        true_m: f64,
         /// What must be kept \[m\].
         clearance_m: f64,
     },
@@ -70,6 +109,41 @@ pub enum LawError {
         /// Number of vehicles given.
         found: usize,
     },
+}
+
+impl LawError {
+    /// Whether a pair, or a vehicle and an obstacle, came to the barrier of the law, in truth or by what vehicles know.
+    #[must_use]
+    pub fn is_at_a_barrier(self) -> bool {
+        matches!(
+            self,
+            Self::Collision { .. } | Self::Obstacle { .. } | Self::KnownCollision { .. } | Self::KnownObstacle { .. }
+        )
+    }
+
+    /// The same reason with the true distance beside the one that vehicles know, where the two differ. Separations are lengths of
+    /// `metric`.
+    #[must_use]
+    pub(crate) fn against_truth(self, truth: &Swarm, metric: Metric, obstacles: &[Obstacle]) -> Self {
+        let place = |vehicle: usize| row(&truth.positions_m, vehicle);
+        let differs = |known_m: f64, true_m: f64| (known_m - true_m).abs() > ROUNDING * known_m.abs().max(true_m.abs());
+        match self {
+            Self::Collision { pair, separation_m: known_m, delta_m } => {
+                let true_m = metric.scaled(place(pair.second()) - place(pair.first())).norm();
+                if differs(known_m, true_m) { Self::KnownCollision { pair, known_m, true_m, delta_m } } else { self }
+            }
+            Self::Obstacle { vehicle, obstacle, distance_m: known_m, clearance_m } => {
+                let Some(solid) = obstacles.get(obstacle) else { return self };
+                let true_m = solid.room_m(place(vehicle)).0 + solid.clearance_m;
+                if differs(known_m, true_m) {
+                    Self::KnownObstacle { vehicle, obstacle, known_m, true_m, clearance_m }
+                } else {
+                    self
+                }
+            }
+            other => other,
+        }
+    }
 }
 
 /// Why a law cannot be made from its parameters.

@@ -8,7 +8,7 @@ use super::modes::Linear;
 use crate::formation::{Formation, Freedom};
 use crate::observation::Observation;
 use crate::swarm::Rows;
-use crate::target::Target;
+use crate::target::{Settling, Target};
 
 /// A control law: a function from what the vehicles know to an acceleration for each.
 ///
@@ -102,6 +102,11 @@ pub trait Law: DynClone + Send {
         None
     }
 
+    /// Largest acceleration that the law commands of a vehicle \[m/s^2\], where it has a limit.
+    fn max_command_m_s2(&self) -> Option<f64> {
+        None
+    }
+
     /// Whether the law keeps vehicles apart in the lengths of its [`Setting`](super::Setting), of which distances between them are then
     /// told, and not in metres alone.
     fn keeps_ellipsoids(&self) -> bool {
@@ -125,9 +130,9 @@ pub trait Law: DynClone + Send {
         0.0
     }
 
-    /// Rate at which errors of position fall where nothing stands in their way \[1/s\], for a law that may be given slots that
-    /// are spread for a while ([`crate::target::Breathing`]) and renews its promise then. `None` for any other.
-    fn settling_rate_per_s(&self) -> Option<f64> {
+    /// How errors of position settle where nothing stands in their way, for a law that may be given slots that are spread for a
+    /// while ([`crate::target::Breathing`]) and renews its promise then. `None` for any other.
+    fn settling(&self) -> Option<Settling> {
         None
     }
 

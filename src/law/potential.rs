@@ -254,6 +254,10 @@ impl Law for PotentialLaw {
         Some(self.delta_m)
     }
 
+    fn max_command_m_s2(&self) -> Option<f64> {
+        self.keys.max_accel_m_s2
+    }
+
     fn sensing_range_m(&self) -> Option<f64> {
         Some(self.range_m)
     }

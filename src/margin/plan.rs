@@ -111,7 +111,7 @@ impl Plan {
         let (overrides, key) = (overrides.to_vec(), key.to_owned());
         let mut plan = Self { source, overrides, template, key, range, whole: false, asked, jitter: None, predicted };
         let ends = [plan.scenario(range.from, 0)?, plan.scenario(range.to, 0)?];
-        plan.whole = takes_whole_numbers_alone([range.from, range.to], |value| plan.scenario(value, 0).is_ok());
+        plan.whole = takes_whole_numbers_alone(&plan.source, &plan.overrides, &plan.key);
         let is_random = plan.template.start_is_random() || ends.iter().any(Scenario::is_random_in_flight);
         let moves = asked.runs > 1 && !is_random;
         plan.jitter = moves.then(|| format!("start.jitter_m={:?}", JITTER * plan.own().delta_m));
@@ -136,7 +136,7 @@ impl Plan {
         self.range
     }
 
-    /// Whether whole numbers alone are looked at: the ends are whole, and between them the key takes nothing else.
+    /// Whether whole numbers alone are looked at, because the key takes nothing else.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.whole

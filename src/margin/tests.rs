@@ -134,6 +134,17 @@ fn a_key_that_takes_whole_numbers_alone_is_halved_at_whole_numbers() {
 }
 
 #[test]
+fn a_key_that_measures_takes_any_number_though_a_millionth_beside_its_ends_is_refused() {
+    let asked = Asked { question: Question::Clear, runs: 1, seed: 0 };
+    let plan = |key: &str| {
+        let source = Source::Builtin("crazyflies".to_owned());
+        Plan::new(source, &[], key, range(0.0, 1.0, 9, 6), asked).expect("a plan")
+    };
+    assert!(!plan("sensing.latency_s").is_whole());
+    assert!(plan("noise.seed").is_whole());
+}
+
+#[test]
 fn several_runs_have_seeds_and_a_start_without_randomness_is_moved() {
     let asked = Asked { question: Question::Clear, runs: 3, seed: 7 };
     let margin = margin_in("law.alpha", range(0.5, 1.0, 2, 1), asked);

@@ -1,7 +1,7 @@
 //! Numbers of a run, folded from its samples one at a time.
 //!
-//! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Peaks are over the
-//! steps between samples too where a sample tells them, see [`crate::record::Peaks`].
+//! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Arrival is judged at every
+//! step, and peaks are over the steps between samples too where a sample tells them, see [`crate::record::Peaks`].
 
 mod strain;
 
@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 
 use crate::formation::Freedom;
 use crate::graph::Graph;
-use crate::record::{Event, Peaks, RecordError, Sample, Sink};
+use crate::record::{Event, Peaks, RecordError, Sample, Sink, Step};
 use crate::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
-use crate::target::{Arrival, Begins, Distance, Guidance, Leg, Reference, assign_anew};
+use crate::target::{Arrival, Distance, Guidance, Leg, Reference, assign_anew};
 
 /// Folds samples, in the order of time, into a [`Summary`].
 #[derive(Clone, Debug)]
@@ -33,6 +33,8 @@ pub struct Metrics<'a> {
     samples: u64,
     /// First instant of the leg from which everything was within the limits up to now \[s\].
     good_since_s: Option<f64>,
+    /// Instant up to which that is known \[s\].
+    judged_to_s: Option<f64>,
     last_s: f64,
     distance: Distance,
     common_m_s: f64,
@@ -117,6 +119,7 @@ impl<'a> Metrics<'a> {
             ended: Vec::new(),
             samples: 0,
             good_since_s: None,
+            judged_to_s: None,
             last_s: 0.0,
             distance: Distance::unknown(),
             common_m_s: f64::NAN,
@@ -150,8 +153,7 @@ impl<'a> Metrics<'a> {
         self.last_s = sample.time_s;
         let leg = self.legs.get(self.leg);
         self.distance = leg.map_or_else(Distance::unknown, |leg| {
-            let reference = self.guidance.map_or_else(Reference::at_rest, |known| known.motion.at(sample.time_s));
-            Distance::of(sample.swarm, &leg.formation, &reference, self.graph, self.freedom)
+            Distance::of(sample.swarm, &leg.formation, &self.reference(sample.time_s), self.graph, self.freedom)
         });
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
@@ -159,17 +161,28 @@ impl<'a> Metrics<'a> {
         self.observe_peaks(sample.peaks);
         self.observe_extent(sample.swarm);
         Strain::observe(&mut self.strain, sample);
-        let good = self.arrival.is_within(&self.distance) && sample.swarm.first_not_finite().is_none();
-        self.good_since_s = good.then(|| self.good_since_s.unwrap_or(sample.time_s));
+        if self.judged_to_s != Some(sample.time_s) {
+            self.judge(sample.time_s, sample.swarm, self.arrival.is_within(&self.distance));
+        }
     }
 
-    /// Ends the present leg. One that ended because it was reached has been, whatever the samples show.
+    /// Notes whether a true state is within the limits of arrival.
+    fn judge(&mut self, time_s: f64, swarm: &Swarm, is_within: bool) {
+        let good = is_within && swarm.first_not_finite().is_none();
+        self.good_since_s = good.then(|| self.good_since_s.unwrap_or(time_s));
+        self.judged_to_s = Some(time_s);
+    }
+
+    fn reference(&self, time_s: f64) -> Reference {
+        self.guidance.map_or_else(Reference::at_rest, |known| known.motion.at(time_s))
+    }
+
+    /// Ends the present leg, which has been reached if the true state was within the limits for long enough, whatever the
+    /// vehicles sensed.
     fn begin_leg(&mut self, leg: usize, time_s: f64) {
         let held_since_s = self.good_since_s.filter(|&since_s| self.arrival.is_held(since_s, time_s));
-        let by_event = self.legs.get(leg).is_some_and(|next| next.begins == Begins::Reached);
-        let told_s = by_event.then(|| self.good_since_s.unwrap_or(time_s - self.arrival.hold_s));
-        self.ended.push(LegSummary { ended_at_s: time_s, reached_at_s: held_since_s.or(told_s) });
-        self.good_since_s = None;
+        self.ended.push(LegSummary { ended_at_s: time_s, reached_at_s: held_since_s });
+        (self.good_since_s, self.judged_to_s) = (None, None);
         self.leg = leg;
     }
 
@@ -233,10 +246,10 @@ impl<'a> Metrics<'a> {
 
     /// The numbers of everything seen.
     ///
-    /// The formation counts as reached at the time of the first sample from which on every sample, to the last, had its
+    /// The formation counts as reached at the end of the first step from which on every step, to the last, had its
     /// errors of edges and places and a disagreement within the limits, provided that this lasted at least `hold_s` up to the last
-    /// sample. A formation that was held for long and lost again is not reached; one that was regained counts from when
-    /// it was regained.
+    /// one. Where only samples are given, those are judged. A formation that was held for long and lost again is not reached; one
+    /// that was regained counts from when it was regained.
     #[must_use]
     pub fn finish(&self) -> Summary {
         let held_s = self.good_since_s.map(|since| self.last_s - since);
@@ -275,14 +288,22 @@ impl Sink for Metrics<'_> {
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         match event {
             &Event::LegBegan { leg, time_s } => self.begin_leg(leg, time_s),
-            Event::Assigned { slots, .. } => _ = assign_anew(self.legs.to_mut(), self.leg, slots),
+            Event::Assigned { slots, .. } => {
+                assign_anew(self.legs.to_mut(), self.leg, slots);
+                self.judged_to_s = None;
+            }
             _ => {}
         }
         Ok(())
     }
 
-    fn looks_at_steps(&self) -> bool {
-        false
+    /// Judges arrival at the end of every step, recorded or not.
+    fn step(&mut self, step: &Step<'_>) {
+        let is_within = self.legs.get(self.leg).is_some_and(|leg| {
+            let reference = self.reference(step.time_s);
+            self.arrival.holds(step.swarm, &leg.formation, &reference, self.graph, self.freedom)
+        });
+        self.judge(step.time_s, step.swarm, is_within);
     }
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::formation::Formation;
+use crate::target::Begins;
 
 /// Sums of a few numbers of order 1 are right to some 1e-15.
 const ROUNDING: f64 = 1e-12;

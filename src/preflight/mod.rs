@@ -194,8 +194,8 @@ impl Preflight {
                 .iter()
                 .map(|&LegBound { energy, certified_m, .. }| LegPromise { certified_m, energy_bound: energy })
                 .collect(),
-            breathes: law.settling_rate_per_s().is_some() && scenario.breathing.is_on(),
-            reassigns: law.settling_rate_per_s().is_some()
+            breathes: law.settling().is_some() && scenario.breathing.is_on(),
+            reassigns: law.settling().is_some()
                 && scenario.breathing.is_on()
                 && scenario.legs.iter().any(|leg| leg.interchangeable),
             needs: law.needs().to_vec(),

@@ -76,6 +76,16 @@ impl Axes {
         *self == Self::default()
     }
 
+    /// Whether z stays the third axis: its sign may change, and its length.
+    pub(super) fn keeps_plane(&self) -> bool {
+        self.from[2] == 2
+    }
+
+    /// Whether what is up stays up.
+    pub(super) fn keeps_up(&self) -> bool {
+        self.keeps_plane() && self.factors[2] > 0.0
+    }
+
     /// Whether lengths stay as they are.
     pub(super) fn keeps_lengths(&self) -> bool {
         self.factors.iter().all(|factor| factor.abs() == 1.0)

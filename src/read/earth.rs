@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::error::{Fault, quoted};
 use super::options::ReadOptions;
+use crate::track::EarthOrigin;
 
 /// Half the equator's diameter \[m\].
 const EQUATOR_M: f64 = 6_378_137.0;
@@ -89,6 +90,11 @@ impl Local {
         format!("{latitude:?},{longitude:?},{height:?}")
     }
 
+    /// The origin, which is `given` or inferred.
+    pub(super) fn measured_from(&self, given: Option<[f64; 3]>) -> EarthOrigin {
+        EarthOrigin { place: self.origin(), is_inferred: given.is_none() }
+    }
+
     /// What a person should know.
     pub(super) fn note(&self) -> String {
         let origin = self.origin();
@@ -96,6 +102,17 @@ impl Local {
             "places on the Earth are in metres east, north and up of {origin} on WGS 84 (--origin {origin} says so)"
         )
     }
+}
+
+/// Whether a receiver that had no fix wrote this: latitude and longitude are both exactly 0.
+pub(super) fn is_no_fix(place: &Geodetic) -> bool {
+    place.x == 0.0 && place.y == 0.0
+}
+
+/// What a person should know of so many rows or messages without a fix, `of` some vehicles.
+pub(super) fn no_fixes(count: u64, of: &str) -> Option<String> {
+    let is = if count == 1 { "place is no fix and was" } else { "places are no fixes and were" };
+    (count > 0).then(|| format!("{count} {is} left out{of}: latitude and longitude are both exactly 0"))
 }
 
 /// Sine and cosine of latitude and of longitude.

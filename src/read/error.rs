@@ -189,8 +189,9 @@ impl Fault {
     /// Time runs backwards where it must not.
     pub(super) fn time_backwards(time_s: f64, before_s: f64) -> Self {
         let problem = format!("time runs backwards: {time_s} s comes after {before_s} s");
-        let remedy = "look whether two recordings were joined or the clock was set; where the lines are only out of \
-                      order, sort the lines by time, or have them sorted with --sort";
+        let remedy = "look whether two recordings were joined or the clock was set; where the rows are of several \
+                      vehicles, name the column that tells them apart with --column id=NAME; where the lines are only \
+                      out of order, sort the lines by time, or have them sorted with --sort";
         Self::content(problem, remedy)
     }
 
@@ -232,4 +233,14 @@ pub(super) fn quoted(value: &str) -> String {
         shown.push('…');
     }
     format!("`{shown}`")
+}
+
+/// The first of some names that are not empty.
+pub(super) fn list(names: &[String], shown: usize) -> String {
+    let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
+    match names.len() {
+        0 => "none".to_owned(),
+        count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
+        _ => names.join(", "),
+    }
 }

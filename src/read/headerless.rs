@@ -20,18 +20,22 @@ fn body(x: usize, dimensions: Dimensions) -> Body {
 pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Result<Layout, Fault> {
     let count = first.len();
     let fits = |dimensions: &Dimensions| count > 1 && (count - 1).is_multiple_of(dimensions.counts().1);
-    let table = |time, names, bodies, words: &str| {
+    let table = |time, names, bodies: Vec<Body>, words: &str| {
         let note = format!("there is no header: the numbers are taken as {words}");
         Layout {
             time,
             rest: None,
             unit: None,
             id: None,
+            is_id_given: false,
+            rivals: Vec::new(),
+            suspects: Vec::new(),
             names,
-            bodies,
             metres: vec![1.0; count],
             on_earth: false,
             convention: Convention::default(),
+            is_planar: bodies.iter().any(|body| body.position[2].is_none()),
+            bodies,
             notes: vec![note],
         }
     };
@@ -73,7 +77,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
     let names: Vec<_> = (1..=bodies.len()).map(|number| number.to_string()).collect();
     let words = format!(
         "time and {}{} of each of {} vehicles",
-        if axes == 2 { "x, y (z is taken as 0)" } else { "x, y, z" },
+        if axes == 2 { "x, y (there is no height)" } else { "x, y, z" },
         if each > axes { " and velocity" } else { "" },
         names.len()
     );

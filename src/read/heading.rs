@@ -24,12 +24,61 @@ pub(super) fn is_angle(role: Role) -> bool {
     (EARTH..EARTH + 2).contains(&role)
 }
 
-/// What latitude, longitude and height are called.
-const EARTH_NAMES: [&[&str]; 3] =
-    [&["lat", "latitude"], &["lon", "lng", "long", "longitude"], &["alt", "altitude", "height", "elevation", "ele"]];
+pub(super) const HEIGHT: Role = EARTH + 2;
+/// A height that counts downwards: no role of its own, but one of a heading.
+pub(super) const DEPTH: Role = EARTH + 3;
+
+/// What latitude and longitude are called.
+const EARTH_NAMES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "long", "longitude"]];
 
 /// What may stand in front of these.
 const EARTH_STARTS: [&str; 4] = ["", "gps_", "gnss_", "global_"];
+
+/// What heights and depths are called.
+const HEIGHT_NAMES: [&str; 13] =
+    ["alt", "altitude", "height", "hgt", "elevation", "elev", "ele", "agl", "msl", "amsl", "asl", "hae", "up"];
+const DEPTH_NAMES: [&str; 2] = ["depth", "down"];
+
+/// What may stand in front of these, and behind them: how the height is measured, and from where.
+const HEIGHT_STARTS: [&str; 24] = [
+    "gps",
+    "gnss",
+    "global",
+    "geo",
+    "geometric",
+    "geodetic",
+    "ellipsoidal",
+    "wgs84",
+    "baro",
+    "barometric",
+    "barometer",
+    "pressure",
+    "rel",
+    "relative",
+    "abs",
+    "absolute",
+    "local",
+    "pos",
+    "position",
+    "est",
+    "estimated",
+    "true",
+    "raw",
+    "filtered",
+];
+const HEIGHT_ENDS: [&str; 11] = [
+    "agl",
+    "msl",
+    "amsl",
+    "asl",
+    "hae",
+    "rel",
+    "relative",
+    "above_ground",
+    "above_ground_level",
+    "above_sea_level",
+    "above_takeoff",
+];
 
 /// Words that name a quantity with axes, and no vehicle.
 const QUANTITIES: [&str; 55] = [
@@ -177,6 +226,21 @@ fn quantity(name: &str) -> Option<Role> {
     axis(POSITION, &["", "p", "p_", "pos_", "position_"])
         .or_else(|| axis(VELOCITY, &["v", "vel_", "velocity_"]))
         .or_else(|| EARTH_STARTS.iter().find_map(on_earth))
+        .or_else(|| height(&name.replace([' ', '-'], "_")))
+}
+
+/// Whether a name in lower case is that of a height, such as `geoaltitude`, `rel_alt`, `height_above_ground`, or of a depth.
+fn height(name: &str) -> Option<Role> {
+    let role = |name: &str| {
+        let is = |names: &[&str]| names.contains(&name);
+        if is(&HEIGHT_NAMES) { Some(HEIGHT) } else { is(&DEPTH_NAMES).then_some(DEPTH) }
+    };
+    let behind = |name: &str| {
+        let starts = HEIGHT_STARTS.iter().filter_map(|start| name.strip_prefix(start));
+        role(name).or_else(|| starts.map(|rest| rest.trim_start_matches('_')).find_map(role))
+    };
+    let ends = HEIGHT_ENDS.iter().filter_map(|end| name.strip_suffix(end)?.strip_suffix('_'));
+    behind(name).or_else(|| ends.filter_map(behind).next())
 }
 
 /// Whether the last word of a name is that of a quantity with axes, as in `cf1_gyro` and `../orientation`.
@@ -198,10 +262,17 @@ pub(super) fn tells_no_vehicle(name: &str) -> bool {
         || stem.rsplit_once(['.', '/', '_']).is_some_and(|(start, _)| start.len() == 1 || says_a_quantity(start))
 }
 
+/// Whether the values of a column of this name could be those of vehicles.
+pub(super) fn may_name(name: &str) -> bool {
+    !is_clock(name) && !tells_no_vehicle(name) && Heading::of(name).is_none()
+}
+
 /// Whether a column would be read as one of a table that names the vehicle of each row: no other may be called so.
 pub(crate) fn is_read(name: &str) -> bool {
-    let is_own = |heading: Heading<'_>| heading.role < EARTH && (heading.vehicle.is_empty() || heading.is_numbered());
-    is_clock(name) || may_be_id(name) || Heading::of(name).is_some_and(is_own)
+    let is_own = |heading: Heading<'_>| {
+        (heading.role < EARTH || heading.role >= HEIGHT) && (heading.vehicle.is_empty() || heading.is_numbered())
+    };
+    is_clock(name) || is_id(name) || Heading::of(name).is_some_and(is_own)
 }
 
 /// The name of a column of time in lower case without its unit, and the unit.
@@ -244,19 +315,70 @@ pub(super) fn said_unit(name: &str) -> Option<String> {
     time_and_unit(name).1
 }
 
+/// Words that name the vehicle of a row, with `id`, `name`, `no` or the like behind them or without.
+const VEHICLES: [&str; 49] = [
+    "vehicle",
+    "drone",
+    "uav",
+    "uas",
+    "quad",
+    "quadrotor",
+    "copter",
+    "agent",
+    "robot",
+    "rover",
+    "aircraft",
+    "plane",
+    "airplane",
+    "ship",
+    "vessel",
+    "boat",
+    "usv",
+    "auv",
+    "car",
+    "truck",
+    "object",
+    "obj",
+    "track",
+    "target",
+    "body",
+    "rigidbody",
+    "model",
+    "entity",
+    "actor",
+    "person",
+    "pedestrian",
+    "ped",
+    "player",
+    "unit",
+    "node",
+    "tag",
+    "device",
+    "callsign",
+    "flight",
+    "tail",
+    "registration",
+    "icao",
+    "icao24",
+    "hex",
+    "hexident",
+    "mmsi",
+    "imo",
+    "childframe",
+    "sys",
+];
+
+/// What may stand behind these.
+const VEHICLE_ENDS: [&str; 9] = ["id", "idx", "name", "number", "no", "nr", "num", "index", "code"];
+
 /// Whether a column names the vehicle of a row.
 pub(super) fn is_id(name: &str) -> bool {
     let name = joined(name);
-    let stem = name.strip_suffix("id").or_else(|| name.strip_suffix("name")).unwrap_or(&name);
-    !name.is_empty() && matches!(stem, "" | "vehicle" | "drone" | "uav" | "agent" | "robot")
-}
-
-/// Whether a column may well name the vehicle of a row, in a table that is said to be of one.
-pub(super) fn may_be_id(name: &str) -> bool {
-    let name = joined(name);
-    let stem = name.strip_suffix("id").or_else(|| name.strip_suffix("name")).unwrap_or(&name);
-    let things = ["model", "object", "track", "body", "rigidbody", "tag", "entity", "callsign", "childframe"];
-    is_id(&name) || things.contains(&stem)
+    let is = |stem: &str| VEHICLES.contains(&stem);
+    let behind = VEHICLE_ENDS.iter().filter_map(|end| name.strip_suffix(end));
+    matches!(name.as_str(), "id" | "name" | "uid" | "uuid" | "sysid" | "systemid")
+        || is(&name)
+        || behind.into_iter().any(is)
 }
 
 /// A name in lower case without its unit, as one word.

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::error::{Fault, ReadError, quoted};
+use super::identity::spelling;
 use super::order::Recording;
 use super::source::Source;
-use crate::track::{Clock, Item, Tracks};
+use crate::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// Clocks that begin further apart than this are not the same \[ns\]: 30 days.
 const APART_NS: i64 = 30 * 86_400 * 1_000_000_000;
@@ -29,6 +30,8 @@ struct Joined {
     parts: Vec<Part>,
     clock: Clock,
     notes: Vec<String>,
+    /// Whether some file has no height: then the heights of the others are not used.
+    is_planar: bool,
 }
 
 /// One recording out of several with a vehicle each, which is called as its file; `left_out` says what else there is.
@@ -39,12 +42,13 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     let (paths, recordings): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
     let mut known = BTreeMap::new();
     for (name, path) in vehicles.iter().zip(&paths) {
-        if let Some(first) = known.insert(name, path) {
+        if let Some(first) = known.insert(spelling(name), path) {
             let problem = format!("the vehicle of {} is called {} too", first.display(), quoted(name));
             let remedy = "vehicles are called as their files: give each file another name";
             return Err(ReadError::new(path, Fault::content(problem, remedy)));
         }
     }
+    check_own_names(&recordings, &paths)?;
     let clocks: Vec<Clock> = recordings.iter().map(|tracks| tracks.clock().clone()).collect();
     let Some(first) = clocks.iter().min_by_key(|clock| clock.epoch_ns) else { return Err(Fault::Empty.into()) };
     for ((name, path), clock) in vehicles.iter().zip(&paths).zip(&clocks) {
@@ -72,6 +76,17 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     };
     let mut notes = vec![format!("a file is a vehicle: {}", vehicles.join(", "))];
     notes.extend(left_out);
+    let without: Vec<_> = vehicles
+        .iter()
+        .zip(&recordings)
+        .filter(|(_, tracks)| tracks.is_planar())
+        .map(|(name, _)| quoted(name))
+        .collect();
+    let is_planar = !without.is_empty();
+    if is_planar && without.len() < vehicles.len() {
+        let without = without.join(", ");
+        notes.push(format!("no height is known of {without}: the heights of the other files are not used"));
+    }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
         note_new(&mut notes, tracks.notes());
@@ -79,7 +94,28 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let waiting = Vec::new().into_iter().peekable();
         joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
-    Ok(Box::new(Joined { vehicles, parts: joined, clock, notes }))
+    Ok(Box::new(Joined { vehicles, parts: joined, clock, notes, is_planar }))
+}
+
+/// Refuses files of which some are of one vehicle, going by the names that their rows have. Where all have one name it is no
+/// vehicle's, but what all are.
+fn check_own_names(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadError> {
+    let own = recordings.iter().map(|tracks| match tracks.vehicles() {
+        [only] => Some(only.as_str()),
+        _ => None,
+    });
+    let own: Vec<_> = own.collect();
+    let (mut known, mut twice) = (BTreeMap::new(), None);
+    for (name, path) in own.iter().zip(paths) {
+        let Some(name) = name else { return Ok(()) };
+        if let Some(first) = known.insert(spelling(name), path) {
+            twice = twice.or(Some((*name, first, path)));
+        }
+    }
+    let Some((name, first, path)) = twice.filter(|_| known.len() > 1) else { return Ok(()) };
+    let problem = format!("its rows are of the vehicle {}, and so are those of {}", quoted(name), first.display());
+    let remedy = "put all rows of a vehicle into one file, or take the column out that names it";
+    Err(ReadError::new(path, Fault::content(problem, remedy)))
 }
 
 /// Appends notes that are not there yet.
@@ -93,7 +129,7 @@ fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
 
 impl Part {
     /// Reads the next items where none are waiting.
-    fn fill(&mut self, vehicle: usize) -> Result<(), ReadError> {
+    fn fill(&mut self, vehicle: usize, is_planar: bool) -> Result<(), ReadError> {
         if self.until_s == f64::INFINITY || self.waiting.peek().is_some() {
             return Ok(());
         }
@@ -106,6 +142,10 @@ impl Part {
             let problem = match item {
                 Item::Sample(sample) if sample.vehicle == 0 => {
                     (sample.vehicle, sample.time_s) = (vehicle, sample.time_s + self.shift_s);
+                    if is_planar {
+                        sample.position_m.z = 0.0;
+                        sample.velocity_m_s.iter_mut().for_each(|velocity| velocity.z = 0.0);
+                    }
                     continue;
                 }
                 Item::Sample(_) => "it holds several vehicles: a column of it names those of its rows",
@@ -130,11 +170,7 @@ impl Tracks for Joined {
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
         for (vehicle, part) in self.parts.iter_mut().enumerate() {
-            let had_ended = part.until_s == f64::INFINITY;
-            part.fill(vehicle)?;
-            if part.until_s == f64::INFINITY && !had_ended {
-                note_new(&mut self.notes, part.tracks.notes());
-            }
+            part.fill(vehicle, self.is_planar)?;
         }
         // Up to here nothing can come between what is known.
         let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);
@@ -142,6 +178,12 @@ impl Tracks for Joined {
             items.extend(std::iter::from_fn(|| part.waiting.next_if(|item| item.time_s() <= until_s)));
         }
         items[before..].sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+        if items.len() == before {
+            // Some of what a person should know shows at the end.
+            for part in &self.parts {
+                note_new(&mut self.notes, part.tracks.notes());
+            }
+        }
         Ok(items.len() > before)
     }
 
@@ -155,5 +197,13 @@ impl Tracks for Joined {
 
     fn assumed(&self) -> Option<&str> {
         self.parts.iter().find_map(|part| part.tracks.assumed())
+    }
+
+    fn is_planar(&self) -> bool {
+        self.is_planar
+    }
+
+    fn earth_origin(&self) -> Option<&EarthOrigin> {
+        self.parts.iter().find_map(|part| part.tracks.earth_origin())
     }
 }

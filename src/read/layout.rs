@@ -7,9 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
 use super::conventions::Convention;
-use super::error::{Fault, quoted};
+use super::error::{Fault, list, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
+use super::heights::Heights;
 use super::options::{ColumnNames, ReadOptions};
+use super::order::PLANAR;
 use super::time_columns::{self, Rest};
 use super::turned;
 use super::units;
@@ -23,6 +25,15 @@ pub(super) struct Body {
     pub(super) radius: Option<usize>,
 }
 
+impl Body {
+    /// The same without a height.
+    fn flattened(mut self) -> Self {
+        self.position[2] = None;
+        self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
+        self
+    }
+}
+
 /// The columns of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layout {
@@ -34,6 +45,12 @@ pub(super) struct Layout {
     pub(super) unit: Option<TimeUnit>,
     /// The column of the vehicle in a long table.
     pub(super) id: Option<usize>,
+    /// Whether the user says that this column is the one.
+    pub(super) is_id_given: bool,
+    /// Other columns of a long table that could name the vehicles, by their names.
+    pub(super) rivals: Vec<usize>,
+    /// Columns that are not read, whose values could name vehicles where there seems to be a single one.
+    pub(super) suspects: Vec<usize>,
     /// The vehicles of a wide table by name; none of a long one.
     pub(super) names: Vec<String>,
     /// The columns of each vehicle of a wide table, or of every row of a long one.
@@ -44,6 +61,8 @@ pub(super) struct Layout {
     pub(super) on_earth: bool,
     /// What the names of the columns say of frames and of programs.
     pub(super) convention: Convention,
+    /// Whether some vehicle has no column of its height: then no vehicle has one.
+    pub(super) is_planar: bool,
     /// What a person should know about the columns.
     pub(super) notes: Vec<String>,
 }
@@ -76,7 +95,13 @@ impl Layout {
         if convention.has_directions {
             turned::refuse_known(options, "its header")?;
         }
-        let mut columns = Columns { header, found: BTreeMap::new(), units: BTreeMap::new(), place: POSITION };
+        let mut columns = Columns {
+            header,
+            found: BTreeMap::new(),
+            units: BTreeMap::new(),
+            heights: Heights::default(),
+            place: POSITION,
+        };
         for (role, name) in options.columns.given() {
             let column = header.iter().position(|column| column == name);
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
@@ -87,7 +112,6 @@ impl Layout {
             let unit = unit.filter(|unit| is_angle(role) || units::size_of(unit, is_velocity(role)).is_some());
             columns.units.extend(unit.map(|unit| (column, unit)));
         }
-        let first = |is: fn(&str) -> bool| header.iter().position(|name| is(name));
         let found = match columns.get("", TIME) {
             Some(given) => Some((given, None)),
             None => time_columns::find(header, options)?,
@@ -99,22 +123,22 @@ impl Layout {
                 unit_of_time(&header[time], options)?.or(convention.counts_from_boot.then_some(TimeUnit::Microseconds))
             }
         };
-        let may_be_id = || if options.is_joined { first(heading::may_be_id) } else { None };
-        let id = columns.get("", ID).or_else(|| first(heading::is_id)).or_else(may_be_id);
+        let (id, rivals) = naming_columns(header, time, columns.get("", ID));
+        let is_id_given = columns.get("", ID).is_some();
 
         let is_taken = |column| column == time || id == Some(column) || rest.is_some_and(|rest| rest.column == column);
         let others = (0..header.len()).filter(|&column| !is_taken(column));
         let names = &convention.header;
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
         // Metres go before degrees where a table has both.
-        let gives = |role: Role| {
-            headings.iter().any(|(_, of)| of.role == role) || options.columns.given().any(|(given, _)| given == role)
-        };
+        let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
-        headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { heading.role < EARTH });
         columns.place = if on_earth { EARTH } else { POSITION };
+        headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { !is_angle(heading.role) });
+        columns.heights = Heights::place(columns.place, header, &mut columns.found, &mut headings);
+        let given: BTreeSet<_> = columns.found.keys().map(|(_, role)| *role).collect();
         for (column, heading) in headings.iter().filter(|(_, heading)| heading.vehicle.is_empty()) {
-            if options.columns.given().all(|(known, _)| known != heading.role) {
+            if !given.contains(&heading.role) {
                 columns.claim("", heading, *column)?;
             }
         }
@@ -131,22 +155,36 @@ impl Layout {
             None if one => (vec![String::new()], vec![alone.to_owned()]),
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
-        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<_, _>>()?;
+        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
+        let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
+        let flat: Vec<_> = flat.map(|(vehicle, _)| vehicle.clone()).collect();
+        let is_planar = !flat.is_empty();
+        let bodies = if is_planar { bodies.into_iter().map(Body::flattened).collect() } else { bodies };
         let mut layout = Self {
             time: Some(time),
             rest,
             unit,
             id,
+            is_id_given,
+            rivals,
+            suspects: Vec::new(),
             names,
             bodies,
             metres: Vec::new(),
             on_earth,
             convention: Convention::default(),
+            is_planar,
             notes: Vec::new(),
         };
         let used = layout.columns();
         layout.metres = columns.metres(&used, options.scale)?;
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
+        layout.notes.extend(convention.note.clone());
+        if is_planar {
+            let of = if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
+            layout.notes.push(format!("there is no column for the height{of}: {PLANAR}"));
+        }
+        layout.notes.extend(columns.heights_used(&layout.bodies, options)?);
         layout.convention = convention;
         layout.check(header, options, one)?;
         Ok(layout)
@@ -167,11 +205,18 @@ impl Layout {
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
             return Err(Fault::content(format!("{namer} names the vehicles"), "leave --one-vehicle away"));
         }
-        let is_one_vehicle = options.one_vehicle || convention.is_one_vehicle;
-        self.notes.extend(convention.note.clone());
+        let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
+        // A user who says that all rows are of one vehicle knows.
+        if (self.id.is_some() || one) && !options.one_vehicle {
+            let may_name =
+                |column: &usize| heading::may_name(&header[*column]) && !time_columns::is_part(&header[*column]);
+            let suspects = unused.clone().filter(|column| may_name(column) && !self.rivals.contains(column));
+            self.suspects = suspects.collect();
+        }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
-        if self.id.is_none() && one && !is_one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+        let is_told = is_one_vehicle || convention.is_one_vehicle;
+        if self.id.is_none() && one && !is_told && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
             return Err(match missing(header, ID, "") {
                 Fault::Content { problem, remedy } => {
                     let remedy = format!("{remedy}; where all rows are of one vehicle, say so with --one-vehicle");
@@ -180,10 +225,6 @@ impl Layout {
                 fault => fault,
             });
         }
-        if self.bodies.iter().any(|body| body.position[2].is_none()) {
-            let what = if self.on_earth { "the height" } else { "z" };
-            self.notes.push(format!("there is no column for {what}: it is taken as 0"));
-        }
         if let Some((time, rest)) = self.time.zip(self.rest) {
             let (whole, rest) = (quoted(&header[time]), quoted(&header[rest.column]));
             self.notes.push(format!("a time is {whole} and, below a unit of that, {rest}"));
@@ -191,10 +232,21 @@ impl Layout {
         if !unused.is_empty() {
             self.notes.push(format!("columns not used: {}", unused.join(", ")));
         }
-        if !self.names.is_empty() && !options.one_vehicle {
+        if !self.names.is_empty() && !is_one_vehicle {
             self.notes.push(format!("vehicles, going by the names of columns: {}", list(&self.names, 50)));
         }
         Ok(())
+    }
+
+    /// The columns that are read or looked at, each once, in rising order.
+    pub(super) fn columns_to_see(&self) -> Vec<usize> {
+        let columns: BTreeSet<_> = self
+            .columns()
+            .into_iter()
+            .chain(self.rivals.iter().copied())
+            .chain(self.suspects.iter().copied())
+            .collect();
+        columns.into_iter().collect()
     }
 
     /// The columns that are read, each once, in rising order.
@@ -213,6 +265,13 @@ impl Layout {
     pub(super) fn of_time(&self) -> impl Iterator<Item = usize> {
         self.time.into_iter().chain(self.rest.map(|rest| rest.column))
     }
+}
+
+/// The column that names the vehicles, and others that could; none where the user says which one it is.
+fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Option<usize>, Vec<usize>) {
+    let is_one = |&column: &usize| column != time && heading::is_id(&header[column]);
+    let mut named = (0..header.len()).filter(is_one);
+    if given.is_some() { (given, Vec::new()) } else { (named.next(), named.collect()) }
 }
 
 /// The unit that the name of a column of time says, where the user says nothing of it.
@@ -240,6 +299,7 @@ struct Columns<'a> {
     found: BTreeMap<(String, Role), usize>,
     /// The unit that the name of a column says.
     units: BTreeMap<usize, &'a str>,
+    heights: Heights,
     /// The role of the first axis of positions.
     place: Role,
 }
@@ -247,6 +307,24 @@ struct Columns<'a> {
 impl<'a> Columns<'a> {
     fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
         self.found.get(&(vehicle.to_owned(), role)).copied()
+    }
+
+    /// What a person should know of columns that are read because their names are those of heights, which are up whatever
+    /// the user says of the other axes.
+    fn heights_used(&self, bodies: &[Body], options: &ReadOptions) -> Result<Option<String>, Fault> {
+        let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
+        let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
+        turned::refuse_turned_height(options, &self.header[first])?;
+        let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
+        let turned = if is_turned { ", with the sign turned" } else { "" };
+        let scale = options.scale;
+        let unit = match self.units.get(&first) {
+            None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m as --scale says"),
+            None if self.place == EARTH => ", in metres: the name says no unit (--scale gives another)".to_owned(),
+            _ => String::new(),
+        };
+        let columns = if used.len() > 1 { "columns" } else { "column" };
+        Ok(Some(format!("heights are those of {columns} {}{turned}{unit}", list(&names, 12))))
     }
 
     fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
@@ -333,21 +411,29 @@ impl<'a> Columns<'a> {
                 continue;
             };
             let what = if is_velocity(role) { "velocity" } else { "length" };
-            metres[column] = units::size_of(unit, is_velocity(role)).ok_or_else(|| {
+            let size = units::size_of(unit, is_velocity(role)).ok_or_else(|| {
                 let problem = format!("column {name} says a unit of {what} that is not known, {}", quoted(unit));
                 let remedy =
                     "write it in m, cm, mm, km, ft or in, or name the column with --column and its unit with --scale";
                 Fault::content(problem, remedy)
             })?;
-            if metres[column] != 1.0 {
+            metres[column] = size;
+            if size != 1.0 {
                 other = Some(name);
             }
         }
-        if self.place == EARTH && scale != 1.0 {
-            let problem = format!("places on the Earth are in metres, and --scale {scale} says another unit");
-            return Err(Fault::content(problem, "leave --scale away"));
+        for column in self.heights.downward() {
+            metres[column] = -metres[column];
         }
-        let Some(other) = other else { return Ok(metres) };
+        let Some(other) = other else {
+            if self.place == EARTH {
+                let is_length = |(_, role): &&(String, Role)| !is_angle(*role) && *role >= POSITION;
+                let lengths: BTreeSet<_> =
+                    self.found.iter().filter(|(key, _)| is_length(key)).map(|(_, column)| *column).collect();
+                lengths.into_iter().for_each(|column| metres[column] *= scale);
+            }
+            return Ok(metres);
+        };
         if let Some(silent) = silent {
             let problem = format!("column {other} says its unit, and column {silent} none");
             return Err(Fault::content(problem, "write the unit of each column into its name, as in `x [mm]`"));
@@ -357,16 +443,6 @@ impl<'a> Columns<'a> {
             return Err(Fault::content(problem, "leave --scale away, or take the units out of the header"));
         }
         Ok(metres)
-    }
-}
-
-/// The first of some names that are not empty.
-fn list(names: &[String], shown: usize) -> String {
-    let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
-    match names.len() {
-        0 => "none".to_owned(),
-        count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
-        _ => names.join(", "),
     }
 }
 

@@ -28,6 +28,8 @@ mod folder;
 mod format;
 mod headerless;
 mod heading;
+mod heights;
+mod identity;
 mod join;
 mod layout;
 pub(crate) mod mcap;
@@ -60,7 +62,7 @@ pub use error::{Fault, Place, ReadError};
 pub use format::Format;
 pub(crate) use heading::is_read;
 pub use mcap::Channels;
-pub use options::{AxisOrder, ColumnNames, Dimensions, Duplicates, ReadOptions};
+pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions};
 pub use order::Recording;
 
 use std::fs;
@@ -81,7 +83,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened.map(|recording| turned::turned(recording, options)).map_err(|error| error.of(path))
+    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(path))
 }
 
 /// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
@@ -101,7 +103,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.map(|recording| turned::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
+    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
 }
 
 /// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
@@ -174,7 +176,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     if !folder.folders.is_empty() {
         return Err(folder.of_folders().into());
     }
-    let options = ReadOptions { one_vehicle: true, is_joined: true, ..options.clone() };
+    let options = ReadOptions { is_joined: true, ..options.clone() };
     let open = |file: Source| {
         let shown = file.shown();
         Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))

@@ -2,22 +2,53 @@
 
 use std::collections::HashMap;
 
+use super::error::Fault;
+use super::identity::{alike, spelling};
+
 /// Names in the order of their indices, and the way back.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Names {
     names: Vec<String>,
     indices: HashMap<Box<str>, usize>,
+    /// Indices by what names are but for their spelling.
+    spellings: HashMap<String, usize>,
 }
 
 impl Names {
-    pub(super) fn from_list(names: Vec<String>) -> Self {
-        let indices = names.iter().enumerate().map(|(index, name)| (name.as_str().into(), index)).collect();
-        Self { names, indices }
+    /// Names in this order.
+    ///
+    /// # Errors
+    /// Where two differ only in how they are spelled.
+    pub(super) fn from_list(names: Vec<String>) -> Result<Self, Fault> {
+        let mut all = Self::default();
+        for name in names {
+            all.add(name)?;
+        }
+        Ok(all)
     }
 
     /// `1`, `2`, ... up to `count`.
     pub(super) fn numbered(count: usize) -> Self {
-        Self::from_list((1..=count).map(|number| number.to_string()).collect())
+        Self::ordered((1..=count).map(|number| number.to_string()).collect())
+    }
+
+    /// Names that are known to differ.
+    fn ordered(names: Vec<String>) -> Self {
+        let spellings = names.iter().enumerate().map(|(index, name)| (spelling(name), index)).collect();
+        let indices = names.iter().enumerate().map(|(index, name)| (name.as_str().into(), index)).collect();
+        Self { names, indices, spellings }
+    }
+
+    /// Adds a name and gives its index.
+    fn add(&mut self, name: String) -> Result<usize, Fault> {
+        let index = self.names.len();
+        if let Some(&first) = self.spellings.get(&spelling(&name)) {
+            return Err(alike(&self.names[first], &name));
+        }
+        self.spellings.insert(spelling(&name), index);
+        self.indices.insert(name.as_str().into(), index);
+        self.names.push(name);
+        Ok(index)
     }
 
     pub(super) fn all(&self) -> &[String] {
@@ -26,19 +57,19 @@ impl Names {
 
     /// The index of a name, which is new if need be. Looked for first right after the vehicle before, or at the first
     /// after the last: most files go round.
+    ///
+    /// # Errors
+    /// Where a new name differs from another only in how it is spelled.
     #[inline]
-    pub(super) fn index(&mut self, name: &str, before: usize) -> usize {
+    pub(super) fn index(&mut self, name: &str, before: usize) -> Result<usize, Fault> {
         let next = if before + 1 < self.names.len() { before + 1 } else { 0 };
         if self.names.get(next).is_some_and(|known| known == name) {
-            return next;
+            return Ok(next);
         }
         if let Some(&index) = self.indices.get(name) {
-            return index;
+            return Ok(index);
         }
-        let index = self.names.len();
-        self.names.push(name.to_owned());
-        self.indices.insert(name.into(), index);
-        index
+        self.add(name.to_owned())
     }
 
     /// Puts the names in order of value where all are numbers. Indices given before lose their meaning.
@@ -47,6 +78,6 @@ impl Names {
         let Some(numbers) = numbers else { return };
         let mut order: Vec<usize> = (0..self.names.len()).collect();
         order.sort_by_key(|&index| numbers[index]);
-        *self = Self::from_list(order.iter().map(|&index| self.names[index].clone()).collect());
+        *self = Self::ordered(order.iter().map(|&index| self.names[index].clone()).collect());
     }
 }

@@ -3,15 +3,16 @@
 //! | array | shape | holds |
 //! | --- | --- | --- |
 //! | `t` | T | times, as numbers or `datetime64` |
-//! | `positions` | T x N x 3, or N x T x 3 | positions; two columns instead of three are a plane |
+//! | `positions` | T x N x 3, or its axes in another order | positions; two axes instead of three are a plane |
 //! | `velocities` | as `positions` | velocities, if there are any |
-//! | `radii` | N, or the first two axes of `positions` | radii, if there are any; NaN where unknown |
+//! | `radii` | N, or `positions` without its axis of x, y, z | radii, if there are any; NaN where unknown |
 //! | `names` | N | names, if there are any, each another |
-//! | `seen` | the first two axes of `positions` | whether a vehicle was seen; where it was not, its position means nothing |
-//! | `axes` | 1 to 3 | names of the axes: `time` first or `vehicle` first, if it is said |
+//! | `seen` | the same | whether a vehicle was seen; where it was not, its position means nothing |
+//! | `axes` | 1 to 3 | what the axes count, if it is said: `time`, `vehicle`, and `axis` (or `xyz`) |
 //! | `epoch_ns` | 1 or no axis | what `t` counts from |
 //!
-//! Arrays whose first axis is time are streamed; others are in memory.
+//! Where the lengths of the axes have several meanings (3 x 3 x 3, or T x 3 x 2), neither the user nor `axes` says which one
+//! holds, the archive is refused. Arrays in the usual order are streamed; others are in memory.
 
 use std::collections::BTreeSet;
 
@@ -22,8 +23,8 @@ use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
 use super::names::Names;
 use super::npy::Array;
-use super::options::{AxisOrder, ReadOptions};
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
+use super::order::{About, BATCH, Ordered, PLANAR, Recording, Row, Rows};
 use super::source::Source;
 
 const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
@@ -56,31 +57,70 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         });
         times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
     }
-    let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?;
-    let order = options.axis_order.or_else(|| match axes?.first()?.as_str() {
-        "time" => Some(AxisOrder::TimeFirst),
-        "vehicle" => Some(AxisOrder::VehicleFirst),
-        _ => None,
-    });
-    let table = arrays.table(&positions, times.len(), order)?;
-    let velocities = arrays.optional("velocities", |arrays| arrays.like(&table, "velocities", 3))?;
-    let seen = arrays.optional("seen", |arrays| arrays.like(&table, "seen", 2))?;
+    let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?.unwrap_or_default();
+    let mut said = options.layout.map_or_else(|| axes.iter().map_while(|name| axis(name)).collect(), Vec::from);
+    if said.is_empty() {
+        said.extend(options.usual_layout.iter().flatten());
+    }
+    let table = arrays.table(&positions, times.len(), &said)?;
+    let velocities = arrays.optional("velocities", |arrays| arrays.like(&table, "velocities", true))?;
+    let seen = arrays.optional("seen", |arrays| arrays.like(&table, "seen", false))?;
     let radii = arrays.optional("radii", |arrays| arrays.radii(&table))?;
     let names = arrays.optional("names", |arrays| arrays.names(table.vehicles()))?;
     let epoch_ns = arrays.optional("epoch_ns", |arrays| Ok(arrays.array("epoch_ns")?.next_stamp()?))?;
 
-    let names = names.map_or_else(Names::default, Names::from_list);
+    let names = names.map(Names::from_list).transpose()?.unwrap_or_default();
     let mut notes = Vec::new();
     if table.axes() == 2 {
-        notes.push("positions have two columns: z is taken as 0".to_owned());
+        notes.push(format!("positions have two axes and no height: {PLANAR}"));
     }
+    let is_planar = table.axes() == 2;
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::content("it holds no position", "save at least one instant of one vehicle");
-    let mut about = About::new(source, options, unit, notes, none);
+    let mut about = About { is_planar, ..About::new(source, options, unit, notes, none) };
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
         about.epoch_ns = epoch;
     }
     Ok(Box::new(Ordered::open(rows, about)?))
+}
+
+/// What an axis counts, by the name that an archive gives it.
+fn axis(name: &str) -> Option<ArrayAxis> {
+    match name {
+        "time" => Some(ArrayAxis::Time),
+        "vehicle" => Some(ArrayAxis::Vehicle),
+        "axis" | "xyz" | "xy" => Some(ArrayAxis::Axis),
+        _ => None,
+    }
+}
+
+/// The layout of an array of positions of this shape at so many times; `said` are its first axes, as far as they are known.
+/// Nothing else than a length tells which axis is which, so that it is one of a few lengths or is asked about.
+fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLayout, Fault> {
+    let fits = |layout: &ArrayLayout| {
+        layout.starts_with(said)
+            && layout.iter().zip(shape).all(|(axis, length)| match axis {
+                ArrayAxis::Time => length == times,
+                ArrayAxis::Axis => matches!(length, 2 | 3),
+                ArrayAxis::Vehicle => true,
+            })
+    };
+    let fitting: Vec<_> = ArrayAxis::LAYOUTS.into_iter().filter(fits).collect();
+    let problem = |what: &str| format!("it is of shape {shape:?}, and there are {times} times{what}");
+    match fitting[..] {
+        // Where x, y, z are not last, an axis of two or three vehicles looks the same.
+        [only] if only[2] == ArrayAxis::Axis || !said.is_empty() => Ok(only),
+        [] => {
+            let remedy = "save as many instants as times, and two or three axes: T x N x 3, or say what the axes are \
+                          with --layout, such as --layout time,vehicle,axis";
+            Err(Fault::content(problem(""), remedy))
+        }
+        _ => {
+            let ways: Vec<_> = fitting.iter().map(|layout| ArrayAxis::layout_name(*layout)).collect();
+            let remedy = format!("say what its axes are with --layout {}", ways.join(" or "));
+            Err(Fault::content(problem(": its shape does not say which axis is which"), remedy))
+        }
+    }
 }
 
 /// The arrays of an archive.
@@ -139,21 +179,23 @@ impl Arrays {
     fn radii(&mut self, positions: &Table) -> Result<Numbers, ReadError> {
         let mut array = self.array("radii")?;
         if array.shape != [positions.vehicles()] {
-            return self.like(positions, "radii", 2);
+            return self.like(positions, "radii", false);
         }
         let radii = (0..array.count()).map(|_| array.next_number()).collect::<Result<Vec<_>, _>>();
         Ok(Box::new(radii.map_err(in_array("radii"))?.into_iter().cycle().map(Ok)))
     }
 
-    /// The numbers of an array whose axes are the first `axes` of those of the positions.
-    fn like(&mut self, positions: &Table, name: &str, axes: usize) -> Result<Numbers, ReadError> {
+    /// The numbers of an array laid out as the positions are, with their axis of x, y and z or without.
+    fn like(&mut self, positions: &Table, name: &str, with_axes: bool) -> Result<Numbers, ReadError> {
         let array = self.array(name)?;
-        let expected = &positions.shape[..axes];
+        let axes = positions.layout.into_iter().zip(positions.shape);
+        let axes: Vec<_> = axes.filter(|(axis, _)| with_axes || *axis != ArrayAxis::Axis).collect();
+        let (order, expected): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
         if array.shape != expected {
             let problem = format!("it is of shape {:?} where {expected:?} belongs to the positions", array.shape);
             return Err(in_array(name)(Fault::content(problem, "save arrays of one recording together")));
         }
-        numbers(array, positions.order).map_err(in_array(name))
+        numbers(array, &order).map_err(in_array(name))
     }
 
     /// Names of as many vehicles.
@@ -178,10 +220,10 @@ impl Arrays {
     }
 
     /// An array of vectors with `times` instants.
-    fn table(&mut self, name: &str, times: usize, order: Option<AxisOrder>) -> Result<Table, ReadError> {
+    fn table(&mut self, name: &str, times: usize, said: &[ArrayAxis]) -> Result<Table, ReadError> {
         let array = self.array(name)?;
         let at = in_array(name);
-        let &[first, second, axes @ (2 | 3)] = array.shape.as_slice() else {
+        let &[first, second, third] = array.shape.as_slice() else {
             let problem = format!("it is of shape {:?}", array.shape);
             return Err(at(Fault::content(problem, "save positions as T x N x 3 or N x T x 3")));
         };
@@ -189,61 +231,57 @@ impl Arrays {
             let problem = format!("it is of shape {:?}, which holds nothing", array.shape);
             return Err(at(Fault::content(problem, "save at least one instant of one vehicle")));
         }
-        let order = match (order, first == times, second == times) {
-            (Some(AxisOrder::TimeFirst), true, _) | (None, true, false) => AxisOrder::TimeFirst,
-            (Some(AxisOrder::VehicleFirst), _, true) | (None, false, true) => AxisOrder::VehicleFirst,
-            (None, true, true) => {
-                let problem =
-                    format!("it is of shape {:?}, and there are {times} times: either axis may be time", array.shape);
-                let remedy = "name the first axis with --axis-order time-first or --axis-order vehicle-first";
-                return Err(at(Fault::content(problem, remedy)));
-            }
-            _ => {
-                let problem = format!("it is of shape {:?}, and there are {times} times", array.shape);
-                return Err(at(Fault::content(problem, "save as many instants as times")));
-            }
-        };
-        let shape = [first, second, axes];
-        Ok(Table { shape, order, numbers: numbers(array, order).map_err(at)? })
+        let shape = [first, second, third];
+        let layout = layout(shape, times, said).map_err(&at)?;
+        Ok(Table { shape, layout, numbers: numbers(array, &layout).map_err(at)? })
     }
 }
 
 /// Positions of all vehicles, instant by instant.
 struct Table {
-    /// As the archive has it: time and vehicle in their `order`, then the axes of space.
+    /// As the archive has it.
     shape: [usize; 3],
-    order: AxisOrder,
+    layout: ArrayLayout,
     numbers: Numbers,
 }
 
 impl Table {
+    fn length(&self, axis: ArrayAxis) -> usize {
+        self.layout.into_iter().zip(self.shape).find(|(of, _)| *of == axis).map_or(1, |(_, length)| length)
+    }
+
     fn vehicles(&self) -> usize {
-        self.shape[usize::from(self.order == AxisOrder::TimeFirst)]
+        self.length(ArrayAxis::Vehicle)
     }
 
     fn axes(&self) -> usize {
-        self.shape[2]
+        self.length(ArrayAxis::Axis)
     }
 }
 
 /// The numbers of an array of times and vehicles, instant by instant.
 type Numbers = Box<dyn Iterator<Item = Result<f64, Fault>>>;
 
-/// The numbers of an array whose first two axes are time and vehicle in this order.
-fn numbers(mut array: Array, order: AxisOrder) -> Result<Numbers, Fault> {
-    if order == AxisOrder::TimeFirst && !array.fortran_order {
+/// The numbers of an array whose axes count these.
+fn numbers(mut array: Array, order: &[ArrayAxis]) -> Result<Numbers, Fault> {
+    const USUAL: ArrayLayout = ArrayAxis::LAYOUTS[0];
+    if USUAL.starts_with(order) && !array.fortran_order {
         return Ok(Box::new(std::iter::repeat_with(move || array.next_number())));
     }
     let stored = (0..array.count()).map(|_| array.next_number()).collect::<Result<Vec<_>, _>>()?;
-    let (first, second, axes) = (array.shape[0], array.shape[1], array.shape[2..].iter().product::<usize>());
-    let strides = if array.fortran_order { [1, first, first * second] } else { [second * axes, axes, 1] };
-    let [mut times, mut vehicles] = [(first, strides[0]), (second, strides[1])];
-    if order == AxisOrder::VehicleFirst {
-        std::mem::swap(&mut times, &mut vehicles);
-    }
-    let along = |(length, stride): (usize, usize)| (0..length).map(move |k| k * stride);
-    let places = along(times).flat_map(move |time| along(vehicles).map(move |vehicle| time + vehicle));
-    let places = places.flat_map(move |place| along((axes, strides[2])).map(move |axis| place + axis));
+    let shape = array.shape.clone();
+    let stride = |place: usize| {
+        let inner = if array.fortran_order { &shape[..place] } else { &shape[place + 1..] };
+        inner.iter().product::<usize>()
+    };
+    let along = USUAL.map(|axis| {
+        let place = order.iter().position(|of| *of == axis);
+        place.map_or((1, 0), |place| (shape[place], stride(place)))
+    });
+    let steps = |(length, stride): (usize, usize)| (0..length).map(move |k| k * stride);
+    let [times, vehicles, axes] = along;
+    let places = steps(times).flat_map(move |time| steps(vehicles).map(move |vehicle| time + vehicle));
+    let places = places.flat_map(move |place| steps(axes).map(move |axis| place + axis));
     Ok(Box::new(places.map(move |place| Ok(stored[place]))))
 }
 

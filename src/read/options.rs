@@ -7,13 +7,55 @@ use super::clock::TimeUnit;
 use super::error::Fault;
 use super::format::Format;
 
-/// Which axis of an array comes first.
+/// What an axis of an array of positions counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AxisOrder {
-    /// T x N x 3.
-    TimeFirst,
-    /// N x T x 3.
-    VehicleFirst,
+pub enum ArrayAxis {
+    /// Instants.
+    Time,
+    /// Vehicles.
+    Vehicle,
+    /// x and y, or x, y and z.
+    Axis,
+}
+
+/// What the three axes of an array of positions count, in their order.
+pub type ArrayLayout = [ArrayAxis; 3];
+
+impl ArrayAxis {
+    /// All layouts, the usual one first.
+    pub const LAYOUTS: [ArrayLayout; 6] = [
+        [Self::Time, Self::Vehicle, Self::Axis],
+        [Self::Vehicle, Self::Time, Self::Axis],
+        [Self::Time, Self::Axis, Self::Vehicle],
+        [Self::Vehicle, Self::Axis, Self::Time],
+        [Self::Axis, Self::Time, Self::Vehicle],
+        [Self::Axis, Self::Vehicle, Self::Time],
+    ];
+
+    /// What `--layout` calls it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Vehicle => "vehicle",
+            Self::Axis => "axis",
+        }
+    }
+
+    /// What `--layout` calls a layout, such as `time,vehicle,axis`.
+    #[must_use]
+    pub fn layout_name(layout: ArrayLayout) -> String {
+        layout.map(Self::name).join(",")
+    }
+
+    /// The layout of such a name.
+    ///
+    /// # Errors
+    /// The names of all layouts, where it is the name of none.
+    pub fn layout_of(name: &str) -> Result<ArrayLayout, String> {
+        let layout = Self::LAYOUTS.into_iter().find(|layout| Self::layout_name(*layout) == name);
+        layout.ok_or_else(|| format!("`{name}` is none of {}", Self::LAYOUTS.map(Self::layout_name).join(" ")))
+    }
 }
 
 /// The numbers of a vehicle at a time.
@@ -137,8 +179,10 @@ pub struct ReadOptions {
     pub columns: ColumnNames,
     /// Where the curves of vehicles start, if they are relative to that \[m\].
     pub starts: BTreeMap<String, [f64; 3]>,
-    /// Which axis of an array comes first, where its shape does not tell.
-    pub axis_order: Option<AxisOrder>,
+    /// What the axes of an array of positions count, where its shape has several meanings.
+    pub layout: Option<ArrayLayout>,
+    /// The same for arrays of which nothing else says it; it may be given for recordings of any format.
+    pub usual_layout: Option<ArrayLayout>,
     /// The frame that all poses are brought into, where messages have several; those that no transforms lead from are left
     /// out.
     pub frame: Option<String>,
@@ -167,7 +211,8 @@ impl Default for ReadOptions {
             is_joined: false,
             starts: BTreeMap::new(),
             columns: ColumnNames::default(),
-            axis_order: None,
+            layout: None,
+            usual_layout: None,
             frame: None,
             topics: Vec::new(),
             origin: None,
@@ -213,7 +258,7 @@ impl ReadOptions {
                 "does not hold curves that are relative",
             ),
             (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
-            (self.axis_order.is_some() && !is_npz, "--axis-order", "has no arrays"),
+            (self.layout.is_some() && !is_npz, "--layout", "has no arrays"),
             (
                 self.origin.is_some() && !is_mcap && !is_ulog && (!is_table || is_npz),
                 "--origin",

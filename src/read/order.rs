@@ -8,10 +8,13 @@ use super::clock::{Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::{Duplicates, ReadOptions};
 use super::source::Source;
-use crate::track::{Clock, Item, Sample, Tracks};
+use crate::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 
 /// Rows given out at a time.
 pub(super) const BATCH: usize = 10_000;
+
+/// What follows for a recording in which some height is not known.
+pub(super) const PLANAR: &str = "the recording is judged in the plane of x and y";
 
 /// A vehicle at an instant, as the file has it.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +47,11 @@ pub(super) trait Rows {
 
     /// What a person should know that shows as rows are read.
     fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What a person should know that shows once all rows have been read.
+    fn late_notes(&self) -> Vec<String> {
         Vec::new()
     }
 
@@ -105,8 +113,9 @@ fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -> Result<()
                 "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
                 of.place(before.place)
             );
-            let remedy = "look whether its clock was set or two vehicles share the name; where the rows are only out of \
-                          order, have them sorted with --sort";
+            let remedy = "look whether its clock was set; where the rows are of several vehicles, name the column that \
+                          tells them apart with --column id=NAME; where they are only out of order, have them sorted \
+                          with --sort";
             return Err(Fault::content(problem, remedy).at(of.place(row.place)));
         }
     }
@@ -131,6 +140,10 @@ pub(super) struct About {
     pub(super) sort: bool,
     /// Which of several rows of a vehicle at one time is read.
     pub(super) duplicates: Option<Duplicates>,
+    /// Whether its rows have no height.
+    pub(super) is_planar: bool,
+    /// What its places on the Earth are measured from.
+    pub(super) earth_origin: Option<EarthOrigin>,
     pub(super) notes: Vec<String>,
     /// The fault of a recording without rows.
     pub(super) none: Fault,
@@ -154,6 +167,8 @@ impl About {
             scale: options.scale,
             sort: options.sort,
             duplicates: options.duplicates,
+            is_planar: false,
+            earth_origin: None,
             notes,
             none,
         }
@@ -172,11 +187,15 @@ pub(super) struct Ordered<R> {
     timing: Timing,
     notes: Vec<String>,
     assumed: Option<String>,
+    is_planar: bool,
+    earth_origin: Option<EarthOrigin>,
     scale: f64,
     /// Rows read that have not been given out.
     batch: std::vec::IntoIter<Row>,
     /// All rows have been read.
     ended: bool,
+    /// All rows have been given out.
+    finished: bool,
     /// Stamp and time of the last row.
     now: Option<(Stamp, f64)>,
     /// Time of each vehicle's last row, and the row.
@@ -191,7 +210,8 @@ pub(super) struct Ordered<R> {
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { path, unit, times_per_second, epoch_ns, scale, sort, duplicates, mut notes, none } = about;
+        let About { path, unit, times_per_second, epoch_ns, scale, sort, duplicates, mut notes, none, .. } = about;
+        let (is_planar, earth_origin) = (about.is_planar, about.earth_origin);
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() && sort {
@@ -230,8 +250,24 @@ impl<R: Rows> Ordered<R> {
             notes.push("rows are not in order of time and were sorted".to_owned());
         }
         let batch = first.into_iter();
-        let (now, last, given) = (None, Vec::new(), Vec::new());
-        Ok(Self { path, rows, timing, notes, assumed, scale, batch, ended, now, last, given, duplicates, left_out: 0 })
+        Ok(Self {
+            path,
+            rows,
+            timing,
+            notes,
+            assumed,
+            is_planar,
+            earth_origin,
+            scale,
+            batch,
+            ended,
+            finished: false,
+            now: None,
+            last: Vec::new(),
+            given: Vec::new(),
+            duplicates,
+            left_out: 0,
+        })
     }
 
     fn error(&self, row: &Row, fault: Fault) -> ReadError {
@@ -321,7 +357,8 @@ impl<R: Rows> Ordered<R> {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let problem = format!("vehicle {vehicle} is there a second time at {time_s} s; the first is {first}");
         let remedy = "take one of the two out, or say which is read with --duplicates first or --duplicates last: a \
-                      vehicle is in one place at a time";
+                      vehicle is in one place at a time; where the rows are of several, name the column that tells \
+                      them apart with --column id=NAME";
         Fault::content(problem, remedy)
     }
 
@@ -363,6 +400,10 @@ impl<R: Rows> Ordered<R> {
             let which = if waits { "a later" } else { "an earlier" };
             self.notes.push(format!("rows left out because {which} one of the vehicle is of the same time: {rows}"));
         }
+        if items.len() == before && !self.finished {
+            self.finished = true;
+            self.notes.extend(self.rows.late_notes());
+        }
         Ok(items.len() > before)
     }
 }
@@ -388,5 +429,13 @@ impl<R: Rows> Tracks for Ordered<R> {
 
     fn assumed(&self) -> Option<&str> {
         self.assumed.as_deref()
+    }
+
+    fn is_planar(&self) -> bool {
+        self.is_planar
+    }
+
+    fn earth_origin(&self) -> Option<&EarthOrigin> {
+        self.earth_origin.as_ref()
     }
 }

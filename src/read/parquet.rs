@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit};
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
@@ -46,7 +46,14 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
     let header: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let layout = Layout::of(&header, options, &source.stem())?;
+    let mut layout = Layout::of(&header, options, &source.stem())?;
+    let can_name = |&column: &usize| {
+        let physical = schema.column(column).physical_type();
+        unreadable(&reader, column).is_none()
+            && !matches!(physical, Physical::BOOLEAN | Physical::INT96 | Physical::FIXED_LEN_BYTE_ARRAY)
+    };
+    layout.rivals.retain(can_name);
+    layout.suspects.retain(can_name);
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
         if let Some((what, remedy)) = unreadable(&reader, column) {

@@ -1,14 +1,16 @@
 //! Tables row by row, whatever their cells are written as.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit};
 use super::conventions::GLOBAL;
 use super::dates::Date;
-use super::earth::{Geodetic, Local};
+use super::earth::{Geodetic, Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::identity::{Rival, Suspect};
 use super::layout::{Body, Layout};
 use super::names::Names;
 use super::options::ReadOptions;
@@ -95,6 +97,11 @@ struct Table<C> {
     has_own_clock: bool,
     /// The first time, where times are written as dates.
     dates: Option<Date>,
+    /// Columns that may say otherwise whose rows they are.
+    rivals: Vec<Rival>,
+    suspects: Vec<Suspect>,
+    /// How many rows of each vehicle have no fix.
+    no_fixes: BTreeMap<usize, u64>,
     /// Vehicle of the last row.
     vehicle: usize,
     /// Rows before the current one.
@@ -120,13 +127,31 @@ pub(super) fn open<C: Cells + 'static>(
     if dates.is_some_and(|first| !first.has_zone) {
         about.notes.push("times are dates without a zone and are taken as UTC".to_owned());
     }
-    let names = Names::from_list(layout.names.clone());
+    let (names, is_planar) = (Names::from_list(layout.names.clone())?, layout.is_planar);
     let local = origin(&mut cells, &layout, options)?;
     about.notes.extend(local.map(|local| local.note()));
-    cells.restart(&layout.columns(), true)?;
+    about.earth_origin = local.map(|local| local.measured_from(options.origin));
+    cells.restart(&layout.columns_to_see(), true)?;
+    // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
+    about.scale = if layout.on_earth { 1.0 } else { about.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
-    let table = Table { cells, layout, names, local, there: None, has_own_clock, dates, vehicle: 0, count: 0 };
-    Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
+    let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
+    let suspects = layout.suspects.iter().copied().map(Suspect::new).collect();
+    let table = Table {
+        cells,
+        layout,
+        names,
+        local,
+        there: None,
+        has_own_clock,
+        dates,
+        rivals,
+        suspects,
+        no_fixes: BTreeMap::new(),
+        vehicle: 0,
+        count: 0,
+    };
+    Ok(Box::new(Ordered::open(table, About { epoch_ns, is_planar, ..about })?))
 }
 
 /// The first time of a table, where it is a date.
@@ -150,14 +175,11 @@ fn origin<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Re
     }
     turned::refuse_known(options, "a table of latitudes and longitudes")?;
     cells.restart(&layout.columns(), true)?;
+    let mut unfixed = false;
     while cells.advance()? {
         let place = match reference {
             Some(columns) => measured_from(cells, columns),
-            None => layout
-                .bodies
-                .iter()
-                .find_map(|body| vector(cells, &body.position, &layout.metres).transpose())
-                .transpose(),
+            None => fix(cells, layout, &mut unfixed),
         };
         let at_row = |fault: Fault| fault.at(C::place(cells.row()));
         if let Some(place) = place.map_err(at_row)? {
@@ -167,6 +189,10 @@ fn origin<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Re
     if reference.is_some() {
         let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
         return Err(Fault::content(problem, GLOBAL).into());
+    }
+    if unfixed {
+        let problem = "no row has a fix: every latitude and longitude is exactly 0";
+        return Err(Fault::content(problem, "record again once the receiver has a fix, or give another file").into());
     }
     Ok(None)
 }
@@ -184,7 +210,19 @@ fn measured_from(cells: &impl Cells, columns: [usize; 3]) -> Result<Option<Geode
             },
         }
     }
-    Ok(Some(place).filter(|place| (place.x, place.y) != (0.0, 0.0)))
+    Ok(Some(place).filter(|place| !is_no_fix(place)))
+}
+
+/// The first place on the Earth of a row; none where it has none. Sets `unfixed` where it has no fix.
+fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option<Geodetic>, Fault> {
+    for body in &layout.bodies {
+        match vector(cells, &body.position, &layout.metres)? {
+            Some(place) if is_no_fix(&place) => *unfixed = true,
+            None => {}
+            place => return Ok(place),
+        }
+    }
+    Ok(None)
 }
 
 impl<C: Cells> Table<C> {
@@ -250,7 +288,7 @@ impl<C: Cells> Table<C> {
         if name.is_empty() {
             return Err(empty(&self.cells, id));
         }
-        self.vehicle = self.names.index(name, self.vehicle);
+        self.vehicle = self.names.index(name, self.vehicle)?;
         Ok(self.vehicle)
     }
 
@@ -261,6 +299,10 @@ impl<C: Cells> Table<C> {
         let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
         for (place, body) in self.layout.bodies.iter().enumerate() {
             let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
+            if self.layout.on_earth && is_no_fix(&row.position) {
+                *self.no_fixes.entry(row.vehicle).or_default() += 1;
+                continue;
+            }
             if let Some(columns) = self.layout.convention.reference {
                 let valid = &self.layout.convention.valid;
                 if !bring(&self.cells, &mut row, (columns, valid), self.local, &mut self.there)? {
@@ -269,9 +311,57 @@ impl<C: Cells> Table<C> {
             } else if let Some(local) = &self.local {
                 row.position = local.place(row.position)?;
             }
+            if self.layout.is_planar {
+                row.position.z = 0.0;
+                row.velocity.iter_mut().for_each(|velocity| velocity.z = 0.0);
+            }
             rows.push(row);
         }
         self.count += 1;
+        if !self.suspects.is_empty() {
+            self.suspect(rows.last().filter(|row| row.place == self.cells.row()).copied())?;
+        }
+        Ok(())
+    }
+
+    /// Looks at what columns that are not read say of a row, as long as all rows seem to be of one vehicle.
+    fn suspect(&mut self, row: Option<Row>) -> Result<(), Fault> {
+        if self.names.all().len() > 1 {
+            self.suspects.clear();
+        }
+        let Some(row) = row else { return Ok(()) };
+        for suspect in &mut self.suspects {
+            let value = self.cells.text(suspect.column)?;
+            suspect.see(value.trim(), row.stamp.approximately(), row.position);
+        }
+        self.suspects.retain(|suspect| !suspect.is_cleared());
+        Ok(())
+    }
+
+    /// Refuses rows that are named by a column that numbers them, or by two columns in two ways.
+    fn check_names(&self, id: usize, rows: usize, is_one_instant: bool) -> Result<(), Fault> {
+        let header = self.cells.header();
+        let called = |column: usize| quoted(&header[column]);
+        // Two rows at two times are of vehicles that never meet.
+        if rows > 2 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
+            let others: Vec<_> = self.layout.rivals.iter().chain(&self.layout.suspects).copied().map(called).collect();
+            let others = if others.is_empty() {
+                String::new()
+            } else {
+                format!("; the other columns are {}", others.join(", "))
+            };
+            let problem =
+                format!("column {} has another value in each row, and so names no vehicle{others}", called(id));
+            let remedy = "say which column names the vehicle with --column id=NAME, or take this one out";
+            return Err(Fault::content(problem, remedy));
+        }
+        if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
+            let (first, other) = (called(id), called(rival.column));
+            let problem = format!("the columns {first} and {other} could both name the vehicle, and do not agree");
+            let [first, other] = [&header[id], &header[rival.column]];
+            let remedy = format!("say which one does with --column id={first} or --column id={other}");
+            return Err(Fault::content(problem, remedy));
+        }
         Ok(())
     }
 }
@@ -338,7 +428,11 @@ fn vector(cells: &impl Cells, columns: &[Option<usize>; 3], metres: &[f64]) -> R
 impl<C: Cells> Rows for Table<C> {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
-        while rows.len() < before + BATCH && self.cells.advance()? {
+        while rows.len() < before + BATCH {
+            if !self.cells.advance()? {
+                let fault = self.suspects.iter().find_map(|of| of.fault(&self.cells.header()[of.column]));
+                return fault.map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
+            }
             self.append(rows).map_err(|fault| self.at_row(fault))?;
         }
         Ok(rows.len() > before)
@@ -346,7 +440,9 @@ impl<C: Cells> Rows for Table<C> {
 
     fn rewind(&mut self) -> Result<(), ReadError> {
         self.count = 0;
-        self.cells.restart(&self.layout.columns(), true)
+        self.no_fixes.clear();
+        self.suspects = self.layout.suspects.iter().copied().map(Suspect::new).collect();
+        self.cells.restart(&self.layout.columns_to_see(), true)
     }
 
     fn vehicles(&self) -> &[String] {
@@ -355,6 +451,14 @@ impl<C: Cells> Rows for Table<C> {
 
     fn settle_names(&mut self) {
         self.names.settle();
+    }
+
+    fn late_notes(&self) -> Vec<String> {
+        const LISTED: usize = 12;
+        let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
+        let mut of: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
+        of.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
+        no_fixes(self.no_fixes.values().sum(), &format!(" of {}", of.join(", "))).into_iter().collect()
     }
 
     fn place(&self, number: u64) -> Place {
@@ -373,14 +477,23 @@ impl<C: Cells> Rows for Table<C> {
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let Some(id) = self.layout.id else { return Ok(None) };
         let mut columns: Vec<usize> = self.layout.of_time().chain([id]).collect();
+        columns.extend(&self.layout.rivals);
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
         let mut probe: Option<Probe> = None;
+        let (mut rows, mut first, mut is_one_instant) = (0, None, true);
         while self.cells.advance()? {
             let stamp = self.stamp().and_then(|stamp| self.vehicle(id).map(|_| stamp));
             let stamp = stamp.map_err(|fault| self.at_row(fault))?;
             probe.get_or_insert_with(|| Probe::new(stamp)).see(stamp);
+            rows += 1;
+            is_one_instant &= *first.get_or_insert(stamp) == stamp;
+            for rival in &mut self.rivals {
+                let value = self.cells.text(rival.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
+                rival.see(self.vehicle, value.trim());
+            }
         }
+        self.check_names(id, rows, is_one_instant)?;
         Ok(probe)
     }
 }

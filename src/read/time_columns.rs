@@ -75,6 +75,11 @@ pub(super) fn find(header: &[String], options: &ReadOptions) -> Result<Option<(u
     }
 }
 
+/// Whether a column of this name gives a time or a part of one.
+pub(super) fn is_part(name: &str) -> bool {
+    candidate(0, name).is_some()
+}
+
 fn candidate(column: usize, name: &str) -> Option<Candidate> {
     let (stem, unit) = heading::time_and_unit(name);
     let known = unit.as_deref().and_then(TimeUnit::from_name);

@@ -17,7 +17,7 @@ use std::str;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::earth::Local;
+use super::earth::{Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
@@ -70,8 +70,10 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         None => ("times count from the start of the vehicle's computer", "the clocks of all vehicles started together"),
     };
     notes.push(clock.to_owned());
+    notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
     let none = Fault::content("it holds no position", "record again");
-    let about = About::new(source, options, Some(TimeUnit::Microseconds), notes, none);
+    let mut about = About::new(source, options, Some(TimeUnit::Microseconds), notes, none);
+    about.earth_origin = Some(local.measured_from(options.origin));
     let assumed = options.is_joined.then(|| assumed.to_owned());
     let rows = Positions { names: vec![source.stem()], rows: rows.into_iter(), assumed };
     Ok(Box::new(Ordered::open(rows, about)?))
@@ -97,6 +99,8 @@ struct Log {
     topics: BTreeMap<u16, Topic>,
     global: Vec<Fix>,
     local: Vec<Fix>,
+    /// Global positions that are none.
+    no_fixes: u64,
     /// When the computer started \[us since 1970\], where GPS says it.
     boot_us: Option<i64>,
 }
@@ -237,6 +241,8 @@ impl Log {
             GLOBAL => {
                 let place = message.place(["lat", "lon", "alt"])?;
                 let valid = message.is_set("lat_lon_valid")? && message.is_set("alt_valid")?;
+                let numbers = Vector3::from(message.numbers(["lat", "lon", "alt"])?);
+                self.no_fixes += u64::from(valid && is_no_fix(&numbers));
                 if let Some(origin) = place.filter(|_| valid) {
                     self.global.push(Fix { at, time_us, origin, position: Vector3::zeros() });
                 }
@@ -321,7 +327,7 @@ impl Message<'_> {
     /// A place on the Earth; none where it is not known: not finite, or where latitude and longitude are 0.
     fn place(&self, names: [&str; 3]) -> Result<Option<Vector3<f64>>, Fault> {
         let place = Vector3::from(self.numbers(names)?);
-        Ok(Some(place).filter(|place| place.iter().all(|x| x.is_finite()) && (place.x, place.y) != (0.0, 0.0)))
+        Ok(Some(place).filter(|place| place.iter().all(|x| x.is_finite()) && !is_no_fix(place)))
     }
 
     /// Whether a flag is set, or is not there.

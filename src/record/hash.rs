@@ -65,6 +65,25 @@ fn append_rows(bytes: &mut Vec<u8>, rows: &Rows) {
     }
 }
 
+/// SHA-256 over messages, each with the name of its topic and its length.
+#[cfg(feature = "recordings")]
+#[derive(Clone, Debug, Default)]
+pub(super) struct MessageHash(Sha256);
+
+#[cfg(feature = "recordings")]
+impl MessageHash {
+    pub(super) fn take(&mut self, topic: &str, message: &[u8]) {
+        self.0.update(topic.as_bytes());
+        self.0.update((message.len() as u64).to_le_bytes());
+        self.0.update(message);
+    }
+
+    /// The hash as 64 lower-case hexadecimal digits.
+    pub(super) fn digits(&self) -> String {
+        hex(&self.0.clone().finalize())
+    }
+}
+
 /// SHA-256 of a text as 64 lower-case hexadecimal digits.
 #[must_use]
 pub fn sha256_hex(text: &str) -> String {

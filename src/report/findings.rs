@@ -75,15 +75,16 @@ pub struct Findings<'a> {
 }
 
 impl Findings<'_> {
-    /// The judge's verdict on vehicles and obstacles together: the worse one.
+    /// Returns the verdict on vehicles and obstacles together over the whole flight: never clear where the flight ended early.
     pub(super) fn status(&self) -> Status {
-        let both = [Some(self.audit.status), self.clearance.map(|clearance| clearance.status)];
-        let has = |status: Status| both.contains(&Some(status));
-        match (has(Status::Violation), has(Status::Undecided)) {
-            (true, _) => Status::Violation,
-            (false, true) => Status::Undecided,
-            (false, false) => Status::Clear,
-        }
+        let of_obstacles = self.clearance.map_or(Status::Clear, |clearance| clearance.status);
+        let of_the_rest = if self.run.ended_early.is_some() { Status::Undecided } else { Status::Clear };
+        self.audit.status.and(of_obstacles).and(of_the_rest)
+    }
+
+    /// Returns when the last formation was reached \[s\], where it was kept to the end of a flight that was flown to its end.
+    pub(super) fn reached_at_s(&self) -> Option<f64> {
+        self.summary.reached_at_s.filter(|_| self.run.ended_early.is_none())
     }
 }
 

@@ -74,8 +74,9 @@ pub struct Report {
     /// What flying again at half the step changed, where that was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verification: Option<Verification>,
-    /// Wall-clock times, the only part that differs between two runs of one scenario.
-    pub performance: Performance,
+    /// Wall-clock times, the only part that differs between two runs of one scenario; left out where a campaign flies a run again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub performance: Option<Performance>,
 }
 
 /// Which scenario it was.
@@ -129,7 +130,8 @@ impl<Delta> Separation<Delta> {
 /// What the judgement rests on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Audit {
-    /// The judge's verdict on separation, and on obstacles where there are any: the worse of the two.
+    /// Verdict on separation, and on obstacles where there are any: the worse of the two. Undecided at best where the flight ended
+    /// early.
     pub status: Status,
     /// Every time that a pair was closer than delta.
     pub violations: Vec<Violation>,
@@ -196,7 +198,7 @@ pub struct Rapier {
 /// How near the formation was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FormationNumbers {
-    /// Whether it was reached and kept to the end.
+    /// Whether it was reached and kept to the end; never of a flight that ended early.
     pub reached: bool,
     /// From when on \[s\].
     pub reached_at_s: Option<f64>,
@@ -295,10 +297,10 @@ impl Report {
             obstacles: Obstacles::of(findings),
             hulls: findings.hulls.clone(),
             formation: FormationNumbers {
-                reached: summary.reached_at_s.is_some(),
-                reached_at_s: summary.reached_at_s.and_then(finite),
+                reached: findings.reached_at_s().is_some(),
+                reached_at_s: findings.reached_at_s().and_then(finite),
                 held_s: summary.held_s.and_then(finite),
-                fails: Fails::of(summary, findings.judge),
+                fails: Fails::of(findings),
                 at_rest: at_rest(findings),
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),
@@ -324,7 +326,7 @@ impl Report {
             },
             run: findings.run.clone(),
             verification: None,
-            performance: findings.performance,
+            performance: Some(findings.performance),
         }
     }
 

@@ -6,7 +6,6 @@ use super::findings::Performance;
 use super::flight::{Report, Violation};
 use super::page::{self, Badge, Page, Picture, Start, noted, section};
 use super::vehicles::plant;
-use crate::audit::Status;
 use crate::figures::Figure;
 use crate::formation::Freedom;
 use crate::replay::{NoReplay, Replay};
@@ -74,7 +73,7 @@ impl Report {
         }
         sections.push(section("What was assumed", &[page::list(&self.assumptions(page.scenario))]));
         sections.push(section("Repeat it", &[self.repetition(page)]));
-        sections.push(section("Performance", &[self.performance.table()]));
+        sections.extend(self.performance.map(|times| section("Performance", &[times.table()])));
         Page {
             title: self.scenario.name.clone(),
             kind: "Flight report",
@@ -98,11 +97,6 @@ impl Report {
         } else {
             separation.certificate_void.join(" ")
         };
-        let status = match audit.status {
-            Status::Clear => "clear",
-            Status::Violation => "violation",
-            Status::Undecided => "undecided",
-        };
         let sweep = format!("{} steps and {} pairs swept", audit.steps, audit.pairs_checked);
         let contacts = audit.rapier.contact_pairs.map_or(NOT_KNOWN.to_owned(), |pairs| pairs.to_string());
         let caption = match &separation.ellipsoid {
@@ -115,7 +109,7 @@ impl Report {
                 ("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
                 ("Smallest distance", proved_m(separation.min_m), &closest),
                 ("Certified distance", proved_m(separation.certified_m), &certificate),
-                ("Audit", status.to_owned(), &sweep),
+                ("Audit", audit.status.name().to_owned(), &sweep),
                 ("Violations", audit.violations.len().to_string(), "times that a pair was closer than δ"),
                 ("Disagreements", audit.parry.disagreements.to_string(), "of closed form and shape cast"),
                 ("Contacts seen by the engine", contacts, "pairs whose keep-out balls overlapped"),

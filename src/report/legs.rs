@@ -35,7 +35,7 @@ pub(super) fn legs(findings: &Findings<'_>) -> Vec<LegNumbers> {
         let began = |leg: usize| leg.checked_sub(1).map_or(Some(0.0), |before| Some(ended.get(before)?.ended_at_s));
         let LegSummary { ended_at_s, reached_at_s } = ended.get(leg).copied().unwrap_or(LegSummary {
             ended_at_s: findings.run.duration_s,
-            reached_at_s: findings.summary.reached_at_s.filter(|_| leg == last),
+            reached_at_s: findings.reached_at_s().filter(|_| leg == last),
         });
         let bound = findings.certificate.legs.get(leg);
         LegNumbers {

@@ -44,6 +44,8 @@ pub use verdict::{Fails, Verdict};
 pub use verification::Verification;
 
 #[cfg(test)]
+mod early_end_tests;
+#[cfg(test)]
 mod promise_tests;
 #[cfg(test)]
 mod tests;

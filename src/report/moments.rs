@@ -28,7 +28,8 @@ impl Report {
         let unit = if self.separation.ellipsoid.is_some() { "m, scaled" } else { "m" };
         let of_pairs = self.audit.undecided == 0 && self.audit.parry.disagreements == 0;
         let of_obstacles = self.obstacles.iter().all(|of| of.undecided == 0 && of.disagreements == 0);
-        let is_else_known = self.audit.status != Status::Undecided && of_pairs && of_obstacles;
+        let is_judged = self.audit.status != Status::Undecided || self.is_clear_until_its_early_end();
+        let is_else_known = is_judged && of_pairs && of_obstacles;
         Judged { is_else_known, limit: Some(self.separation.delta_m), unit }
     }
 

@@ -15,7 +15,7 @@ const LISTED: usize = 50;
 /// The judge's findings on a flight past obstacles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Obstacles {
-    /// The verdict on them alone; that of `audit` holds it too.
+    /// The verdict on them alone; that of `audit` holds it too. Undecided at best where the flight ended early.
     pub status: Status,
     /// Every vehicle keeps this much beyond the clearance of every obstacle, by the law's certificate \[m\].
     pub certified_room_m: Option<f64>,
@@ -76,7 +76,7 @@ impl Obstacles {
         };
         let of_closest = |found: &Approach| approach(found.pair, found.limit_m, found.certain_m(), found.time_s);
         Some(Self {
-            status: *status,
+            status: if findings.run.ended_early.is_some() { status.and(Status::Undecided) } else { *status },
             certified_room_m: findings.certificate.certified_room_m.and_then(finite),
             closest: closest.iter().filter_map(of_closest).collect(),
             violations: violations.iter().filter_map(of_violation).collect(),
@@ -110,7 +110,7 @@ impl Obstacles {
 
     /// Every reason that they give against a pass, a sentence.
     pub(super) fn reason(&self) -> Option<String> {
-        let violation = self.deepest().map(|deepest| {
+        let violation = self.deepest().filter(|_| self.status == Status::Violation).map(|deepest| {
             let others = match self.violations.len() - 1 {
                 0 => String::new(),
                 1 => " There is 1 more such time.".to_owned(),
@@ -133,8 +133,14 @@ impl Obstacles {
             let times = counted(self.disagreements, "time", "times");
             format!("The two detectors disagree {times} on the distance from an obstacle, so one of them is wrong.")
         });
-        let open = (self.status == Status::Undecided && self.disagreements == 0)
-            .then(|| "It cannot be told whether every vehicle kept clear of the obstacles.".to_owned());
+        let open = (self.status == Status::Undecided && self.disagreements == 0).then(|| match self.deepest() {
+            Some(deepest) => format!(
+                "The step cannot resolve whether the clearance of obstacles is kept: as flown, {}, and after steps that are too \
+                 long for the law integration may err by more than that.",
+                deepest.brief()
+            ),
+            None => "It cannot be told whether every vehicle kept clear of the obstacles.".to_owned(),
+        });
         violation.into_iter().chain(broken).chain(disagree).chain(open).reduce(|all, next| all + " " + &next)
     }
 

@@ -316,7 +316,7 @@ fn a_formation_that_is_not_reached_is_told_with_its_largest_error() {
     assert_eq!(
         case.reason(),
         "The formation was not reached: at the end a distance is still wrong by 8.570 m, and 0.01 m are allowed. The \
-         vehicles have come to rest elsewhere: more time does not help."
+         vehicles have come to rest elsewhere: ten times the duration would not be enough."
     );
     assert_eq!(
         case.report().headline(),

@@ -8,10 +8,8 @@ use super::findings::Findings;
 use super::legs;
 use super::obstacles::Obstacles;
 use crate::audit::Status;
-use crate::metrics::Summary;
 use crate::record::EnergyRise;
 use crate::scenario::TimeSpec;
-use crate::target::Arrival;
 use crate::text::{counted, metres, metres_below, seconds};
 
 /// The judgement.
@@ -32,6 +30,7 @@ impl Verdict {
         let reasons: Vec<_> = [
             refused(findings),
             violation(findings),
+            unresolved_by_step(findings),
             Obstacles::of(findings).and_then(|obstacles| obstacles.reason()),
             findings.hulls.reason(),
             disagreement(findings),
@@ -56,6 +55,8 @@ impl Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fails {
+    /// The formation was reached, and the flight ended early.
+    EndedEarly,
     /// Everything was within the limits at the end, for too short a time.
     HeldS,
     /// No state at the end is known.
@@ -71,9 +72,10 @@ pub enum Fails {
 }
 
 impl Fails {
-    pub(super) fn of(summary: &Summary, judge: Arrival) -> Option<Self> {
+    pub(super) fn of(findings: &Findings<'_>) -> Option<Self> {
+        let Findings { summary, judge, .. } = findings;
         if summary.reached_at_s.is_some() {
-            None
+            findings.run.ended_early.as_ref().map(|_| Self::EndedEarly)
         } else if summary.held_s.is_some() {
             Some(Self::HeldS)
         } else if !summary.max_edge_error_m.is_finite() {
@@ -88,22 +90,28 @@ impl Fails {
     }
 }
 
-/// Speeds relative to the mean, and commanded accelerations over a second, below this part of what counts as reached are
-/// rest.
-const REST: f64 = 0.1;
+/// Vehicles are at rest if what they still lack is farther than they would get in this many times the flight's duration.
+const REST_DURATIONS: f64 = 10.0;
 
-/// Where a formation is not reached: whether the vehicles have come to rest elsewhere; none where that is not known, as of
-/// vehicles that stand while they are commanded, for something may hold against that.
+/// Whether the vehicles of a formation that is not reached have come to rest elsewhere: at the speeds and commanded
+/// accelerations of the end, ten times the flight's duration would not cover the position error that is too much,
+///
+/// ```text
+/// v H + u H^2/2 < e - edge_error_m,    H = 10 T
+/// ```
+///
+/// None where that is not known, as of vehicles that stand while they are commanded and something may hold against that.
 pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
     let Findings { summary, judge, is_disturbed, .. } = findings;
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
-    let is_known = summary.reached_at_s.is_none() && speed_m_s.is_finite() && command_m_s2.is_finite();
-    let rests = [speed_m_s, command_m_s2].map(|number| number <= REST * judge.disagreement_m_s);
-    match rests {
-        _ if !is_known => None,
-        [true, false] if *is_disturbed => None,
-        [stands, is_left_alone] => Some(stands && is_left_alone),
+    let lacking_m = summary.max_edge_error_m.max(summary.max_position_error_m) - judge.edge_error_m;
+    if findings.reached_at_s().is_some() || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
+        return None;
     }
+    let horizon_s = REST_DURATIONS * summary.end_s;
+    let stands = speed_m_s * horizon_s < lacking_m;
+    let is_left_alone = speed_m_s * horizon_s + 0.5 * command_m_s2 * horizon_s.powi(2) < lacking_m;
+    if stands && !is_left_alone && *is_disturbed { None } else { Some(is_left_alone) }
 }
 
 fn refused(findings: &Findings<'_>) -> Option<String> {
@@ -134,6 +142,27 @@ fn violation(findings: &Findings<'_>) -> Option<String> {
     ))
 }
 
+/// Whether violations were found that integration may have made: a step was too long for the law before, or in, the first of them.
+pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violations: usize) -> bool {
+    status == Status::Undecided && overlong_steps > 0 && violations > 0
+}
+
+fn unresolved_by_step(findings: &Findings<'_>) -> Option<String> {
+    let audit = findings.audit;
+    if !is_unresolved_by_step(audit.status, findings.run.overlong_steps, audit.violations.len()) {
+        return None;
+    }
+    let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m))?;
+    let [first, second] = deepest.pair.numbers();
+    Some(format!(
+        "The step cannot resolve whether the safety distance of {} m is kept: vehicles {first} and {second} came to {} m of each \
+         other at {} as flown, and after steps that are too long for the law integration may err by more than that.",
+        metres(findings.delta_m),
+        metres_below(deepest.min_m, findings.delta_m),
+        seconds(deepest.min_at_s),
+    ))
+}
+
 fn disagreement(findings: &Findings<'_>) -> Option<String> {
     let parry = &findings.audit.parry;
     let first = parry.first_disagreement.as_ref().map(|first| format!(" First: {first}.")).unwrap_or_default();
@@ -143,6 +172,9 @@ fn disagreement(findings: &Findings<'_>) -> Option<String> {
 }
 
 fn undecided(findings: &Findings<'_>) -> Option<String> {
+    if !findings.audit.violations.is_empty() {
+        return None;
+    }
     if findings.audit.status == Status::Undecided && findings.audit.unresolved > 0 {
         return Some(
             "Two vehicles came so near to delta that the audit cannot tell whether they kept it: rounding, or paths that bend \
@@ -218,7 +250,9 @@ fn steps_too_long(findings: &Findings<'_>) -> Option<String> {
 
 fn not_reached(findings: &Findings<'_>) -> Option<String> {
     let (summary, judge) = (findings.summary, findings.judge);
-    let why = match Fails::of(summary, judge)? {
+    let why = match Fails::of(findings)? {
+        // The reason is that of the early end.
+        Fails::EndedEarly => return None,
         Fails::HeldS => format!(
             "it was kept for the last {} only, and {} are asked for",
             seconds(summary.held_s.unwrap_or_default()),
@@ -247,7 +281,9 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
         (!findings.failures.is_empty()).then(|| format!(" Failed: {}.", FailedVehicle::line(findings.failures)));
     let then = match at_rest(findings) {
         _ if failed.is_some() => "",
-        Some(true) if summary.held_s.is_none() => " The vehicles have come to rest elsewhere: more time does not help.",
+        Some(true) if summary.held_s.is_none() => {
+            " The vehicles have come to rest elsewhere: ten times the duration would not be enough."
+        }
         Some(false) if summary.held_s.is_none() && findings.refused.is_empty() => {
             " The vehicles are still moving: more time may help."
         }
@@ -259,7 +295,7 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
 
 /// A start flatter than the formation: forces along the lines between vehicles never leave it.
 fn too_flat(findings: &Findings<'_>) -> Option<String> {
-    if findings.summary.reached_at_s.is_some() {
+    if findings.reached_at_s().is_some() {
         return None;
     }
     let (start, trap) = match findings.trap_dimension? {

@@ -3,7 +3,7 @@
 use super::failures::FailedVehicle;
 use super::findings::Performance;
 use super::flight::Report;
-use super::verdict::{Fails, breaks_certificate};
+use super::verdict::{Fails, breaks_certificate, is_unresolved_by_step};
 use crate::audit::Status;
 use crate::text::{at_least, counted, metres, metres_below, seconds, table};
 
@@ -61,36 +61,69 @@ impl Report {
     fn judged(&self) -> String {
         let delta = metres(self.separation.delta_m);
         match self.audit.status {
-            Status::Clear => {
-                let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
-                let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
-                let broken = match self.separation.certified_m.filter(|_| self.breaks_certificate()) {
-                    Some(certified_m) => format!(", which breaks the certificate of {} m", at_least(certified_m, 6)),
-                    None => String::new(),
-                };
-                let rose = match self.energy.max_over_leg_start.filter(|_| self.energy.rose) {
-                    Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
-                    None => String::new(),
-                };
-                let room = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::room);
-                let room = room.map(|room| format!(", {room}")).unwrap_or_default();
-                format!(
-                    "CLEAR: {closest}{} (delta {delta} m){room}{broken}{rose}, {}",
-                    self.scaled(),
-                    self.formation_in_words()
-                )
-            }
+            Status::Clear => format!("CLEAR: {}", self.clear_in_words()),
             Status::Violation => {
                 let deepest = self.deepest_in_words();
                 format!("VIOLATION: {deepest}")
             }
+            Status::Undecided if self.is_clear_until_its_early_end() => {
+                format!("UNDECIDED from {} on: {}", seconds(self.run.duration_s), self.clear_in_words())
+            }
             Status::Undecided if self.audit.parry.disagreements > 0 => {
                 format!("UNDECIDED: the two detectors disagree (delta {delta} m), {}", self.formation_in_words())
+            }
+            Status::Undecided if self.is_unresolved_by_step() => {
+                format!(
+                    "UNDECIDED: the step cannot resolve this, as flown {}, {}",
+                    self.deepest_in_words(),
+                    self.formation_in_words()
+                )
             }
             Status::Undecided => {
                 format!("UNDECIDED: not everything could be judged (delta {delta} m), {}", self.formation_in_words())
             }
         }
+    }
+
+    /// Returns whether the flight ended early and was clear up to there.
+    pub(super) fn is_clear_until_its_early_end(&self) -> bool {
+        let audit = &self.audit;
+        let of_obstacles = self.obstacles.as_ref().map_or(0, |of| of.undecided + of.disagreements);
+        let is_open = audit.undecided + audit.parry.disagreements + of_obstacles > 0;
+        let is_judged = self.run.vehicles < 2 || self.separation.min_m.is_some();
+        self.run.ended_early.is_some()
+            && audit.status == Status::Undecided
+            && is_judged
+            && !is_open
+            && !self.is_unresolved_by_step()
+    }
+
+    fn clear_in_words(&self) -> String {
+        let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
+        let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
+        let broken = match self.separation.certified_m.filter(|_| self.breaks_certificate()) {
+            Some(certified_m) => format!(", which breaks the certificate of {} m", at_least(certified_m, 6)),
+            None => String::new(),
+        };
+        let rose = match self.energy.max_over_leg_start.filter(|_| self.energy.rose) {
+            Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
+            None => String::new(),
+        };
+        let room = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::room);
+        let room = room.map(|room| format!(", {room}")).unwrap_or_default();
+        format!(
+            "{closest}{} (delta {} m){room}{broken}{rose}, {}",
+            self.scaled(),
+            metres(self.separation.delta_m),
+            self.formation_in_words()
+        )
+    }
+
+    /// Whether integration may have made all violations.
+    fn is_unresolved_by_step(&self) -> bool {
+        let past_obstacles = self.obstacles.as_ref().map_or(0, |obstacles| obstacles.violations.len());
+        let violations = self.audit.violations.len() + past_obstacles;
+        is_unresolved_by_step(self.audit.status, self.run.overlong_steps, violations)
     }
 
     fn formation_in_words(&self) -> String {
@@ -100,6 +133,7 @@ impl Report {
                 let at_s = formation.reached_at_s.unwrap_or_default();
                 return format!("formation reached at {at_s:.1} s");
             }
+            Some(Fails::EndedEarly) => return "formation NOT reached (the flight ended early)".to_owned(),
             Some(Fails::Unknown) => return "formation NOT reached".to_owned(),
             Some(Fails::HeldS) => {
                 let held_s = formation.held_s.unwrap_or_default();
@@ -165,9 +199,9 @@ impl Report {
             ("control", format!("peak {peak}, final {last} m/s^2")),
             ("velocity", format!("disagreement {disagreement}, common {common} m/s")),
             ("run", self.run_line()),
-            ("performance", self.performance_line()),
         ];
-        rows.extend(rest.map(|(name, line)| (name.to_owned(), line)));
+        let times = self.performance.map(|times| ("performance", times.line()));
+        rows.extend(rest.into_iter().chain(times).map(|(name, line)| (name.to_owned(), line)));
         table(rows)
     }
 
@@ -248,10 +282,11 @@ impl Report {
             run.state_hash.get(..12).unwrap_or(&run.state_hash)
         )
     }
+}
 
-    fn performance_line(&self) -> String {
-        let Performance { wall_s, real_time_factor, law_s, energy_s, physics_s, airframe_s, audit_s, record_s } =
-            self.performance;
+impl Performance {
+    fn line(self) -> String {
+        let Self { wall_s, real_time_factor, law_s, energy_s, physics_s, airframe_s, audit_s, record_s } = self;
         let airframe = if airframe_s > 0.0 { format!(", {airframe_s:.3} of it airframes") } else { String::new() };
         let factor = real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
         format!(

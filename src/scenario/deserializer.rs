@@ -27,6 +27,8 @@ pub(super) struct KeyError {
     pub(super) unknown: Option<Unknown>,
     /// Where it stands in the text.
     pub(super) span: Option<Range<usize>>,
+    /// Whether the type of the value asks for a whole number, which the value is not.
+    pub(super) asks_for_whole: bool,
 }
 
 /// A name where another was expected.
@@ -55,7 +57,7 @@ impl KeyError {
 
 impl de::Error for KeyError {
     fn custom<T: Display>(message: T) -> Self {
-        Self { message: message.to_string(), unknown: None, span: None }
+        Self { message: message.to_string(), unknown: None, span: None, asks_for_whole: false }
     }
 
     fn missing_field(field: &'static str) -> Self {
@@ -113,7 +115,9 @@ impl<'de> Value<'de> {
 
     fn whole_number(&self, most: u64) -> Result<u64, KeyError> {
         const FROM_0: &str = "a whole number from 0";
-        let DeValue::Integer(written) = &self.inner else { return Err(self.wrong_type(FROM_0)) };
+        let DeValue::Integer(written) = &self.inner else {
+            return Err(KeyError { asks_for_whole: true, ..self.wrong_type(FROM_0) });
+        };
         let number = u64::from_str_radix(written.as_str(), written.radix()).ok().filter(|&number| number <= most);
         number.ok_or_else(|| KeyError::invalid_value(self.unexpected(), &FROM_0).at(&self.span))
     }

@@ -77,7 +77,7 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
         return Ok(false);
     }
     let Ok(law) = scenario.law() else { return Ok(false) };
-    let why = match (law.settling_rate_per_s(), scenario.breathing.is_on()) {
+    let why = match (law.settling(), scenario.breathing.is_on()) {
         (Some(_), true) => return Ok(true),
         (None, _) => format!("under the law `{}` nobody is assigned anew where the swarm is stalled", law.name()),
         (Some(_), false) => "with breathing off nobody is assigned anew where the swarm is stalled".to_owned(),

@@ -114,4 +114,4 @@ pub use template::{Draw, NamedLaw, Template};
 pub use time::TimeSpec;
 pub use vehicle::{DEFAULT_ATTITUDE_HZ, QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
 #[cfg(feature = "reports")]
-pub(crate) use whole::{between, takes_whole_numbers_alone};
+pub(crate) use whole::takes_whole_numbers_alone;

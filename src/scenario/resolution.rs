@@ -70,7 +70,7 @@ impl Scenario {
     /// Of every leg, with the breath that it begins with where it does.
     fn promised(&self, law: &dyn Law) -> Certificate {
         let start = self.observation(&self.start);
-        if self.breathing.mode != BreathingMode::Start || law.settling_rate_per_s().is_none() {
+        if self.breathing.mode != BreathingMode::Start || law.settling().is_none() {
             let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
             return law.certificate_through(&start, &ahead);
         }

@@ -57,6 +57,20 @@ pub(super) struct Text<'a> {
 impl<'a> Text<'a> {
     /// Reads the keys of the scenario, without those of a choice that an override has left.
     pub(super) fn decode(&self) -> Result<Document, ScenarioError> {
+        self.document()?.map_err(|error| self.explain(error))
+    }
+
+    /// Whether the type of the key that the last override sets asks for a whole number. The override must give a number that is
+    /// none.
+    pub(super) fn asks_for_whole_number(&self) -> bool {
+        let Some((_, before)) = self.overrides.split_last() else { return false };
+        let base = before.iter().fold(self.toml.len() + 1, |base, set| base + set.text().len() + 1);
+        let is_of_last = |error: &KeyError| error.span.as_ref().is_some_and(|span| span.start >= base);
+        matches!(self.document(), Ok(Err(error)) if error.asks_for_whole && is_of_last(&error))
+    }
+
+    /// The keys of the scenario, or what is wrong with one of them.
+    fn document(&self) -> Result<Result<Document, KeyError>, ScenarioError> {
         let mut left: Vec<(String, String)> = Vec::new();
         loop {
             let mut root = self.tree()?;
@@ -69,10 +83,10 @@ impl<'a> Text<'a> {
                 remove(&mut root, table, key);
             }
             match Document::deserialize(Value::from(root)) {
-                Ok(document) => return Ok(document),
+                Ok(document) => return Ok(Ok(document)),
                 Err(error) => match self.left_behind(&error) {
                     Some(key) => left.push(key),
-                    None => return Err(self.explain(error)),
+                    None => return Ok(Err(error)),
                 },
             }
         }

@@ -1,45 +1,58 @@
 //! Which keys take whole numbers alone.
 
-/// Part of the way between two ends.
-const BETWEEN: f64 = 0.381_966;
-/// What is next to a whole number is as far from it.
-const NEXT: f64 = 1.0 / 1_048_576.0;
+use super::overrides::Override;
+use super::source::Source;
+use super::text::Text;
 
-/// A value between two ends, which stands for all of them; a whole one where it is to be.
-pub(crate) fn between([from, to]: [f64; 2], whole: bool) -> f64 {
-    let value = from + (to - from) * BETWEEN;
-    if whole { value.round() } else { value }
-}
-
-/// Whether a key takes whole numbers alone between two ends: they are whole, and where one of them or one between is taken, what
-/// lies next to it is not. What is refused far from there may be so for its size.
-pub(crate) fn takes_whole_numbers_alone(ends: [f64; 2], takes: impl Fn(f64) -> bool) -> bool {
-    if ends.iter().any(|end| end.fract() != 0.0) {
-        return false;
-    }
-    let whole = [between(ends, true), ends[0], ends[1]].into_iter().find(|&whole| takes(whole));
-    whole.is_some_and(|whole| {
-        // As near as it is still no whole number.
-        let by = (whole.abs() * 2.0 * f64::EPSILON).clamp(NEXT, 0.5);
-        !takes(whole - by) && !takes(whole + by)
-    })
+/// Whether a key of a scenario takes whole numbers alone: whether the type of its value asks for one. What the value must be
+/// beside that, such as positive, is no matter here.
+pub(crate) fn takes_whole_numbers_alone(source: &Source, overrides: &[Override], key: &str) -> bool {
+    let Ok(set) = Override::parse(&format!("{key}=0.5")) else { return false };
+    let Ok((name, toml)) = source.text() else { return false };
+    let overrides = [overrides, &[set]].concat();
+    Text { name: &name, toml: &toml, overrides: &overrides }.asks_for_whole_number()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn is_whole(builtin: &str, sets: &[&str], key: &str) -> bool {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
+        takes_whole_numbers_alone(&Source::Builtin(builtin.to_owned()), &overrides, key)
+    }
+
     #[test]
-    fn whole_numbers_are_told_from_others_by_what_lies_next_to_them() {
-        let seeds = |value: f64| value.fract() == 0.0 && value >= 0.0;
-        for ends in [[0.0, 1.0], [1.0, 1_000_001.0], [1_000_000.0, 0.0], [3.0, 3.0], [-5.0, 20.0], [0.0, 1e12]] {
-            assert!(takes_whole_numbers_alone(ends, seeds), "{ends:?}");
+    fn keys_that_count_take_whole_numbers() {
+        for (key, sets) in [
+            ("start.seed", &[][..]),
+            ("noise.seed", &[]),
+            ("time.max_halvings", &[]),
+            ("swarm.count", &[]),
+            ("law.neighbours_max", &["law.kind=orca"]),
+            ("failure.1.vehicle", &["failure=[{vehicle=1, kind=\"silent\", at_s=1}]"]),
+            ("graph.edges.1.2", &["graph={kind=\"edges\", edges=[[1, 2], [2, 3], [3, 4], [4, 5]]}"]),
+        ] {
+            assert!(is_whole("pentagon", sets, key), "{key}");
         }
-        assert!(!takes_whole_numbers_alone([0.5, 2.0], seeds), "an end is no whole number");
-        assert!(!takes_whole_numbers_alone([-9.0, -1.0], seeds), "none is taken");
-        // Refused at 0.76 for its size, and taken at 1.
-        let radii = |value: f64| value >= 0.9;
-        assert!(!takes_whole_numbers_alone([0.0, 2.0], radii));
-        assert!(!takes_whole_numbers_alone([1.0, 2.0], |value| value >= 1.0), "taken from an end on");
+    }
+
+    #[test]
+    fn keys_that_measure_take_any_number_whatever_is_refused_between() {
+        for (builtin, key) in [
+            ("crazyflies", "sensing.latency_s"),
+            ("crazyflies", "time.control_hz"),
+            ("pentagon", "time.record_hz"),
+            ("pentagon", "time.dt_s"),
+            ("pentagon", "law.alpha"),
+            ("pentagon", "start.positions_m.2.x"),
+            ("pentagon", "wind.mean_m_s"),
+            ("gusts", "wind.mean_m_s.1"),
+            ("pentagon", "law.kind"),
+            ("pentagon", "law.alfa"),
+            ("pentagon", "law..alpha"),
+        ] {
+            assert!(!is_whole(builtin, &[], key), "{builtin} {key}");
+        }
     }
 }

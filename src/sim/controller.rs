@@ -7,7 +7,7 @@ use crate::law::{Certificate, Law, LawError};
 use crate::link::Link;
 use crate::observation::{Observation, Others};
 use crate::scenario::Scenario;
-use crate::space::{KeptPairs, Obstacle};
+use crate::space::{KeptPairs, Metric, Obstacle};
 use crate::swarm::{Rows, Swarm};
 use crate::target::{Change, CurrentTarget, Guidance, Supervisor};
 
@@ -21,6 +21,8 @@ pub(super) struct Controller {
     guidance: Option<Guidance>,
     pub(super) links: Graph,
     pub(super) obstacles: Vec<Obstacle>,
+    /// Lengths in which vehicles are kept apart.
+    metric: Metric,
     near: KeptPairs,
     /// What the law commanded last, N x 3 \[m/s^2\].
     commanded: Rows,
@@ -37,7 +39,8 @@ impl Controller {
         let (guidance, links) = (scenario.reference.clone(), scenario.graph.clone());
         let (obstacles, near) = (scenario.obstacles.clone(), KeptPairs::default());
         let commanded = Rows::zeros(scenario.count());
-        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, near, commanded })
+        let metric = scenario.metric();
+        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, metric, near, commanded })
     }
 
     /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
@@ -79,7 +82,8 @@ impl Controller {
             near: self.near.pairs(),
             obstacles: &self.obstacles,
         };
-        self.law.command(&at, &mut self.commanded)?;
+        let commanded = self.law.command(&at, &mut self.commanded);
+        commanded.map_err(|error| error.against_truth(truth, self.metric, &self.obstacles))?;
         self.actuate(time_s, command);
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError};
+use crate::audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError, Status};
 use crate::law::{Certificate, LawError, ParameterError};
 use crate::link::Traffic;
 use crate::record::{Breath, EnergyRise, Reassignment, RecordError};
@@ -11,6 +11,9 @@ use crate::swarm::{Bounce, Pair, Swarm};
 /// A path may bend away from the straight line that is swept by this much \[m\]; two vehicles by twice as much. A step
 /// that bends more is flown in halves.
 pub(super) const MAX_BEND_M: f64 = 1e-5;
+/// Largest acceleration that is flown, along any axis \[m/s^2\]. What it leads to within any flight stays within what judges and
+/// readers of recordings take.
+pub(super) const MAX_COMMAND_M_S2: f64 = 1e30;
 
 /// What a flight left behind besides its recording.
 #[derive(Clone, Debug)]
@@ -29,7 +32,8 @@ pub struct Flight {
     pub overlong_steps: u64,
     /// The law's promise, made before the first step; void where the steps were too long for it.
     pub certificate: Certificate,
-    /// What the independent judge found.
+    /// What the independent judge found. Its status is undecided where integration may have made all violations: where steps were too
+    /// long for the law, and no violation is deeper than the bound of their error or began before the first of them.
     pub audit: AuditOutcome,
     /// Where that was of scaled lengths ([`crate::space::Metric`]): what it found in metres, by the widest hulls.
     pub in_metres: Option<AuditOutcome>,
@@ -52,6 +56,21 @@ pub struct Flight {
     pub last: Swarm,
     /// Wall-clock time by kind of work.
     pub performance: Performance,
+}
+
+impl Flight {
+    /// Returns the verdict on vehicles and obstacles together, over what was flown.
+    #[must_use]
+    pub fn status_so_far(&self) -> Status {
+        self.audit.status.and(self.clearance.as_ref().map_or(Status::Clear, |clearance| clearance.status))
+    }
+
+    /// Returns the verdict on the whole flight that the scenario asks for: undecided at best where it ended early.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        let is_whole = self.ending == Ending::Completed;
+        self.status_so_far().and(if is_whole { Status::Clear } else { Status::Undecided })
+    }
 }
 
 /// How a flight ended.
@@ -92,6 +111,14 @@ pub enum Breakdown {
     /// The law commanded something that is not a number.
     #[error("step {step}: the law's command for vehicle {} is not a finite number", vehicle + 1)]
     CommandNotFinite {
+        /// The step, from 1; 0 is the start.
+        step: u64,
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
+    /// The law commanded an acceleration that no flight comes back from, and that no judge can follow.
+    #[error("step {step}: the law's command for vehicle {} is beyond {MAX_COMMAND_M_S2:e} m/s^2", vehicle + 1)]
+    CommandOutOfRange {
         /// The step, from 1; 0 is the start.
         step: u64,
         /// The vehicle, from 0.
@@ -171,7 +198,10 @@ pub enum SimError {
         found: usize,
     },
     /// Accelerations from outside that are not a finite row for each vehicle.
-    #[error("{found} rows of accelerations for {expected} vehicles, or a number among them that is not finite")]
+    #[error(
+        "{found} rows of accelerations for {expected} vehicles, or a number among them that is not finite or beyond \
+         {MAX_COMMAND_M_S2:e} m/s^2"
+    )]
     Commands {
         /// Number of vehicles.
         expected: usize,

@@ -29,6 +29,10 @@ pub(super) struct Judge {
     /// Sweeps that were clear of everything by less than paths may bend away from what was swept.
     bent: u64,
     bent_past_obstacles: u64,
+    /// By how much the motion that is judged may err from the law's \[m\], once a step was too long for the law.
+    error_m: Option<f64>,
+    /// Whether a violation of two vehicles, and one of an obstacle's clearance, is deeper than the error of its time.
+    beyond_error: [bool; 2],
     /// What judges the way past obstacles, where there are any, and these.
     clearance: Option<ClearanceAuditor>,
     obstacles: Vec<Obstacle>,
@@ -73,6 +77,8 @@ impl Judge {
             delta_m: scenario.delta_m,
             bent: 0,
             bent_past_obstacles: 0,
+            error_m: None,
+            beyond_error: [false; 2],
             clearance,
             obstacles,
             room_m: f64::INFINITY,
@@ -115,7 +121,25 @@ impl Judge {
             self.bent += u64::from(is_open(closest.separation_m, nearer_m, self.delta_m));
         }
         note(finding, &mut self.closest, &mut self.nearest_m, events);
-        self.clear_of_obstacles(time_s, positions_m, bend_m, events)
+        self.clear_of_obstacles(time_s, positions_m, bend_m, events)?;
+        if let Some(error_m) = self.error_m {
+            self.beyond_error[0] |= self.delta_m - self.nearest_m > self.metric.most_scaled(error_m);
+            self.beyond_error[1] |= -self.room_m > error_m;
+        }
+        Ok(())
+    }
+
+    /// Takes note that what is swept from now on may err from the law's motion by `error_m` \[m\]. Violations up to now are exact.
+    pub(super) fn may_err_by(&mut self, error_m: f64) {
+        if self.error_m.replace(error_m).is_none() {
+            self.beyond_error = self.violated();
+        }
+    }
+
+    /// Whether two vehicles violated delta, and whether one violated an obstacle's clearance.
+    fn violated(&self) -> [bool; 2] {
+        let mut past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
+        [!self.auditor.violations().is_empty(), past_obstacles.next().is_some()]
     }
 
     fn clear_of_obstacles(
@@ -149,11 +173,9 @@ impl Judge {
         let pairs = self.auditor.closest().map(|closest| closest.separation_m - self.delta_m);
         let obstacles = self.clearance.as_ref().and_then(|clearance| clearance.closest().first());
         let beyond = obstacles.map(|approach| approach.upper_m - approach.limit_m);
-        let mut past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
-        let is_violated = !self.auditor.violations().is_empty() || past_obstacles.next().is_some();
         let least_m = pairs.into_iter().chain(beyond).reduce(f64::min)?;
         // Rounding never moves a distance across its limit.
-        Some(if is_violated { least_m.min(-f64::MIN_POSITIVE) } else { least_m.max(0.0) })
+        Some(if self.violated().contains(&true) { least_m.min(-f64::MIN_POSITIVE) } else { least_m.max(0.0) })
     }
 
     /// The closest that two vehicles came so far.
@@ -211,6 +233,16 @@ impl Judge {
         // A pair that begins farther apart keeps half of its clearance.
         self.near.update(start, metric.longest_m(barrier_m) + 4.0 * metric.ratio().max(1.0 / metric.ratio()) * moved_m);
         self.near.pairs().iter().copied().any(loses_half)
+    }
+
+    /// Lower bound of the present separations of the pairs that the law acts on, in the judge's lengths: all pairs where the
+    /// law senses, else those with a link. It costs a look at every edge of a graph that is not complete.
+    pub(super) fn nearest_acted_on_m(&self, law: &dyn Law, links: &Graph, state: &Swarm) -> f64 {
+        if law.sensing_range_m().is_some() || links.is_complete() {
+            return self.nearest_m;
+        }
+        let apart = |(i, j)| self.metric.scaled(row(&state.positions_m, j) - row(&state.positions_m, i)).norm();
+        links.edges().map(apart).fold(f64::INFINITY, f64::min)
     }
 
     /// The smallest separation of any pair that the law joins or senses over the move from `start` to `end`, on which no vehicle
@@ -284,17 +316,19 @@ impl Judge {
     }
 
     pub(super) fn finish(self) -> Judged {
-        let unless = |open: u64, status: Status| match status {
+        let in_doubt = self.beyond_error.map(|is_beyond| self.error_m.is_some() && !is_beyond);
+        let unless = |open: u64, is_in_doubt: bool, status: Status| match status {
             Status::Clear if open > 0 => Status::Undecided,
+            Status::Violation if is_in_doubt => Status::Undecided,
             known => known,
         };
         let mut audit = self.auditor.finish();
         audit.unresolved += self.bent;
-        audit.status = unless(self.bent, audit.status);
+        audit.status = unless(self.bent, in_doubt[0], audit.status);
         let mut clearance = self.clearance.map(ClearanceAuditor::finish);
         if let Some(clearance) = &mut clearance {
             clearance.unresolved += self.bent_past_obstacles;
-            clearance.status = unless(self.bent_past_obstacles, clearance.status);
+            clearance.status = unless(self.bent_past_obstacles, in_doubt[1], clearance.status);
         }
         Judged {
             audit,

@@ -8,6 +8,7 @@
 mod channels;
 mod controller;
 mod ending;
+mod integration;
 mod judge;
 mod motion;
 mod obstacles;

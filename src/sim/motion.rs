@@ -6,7 +6,6 @@ use std::time::Duration;
 use crate::continuous::{Continuous, IdealError, Quadrotors};
 #[cfg(feature = "ideal")]
 use crate::feedback::Feedback;
-#[cfg(feature = "ideal")]
 use crate::law::LawError;
 use crate::plant::{HullContact, Path, Plant, PlantError, Unicycles, rapier};
 use crate::record::Channel;
@@ -62,7 +61,8 @@ impl Motion {
     }
 
     /// Moves from `from_s` over `dt_s` seconds, and says where the vehicles are then. In continuous time accelerations that
-    /// are `held` stand in the place of the law's.
+    /// are `held` stand in the place of the law's. The result is why the law had no answer on the way, where vehicles came to its
+    /// barrier and moved on under the accelerations that they had there.
     #[cfg_attr(not(feature = "ideal"), expect(unused_variables, reason = "a plant is not told the time"))]
     pub(super) fn advance(
         &mut self,
@@ -71,10 +71,10 @@ impl Motion {
         controller: &mut Controller,
         end: &mut Swarm,
         path: &mut Path,
-    ) -> Result<(), Ending> {
+    ) -> Result<Option<LawError>, Ending> {
         path.begin();
         match self {
-            Self::Sampled(plant) => plant.advance(dt_s, end, path).map_err(|error| match error {
+            Self::Sampled(plant) => plant.advance(dt_s, end, path).map(|()| None).map_err(|error| match error {
                 PlantError::NotFinite { vehicle } => Breakdown::StateNotFinite { step, vehicle }.into(),
                 PlantError::Stalled => Breakdown::Stalled { step }.into(),
             }),

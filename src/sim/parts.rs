@@ -34,10 +34,10 @@ impl Parts {
         let link = link::of(scenario, law.sensing_range_m().is_some());
         let supervisor =
             Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(law.controls().freedom());
-        let supervisor = match law.settling_rate_per_s() {
-            Some(rate_per_s) => {
+        let supervisor = match law.settling() {
+            Some(settling) => {
                 let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-                supervisor.breathing(scenario.breathing, rate_per_s, leader).blown(!scenario.wind.is_still())
+                supervisor.breathing(scenario.breathing, settling, leader).blown(!scenario.wind.is_still())
             }
             None => supervisor,
         };

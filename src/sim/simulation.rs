@@ -4,7 +4,8 @@ mod step;
 
 use super::channels::Channels;
 use super::controller::Controller;
-use super::ending::{Breakdown, Ending, Flight, Performance, SimError};
+use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
+use super::integration::IntegrationError;
 use super::judge::{Judge, Judged};
 use super::motion::Motion;
 use super::parts::Parts;
@@ -14,7 +15,7 @@ use crate::law::{Certificate, Void};
 use crate::plant::Path;
 use crate::record::{Event, Peaks, Sample};
 use crate::scenario::Scenario;
-use crate::swarm::{ClosestApproach, Rows, Swarm, first_row_not_finite};
+use crate::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
 
 /// A flight under way: law, link, supervisor, vehicles and judge, with everything that any of them remembers.
 ///
@@ -58,6 +59,8 @@ pub struct Simulation {
     refined_steps: u64,
     /// Steps of which even the shortest part was too long for the law.
     overlong_steps: u64,
+    /// Error of integration since the first of them.
+    error: Option<IntegrationError>,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     watch: Watch,
@@ -119,6 +122,7 @@ impl Simulation {
             shortest: 0,
             refined_steps: 0,
             overlong_steps: 0,
+            error: None,
             energy: None,
             watch: Watch::default(),
             peaks: Peaks::default(),
@@ -158,14 +162,15 @@ impl Simulation {
         self.step_on();
     }
 
-    /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked.
+    /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked. The step
+    /// is not shortened for the barrier or the rate of the law.
     ///
     /// # Errors
     /// [`SimError::Commands`] where there is not a finite row for each vehicle; nothing is flown then. After the end nothing
     /// is flown either. A certificate that the law gave is void from then on.
     pub fn step_with(&mut self, commands: &Rows) -> Result<(), SimError> {
         let count = self.state.count();
-        if commands.nrows() != count || first_row_not_finite(commands).is_some() {
+        if commands.nrows() != count || first_row_beyond(commands, MAX_COMMAND_M_S2).is_some() {
             return Err(SimError::Commands { expected: count, found: commands.nrows() });
         }
         if self.ending.is_none() {

@@ -1,7 +1,7 @@
 //! What some runs say of all that could have been flown: shares, means, quantiles and differences with 95 % intervals.
 //!
 //! [`Proportion::new`], [`Estimate`] and [`Paired`] are two-sided, with at most 2.5 % on either side, and for a number of runs that was
-//! fixed beforehand. Whoever wants to stop where the answer is known takes [`anytime`] and [`ConfidenceSequence`], which hold at
+//! fixed beforehand. [`Proportion::upper_bound`] is one-sided, with at most 5 % above. Whoever wants to stop where the answer is known takes [`anytime`] and [`ConfidenceSequence`], which hold at
 //! every number of runs at once. `coverage` measures how often each of them holds the truth.
 
 mod confidence;

@@ -31,6 +31,16 @@ impl Proportion {
         Self::between(count, of, clopper_pearson(count, of, TAIL))
     }
 
+    /// Returns the one-sided upper bound of the share, of Clopper and Pearson: the largest share in which `count` of `of` or fewer are met
+    /// with a probability of 1 - [`CONFIDENCE`]. A one-sided bound leaves out all of that on one side, and the interval of
+    /// [`Proportion::new`] half of it on either side. For a count of 0 it is `1 - (1 - CONFIDENCE)^(1 / of)`. A count beyond `of` is taken
+    /// for `of`.
+    #[must_use]
+    pub fn upper_bound(count: u64, of: u64) -> f64 {
+        let [_, high] = clopper_pearson(count, of, 1.0 - CONFIDENCE);
+        high
+    }
+
     /// `count` of `of` with the bounds of another interval; a count beyond `of` is taken for `of`.
     pub(super) fn between(count: u64, of: u64, [low, high]: [f64; 2]) -> Self {
         let count = count.min(of);
@@ -70,6 +80,20 @@ mod tests {
         assert_eq!(Proportion::new(0, 0).share, None);
         assert_eq!((Proportion::new(0, 0).low, Proportion::new(0, 0).high), (0.0, 1.0));
         assert_eq!(Proportion::new(9, 4).count, 4);
+    }
+
+    #[test]
+    fn a_one_sided_bound_leaves_out_a_twentieth_on_its_side() {
+        for of in [1_u64, 20, 200, 1000, 10_000] {
+            near(Proportion::upper_bound(0, of), 1.0 - 0.05_f64.powf(1.0 / of as f64), 1e-9);
+        }
+        near(Proportion::upper_bound(0, 200), 0.014_867, 1e-6);
+        for (count, of) in [(1, 7), (3, 60), (299, 300)] {
+            let bound = Proportion::upper_bound(count, of);
+            near(binomial_up_to(count, of, bound), 1.0 - CONFIDENCE, 1e-9);
+            assert!(bound < Proportion::new(count, of).high, "below the upper end of the two-sided interval");
+        }
+        assert_eq!([Proportion::upper_bound(7, 7), Proportion::upper_bound(0, 0)], [1.0, 1.0]);
     }
 
     #[test]

@@ -64,6 +64,15 @@ impl Breathing {
     }
 }
 
+/// How errors of position settle under a law where nothing stands in their way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settling {
+    /// Rate of the slowest mode \[1/s\].
+    pub rate_per_s: f64,
+    /// Time in which the commanded acceleration brings a vehicle from rest to the speed of that mode \[s\].
+    pub response_s: f64,
+}
+
 /// What a [supervisor](super::Supervisor) changed within a leg.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
@@ -79,9 +88,10 @@ pub enum Change {
     },
 }
 
-/// The root mean square speed below this part of the error times the law's rate is no progress.
+/// The root mean square speed below this part of the error times the rate of the law's slowest mode is no progress.
 const SLOW: f64 = 0.2;
-/// What is no progress for so long is a stall \[s\].
+/// No progress for this long is a stall \[s\]; for twice as long as a law takes to bring vehicles from rest to that speed, where
+/// that is longer.
 const STALLED_S: f64 = 2.0;
 /// Errors of so many times what counts as reached are worth a breath.
 const WORTH: f64 = 2.0;
@@ -107,8 +117,8 @@ enum Phase {
 
 /// Spreads the slots of a leg when the swarm is stalled.
 ///
-/// Stalled is a swarm whose vehicles are more than twice the limit of arrival from their slots and for 2 s move slower, root
-/// mean square, than 0.2 of the law's rate times their root mean square error. Slots are then scaled about their centre, or
+/// Stalled is a swarm whose vehicles are more than twice the limit of arrival from their slots and for 2 s or more move slower, root
+/// mean square, than 0.2 of the rate of the law's slowest mode times their root mean square error ([`Settling`]). Slots are then scaled about their centre, or
 /// about a leader's slot, held until every vehicle is within a quarter of the smallest slot distance of its own or no progress
 /// is made for 10 s, but at least for `hold_s`, and come together with an e-folding time of 2 s.
 ///
@@ -117,8 +127,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub(super) struct Breather {
     breathing: Breathing,
-    /// Rate at which errors fall by themselves, sqrt k \[1/s\].
-    rate_per_s: f64,
+    settling: Settling,
     tolerance_m: f64,
     freedom: Freedom,
     leader: Option<usize>,
@@ -158,14 +167,14 @@ impl Errors {
 impl Breather {
     pub(super) fn new(
         breathing: Breathing,
-        rate_per_s: f64,
+        settling: Settling,
         leader: Option<usize>,
         arrival: Arrival,
         freedom: Freedom,
     ) -> Self {
         let phase = Phase::Flying { idle_since_s: None };
         let tolerance_m = WORTH * arrival.edge_error_m;
-        Self { breathing, rate_per_s, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
+        Self { breathing, settling, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
     }
 
     /// Looks at errors apart from what all have in common.
@@ -190,7 +199,12 @@ impl Breather {
     }
 
     fn is_idle(&self, errors: &Errors) -> bool {
-        errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.rate_per_s * errors.rms_m
+        errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.settling.rate_per_s * errors.rms_m
+    }
+
+    /// No progress for this long is a stall \[s\].
+    fn stalled_s(&self) -> f64 {
+        STALLED_S.max(2.0 * SLOW * self.settling.response_s)
     }
 
     /// Spreads the slots of a leg, once more.
@@ -226,7 +240,7 @@ impl Breather {
                 let first = self.breathing.mode == BreathingMode::Start && self.breaths == 0;
                 let since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
                 self.phase = Phase::Flying { idle_since_s: since_s };
-                let stalled = since_s.is_some_and(|since_s| time_s - since_s >= STALLED_S);
+                let stalled = since_s.is_some_and(|since_s| time_s - since_s >= self.stalled_s());
                 if first || (stalled && !self.assign(sensed, leg, target)) {
                     self.breathe(time_s, leg, target);
                 }
@@ -236,7 +250,7 @@ impl Breather {
                 let idle_since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
                 self.phase = Phase::Spread { scale, since_s, idle_since_s };
                 // Those who come no nearer to spread slots either are not in each other's way.
-                let gives_up = idle_since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S);
+                let gives_up = idle_since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S.max(self.stalled_s()));
                 let is_held = time_s - since_s >= self.breathing.hold_s;
                 if is_held && (errors.max_m < SETTLED * slots_m || gives_up) {
                     self.phase = Phase::Closing { scale, since_s: time_s };
@@ -295,13 +309,14 @@ impl Leg {
 mod tests {
     use super::*;
 
+    const SETTLING: Settling = Settling { rate_per_s: 1.0, response_s: 1.0 };
     const ARRIVAL: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 };
 
     /// The spread of the target at times 0, 0.5, 1, ... while vehicle 2 is `off(time)` m from its slot of the leg.
     fn spreads(breathing: Breathing, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, 1.0, None, ARRIVAL, Freedom::Fixed);
+        let mut breather = Breather::new(breathing, SETTLING, None, ARRIVAL, Freedom::Fixed);
         (0..steps)
             .map(|k| {
                 let time_s = 0.5 * f64::from(k);
@@ -337,7 +352,7 @@ mod tests {
         // Settles whenever slots are spread, and is off again when they are not.
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, 1.0, None, ARRIVAL, Freedom::Translation);
+        let mut breather = Breather::new(breathing, SETTLING, None, ARRIVAL, Freedom::Translation);
         let mut begun = Vec::new();
         for k in 0..400 {
             let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
@@ -363,7 +378,7 @@ mod tests {
     fn changes(leg: &Leg, leader: Option<usize>, at_m: [f64; 3]) -> Vec<Change> {
         let mut target = CurrentTarget::first_of(std::slice::from_ref(leg)).expect("a leg");
         let mut leg = leg.clone();
-        let mut breather = Breather::new(Breathing::default(), 1.0, leader, ARRIVAL, Freedom::Fixed);
+        let mut breather = Breather::new(Breathing::default(), SETTLING, leader, ARRIVAL, Freedom::Fixed);
         let mut swarm = Swarm::at_rest(leg.formation.slots_m.clone());
         (0..3).for_each(|i| swarm.positions_m[(i, 0)] = at_m[i]);
         let mut found = Vec::new();

@@ -11,7 +11,7 @@ mod reference;
 mod supervisor;
 
 pub use arrival::{Arrival, Distance};
-pub use breathing::{Breathing, BreathingMode, Change};
+pub use breathing::{Breathing, BreathingMode, Change, Settling};
 pub use course::{Course, assign_anew};
 pub use reference::{Guidance, Reference, ReferenceMotion, Spline};
 pub use supervisor::{Schedule, Supervisor};

@@ -2,7 +2,7 @@
 
 use dyn_clone::DynClone;
 
-use super::breathing::{Breather, Breathing, Change};
+use super::breathing::{Breather, Breathing, Change, Settling};
 use super::{Arrival, Begins, CurrentTarget, Leg, Target, assign_anew};
 use crate::formation::{Formation, Freedom};
 use crate::graph::Graph;
@@ -81,12 +81,12 @@ impl Schedule {
     }
 
     /// The same, spreading slots (about those of a leader, where there is one) where the swarm is stalled under a law by which
-    /// errors fall at a rate `rate_per_s` \[1/s\].
+    /// errors settle so.
     /// To be said after [`Schedule::free_by`].
     #[must_use]
-    pub fn breathing(mut self, breathing: Breathing, rate_per_s: f64, leader: Option<usize>) -> Self {
+    pub fn breathing(mut self, breathing: Breathing, settling: Settling, leader: Option<usize>) -> Self {
         self.breather =
-            breathing.is_on().then(|| Breather::new(breathing, rate_per_s, leader, self.arrival, self.freedom));
+            breathing.is_on().then(|| Breather::new(breathing, settling, leader, self.arrival, self.freedom));
         self
     }
 

@@ -33,6 +33,16 @@ pub struct Piece {
     pub coefficients: Vec<Vector3<f64>>,
 }
 
+/// What places on the Earth are measured from, east, north and up.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EarthOrigin {
+    /// Latitude and longitude \[degrees\] and height above the ellipsoid \[m\], between commas.
+    pub place: String,
+    /// Whether it is the first place of the recording, because the user names none: only differences of positions can be judged
+    /// then, and not heights or places.
+    pub is_inferred: bool,
+}
+
 /// What a recording says next.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
@@ -104,6 +114,17 @@ pub trait Tracks {
     /// What was assumed to know positions at the very times of items, in words that go on after "if": nothing may be said to
     /// be proved then. None where the recording says them itself.
     fn assumed(&self) -> Option<&str> {
+        None
+    }
+
+    /// Whether the height of some vehicle is not known. Then z is 0 in every item and has no meaning: only distances in the
+    /// plane of x and y can be judged, and no question about heights has an answer.
+    fn is_planar(&self) -> bool {
+        false
+    }
+
+    /// What positions are measured from, where the recording has latitudes and longitudes.
+    fn earth_origin(&self) -> Option<&EarthOrigin> {
         None
     }
 }

@@ -124,7 +124,7 @@ fn curves_are_judged_between_their_ends() {
     ] {
         let (status, found) = at(quantity, reached);
         let extreme = found[0].extreme.expect("a value");
-        assert_eq!((status, found[0].assumes), (Status::Clear, None), "{quantity:?} {extreme:?}");
+        assert_eq!((status, found[0].assumes.as_deref()), (Status::Clear, None), "{quantity:?} {extreme:?}");
         assert!((extreme.lower - reached).abs() < 1e-9 && (extreme.upper - reached).abs() < 1e-9, "{extreme:?}");
         assert_eq!(at(quantity, reached - 1e-6).0, Status::Violation, "{quantity:?}");
     }
@@ -133,7 +133,7 @@ fn curves_are_judged_between_their_ends() {
 }
 
 #[test]
-fn a_curve_with_a_corner_has_no_acceleration_and_one_that_jumps_no_speed() {
+fn corners_of_curves_are_reported_apart_and_curves_that_jump_have_no_speed() {
     let piece = |from_s: f64, at: [f64; 3], by: [f64; 3]| {
         Item::Piece(Piece {
             vehicle: 0,
@@ -146,11 +146,15 @@ fn a_curve_with_a_corner_has_no_acceleration_and_one_that_jumps_no_speed() {
     let of =
         |items: &[Item]| judged(items, asked(limits(&fast))).1.iter().map(|found| found.status).collect::<Vec<_>>();
     let corner = [piece(0.0, [0.0; 3], [1.0, 0.0, 0.0]), piece(1.0, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])];
-    assert_eq!(of(&corner), [Status::Clear, Status::Violation]);
+    assert_eq!(of(&corner), [Status::Clear, Status::Clear]);
+    let found = judged(&corner, asked(limits(&fast))).1[1].corners.expect("a corner");
+    assert_eq!((found.count, found.largest.vehicle, found.largest.at_s), (1, 0, 1.0));
+    assert!((found.largest.by_m_s - 2.0_f64.sqrt()).abs() < 1e-12);
     let jump = [piece(0.0, [0.0; 3], [1.0, 0.0, 0.0]), piece(1.0, [1.5, 0.0, 0.0], [1.0, 0.0, 0.0])];
     assert_eq!(of(&jump), [Status::Undecided, Status::Undecided]);
     let smooth = [piece(0.0, [0.0; 3], [1.0, 0.0, 0.0]), piece(1.0, [1.000_01, 0.0, 0.0], [1.0, 0.0, 0.0])];
     assert_eq!(of(&smooth), [Status::Clear, Status::Clear]);
+    assert_eq!(judged(&smooth, asked(limits(&fast))).1[1].corners, None);
 }
 
 #[test]
@@ -283,7 +287,7 @@ fn an_eased_flight_along_a_wall_has_all_of_its_room() {
 }
 
 #[test]
-fn digits_of_places_are_no_speed_and_their_corners_no_acceleration() {
+fn digits_of_places_are_no_speed_and_their_corners_are_none() {
     // 3 m/s at 5400 km from the origin, 100 times a second.
     let items: Vec<_> = (0..100)
         .map(|k| f64::from(k) / 100.0)
@@ -300,9 +304,77 @@ fn digits_of_places_are_no_speed_and_their_corners_no_acceleration() {
         })
     };
     let corner = |by: f64| {
-        judged(&[piece(0.0, 0.0, 1.0), piece(1.0, 1.0, 1.0 + by)], asked(limits(&[(Quantity::Acceleration, 9.0)]))).0
+        let (status, found) =
+            judged(&[piece(0.0, 0.0, 1.0), piece(1.0, 1.0, 1.0 + by)], asked(limits(&[(Quantity::Acceleration, 9.0)])));
+        (status, found[0].corners.map_or(0, |corners| corners.count))
     };
-    assert_eq!([5e-4, 3e-3, 1e-2].map(corner), [Status::Clear, Status::Undecided, Status::Violation]);
+    assert_eq!([5e-4, 1e-2].map(corner), [(Status::Clear, 0), (Status::Clear, 1)]);
+}
+
+/// A way along straight lines between corners a second apart, as curves and as samples.
+fn zigzag(corners: &[[f64; 2]], hz: Option<u32>) -> Vec<Item> {
+    let at = |k: usize| Vector3::new(corners[k][0], corners[k][1], 0.0);
+    let legs = 0..corners.len() - 1;
+    match hz {
+        None => legs
+            .map(|k| {
+                let (from_s, to_s, coefficients) = (k as f64, (k + 1) as f64, vec![at(k), at(k + 1) - at(k)]);
+                Item::Piece(Piece { vehicle: 0, from_s, to_s, coefficients })
+            })
+            .collect(),
+        Some(hz) => legs
+            .flat_map(|k| {
+                (0..hz).map(move |j| {
+                    let along = f64::from(j) / f64::from(hz);
+                    sample(k as f64 + along, at(k).lerp(&at(k + 1), along), None)
+                })
+            })
+            .collect(),
+    }
+}
+
+#[test]
+fn mean_accelerations_over_a_window_spread_corners_over_its_length() {
+    // At 3 m/s, then to the side, then to rest.
+    let corners = [[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [3.0, 3.0], [3.0, 3.0]];
+    let turn = 3.0 * 2.0_f64.sqrt();
+    for items in [zigzag(&corners, None), zigzag(&corners, Some(20))] {
+        let of = |window_s, allowed| {
+            let settings =
+                Settings { accel_window_s: Some(window_s), ..asked(limits(&[(Quantity::Acceleration, allowed)])) };
+            let (status, found) = judged(&items, settings);
+            assert!(found[0].assumes.as_ref().is_some_and(|of| of.contains("means over")), "{:?}", found[0].assumes);
+            assert_eq!(found[0].corners, None, "corners are held against the limit");
+            (status, found[0].extreme.expect("an acceleration").upper, found[0].violations_tally.count)
+        };
+        for window_s in [0.2, 0.4] {
+            let (status, most, _) = of(window_s, turn / window_s * 1.000_001);
+            assert!(status == Status::Clear && (most - turn / window_s).abs() < 1e-6, "{window_s}: {most}");
+            let (status, _, count) = of(window_s, turn / window_s * 0.999);
+            assert_eq!((status, count), (Status::Violation, 1), "the turn alone");
+            assert_eq!(of(window_s, 2.9 / window_s).2, 2, "the turn and the stop");
+        }
+    }
+    let short = Settings { accel_window_s: Some(60.0), ..asked(limits(&[(Quantity::Acceleration, 9.0)])) };
+    let (status, found) = judged(&zigzag(&corners, None), short);
+    assert_eq!((status, &found[0].unknown[..]), (Status::Undecided, &[0][..]), "no window fits");
+}
+
+#[test]
+fn a_window_of_accelerations_needs_accelerations_that_are_limited_and_not_bounded() {
+    let items = zigzag(&[[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]], Some(10));
+    let window = |envelope, motion, accel_window_s| {
+        let max_accel_m_s2 = Some(9.0);
+        let settings = Settings { accel_window_s: Some(accel_window_s), motion, max_accel_m_s2, ..asked(envelope) };
+        audit(&["one".to_owned()], &items, settings).map(|outcome| outcome.status)
+    };
+    let accel = || limits(&[(Quantity::Acceleration, 100.0)]);
+    assert_eq!(window(accel(), None, 0.2), Ok(Status::Clear));
+    assert_eq!(window(limits(&[(Quantity::Speed, 9.0)]), None, 0.2), Err(RecordedError::NoAccelWindow));
+    assert_eq!(window(accel(), Some(Motion::Bounded), 0.2), Err(RecordedError::NoAccelWindow));
+    for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(window(accel(), None, wrong), Err(RecordedError::OutOfRange { .. })), "{wrong}");
+    }
 }
 
 #[test]

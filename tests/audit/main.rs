@@ -5,6 +5,8 @@ mod encounters;
 mod envelope;
 mod findings;
 mod flown;
+mod many_findings;
+mod presence;
 mod recorded;
 mod recorded_curves;
 mod scenes;

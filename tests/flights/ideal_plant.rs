@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::LazyLock;
 
 use nalgebra::Vector3;
-use tautline::audit::Auditor;
+use tautline::audit::{Auditor, Status};
 use tautline::continuous::{self, IdealError, Solution, Tolerances};
 use tautline::formation::Formation;
 use tautline::graph::Graph;
@@ -352,6 +352,42 @@ fn the_ideal_plant_asks_the_law_it_is_given_and_ends_where_that_has_no_answer() 
     let flight = sim::fly(&scenario, Parts::under(&scenario, Box::new(Wall)), &mut (), carry_on).expect("a flight");
     assert!(matches!(flight.ending, Ending::LawUndefined(LawError::Collision { .. })));
     assert!((flight.duration_s - 1.0).abs() <= scenario.time.dt_s, "{}", flight.duration_s);
+}
+
+/// Two that fly at each other beside a third, which limited accelerations stop or do not.
+fn limited(speed_m_s: f64, law: &str) -> sim::Flight {
+    let text = format!(
+        "start = {{ positions_m = [[0, 20], [-4, 0], [4, 0]], velocities_m_s = [[0, 0], [{speed_m_s}, 0], [-{speed_m_s}, 0]] }}\n\
+         formation = {{ shape = \"points\", points_m = [[0, 20], [-2, 0], [2, 0]] }}\nplant.kind = \"ideal\"\n\
+         time.duration_s = 3.0\n{law}"
+    );
+    let scenario = Scenario::read(&Source::Text { name: "limited".to_owned(), text }, &[]).expect("a scenario");
+    let carry_on = &mut |_| ControlFlow::Continue(());
+    sim::fly(&scenario, Parts::of(&scenario).expect("a law"), &mut (), carry_on).expect("a flight")
+}
+
+#[test]
+fn vehicles_that_limited_accelerations_do_not_stop_are_judged_past_the_barrier() {
+    for law in [
+        "law = { kind = \"potential\", delta_m = 1.0, max_accel_m_s2 = 5.0 }",
+        "law = { kind = \"displacement\", delta_m = 1.0 }\nactuation.max_accel_m_s2 = 5.0",
+    ] {
+        let flight = limited(10.0, law);
+        assert_eq!(flight.audit.status, Status::Violation, "{law}: {:?}", flight.ending);
+        assert_eq!(flight.audit.violations[0].pair, Pair::new(1, 2), "{law}");
+        let Ending::LawUndefined(LawError::Collision { pair, separation_m, .. }) = flight.ending else {
+            panic!("{law}: {:?}", flight.ending)
+        };
+        assert!(pair == Pair::new(1, 2) && separation_m < 1.0 && separation_m > 0.999, "{law}: {separation_m}");
+        let stopped = limited(2.0, law);
+        assert_eq!((stopped.ending, stopped.audit.status), (Ending::Completed, Status::Clear), "{law}");
+    }
+}
+
+#[test]
+fn a_barrier_without_a_limit_is_never_coasted_through() {
+    let flight = limited(10.0, "law = { kind = \"potential\", delta_m = 1.0 }");
+    assert_eq!((flight.ending, flight.audit.status), (Ending::Completed, Status::Clear));
 }
 
 #[test]

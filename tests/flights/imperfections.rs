@@ -1,12 +1,13 @@
 //! What sensors, radio and motors that are not perfect do to a flight, against what theory says.
 
 use crate::flight::{Log, builtin, fly, read};
+use tautline::audit::Status;
 use tautline::formation::Formation;
-use tautline::law::{Linear, Void};
+use tautline::law::{LawError, Linear, Void};
 use tautline::record::OwnedSample;
 use tautline::scenario::{Failure, FailureKind, Scenario};
 use tautline::sim::{Ending, Simulation};
-use tautline::swarm::{Rows, Swarm, row};
+use tautline::swarm::{Pair, Rows, Swarm, row};
 
 /// Every imperfection at once that Rapier can have.
 const ALL: [&str; 16] = [
@@ -283,4 +284,28 @@ fn the_time_between_commands_at_which_it_grows_is_the_formulas() {
             assert_eq!(grows(&held), expected, "{graph}: {share} of {margin_s} s");
         }
     }
+}
+
+/// Two that fly one behind the other, 2.5 m apart, and hear of each other a tenth of a second late.
+#[test]
+fn a_law_that_ends_by_what_a_vehicle_heard_says_so_with_the_true_distance() {
+    let flight = |latency_s: f64| {
+        let scenario = read(&format!(
+            "start = {{ positions_m = [[0, 0], [2.5, 0]], velocities_m_s = [[100, 0], [100, 0]] }}\n\
+             formation = {{ shape = \"line\", spacing_m = 3.0 }}\nlaw.delta_m = 2.0\nnetwork.latency_s = {latency_s:?}\n\
+             network.missing = \"hold\"\ntime.duration_s = 1.0"
+        ));
+        fly(&scenario).0
+    };
+    let late = flight(0.1);
+    let Ending::LawUndefined(LawError::KnownCollision { pair, known_m, true_m, .. }) = late.ending else {
+        panic!("{:?}", late.ending)
+    };
+    assert_eq!((pair, late.audit.status), (Pair::new(0, 1), Status::Clear));
+    assert!(known_m <= 2.0 && true_m > 2.4, "{known_m} {true_m}");
+    let closest_m = late.audit.closest.expect("a pair").separation_m;
+    assert!(true_m >= closest_m && closest_m > 2.4, "{closest_m}");
+    let reason = late.ending.reason().expect("it ended early");
+    assert!(reason.contains("by what they measured or heard of each other") && reason.contains("true distance is 2."));
+    assert_eq!(flight(0.0).ending, Ending::Completed);
 }

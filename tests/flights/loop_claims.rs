@@ -238,9 +238,9 @@ fn breakdown(flown: Result<Flight, SimError>) -> Breakdown {
 }
 
 #[test]
-fn a_law_that_commands_what_is_not_a_number_is_named_with_vehicle_and_step() {
+fn a_law_that_commands_what_cannot_be_flown_is_named_with_vehicle_and_step() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
-    for (bad, at) in [(f64::NAN, 0), (f64::INFINITY, 7), (f64::NEG_INFINITY, 239)] {
+    for (bad, at) in [(f64::NAN, 0), (f64::INFINITY, 7), (f64::NEG_INFINITY, 239), (1e300, 0), (-1.1e30, 5)] {
         let law = Bent::new(&scenario, move |asked, _: &Swarm, control: &mut Rows| {
             if asked == at {
                 control[(3, 1)] = bad;
@@ -249,7 +249,9 @@ fn a_law_that_commands_what_is_not_a_number_is_named_with_vehicle_and_step() {
         });
         let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
         let error = breakdown(flown);
-        assert_eq!(error, Breakdown::CommandNotFinite { step: at, vehicle: 3 });
+        let not_finite = Breakdown::CommandNotFinite { step: at, vehicle: 3 };
+        let expected = if bad.is_finite() { Breakdown::CommandOutOfRange { step: at, vehicle: 3 } } else { not_finite };
+        assert_eq!(error, expected);
         assert_eq!(log.samples.last().map(|last| (last.step, last.control.nrows())), Some((at, 0)));
         assert!(error.to_string().starts_with(&format!("step {at}: ")) && error.to_string().contains("vehicle 4"));
         assert!(log.samples.iter().all(|sample| sample.control.iter().all(|u| u.is_finite())));

@@ -28,4 +28,5 @@ mod simulation;
 mod steps;
 mod symmetry;
 mod unicycles;
+mod verdicts;
 mod wind;

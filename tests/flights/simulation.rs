@@ -4,6 +4,7 @@
 use std::ops::ControlFlow;
 
 use proptest::strategy::{Strategy as _, ValueTree as _};
+use tautline::audit::Status;
 use tautline::continuous::{self, Tolerances};
 use tautline::formation::{Formation, largest_edge_error_m};
 use tautline::graph::Graph;
@@ -272,6 +273,40 @@ fn commands_from_outside_are_flown_in_continuous_time_too_and_void_the_certifica
     assert_eq!(still.state(), &scenario.start, "nobody is accelerated");
     let certificate = still.finish().certificate;
     assert_eq!((certificate.certified_m, certificate.void), (None, vec![Void::CommandsFromOutside]));
+}
+
+/// Two that drift at each other, a thousandth of a metre before the barrier.
+fn at_the_barrier(speed_m_s: f64) -> Scenario {
+    let mut start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 2.001, 0.0, 0.0]));
+    start.velocities_m_s[(1, 0)] = -speed_m_s;
+    Scenario::new("barrier", start, Formation::line(2, 4.0), 2.0, 5.0)
+}
+
+#[test]
+fn commands_from_outside_are_not_refined_for_a_law_that_is_not_asked() {
+    let scenario = at_the_barrier(0.0);
+    let mut by_hand = Simulation::new(&scenario).expect("a simulation");
+    let mut by_law = by_hand.clone();
+    for _ in 0..100 {
+        by_hand.step_with(&Rows::zeros(2)).expect("finite commands");
+        by_law.step();
+    }
+    let (by_hand, by_law) = (by_hand.finish(), by_law.finish());
+    assert_eq!((by_hand.refined_steps, by_hand.audit.steps), (0, 100));
+    assert!(by_law.refined_steps > 0 && by_law.audit.steps > 100, "the law asks for shorter steps");
+}
+
+#[test]
+fn commands_from_outside_are_judged_past_the_barrier_of_the_law_and_the_law_is_refined_for_again() {
+    let mut by_hand = Simulation::new(&at_the_barrier(0.1)).expect("a simulation");
+    (0..10).for_each(|_| by_hand.step_with(&Rows::zeros(2)).expect("finite commands"));
+    let flight = by_hand.finish();
+    assert_eq!((flight.audit.status, flight.audit.steps, flight.overlong_steps), (Status::Violation, 10, 0));
+    let mut mixed = Simulation::new(&at_the_barrier(0.0)).expect("a simulation");
+    mixed.step_with(&Rows::zeros(2)).expect("finite commands");
+    mixed.step();
+    let flight = mixed.finish();
+    assert_eq!((flight.refined_steps, flight.audit.status), (1, Status::Clear));
 }
 
 #[test]

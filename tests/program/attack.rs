@@ -27,7 +27,7 @@ fn the_worst_is_flown_again_by_the_command_that_is_printed_and_by_the_recording_
 
     let sets = found["sets"].as_array().expect("a list").iter().map(|set| set.as_str().expect("text"));
     let sets = sets.flat_map(|set| ["--set", set]);
-    let again: Vec<_> = ["run", "pentagon"].into_iter().chain(SHORT).chain(sets).collect();
+    let again: Vec<_> = ["run", "pentagon"].into_iter().chain(sets).collect();
     let flown = ran(folder.path(), &[&again[..], &["--json", "--no-snapshots", "--no-figures"]].concat());
     let flown: Value = serde_json::from_str(&flown.out).expect("a report");
     let left = std::fs::read_to_string(folder.path().join("worst/report.json")).expect("a report");

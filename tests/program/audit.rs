@@ -32,7 +32,8 @@ fn the_first_line_says_it_and_so_does_the_exit_code() {
     assert_eq!(clear.exit, Some(0), "{clear:?}");
     assert!(
         clear.out.starts_with(
-            "CLEAR if straight between samples: never closer than 1.000000 m, alpha and bravo at 0.50 s (delta 0.500 m)"
+            "CLEAR if straight between samples: never closer than 1.000000 m, alpha and bravo at 0.50 s (delta 0.500 m); from 0.000 s to \
+             1.000 s"
         ),
         "{clear:?}"
     );
@@ -313,9 +314,9 @@ fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
     let late = audit(folder.path(), &["late.csv", "--delta", "1", "--junit", "late.xml"]);
     assert_eq!(late.exit, Some(0), "{late:?}");
     let junit = fs::read_to_string(folder.path().join("late.xml")).expect("JUnit");
-    assert!(junit.contains("failures=\"0\"") && !late.out.contains("not seen"), "{junit} {late:?}");
+    assert!(junit.contains("failures=\"0\"") && !late.out.contains("was not seen"), "{junit} {late:?}");
     // Nothing is said of charlie, and that is said.
-    assert!(late.out.contains("(delta 1.000 m); charlie is never there with another\n"), "{late:?}");
+    assert!(late.out.contains("(delta 1.000 m); charlie is never there with another; from "), "{late:?}");
     assert!(late.err.contains("charlie, there from 10.5 s to 19.5 s, is never there with another"), "{late:?}");
     let gap = audit(folder.path(), &["gap.csv", "--delta", "1"]);
     assert_eq!(gap.exit, Some(1), "{gap:?}");
@@ -365,7 +366,10 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
     // What straight lines say of it is a violation, and the run knows better.
     let (exit, apart) = fly("swap.toml", "apart", &[]);
     assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &false.into()), "{apart}");
-    assert_eq!(apart["audit"]["assumes"], "straight between samples");
+    assert_eq!(
+        (&apart["audit"]["judged_by_run"], &apart["audit"]["assumes"]),
+        (&true.into(), &serde_json::Value::Null)
+    );
     ran_by(TAUTLINE, folder.path(), &["export", "apart/run.mcap", "-o", "apart.csv"]);
     let drawn = audit(folder.path(), &["apart.csv", "--delta", "1"]);
     assert!(drawn.out.starts_with("VIOLATION: 1 and 2 came to 0.000"), "{drawn:?}");

@@ -277,7 +277,7 @@ fn what_is_wrong_is_said_with_its_key_and_remedy() {
         ),
         &["both in [vary]"],
     );
-    refused(&vary("\" start.jitter_m\" = { uniform = [0.0, 0.1] }"), &["no key of a scenario"]);
+    refused(&vary("\" start.jitter_m\" = { uniform = [0.0, 0.1] }"), &["not a key of a scenario"]);
     refused(&vary("start.seed = \"run\""), &["all 10 runs are the same flight"]);
     let place = Place::of(SPEC);
     for (arguments, says) in [

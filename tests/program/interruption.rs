@@ -116,6 +116,32 @@ fn a_killed_run_can_be_read_up_to_the_last_chunk() {
     assert!(samples.iter().enumerate().all(|(k, sample)| sample.step == 4 * k as u64), "without a gap");
 }
 
+/// Judges the recording of a run that was interrupted, in every form.
+fn assert_the_audit_agrees(folder: &Path, last_s: f64) {
+    let audit = |more: &[&str]| ran_by(TAUTLINE, folder, &[&["audit", "out/run.mcap"], more].concat());
+    let judged = audit(&["--junit", "found.xml", "--events", "found.csv", "--summary", "found.md"]);
+    assert_eq!(judged.exit, Some(1), "{judged:?}");
+    let headline = judged.out.lines().next().expect("a headline");
+    let early =
+        format!("UNDECIDED: the flight ended early, at {last_s:.2} s of 1000000.00 s (interrupted); until then ");
+    assert!(headline.starts_with(&early) && headline.contains("CLEAR"), "{headline}");
+    let cases = fs::read_to_string(folder.join("found.xml")).expect("cases");
+    assert!(cases.contains("<failure") && cases.contains("the flight ended early"), "{cases}");
+    let rows = fs::read_to_string(folder.join("found.csv")).expect("rows");
+    assert!(rows.contains(&format!("ended-early,,,{last_s:?},1000000.0")), "{rows}");
+    assert!(fs::read_to_string(folder.join("found.md")).expect("a summary").contains("UNDECIDED"));
+    assert_eq!(audit(&["--allow-undecided"]).exit, Some(0));
+    // A window that was flown is judged whole.
+    let part = audit(&["--to", "1", "--json"]);
+    let report: Value = serde_json::from_str(&part.out).expect("JSON");
+    assert_eq!((part.exit, &report["status"], &report["ended_early"]), (Some(0), &Value::from("clear"), &Value::Null));
+    let whole: Value = serde_json::from_str(&audit(&["--json"]).out).expect("JSON");
+    assert_eq!((&whole["status"], &whole["audit"]["status"]), (&Value::from("undecided"), &Value::from("undecided")));
+    assert_eq!((&whole["audit"]["proved"], &whole["ended_early"]["at_s"]), (&Value::from(false), &Value::from(last_s)));
+    let limited: Value = serde_json::from_str(&audit(&["--limit", "speed=100", "--json"]).out).expect("JSON");
+    assert_eq!(limited["limits"][0]["status"], "undecided", "{limited}");
+}
+
 #[test]
 fn a_killed_run_is_flown_again_without_force() {
     let mut underway = Underway::new();
@@ -155,7 +181,8 @@ fn a_run_that_is_asked_to_stop_ends_with_a_report_on_what_it_flew() {
             reasons.iter().any(|reason| reason.as_str().is_some_and(|said| said.contains("interrupted"))),
             "{text}"
         );
-        assert_eq!(report["audit"]["status"], "clear", "what was flown is judged");
+        assert_eq!(report["audit"]["status"], "undecided", "what was flown is judged, and the rest is not known");
+        assert_eq!(report["formation"]["reached"], false);
         assert_eq!(report["run"]["steps"], report["audit"]["steps"]);
 
         let recording = McapRecording::open(&underway.recording()).expect("a recording");
@@ -165,5 +192,6 @@ fn a_run_that_is_asked_to_stop_ends_with_a_report_on_what_it_flew() {
         assert_eq!(report["run"]["duration_s"], last.time_s);
         let [Event::EndedEarly { time_s, reason }] = &events[..] else { panic!("{events:?}") };
         assert_eq!((*time_s, reason.as_str()), (last.time_s, "interrupted"));
+        assert_the_audit_agrees(underway.folder.path(), last.time_s);
     }
 }

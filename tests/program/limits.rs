@@ -60,7 +60,7 @@ fn nothing_is_said_of_distances_that_were_not_asked_about() {
     assert_eq!(ran.exit, Some(0), "{ran:?}");
     assert_eq!(
         ran.out.lines().next(),
-        Some("CLEAR if straight between samples: speed at most 5.100 m/s (limit 6.000 m/s)")
+        Some("CLEAR if straight between samples: speed at most 5.100 m/s (limit 6.000 m/s); from 0.000 s to 4.000 s")
     );
     let (ran, _) = audit(&["--limit", "speed=6", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
@@ -99,4 +99,42 @@ fn what_is_no_limit_is_refused() {
         let said = ran.err.split_whitespace().collect::<Vec<_>>().join(" ").replace("│ ", "");
         assert!(said.contains(expected), "{words:?}: {said}");
     }
+}
+
+/// A Skybrush-like way of straight segments: polynomials with a corner each second.
+fn corners() -> tempfile::TempDir {
+    let head = "duration,x^0,x^1,x^2,x^3,x^4,x^5,x^6,x^7,y^0,y^1,y^2,y^3,y^4,y^5,y^6,y^7,z^0,z^1,z^2,z^3,z^4,z^5,z^6,z^7,\
+                yaw^0,yaw^1,yaw^2,yaw^3,yaw^4,yaw^5,yaw^6,yaw^7";
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::create_dir(folder.path().join("show")).expect("a folder");
+    for (name, y) in [("cf1.csv", 0), ("cf2.csv", 9)] {
+        let pieces = (0..40).map(|k| {
+            let (from, by) = if k % 2 == 0 { (0, 3) } else { (3, -3) };
+            format!("1,{from},{by},0,0,0,0,0,0,{y},0,0,0,0,0,0,0,1,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n")
+        });
+        let text = format!("{head}\n{}", pieces.collect::<String>());
+        fs::write(folder.path().join("show").join(name), text).expect("written");
+    }
+    folder
+}
+
+#[test]
+fn corners_of_a_show_are_one_sentence_and_a_window_holds_them_against_the_limit() {
+    let folder = corners();
+    let audit = |words: &[&str]| ran_by(TAUTLINE, folder.path(), &[&["audit", "show"], words].concat());
+    let plain = audit(&["--limit", "accel=4", "--delta", "1"]);
+    assert_eq!(plain.exit, Some(0), "{plain:?}");
+    let said = "CLEAR if vehicles round 78 corners (velocity jumps by at most 6.000 m/s, cf1 at 1.00 s; --accel-window judges them): ";
+    assert!(plain.out.starts_with(said), "{plain:?}");
+    let report: serde_json::Value = serde_json::from_str(&audit(&["--limit", "accel=4", "--json"]).out).expect("JSON");
+    let corners = &report["limits"][0]["corners"];
+    assert_eq!((&corners["count"], &corners["largest"]["by_m_s"]), (&78.into(), &6.0.into()));
+    assert_eq!(report["audit"]["proved"], false);
+    let strict = audit(&["--limit", "accel=4", "--accel-window", "0.2"]);
+    assert_eq!(strict.exit, Some(1), "{strict:?}");
+    assert!(strict.out.starts_with("VIOLATION: accel") && strict.out.contains("30.000 m/s^2"), "{strict:?}");
+    let wide = audit(&["--limit", "accel=31", "--accel-window", "0.2"]);
+    assert!(wide.exit == Some(0) && wide.out.contains("accelerations are means over 0.2 s"), "{wide:?}");
+    let none = audit(&["--limit", "speed=4", "--accel-window", "0.2"]);
+    assert!(none.exit == Some(2) && none.err.contains("leave --accel-window out"), "{none:?}");
 }

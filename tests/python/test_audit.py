@@ -45,6 +45,34 @@ class Arrays(Case):
                 for key in ("status", "separation", "audit", "closest", "violations", "undecided", "gaps", "vehicles", "span_s"):
                     self.assertEqual(ours[key], printed[key], key)
 
+    def test_who_is_not_seen_throughout_is_named_and_presence_can_be_required(self) -> None:
+        t, p = passing()
+        p = p.copy()
+        p[len(t) // 2 :, 3] = np.nan
+        a = tl.audit(t, p, delta=0.1)
+        self.assertTrue(a.is_clear)
+        self.assertIn("1 of 4 vehicles is not seen throughout: 4 is seen from", a.headline)
+        strict = tl.audit(t, p, delta=0.1, require_presence=True)
+        self.assertEqual((strict.status, strict.to_dict()["presence"]["partly"]), ("undecided", 1))
+        self.assertTrue(tl.audit(t, p, delta=0.1, require_presence=True, ids=["1", "2", "3"]).is_clear)
+
+    def test_accelerations_are_means_over_a_window_where_one_is_given(self) -> None:
+        t = np.arange(41) * 0.05
+        p = np.zeros((41, 1, 3))
+        p[:, 0, 0] = 3.0 * np.minimum(t, 1.0)
+        limit = {"accel": 10.0}
+        self.assertEqual(tl.audit(t, p, limit=limit).status, "violation")
+        self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.4).status, "clear")
+        self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.2).status, "violation")
+
+    def test_a_flight_has_the_verdict_of_its_run_and_by_its_samples_alone_another(self) -> None:
+        f = tl.fly("pentagon", set={"time.duration_s": 3})
+        self.assertEqual(f.audit().verdict, "CLEAR as the run judged every step")
+        self.assertEqual(f.audit().separation_m, f.separation_m)
+        self.assertEqual(f.audit(independent=True, delta=2.0).verdict, "CLEAR if straight between samples")
+        with self.assertRaises(ValueError):
+            f.positions[0, 0, 0] = 0.0
+
     def test_the_order_in_memory_changes_nothing(self) -> None:
         rng = np.random.default_rng(1)
         t, p = np.arange(40) * 0.1, rng.normal(scale=5.0, size=(40, 5, 3))
@@ -61,11 +89,23 @@ class Arrays(Case):
         other[7, 2, 1] += 3.0
         self.assertNotEqual(tl.audit(t, other, delta=0.5).to_dict(), expected)
 
-    def test_a_plane_is_the_plane_z_0_and_is_said(self) -> None:
+    def test_a_plane_has_no_heights_and_is_said(self) -> None:
         t, p = passing()
         flat, space = tl.audit(t, p[:, :, :2], delta=1.5), tl.audit(t, p, delta=1.5)
         self.assertEqual((flat.verdict, flat.separation_m), (space.verdict, space.separation_m))
-        self.assertIn("z is taken as 0", flat.notes[0])
+        self.assertIn("in the plane of x and y", flat.notes[0])
+        self.assertTrue(flat.headline.endswith("in the plane of x and y: no heights are known"), flat.headline)
+        self.assertEqual((flat.is_planar, space.is_planar), (True, False))
+        with self.assertRaisesRegex(tl.Error, "heights of its vehicles are not known"):
+            tl.audit(t, p[:, :, :2], limit={"height": 120})
+
+    def test_a_layout_says_what_the_axes_of_arrays_count(self) -> None:
+        t, p = passing()
+        expected = tl.audit(t, p, delta=0.5).to_dict()
+        for layout, order in (("time,axis,vehicle", (0, 2, 1)), ("axis,vehicle,time", (2, 1, 0))):
+            self.assertEqual(tl.audit(t, p.transpose(order), delta=0.5, layout=layout).to_dict(), expected, layout)
+        with self.assertRaisesRegex(tl.Error, "time, vehicle and axis"):
+            tl.audit(t, p, delta=0.5, layout="t,v,x")
 
     def test_who_was_not_seen_is_a_gap_and_never_clear(self) -> None:
         t, p = passing()

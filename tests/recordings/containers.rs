@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{Cursor, Write as _};
 use std::path::Path;
 
-use tautline::read::{AxisOrder, ReadOptions};
+use tautline::read::{ArrayAxis, ReadOptions};
 use tautline::track::{Item, Piece};
 use zip::write::SimpleFileOptions;
 
@@ -192,6 +192,11 @@ fn npy(descr: &str, fortran: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// Options that name the layout of an array: 0 is time, vehicle, axis and 1 vehicle, time, axis.
+fn laid_out(layout: usize) -> ReadOptions {
+    ReadOptions { layout: Some(ArrayAxis::LAYOUTS[layout]), ..ReadOptions::default() }
+}
+
 fn doubles(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
@@ -222,16 +227,22 @@ fn arrays_are_read_in_every_order_of_their_axes_packed_or_not() {
     let big: Vec<u8> = time_first.iter().flat_map(|x| x.to_be_bytes()).collect();
     #[expect(clippy::cast_possible_truncation, reason = "small whole numbers")]
     let single: Vec<u8> = time_first.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
-    for (positions, packed) in [
-        (npy("<f8", "False", "(3, 2, 3)", &doubles(&time_first)), false),
-        (npy("<f8", "False", "(3, 2, 3)", &doubles(&time_first)), true),
-        (npy("<f8", "False", "(2, 3, 3)", &doubles(&vehicle_first)), true),
-        (npy("<f8", "True", "(3, 2, 3)", &doubles(&fortran)), false),
-        (npy(">f8", "False", "(3, 2, 3)", &big), false),
-        (npy("<f4", "False", "(3, 2, 3)", &single), true),
+    let axis_first = arranged(cube(3, 3, 2).map(|[axis, k, i]| [k, i, axis]));
+    let axis_between = arranged(cube(3, 3, 2).map(|[k, axis, i]| [k, i, axis]));
+    for (positions, packed, layout) in [
+        (npy("<f8", "False", "(3, 2, 3)", &doubles(&time_first)), false, 0),
+        (npy("<f8", "False", "(3, 2, 3)", &doubles(&time_first)), true, 0),
+        (npy("<f8", "False", "(2, 3, 3)", &doubles(&vehicle_first)), true, 1),
+        (npy("<f8", "True", "(3, 2, 3)", &doubles(&fortran)), false, 0),
+        (npy(">f8", "False", "(3, 2, 3)", &big), false, 0),
+        (npy("<f4", "False", "(3, 2, 3)", &single), true, 0),
+        (npy("<f8", "False", "(3, 3, 2)", &doubles(&axis_between)), false, 2),
+        (npy("<f8", "True", "(3, 3, 2)", &doubles(&arranged(cube(2, 3, 3).map(|[i, axis, k]| [k, i, axis])))), true, 2),
+        (npy("<f8", "False", "(3, 3, 2)", &doubles(&axis_first)), false, 4),
     ] {
         let t = npy("<f8", "False", "(3,)", &doubles(&[0.0, 0.5, 1.0]));
-        let found = whole("flight.npz", &archive(&[("t.npy", t), ("positions.npy", positions)], packed));
+        let bytes = archive(&[("t.npy", t), ("positions.npy", positions)], packed);
+        let found = read_bytes("flight.npz", &bytes, &laid_out(layout)).expect("read");
         assert_eq!(found.samples(), NPZ_TRUTH);
     }
 }
@@ -245,7 +256,8 @@ fn what_was_seen_is_laid_out_as_the_positions_are() {
     let vehicle_first = [1, 1, 1, 1, 0, 1];
     let all_but_one: Vec<_> = NPZ_TRUTH.iter().copied().filter(|&(t, name, _)| (t, name) != (0.5, "2")).collect();
     for seen in [npy("|b1", "False", "(3, 2)", &time_first), npy("|b1", "True", "(3, 2)", &vehicle_first)] {
-        let found = whole("seen.npz", &archive(&[t(), positions(), ("seen.npy", seen)], false));
+        let bytes = archive(&[t(), positions(), ("seen.npy", seen)], false);
+        let found = read_bytes("seen.npz", &bytes, &laid_out(0)).expect("read");
         assert_eq!(found.samples(), all_but_one);
     }
     let turned = (
@@ -253,7 +265,8 @@ fn what_was_seen_is_laid_out_as_the_positions_are() {
         npy("<f8", "True", "(2, 3, 3)", &doubles(&arranged(cube(3, 3, 2).map(|[axis, k, i]| [k, i, axis])))),
     );
     let seen = ("seen.npy", npy("|b1", "False", "(2, 3)", &vehicle_first));
-    assert_eq!(whole("turned.npz", &archive(&[t(), turned, seen], true)).samples(), all_but_one);
+    let bytes = archive(&[t(), turned, seen], true);
+    assert_eq!(read_bytes("turned.npz", &bytes, &laid_out(1)).expect("read").samples(), all_but_one);
 
     for (name, array, said) in [
         ("seen.npy", npy("|b1", "False", "(2, 3)", &vehicle_first), "array `seen`: it is of shape [2, 3] where [3, 2]"),
@@ -268,7 +281,7 @@ fn what_was_seen_is_laid_out_as_the_positions_are() {
         ("names.npy", npy("|S1", "False", "(3,)", b"abc"), "3 elements for 2 vehicles"),
     ] {
         let bytes = archive(&[t(), positions(), (name, array)], false);
-        let refused = read_bytes("odd.npz", &bytes, &ReadOptions::default()).expect_err(said).to_string();
+        let refused = read_bytes("odd.npz", &bytes, &laid_out(0)).expect_err(said).to_string();
         assert!(refused.contains(said), "{refused}\ninstead of {said}");
     }
 }
@@ -299,18 +312,18 @@ fn times_of_numpy_have_their_unit_and_a_square_of_axes_is_asked_about() {
     let stamps: Vec<u8> = [0_i64, 500, 1000].iter().flat_map(|ms| ms.to_le_bytes()).collect();
     let t = npy("<M8[ms]", "False", "(3,)", &stamps);
     let positions = npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3))));
-    let found = whole("flight.npz", &archive(&[("t.npy", t), ("positions.npy", positions)], true));
+    let bytes = archive(&[("t.npy", t), ("positions.npy", positions)], true);
+    let found = read_bytes("flight.npz", &bytes, &laid_out(0)).expect("read");
     assert_eq!((found.samples(), found.clock.unit), (NPZ_TRUTH.to_vec(), "ms"));
 
     let t = npy("<f8", "False", "(2,)", &doubles(&[0.0, 0.5]));
     let positions = npy("<f8", "False", "(2, 2, 3)", &doubles(&arranged(cube(2, 2, 3))));
     let square = archive(&[("t.npy", t), ("positions.npy", positions)], true);
     let refused = read_bytes("square.npz", &square, &ReadOptions::default()).expect_err("refused");
-    assert!(refused.help().contains("--axis-order"), "{refused}");
-    let ordered = |order| ReadOptions { axis_order: Some(order), ..ReadOptions::default() };
-    let found = read_bytes("square.npz", &square, &ordered(AxisOrder::TimeFirst)).expect("read");
+    assert!(refused.help().contains("--layout time,vehicle,axis or vehicle,time,axis"), "{}", refused.help());
+    let found = read_bytes("square.npz", &square, &laid_out(0)).expect("read");
     assert_eq!(found.samples(), NPZ_TRUTH[..4]);
-    let turned = read_bytes("square.npz", &square, &ordered(AxisOrder::VehicleFirst)).expect("read");
+    let turned = read_bytes("square.npz", &square, &laid_out(1)).expect("read");
     assert_eq!(turned.samples()[1].2, NPZ_TRUTH[2].2);
 }
 
@@ -405,4 +418,48 @@ fn a_curve_that_jumps_is_read_and_said() {
     write(folder.path(), "cf1.csv", &polynomial(&[(1.0, [0.0, 0.0, 1.0]), (1.0, [1.5, 0.0, 1.0])]));
     let found = Whole::read(folder.path(), &ReadOptions::default()).expect("read");
     assert!(found.notes.iter().any(|note| note.contains("jumps by 0.5000 m at 1 s")), "{:?}", found.notes);
+}
+
+#[test]
+fn an_array_whose_shape_has_several_meanings_is_asked_about_and_no_other() {
+    let read = |shape: [usize; 3], times: usize, axes: &[&str], options: &ReadOptions| {
+        let stamps: Vec<_> = (0..u8::try_from(times).expect("few")).map(f64::from).collect();
+        let t = ("t.npy", npy("<f8", "False", &format!("({times},)"), &doubles(&stamps)));
+        let numbers = vec![0.5; shape.iter().product()];
+        let [a, b, c] = shape;
+        let positions = ("positions.npy", npy("<f8", "False", &format!("({a}, {b}, {c})"), &doubles(&numbers)));
+        let letters: Vec<u8> = axes.iter().flat_map(|name| format!("{name:\0<7}").into_bytes()).collect();
+        let axes =
+            (!axes.is_empty()).then(|| ("axes.npy", npy("|S7", "False", &format!("({},)", axes.len()), &letters)));
+        let arrays: Vec<_> = [t, positions].into_iter().chain(axes).collect();
+        read_bytes("flight.npz", &archive(&arrays, false), options)
+    };
+    let plain = ReadOptions::default();
+    // Times, vehicles, and whether it is planar.
+    for (shape, times, vehicles) in [([9, 4, 3], 9, 4), ([4, 9, 3], 9, 4), ([9, 4, 2], 9, 4), ([9, 1, 3], 9, 1)] {
+        let found = read(shape, times, &[], &plain).unwrap_or_else(|error| panic!("{shape:?}: {error}"));
+        assert_eq!((found.vehicles.len(), found.items.len()), (vehicles, times * vehicles), "{shape:?}");
+    }
+    for (shape, times) in [
+        ([9, 3, 2], 9),
+        ([9, 3, 3], 9),
+        ([9, 2, 3], 9),
+        ([9, 2, 2], 9),
+        ([9, 3, 6], 9),
+        ([3, 9, 5], 9),
+        ([3, 5, 3], 3),
+        ([2, 5, 2], 2),
+        ([5, 5, 3], 5),
+        ([4, 3, 9], 9),
+    ] {
+        let refused = read(shape, times, &[], &plain).expect_err("asked");
+        assert!(refused.to_string().contains("which axis is which"), "{shape:?}: {refused}");
+        assert!(refused.help().contains("--layout "), "{}", refused.help());
+    }
+    assert!(read([9, 4, 5], 9, &[], &plain).expect_err("no axes").help().contains("--layout time,vehicle,axis"));
+    assert!(read([9, 4, 3], 9, &[], &laid_out(2)).is_err(), "it is not laid out so");
+    assert_eq!(read([9, 3, 2], 9, &[], &laid_out(2)).expect("read").vehicles.len(), 2);
+    assert_eq!(read([9, 3, 2], 9, &["time", "axis", "vehicle"], &plain).expect("read").vehicles.len(), 2);
+    assert_eq!(read([9, 3, 2], 9, &["time", "vehicle", "xy"], &plain).expect("read").vehicles.len(), 3);
+    assert!(read([3, 3, 3], 3, &["time"], &plain).is_err(), "the other two are not told apart");
 }

@@ -120,14 +120,71 @@ fn what_is_no_place_is_refused_where_it_is() {
         let error = read(&format!("t,id,lat,lon,alt\n{row}\n"), &ReadOptions::default()).expect_err(said);
         assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
     }
-    let scaled = ReadOptions { scale: 0.1, ..ReadOptions::default() };
-    assert!(read(&table("t,id,lat,lon,alt"), &scaled).expect_err("refused").help().contains("--scale"));
     assert!(
         read(&table("t,id,lat [grad],lon,alt"), &ReadOptions::default())
             .expect_err("refused")
             .to_string()
             .contains("`grad`")
     );
+}
+
+#[test]
+fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
+    let rows = "0,a,47,8,1000\n1,a,47,8,1100\n1,b,47,8.001,1100\n";
+    let origin = [47.0, 8.0, 304.8];
+    let read = |height: &str, scale: f64| {
+        let options = ReadOptions { scale, origin: Some(origin), ..ReadOptions::default() };
+        read(&format!("t,id,lat,lon,{height}\n{rows}"), &options)
+    };
+    let metres = read("alt", 1.0).expect("read");
+    let note = "heights are those of column `alt`, in metres: the name says no unit (--scale gives another)";
+    assert!(metres.notes.iter().any(|said| said == note), "{:?}", metres.notes);
+    let feet = read("alt", 0.3048).expect("read");
+    let note = "heights are those of column `alt`, in units of 0.3048 m as --scale says";
+    assert!(feet.notes.iter().any(|said| said == note), "{:?}", feet.notes);
+    let heights = |found: &Whole| found.samples().iter().map(|(_, _, position)| position[2]).collect::<Vec<_>>();
+    assert!((heights(&metres)[0] - 695.2).abs() < 1e-8 && heights(&feet)[0].abs() < 1e-8);
+    assert!((heights(&feet)[1] - 30.48).abs() < 1e-8);
+    // What is across the ground is not scaled, and a unit in the name says the same.
+    let named = read("alt [ft]", 1.0).expect("read");
+    assert_eq!(named.samples(), feet.samples());
+    assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("--scale gives")));
+    assert!(read("alt [ft]", 0.5).expect_err("refused").help().contains("--scale"));
+}
+
+#[test]
+fn a_fix_at_zero_and_zero_is_none() {
+    let found = whole("t,id,lat,lon,alt\n0,a,0,0,0\n1,a,47,8,400\n2,a,0.0,-0.0,400\n3,a,47,8,400\n3,b,0,0,0\n");
+    assert_eq!(found.samples(), [(1.0, "a", [0.0; 3]), (3.0, "a", [0.0; 3])]);
+    let note = "3 places are no fixes and were left out of `a`, `b`: latitude and longitude are both exactly 0";
+    assert!(found.notes.iter().any(|said| said == note), "{:?}", found.notes);
+    // Where one of them is 0 it is the equator, or the meridian of Greenwich.
+    let near = whole("t,id,lat,lon,alt\n0,a,0,8,0\n1,a,51,0,0\n2,a,0,1e-7,0\n");
+    assert_eq!(near.items.len(), 3);
+    assert!(!near.notes.iter().any(|said| said.contains("no fix")), "{:?}", near.notes);
+    // So are metres.
+    assert_eq!(whole("t,id,x,y,z\n0,a,0,0,0\n").items.len(), 1);
+    let none = read("t,id,lat,lon,alt\n0,a,0,0,0\n1,a,0,0,9\n", &ReadOptions::default()).expect_err("refused");
+    assert!(none.to_string().contains("no row has a fix"), "{none}");
+
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["a.csv", "b.csv"] {
+        fs::write(folder.path().join(name), "t,lat,lon,alt\n0,0,0,0\n1,47,8,400\n2,47,8,400\n").expect("written");
+    }
+    let error = Whole::read(folder.path(), &ReadOptions::default()).expect_err("refused");
+    assert!(error.help().contains("--origin 47.0,8.0,400.0"), "{}", error.help());
+    let origin = ReadOptions { origin: Some([47.0, 8.0, 400.0]), ..ReadOptions::default() };
+    let found = Whole::read(folder.path(), &origin).expect("read");
+    assert_eq!(found.items.len(), 4);
+    for name in ["a", "b"] {
+        let note = format!("1 place is no fix and was left out of `{name}`");
+        assert!(found.notes.iter().any(|said| said.contains(&note)), "{:?}", found.notes);
+    }
+    let kind = "sensor_msgs/msg/NavSatFix";
+    let messages = [[0.0; 3], [47.0, 8.0, 400.0]].map(|place| ("/r1/fix", kind, "cdr", 1, fix(0, 0, place)));
+    let found = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect("read");
+    assert_eq!(found.samples().len(), 1);
+    assert!(found.notes.iter().any(|said| said.contains("1 place is no fix")), "{:?}", found.notes);
 }
 
 #[test]

@@ -119,10 +119,14 @@ fn a_vehicle_that_is_not_seen_has_no_sample() {
 }
 
 #[test]
-fn without_z_everything_is_at_height_zero_and_it_is_said() {
+fn without_z_everything_is_in_a_plane_and_it_is_said() {
     let whole = read("flat.csv", "t,id,x,y\n0,1,1,2\n");
     assert_eq!(whole.samples(), [(0.0, "1", [1.0, 2.0, 0.0])]);
-    assert!(whole.notes.iter().any(|note| note.contains("no column for z")), "{:?}", whole.notes);
+    assert!(
+        whole.notes.iter().any(|note| note.contains("no column for the height: the recording is judged in the plane")),
+        "{:?}",
+        whole.notes
+    );
 }
 
 #[test]

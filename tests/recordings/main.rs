@@ -14,6 +14,8 @@ mod doors;
 mod earth;
 mod exports;
 mod formats;
+mod heights;
+mod identity;
 mod messages;
 mod own;
 mod own_channels;

@@ -5,7 +5,7 @@ use std::io::{Cursor, Write as _};
 use std::path::PathBuf;
 
 use tautline::export::{self, ExportOptions};
-use tautline::read::{self, AxisOrder, Dimensions, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
+use tautline::read::{self, ArrayAxis, Dimensions, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -309,7 +309,7 @@ fn a_format_that_is_forced_on_other_content_is_refused() {
     assert!(error.help().contains("leave --time-unit away"), "{error}");
     for (options, option) in [
         (ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() }, "--frame"),
-        (ReadOptions { axis_order: Some(AxisOrder::TimeFirst), ..ReadOptions::default() }, "--axis-order"),
+        (ReadOptions { layout: Some(ArrayAxis::LAYOUTS[0]), ..ReadOptions::default() }, "--layout"),
         (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "--allow-unfinished"),
     ] {
         let error = refused_with("flight.csv", LONG.as_bytes(), &options);

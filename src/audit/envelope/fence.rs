@@ -2,6 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use crate::audit::interruption::Interruption;
 use crate::audit::sweep::MAX_LENGTH_M;
 
 /// Corners of a fence: every edge is compared with every other.
@@ -121,6 +122,12 @@ impl Fence {
         self.margin_m
     }
 
+    /// Its lowest and highest height \[m\], where it has a floor and a ceiling.
+    #[must_use]
+    pub fn height_m(&self) -> Option<[f64; 2]> {
+        self.height_m
+    }
+
     /// Its corners from above \[m\].
     #[must_use]
     pub fn corners_m(&self) -> &[Vector2<f64>] {
@@ -131,7 +138,15 @@ impl Fence {
     /// or ceiling, below 0 by how far it gets outside.
     #[must_use]
     pub fn room_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
-        let across = self.room_across(from.xy(), to.xy());
+        self.room_until(from, to, &Interruption::default())
+    }
+
+    /// The same, or some number once the work is interrupted.
+    pub(super) fn room_until(&self, from: Vector3<f64>, to: Vector3<f64>, interruption: &Interruption) -> f64 {
+        if interruption.is_set() {
+            return f64::INFINITY;
+        }
+        let across = self.room_across(from.xy(), to.xy(), interruption);
         self.height_m.map_or(across, |[low, high]| {
             let (least, most) = (from.z.min(to.z), from.z.max(to.z));
             across.min(least - low).min(high - most)
@@ -143,7 +158,7 @@ impl Fence {
         self.corners_m.iter().zip(next).map(|(&from, &to)| [from, to])
     }
 
-    fn room_across(&self, from: Vector2<f64>, to: Vector2<f64>) -> f64 {
+    fn room_across(&self, from: Vector2<f64>, to: Vector2<f64>, interruption: &Interruption) -> f64 {
         let wall_m = self.edges().map(|edge| distance(edge, [from, to])).fold(f64::INFINITY, f64::min);
         if wall_m > 0.0 && self.holds(from) {
             return wall_m;
@@ -153,6 +168,7 @@ impl Fence {
         crossings.extend([0.0, 1.0]);
         crossings.sort_unstable_by(f64::total_cmp);
         let parts = crossings.windows(2).map(|pair| [pair[0], pair[1]]);
+        let parts = parts.take_while(|_| !interruption.is_set());
         let is_outside = |&[start, end]: &[f64; 2]| !self.holds(from.lerp(&to, 0.5 * (start + end)));
         let farthest =
             parts.filter(is_outside).map(|[start, end]| self.farthest_m(from.lerp(&to, start), from.lerp(&to, end)));

@@ -73,6 +73,18 @@ impl Quantity {
         }
     }
 
+    /// Whether it depends on heights, and has no value in the plane of x and y.
+    #[must_use]
+    pub fn needs_height(self) -> bool {
+        matches!(self, Self::Climb | Self::Descent | Self::Height | Self::Floor)
+    }
+
+    /// Whether it depends on what positions are measured from.
+    #[must_use]
+    pub fn needs_origin(self) -> bool {
+        matches!(self, Self::Height | Self::Floor | Self::Fence)
+    }
+
     /// Whether it must not fall below its limit, where the others must not exceed theirs.
     #[must_use]
     pub fn is_least(self) -> bool {

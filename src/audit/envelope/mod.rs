@@ -12,15 +12,21 @@
 //! - Under acceleration **bounded** by A, over h, the largest speed is at least that of the mean velocity and at most A h / 2 more
 //!   (Peano's form of the error of a mean); a position is within A h^2 / 8 of the chord.
 //!
+//! Where the velocity of a recorded curve jumps, no vehicle flies it as it is drawn: such corners are counted and not held against
+//! a limit. With [`accel_window_s`](super::recorded::Settings::accel_window_s) accelerations are means over windows of that
+//! length, |v(t + w) - v(t)| / w, over corners too.
+//!
 //! A number counts as exceeded where it is by more than 1e-9 of itself, or 1e-9 where it is below 1: less than that is rounding.
 
 mod extremum;
 mod fence;
+mod followed;
 mod limit;
+mod mean_acceleration;
 mod outcome;
 mod watch;
 
 pub use fence::{Fence, FenceError};
 pub use limit::{Envelope, Limit, Quantity};
-pub use outcome::{EnvelopeOutcome, Exceeding, LimitOutcome};
+pub use outcome::{Corner, Corners, EnvelopeOutcome, Exceeding, LimitOutcome};
 pub(super) use watch::{Seen, Watch};

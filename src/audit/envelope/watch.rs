@@ -4,21 +4,29 @@ use nalgebra::Vector3;
 
 use super::extremum::{Enclosure, Goal, WIDTH, derivative, largest, largest_of};
 use super::fence::Fence;
+use super::followed::{Followed, Found};
 use super::limit::{Envelope, Limit, Quantity};
-use super::outcome::{EnvelopeOutcome, Exceeding, LimitOutcome};
-use crate::audit::outcome::Status;
+use super::mean_acceleration::{MeanAcceleration, Velocity};
+use super::outcome::EnvelopeOutcome;
+use crate::audit::interruption::Interruption;
 use crate::audit::polynomial::{rescale, stray_across, value};
 use crate::audit::sweep::Interval;
 use crate::track::{Item, Piece, Sample};
 
 /// Pieces of a curve that meet within this \[m\], and whose velocities do within this \[m/s\], are one smooth curve: their
-/// coefficients are written with so many digits. Places that are off by so much change the velocity at the end of a piece of
-/// degree n and length h by twice n / h times as much: whether there is a corner then is not known.
+/// coefficients are written with so many digits.
 const SMOOTH: f64 = 1e-3;
+/// Pieces whose times are within this \[s\] meet.
+const SAME_INSTANT_S: f64 = 1e-6;
 /// Part of the room that is left to a fence to which a curve's least room is told.
 const COARSE: f64 = 1e-3;
 /// What is taken of accelerations between samples where nothing bounds them.
 const BY_THREE_SAMPLES: &str = "accelerations are those of the parabolas through three samples in a row";
+
+/// What is taken of accelerations that are means over windows \[s\].
+fn by_windows(length_s: f64) -> String {
+    format!("accelerations are means over {length_s:?} s")
+}
 
 /// What is known of an item beside itself.
 #[derive(Clone, Copy, Debug)]
@@ -34,41 +42,49 @@ pub(in crate::audit) struct Seen {
 /// Follows every limit, vehicle by vehicle.
 #[derive(Clone, Debug)]
 pub(in crate::audit) struct Watch {
-    fence: Option<Fence>,
+    fence: Option<WatchedFence>,
     window: Interval,
     of: Vec<Followed>,
     vehicles: Vec<Last>,
+    /// Length of the windows over which accelerations are means \[s\], and what is known of each vehicle for them.
+    accel_window_s: Option<f64>,
+    means: Vec<MeanAcceleration>,
+}
+
+/// A fence, and what ends the search for the room to it.
+#[derive(Clone, Debug)]
+struct WatchedFence {
+    fence: Fence,
+    interruption: Interruption,
+}
+
+impl WatchedFence {
+    fn room_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+        self.fence.room_until(from, to, &self.interruption)
+    }
 }
 
 /// What was seen of a vehicle last.
 #[derive(Clone, Copy, Debug, Default)]
 struct Last {
     sample: Option<Sample>,
-    /// Velocity at the end of its last piece \[m/s\], and how far that is off where places are by [`SMOOTH`].
-    curve_end: Option<(Vector3<f64>, f64)>,
+    /// Velocity at the end of its last piece \[m/s\].
+    curve_end: Option<Vector3<f64>>,
     /// Mean velocity over its last interval \[m/s\], and how long that was \[s\].
     interval: Option<(Vector3<f64>, f64)>,
 }
 
-/// A limit as far as the recording was read.
-#[derive(Clone, Debug)]
-struct Followed {
-    limit: Limit,
-    extreme: Option<Exceeding>,
-    violations: Times,
-    undecided: Times,
-    /// Which vehicles something was told of.
-    told: Vec<bool>,
-    assumes: Option<&'static str>,
-}
-
-/// A value over a time of which it is the extreme, turned so that it must not exceed its bound.
-type Found = (Interval, Enclosure);
-
 impl Watch {
-    pub(in crate::audit) fn new(envelope: &Envelope, window: Interval) -> Self {
+    pub(in crate::audit) fn new(envelope: &Envelope, window: Interval, accel_window_s: Option<f64>) -> Self {
         let of = envelope.all().into_iter().map(Followed::new).collect();
-        Self { fence: envelope.fence.clone(), window, of, vehicles: Vec::new() }
+        let fence = envelope.fence.clone().map(|fence| WatchedFence { fence, interruption: Interruption::default() });
+        Self { fence, window, of, vehicles: Vec::new(), accel_window_s, means: Vec::new() }
+    }
+
+    pub(in crate::audit) fn set_interruption(&mut self, interruption: Interruption) {
+        if let Some(fence) = &mut self.fence {
+            fence.interruption = interruption;
+        }
     }
 
     /// Takes what is said of a vehicle next.
@@ -76,6 +92,10 @@ impl Watch {
         let vehicle = item.vehicle();
         if self.vehicles.len() <= vehicle {
             self.vehicles.resize(vehicle + 1, Last::default());
+            self.means.resize(vehicle + 1, MeanAcceleration::default());
+        }
+        if seen.after_gap {
+            self.means[vehicle].restart();
         }
         let last = std::mem::take(&mut self.vehicles[vehicle]);
         let last = if seen.after_gap { Last::default() } else { last };
@@ -101,8 +121,27 @@ impl Watch {
             1 => speed_between(limit, window, (&before, &seen), mean, bound_m_s2),
             _ => None,
         });
-        self.corner(&before, &seen, (last.interval, mean), bounded_by_m_s2);
+        if self.accel_window_s.is_some() {
+            let rounding_m_s = 2.0 * rounding_m(&before, &seen) / h;
+            self.windows(seen.vehicle, &Velocity { over, coefficients: vec![mean], rounding_m_s });
+        } else {
+            self.corner(&before, &seen, (last.interval, mean), bounded_by_m_s2);
+        }
         Last { sample: Some(seen), interval: Some((mean, h)), curve_end: None }
+    }
+
+    /// Mean accelerations over windows that end in the time of a velocity.
+    fn windows(&mut self, vehicle: usize, velocity: &Velocity) {
+        let Some(length_s) = self.accel_window_s else { return };
+        let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
+        for of in accelerations {
+            let (known, bound, width) = (of.known(), of.limit.bound(), WIDTH * of.limit.allowance());
+            let goal = Goal { known, bound, width, coarse: 0.0 };
+            for found in self.means[vehicle].take(velocity.clone(), length_s, self.window, goal) {
+                of.note(vehicle, Some(found));
+            }
+            of.assumes = Some(by_windows(length_s));
+        }
     }
 
     /// Accelerations around a sample, from the mean velocities on both sides and its own velocity.
@@ -136,7 +175,7 @@ impl Watch {
         });
         if bounded_by_m_s2.is_none() {
             let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
-            accelerations.for_each(|of| of.assumes = Some(BY_THREE_SAMPLES));
+            accelerations.for_each(|of| of.assumes = Some(BY_THREE_SAMPLES.to_owned()));
         }
     }
 
@@ -162,8 +201,7 @@ impl Watch {
         rescale(&mut whole, 0.0, length_s);
         let (start, start_m_s) = (whole[0], derivative(&whole, length_s)[0]);
         let (end, end_m_s) = (value(&whole, 1.0), value(&derivative(&whole, length_s), 1.0));
-        let off_m_s = 2.0 * SMOOTH * (piece.coefficients.len() - 1) as f64 / length_s;
-        self.join(&last, vehicle, (over.from_s, start), (start_m_s, off_m_s));
+        self.join(&last, vehicle, (over.from_s, start), start_m_s);
         let clip = Interval { from_s: over.from_s.max(self.window.from_s), to_s: over.to_s.min(self.window.to_s) };
         if clip.from_s < clip.to_s {
             let mut part = piece.coefficients.clone();
@@ -171,7 +209,8 @@ impl Watch {
             rescale(&mut part, clip.from_s - over.from_s, clipped_s);
             let first = derivative(&part, clipped_s);
             let second = derivative(&first, clipped_s);
-            for of in &mut self.of {
+            let is_mean = self.accel_window_s.is_some();
+            for of in self.of.iter_mut().filter(|of| !(is_mean && of.limit.quantity == Quantity::Acceleration)) {
                 let goal = Goal {
                     known: of.known(),
                     bound: of.limit.bound(),
@@ -187,42 +226,53 @@ impl Watch {
                 of.note(vehicle, found.map(|found| (clip, found)));
             }
         }
+        if self.accel_window_s.is_some() {
+            let coefficients = derivative(&whole, length_s);
+            self.windows(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
+        }
         let sample = Sample { vehicle, time_s: over.to_s, position_m: end, velocity_m_s: None, radius_m: None };
-        Last { sample: Some(sample), curve_end: Some((end_m_s, off_m_s)), interval: None }
+        Last { sample: Some(sample), curve_end: Some(end_m_s), interval: None }
     }
 
-    /// Where a piece does not go on where the one before it ended, no speed is known; where it goes on at another velocity, it
-    /// has no acceleration that a vehicle could have.
-    fn join(
-        &mut self,
-        last: &Last,
-        vehicle: usize,
-        (from_s, start): (f64, Vector3<f64>),
-        (start_m_s, off_m_s): (Vector3<f64>, f64),
-    ) {
-        let Some((before, (end_m_s, off_before_m_s))) = last.sample.zip(last.curve_end) else { return };
-        let apart_s = from_s - before.time_s;
+    /// Where a piece does not go on where the one before it ended, no speed is known; where it goes on at another velocity, the
+    /// curve has a corner.
+    fn join(&mut self, last: &Last, vehicle: usize, (from_s, start): (f64, Vector3<f64>), start_m_s: Vector3<f64>) {
+        let Some((before, end_m_s)) = last.sample.zip(last.curve_end) else { return };
         let jumps = (start - before.position_m).norm() > SMOOTH;
         let by_m_s = (start_m_s - end_m_s).norm();
-        let (may_bend, bends) = (by_m_s > SMOOTH, by_m_s > SMOOTH + off_m_s + off_before_m_s);
+        // Pieces that are parted in time are joined by a straight line.
+        let apart_s = from_s - before.time_s;
+        let (is_parted, is_mean) = (apart_s > SAME_INSTANT_S, self.accel_window_s.is_some());
         let over = Interval { from_s: before.time_s.min(from_s), to_s: from_s };
+        let is_in = |window: Interval| window.from_s <= from_s && from_s <= window.to_s;
         self.each(vehicle, |limit, fence, window, _| {
-            let in_window = window.from_s <= from_s && from_s <= window.to_s;
             let lower = match limit.quantity.derivative() {
                 0 if limit.quantity == Quantity::Fence => -fence?.room_m(before.position_m, start),
                 0 => limit.quantity.of(before.position_m).max(limit.quantity.of(start)),
-                2 if bends => by_m_s / apart_s.max(0.0),
-                2 if may_bend => f64::NEG_INFINITY,
                 _ if jumps => f64::NEG_INFINITY,
+                2 if is_parted && !is_mean && by_m_s > SMOOTH => by_m_s / apart_s,
                 _ => return None,
             };
             let upper = if limit.quantity.derivative() == 0 { lower } else { f64::INFINITY };
-            in_window.then_some((over, Enclosure { lower, upper, at: 1.0 }))
+            is_in(window).then_some((over, Enclosure { lower, upper, at: 1.0 }))
         });
+        if jumps {
+            self.means[vehicle].restart();
+        } else if is_parted {
+            let coefficients = vec![(start - before.position_m) / apart_s];
+            self.windows(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
+        } else if by_m_s > SMOOTH && !is_mean && is_in(self.window) {
+            let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
+            accelerations.for_each(|of| of.note_corner(vehicle, from_s, by_m_s));
+        }
     }
 
     /// Asks for what was found of each limit, given the worst value that is known of it, and notes it.
-    fn each(&mut self, vehicle: usize, mut find: impl FnMut(Limit, Option<&Fence>, Interval, f64) -> Option<Found>) {
+    fn each(
+        &mut self,
+        vehicle: usize,
+        mut find: impl FnMut(Limit, Option<&WatchedFence>, Interval, f64) -> Option<Found>,
+    ) {
         let Self { fence, window, of, .. } = self;
         for of in of {
             let known = of.known();
@@ -240,7 +290,7 @@ impl Watch {
 /// Heights and the room to a fence between two samples: those of the straight line, and of whatever is within A h^2 / 8 of it.
 fn place_between(
     limit: Limit,
-    fence: Option<&Fence>,
+    fence: Option<&WatchedFence>,
     window: Interval,
     (before, seen): (&Sample, &Sample),
     (bound_m_s2, known): (f64, f64),
@@ -309,97 +359,9 @@ fn rounding_m(before: &Sample, seen: &Sample) -> f64 {
 }
 
 /// How far outside of a fence a curve gets.
-fn outside(fence: &Fence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
+fn outside(fence: &WatchedFence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
     largest(part, goal, |part, _| {
         let (from, to) = (part[0], value(part, 1.0));
         [-fence.room_m(from, from), -fence.room_m(to, to), stray_across(part) - fence.room_m(from, to)]
     })
-}
-
-impl Followed {
-    fn new(limit: Limit) -> Self {
-        let (violations, undecided) = (Times::default(), Times::default());
-        Self { limit, extreme: None, violations, undecided, told: Vec::new(), assumes: None }
-    }
-
-    /// The worst value that is known.
-    fn known(&self) -> f64 {
-        self.extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.lower)
-    }
-
-    fn note(&mut self, vehicle: usize, found: Option<Found>) {
-        let Some((over, Enclosure { lower, upper, at })) = found else { return };
-        if self.told.len() <= vehicle {
-            self.told.resize(vehicle + 1, false);
-        }
-        self.told[vehicle] = true;
-        let at_s = over.from_s + at * (over.to_s - over.from_s);
-        let found = Exceeding { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
-        let bound = self.limit.bound();
-        if lower > bound {
-            self.violations.add(found);
-        } else if upper > bound {
-            self.undecided.add(found);
-        }
-        let extreme = self.extreme.get_or_insert(found);
-        if found.lower > extreme.lower {
-            *extreme = Exceeding { upper: extreme.upper.max(upper), ..found };
-        } else {
-            extreme.upper = extreme.upper.max(upper);
-        }
-    }
-
-    fn finish(self, judged: &[bool], is_whole: bool) -> LimitOutcome {
-        let Self { limit, extreme, violations, undecided, told, assumes } = self;
-        let is_told = |vehicle: usize| told.get(vehicle).copied().unwrap_or(false);
-        let unknown: Vec<_> =
-            judged.iter().enumerate().filter(|&(vehicle, &asked)| asked && !is_told(vehicle)).map(|(k, _)| k).collect();
-        let turned = |of: Exceeding| {
-            let (lower, upper) = if limit.quantity.is_least() { (-of.upper, -of.lower) } else { (of.lower, of.upper) };
-            Exceeding { lower, upper, ..of }
-        };
-        let in_order = |times: Times| {
-            let mut all: Vec<_> = times.all.into_iter().map(turned).collect();
-            all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
-            all
-        };
-        let (violations, undecided) = (in_order(violations), in_order(undecided));
-        let decided = is_whole && undecided.is_empty() && unknown.is_empty() && extreme.is_some();
-        LimitOutcome {
-            status: Status::new(!violations.is_empty(), decided),
-            extreme: extreme.map(turned),
-            violations,
-            undecided,
-            unknown,
-            assumes,
-            limit,
-        }
-    }
-}
-
-/// Times of vehicles, those of one that go on as one.
-#[derive(Clone, Debug, Default)]
-struct Times {
-    all: Vec<Exceeding>,
-    /// Where the last one of a vehicle is.
-    last: Vec<Option<usize>>,
-}
-
-impl Times {
-    fn add(&mut self, found: Exceeding) {
-        if self.last.len() <= found.vehicle {
-            self.last.resize(found.vehicle + 1, None);
-        }
-        let last = self.last[found.vehicle].and_then(|last| self.all.get_mut(last));
-        if let Some(of) = last.filter(|of| of.to_s >= found.from_s) {
-            of.to_s = of.to_s.max(found.to_s);
-            of.upper = of.upper.max(found.upper);
-            if found.lower > of.lower {
-                (of.lower, of.at_s) = (found.lower, found.at_s);
-            }
-        } else {
-            self.last[found.vehicle] = Some(self.all.len());
-            self.all.push(found);
-        }
-    }
 }

@@ -1,7 +1,12 @@
 //! The audit of a recording, as it is read.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use super::error::RecordedError;
-use super::outcome::{Gap, Outcome, Presence, Told, ToldViolation, alone};
+use super::gaps::Gaps;
+use super::outcome::{Outcome, Tallies, Told, ToldViolation, alone};
+use super::presence::absences;
 use super::rates::Rates;
 use super::settings::{LARGEST, Settings};
 use super::smallest::Smallest;
@@ -9,6 +14,8 @@ use super::told::{AllTold, Counted};
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::audit::envelope::Watch;
+use crate::audit::interruption::Interruption;
+use crate::audit::ledger::Lists;
 use crate::audit::outcome::Status;
 use crate::audit::results::Results;
 use crate::audit::sweep::Interval;
@@ -36,7 +43,7 @@ pub struct TrackAuditor {
     rates: Option<Rates>,
     windows: Windows,
     results: Results,
-    gaps: Vec<Gap>,
+    gaps: Gaps,
     smallest: Option<Smallest>,
     envelope: Option<Watch>,
     told: AllTold,
@@ -78,12 +85,13 @@ impl TrackAuditor {
         Ok(Self {
             least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
             windows: Windows::new(settings.limits(), &settings.obstacles),
-            envelope: (!settings.envelope.is_empty()).then(|| Watch::new(&settings.envelope, settings.window())),
+            envelope: (!settings.envelope.is_empty())
+                .then(|| Watch::new(&settings.envelope, settings.window(), settings.accel_window_s)),
             settings,
             vehicles: Vec::new(),
             rates: None,
-            results: Results::default(),
-            gaps: Vec::new(),
+            results: Results::bounded(Interruption::default()),
+            gaps: Gaps::default(),
             smallest: None,
             told: AllTold::default(),
             now_s: f64::NEG_INFINITY,
@@ -101,10 +109,29 @@ impl TrackAuditor {
         self
     }
 
+    /// Ends the work soon after the flag is set: [`push`](Self::push) and [`finish`](Self::finish) give
+    /// [`RecordedError::Interrupted`] then. It is given before anything is judged.
+    #[must_use]
+    pub fn with_interruption(mut self, flag: Arc<AtomicBool>) -> Self {
+        let interruption = Interruption::new(flag);
+        if let Some(envelope) = &mut self.envelope {
+            envelope.set_interruption(interruption.clone());
+        }
+        if let Some(smallest) = &mut self.smallest {
+            smallest.set_interruption(interruption.clone());
+        }
+        self.results = Results::bounded(interruption);
+        self
+    }
+
+    fn check_interruption(&self) -> Result<(), RecordedError> {
+        if self.results.interruption.is_set() { Err(RecordedError::Interrupted) } else { Ok(()) }
+    }
+
     /// Judges what comes next. `names` are those of all vehicles known so far.
     ///
     /// # Errors
-    /// [`RecordedError`] where an item is wrong; nothing more can be judged then.
+    /// [`RecordedError`] where an item is wrong, or the work is interrupted; nothing more can be judged then.
     pub fn push(&mut self, names: &[String], items: &[Item]) -> Result<(), RecordedError> {
         if self.rates.is_none() && !items.is_empty() {
             let given = self.settings.max_gap_s.is_some();
@@ -121,11 +148,12 @@ impl TrackAuditor {
         Ok(())
     }
 
-    /// Takes what the recording itself says of the time since the instant before; in order of time, and at any time before
-    /// the end. It goes before what is drawn; where clocks are set right differently, around ellipsoids, or near the ground
+    /// Takes what the recording itself says of the time since the instant before; in order of time, and before anything is judged.
+    /// It goes before what is drawn; where clocks are set right differently, around ellipsoids, or near the ground
     /// it says too little for that, and contradicts the lines that are drawn, nothing is decided; nor of other pairs then, where
     /// they might be too close for all that is told of them.
     pub fn tell(&mut self, told: Told) {
+        self.results.ledger.expect_corrections();
         self.told.push(told);
     }
 
@@ -133,6 +161,7 @@ impl TrackAuditor {
     pub fn tell_violation(&mut self, told: ToldViolation) {
         // A file may say anything.
         if told.from_s <= told.to_s && told.least_m <= told.min_m && told.min_m < told.limit_m {
+            self.results.ledger.expect_corrections();
             self.told.push_violation(told);
         }
     }
@@ -164,6 +193,9 @@ impl TrackAuditor {
         }
         if let Some(envelope) = &mut self.envelope {
             envelope.take(item, vehicle.seen(after_gap));
+            if self.results.interruption.is_set() {
+                return Err(RecordedError::Interrupted);
+            }
         }
         self.pending += 1;
         Ok(())
@@ -189,7 +221,7 @@ impl TrackAuditor {
         } else if self.pending >= (SEGMENTS * self.vehicles.len()).max(FEWEST_ITEMS) {
             self.advance();
         }
-        Ok(())
+        self.check_interruption()
     }
 
     /// Judges up to where every vehicle that may still be there is known.
@@ -257,6 +289,7 @@ impl TrackAuditor {
         if end_s.is_finite() {
             self.judge_until(end_s);
         }
+        self.check_interruption()?;
         self.check_clocks()?;
         let presence: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.presence).collect();
         let there = || presence.iter().flatten();
@@ -273,44 +306,45 @@ impl TrackAuditor {
         });
         // Of a gap that nobody could have used nothing is asked about pairs.
         let obstructed = !self.settings.obstacles.is_empty();
-        let matters = |gap: &Gap| {
-            let others = presence.iter().enumerate().filter(|(vehicle, _)| *vehicle != gap.vehicle);
-            let meets = |other: &Presence| other.from_s < gap.to_s && gap.from_s < other.to_s;
-            obstructed || others.filter_map(|(_, there)| there.as_ref()).any(meets)
-        };
-        let is_gapless = !self.gaps.iter().any(matters);
-        if envelope.is_none() {
-            self.gaps.retain(matters);
-        }
+        let (gaps, gaps_tally, is_gapless) = self.gaps.finish(&presence, obstructed, envelope.is_some());
         let envelope = envelope.unwrap_or_default();
-        self.gaps.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then(a.vehicle.cmp(&b.vehicle)));
         let counts = |vehicle: usize| counted(&self.vehicles, &self.settings, vehicle);
+        self.results.ledger.close();
         let all_listed = self.told.correct(&mut self.results, &self.settings, self.vehicles.len(), counts);
-        let Results { ledger, closest, obstacles, told, swept } = self.results;
+        let absences = absences(&self.vehicles, &self.settings, span_s);
+        if self.results.interruption.is_set() {
+            return Err(RecordedError::Interrupted);
+        }
+        let Results { ledger, closest, obstacles, told, swept, .. } = self.results;
         let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
         let alone = if obstructed || !separates { Vec::new() } else { alone(&presence) };
         let decided = looked_at && ledger.is_decided() && is_gapless && contradiction.is_none();
         let parry = ledger.parry;
         let of_pairs = looked_at && all_listed && parry.disagreements == 0 && contradiction.is_none();
-        let (violations, undecided) = ledger.into_lists();
+        let Lists { violations, undecided, violations_tally, undecided_tally, deciding_rate_hz } = ledger.into_lists();
+        let tallies = Tallies { violations: violations_tally, undecided: undecided_tally, gaps: gaps_tally };
+        let is_everyone_there = !self.settings.require_presence || absences.is_empty();
         Ok(Outcome {
             status: Status::new(
                 !violations.is_empty() || envelope.is_exceeded(),
-                (decided || !separates) && envelope.is_kept(),
+                (decided || !separates) && envelope.is_kept() && is_everyone_there,
             ),
-            is_else_known: (of_pairs || !separates) && envelope.is_else_known(),
+            is_else_known: (of_pairs || !separates) && envelope.is_else_known() && !tallies.are_shortened(),
             separation: separates.then(|| Status::new(!violations.is_empty(), decided)),
             envelope,
             max_gaps_s: self.vehicles.iter().map(|vehicle| vehicle.max_gap_s).collect(),
             vehicles: self.vehicles.into_iter().map(|vehicle| vehicle.name).collect(),
             presence,
+            absences,
             span_s,
             closest: closest.kept,
             obstacles: obstacles.kept,
             smallest: self.smallest.filter(|_| separates).map_or_else(Vec::new, |smallest| smallest.finish(&told)),
             violations,
             undecided,
-            gaps: self.gaps,
+            gaps,
+            tallies,
+            deciding_rate_hz,
             alone,
             contradiction,
             segments: self.segments,

@@ -117,9 +117,17 @@ pub enum RecordedError {
         /// What was to be limited.
         limit: &'static str,
     },
+    /// A window of accelerations where none are limited, or where a bound on them is assumed.
+    #[error(
+        "a window of accelerations says nothing where no acceleration is limited, or where accelerations are bounded"
+    )]
+    NoAccelWindow,
     /// Obstacles and an ellipsoid.
     #[error("obstacles cannot be judged by an ellipsoid")]
     ObstaclesAndEllipsoid,
+    /// The work was interrupted ([`super::TrackAuditor::with_interruption`]).
+    #[error("interrupted")]
+    Interrupted,
     /// An obstacle that is none.
     #[error(transparent)]
     Obstacle(#[from] ObstacleError),

@@ -6,9 +6,13 @@ use crate::audit::envelope::EnvelopeOutcome;
 use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use crate::audit::results::KEPT;
+use crate::audit::shortlist::Tally;
 use crate::audit::slices::Slice;
 use crate::audit::sweep::Interval;
 use crate::swarm::{ClosestApproach, Pair};
+
+/// Relative difference of two distances of the same instant that were computed in two ways.
+const SAME: f64 = 1e-9;
 
 /// A time during which a vehicle was not seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -44,6 +48,35 @@ pub struct Presence {
     pub from_s: f64,
     /// Last seen \[s\].
     pub to_s: f64,
+}
+
+/// A vehicle that is not seen over the whole window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Absence {
+    /// The vehicle.
+    pub vehicle: usize,
+    /// When it is seen; `None` where it is not seen in the window at all.
+    pub seen: Option<Presence>,
+}
+
+/// How many findings of each kind there are, and how many of them are listed: the worst [`LISTED`](crate::audit::LISTED), and the
+/// first of each of as many pairs or vehicles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Tallies {
+    /// Of violations.
+    pub violations: Tally,
+    /// Of times that could not be decided.
+    pub undecided: Tally,
+    /// Of gaps; the worst are the longest.
+    pub gaps: Tally,
+}
+
+impl Tallies {
+    /// Whether some list is shorter than what was found.
+    #[must_use]
+    pub fn are_shortened(&self) -> bool {
+        [self.violations, self.undecided, self.gaps].iter().any(Tally::is_shortened)
+    }
 }
 
 /// Vehicles that are never there together with another: when nobody else was, nothing is judged.
@@ -131,6 +164,8 @@ pub struct Outcome {
     pub vehicles: Vec<String>,
     /// When each vehicle is there within what was asked; `None` where it is not, or was not asked for.
     pub presence: Vec<Option<Presence>>,
+    /// Vehicles that were asked for and are not seen over the whole window, by their numbers.
+    pub absences: Vec<Absence>,
     /// Longest interval between two samples of each vehicle that was no gap \[s\]: as asked, or one and a half of the
     /// usual one.
     pub max_gaps_s: Vec<f64>,
@@ -144,12 +179,16 @@ pub struct Outcome {
     /// recording longer; of times at which no two are there, or both are on the ground, nothing is known. Empty unless it was
     /// asked for.
     pub smallest: Vec<Slice>,
-    /// Every violation, in order of time.
+    /// Violations in order of time, as many as [`Tallies`] says.
     pub violations: Vec<Violation<ObjectPair>>,
-    /// Every time that could not be decided, in order of time.
+    /// Times that could not be decided, in order of time, as many as [`Tallies`] says.
     pub undecided: Vec<Undecided<ObjectPair>>,
-    /// Every gap in which somebody else was there or an obstacle in the way (any gap where single vehicles are asked about), in
-    /// order of time: what happened is not known.
+    /// The sampling rate that would decide everything that is undecided of pairs \[Hz\]; `None` where there is none that would.
+    pub deciding_rate_hz: Option<f64>,
+    /// How many findings there are.
+    pub tallies: Tallies,
+    /// Gaps in which somebody else was there or an obstacle in the way (any gap where single vehicles are asked about), in
+    /// order of time, as many as [`Tallies`] says: what happened is not known.
     pub gaps: Vec<Gap>,
     /// Vehicles that are never there together with another, where they are to keep apart from nothing else: a wrong clock would
     /// look like that.
@@ -171,19 +210,53 @@ impl Outcome {
     /// Adds a violation of a distance that two are to keep, from what else is known of the recording.
     pub fn violate(&mut self, violation: Violation<ObjectPair>) {
         self.violations.push(violation);
+        self.tallies.violations.count += 1;
+        self.tallies.violations.listed += 1;
         self.status = Status::Violation;
         self.separation = Some(Status::Violation);
     }
 
+    /// Drops the violations of which something does not hold.
+    pub fn retain_violations(&mut self, holds: impl FnMut(&Violation<ObjectPair>) -> bool) {
+        let before = self.violations.len();
+        self.violations.retain(holds);
+        let gone = before - self.violations.len();
+        self.tallies.violations.count = self.tallies.violations.count.saturating_sub(gone as u64);
+        self.tallies.violations.listed = self.violations.len();
+    }
+
     /// Adds a time of two that keep a distance that cannot be decided.
     pub fn leave_open(&mut self, undecided: Undecided<ObjectPair>) {
+        self.deciding_rate_hz = if self.undecided.is_empty() {
+            undecided.rate_hz
+        } else {
+            self.deciding_rate_hz.zip(undecided.rate_hz).map(|(a, b)| a.max(b))
+        };
         self.undecided.push(undecided);
+        self.tallies.undecided.count += 1;
+        self.tallies.undecided.listed += 1;
         if self.status == Status::Clear {
             self.status = Status::Undecided;
         }
         if self.separation == Some(Status::Clear) {
             self.separation = Some(Status::Undecided);
         }
+    }
+
+    /// Takes it that no two vehicles came closer than a pair did, as a judge of finer steps found: pairs that are drawn closer, by
+    /// what straight lines and rounding leave, were as far apart at least.
+    pub fn raise_to(&mut self, closest: ClosestApproach) {
+        let (pair, least_m) = (ObjectPair::Vehicles(closest.pair), closest.separation_m);
+        let is_judged = self.span_s.is_some_and(|(from_s, to_s)| from_s <= closest.time_s && closest.time_s <= to_s);
+        for of in &mut self.closest {
+            let is_the_same = is_judged && of.lower_m <= least_m * (1.0 + SAME);
+            of.lower_m = of.lower_m.max(least_m);
+            of.upper_m = of.upper_m.max(of.lower_m);
+            if of.pair == pair && is_the_same {
+                (of.lower_m, of.upper_m, of.time_s) = (least_m, least_m, closest.time_s);
+            }
+        }
+        self.closest.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m).then((a.pair != pair).cmp(&(b.pair != pair))));
     }
 
     /// Takes how close a vehicle came to an obstacle, where that is closer than was found.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::error::RecordedError;
-use crate::audit::envelope::{Envelope, Limit};
+use crate::audit::envelope::{Envelope, Limit, Quantity};
 use crate::audit::limits::{Limits, TOUCHING_ELLIPSOIDS};
 use crate::audit::obstacle::Obstacle;
 use crate::audit::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
@@ -69,6 +69,8 @@ pub struct Settings {
     /// Samples farther apart in time than this \[s\] have a gap between them, which nothing is known of. `None` lets each
     /// vehicle's usual interval decide: a gap is more than one and a half of it.
     pub max_gap_s: Option<f64>,
+    /// Whether it is undecided where a vehicle is not seen over the whole window.
+    pub require_presence: bool,
     /// What is said of single vehicles, by name.
     pub vehicles: BTreeMap<String, VehicleSettings>,
     /// The vehicles to judge, by name; `None` for all.
@@ -77,6 +79,9 @@ pub struct Settings {
     pub obstacles: Vec<Obstacle>,
     /// What each vehicle may do by itself. Where it is all that is asked, nothing is said of how close two came.
     pub envelope: Envelope,
+    /// Accelerations are means over windows of this length \[s\]: how much the velocity changes over one, over its length.
+    /// `None` takes accelerations at instants, and does not hold corners of curves against a limit.
+    pub accel_window_s: Option<f64>,
     /// Whether delta or the ellipsoid are what the recording says of itself: beside an `envelope` that asks nothing of a
     /// vehicle that is alone, without an obstacle.
     pub is_own_limit: bool,
@@ -147,6 +152,11 @@ impl Settings {
         for Limit { quantity, allowed } in &self.envelope.limits {
             let range = if quantity.derivative() == 0 { FINITE } else { POSITIVE };
             check(&format!("the limit of {}", quantity.name()), Some(*allowed), range)?;
+        }
+        check("the window of accelerations", self.accel_window_s, POSITIVE)?;
+        let is_limited = self.envelope.limits.iter().any(|limit| limit.quantity == Quantity::Acceleration);
+        if self.accel_window_s.is_some() && (!is_limited || self.motion == Some(Motion::Bounded)) {
+            return Err(RecordedError::NoAccelWindow);
         }
         if let Some(quantity) = self.envelope.of_motion().filter(|_| self.motion == Some(Motion::Hold)) {
             return Err(RecordedError::LimitOfJumps { limit: quantity.name() });

@@ -4,6 +4,7 @@ use super::company::Company;
 use super::settings::Settings;
 use super::vehicle::Vehicle;
 use super::window::{Windows, within};
+use crate::audit::interruption::Interruption;
 use crate::audit::outcome::Approach;
 use crate::audit::results::Results;
 use crate::audit::slices::{Slice, Slices};
@@ -23,11 +24,17 @@ const FEWEST_SAMPLES: usize = 32;
 pub(super) struct Smallest {
     windows: Windows,
     slices: Slices,
+    interruption: Interruption,
 }
 
 impl Smallest {
     pub(super) fn new(settings: &Settings) -> Self {
-        Self { windows: Windows::of_closest(settings.limits()), slices: Slices::new(MOST_KEPT) }
+        let interruption = Interruption::default();
+        Self { windows: Windows::of_closest(settings.limits()), slices: Slices::new(MOST_KEPT), interruption }
+    }
+
+    pub(super) fn set_interruption(&mut self, interruption: Interruption) {
+        self.interruption = interruption;
     }
 
     /// Looks at a window, in slices between the samples in it and the instants at which anybody comes or goes. `nearest` says which
@@ -60,7 +67,7 @@ impl Smallest {
     }
 
     fn closest(&mut self, vehicles: &[Vehicle], over: Interval) -> Vec<Approach> {
-        let mut results = Results::default();
+        let mut results = Results { interruption: self.interruption.clone(), ..Results::default() };
         self.windows.judge(vehicles, over, &mut results);
         results.closest.kept
     }

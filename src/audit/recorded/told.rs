@@ -180,7 +180,7 @@ impl AllTold {
             later_s.is_some_and(|later_s| self.refuter(pair, span_s, later_s, drawn * question.longest_m).is_some())
         };
         results.closest.retain(|kept| !refuted(kept.pair, [kept.time_s; 2], kept.lower_m));
-        results.ledger.retain_violations(|v| !refuted(v.pair, [v.from_s, v.to_s], v.min_m));
+        results.ledger.violations.retain(|v| !refuted(v.pair, [v.from_s, v.to_s], v.min_m));
         for told in &self.violations {
             let Some(asked) = question.of(told.pair, [told.from_s, told.to_s], told.height_m) else { continue };
             let (lower_m, upper_m) = question.scaled(told.least_m, told.min_m);
@@ -223,6 +223,9 @@ impl AllTold {
         let pairs = (0..vehicles).flat_map(|i| (i + 1..vehicles).map(move |j| Pair::new(i, j)));
         let mut left_open = 0;
         for pair in pairs {
+            if results.interruption.is_set() {
+                return false;
+            }
             let open = odd.iter().filter_map(|told| {
                 let asked = question.of(pair, [told.from_s, told.to_s], [f64::INFINITY; 2])?;
                 let lower = if asked.later_s.is_some() { least(told) } else { 0.0 };
@@ -303,7 +306,7 @@ impl AllTold {
         if limit_m >= below_m {
             // What is drawn of the same time is a part of the same violation.
             let (mut from_s, mut to_s) = (from_s, to_s);
-            results.ledger.retain_violations(|v| {
+            results.ledger.violations.retain(|v| {
                 let is_other = v.pair != pair || v.to_s < from_s || to_s < v.from_s;
                 if !is_other && limit_m > below_m {
                     (from_s, to_s) = (from_s.min(v.from_s), to_s.max(v.to_s));

@@ -50,6 +50,8 @@ pub(super) struct Vehicle {
     pub(super) presence: Option<Presence>,
     /// Where it was last seen, by its clock.
     last: Option<Sample>,
+    /// How many intervals between samples were joined, and how long they were in all \[s\].
+    joined: (u64, f64),
     /// Speed over the last interval \[m/s\] and its length \[s\].
     last_interval: Option<(Vector3<f64>, f64)>,
     pub(super) contradiction: Option<Contradiction>,
@@ -74,6 +76,7 @@ impl Vehicle {
             segments: Vec::new(),
             presence: None,
             last: None,
+            joined: (0, 0.0),
             last_interval: None,
             contradiction: None,
         }
@@ -110,6 +113,12 @@ impl Vehicle {
     #[inline]
     pub(super) fn is_unseen(&self) -> bool {
         self.last.is_none()
+    }
+
+    /// Mean interval between two of its samples \[s\]; 0 of curves.
+    pub(super) fn mean_interval_s(&self) -> f64 {
+        let (count, all_s) = self.joined;
+        if count > 0 { all_s / count as f64 } else { 0.0 }
     }
 
     /// Up to when the vehicle is known \[s\].
@@ -152,6 +161,7 @@ impl Vehicle {
         match &self.last {
             Some(last) if time_s - last.time_s <= self.max_gap_s => {
                 let (from_s, from) = (last.time_s, self.scaled(last.position_m));
+                self.joined = (self.joined.0 + 1, self.joined.1 + (time_s - from_s));
                 let to = self.scaled(sample.position_m);
                 match motion {
                     Motion::Linear | Motion::Polynomial => self.keep_straight((from_s, time_s), from, to),

@@ -19,7 +19,7 @@ use crate::audit::outcome::ObjectPair;
 use crate::audit::pair_sweep::PairSweep;
 use crate::audit::parry::KeepOut;
 use crate::audit::polynomial::stray;
-use crate::audit::results::{ClosestPairs, KEPT, Results};
+use crate::audit::results::{KEPT, Results};
 use crate::audit::segment::Segment;
 use crate::audit::sweep::{Interval, RelativeMotion};
 use crate::swarm::Pair;
@@ -112,6 +112,7 @@ impl Windows {
     }
 
     fn halve(&mut self, vehicles: &[Vehicle], window: Interval, halvings: u32, results: &mut Results) {
+        results.ledger.begin(window);
         self.extents.clear();
         self.extents.extend(vehicles.iter().enumerate().filter_map(|(k, vehicle)| Extent::over(k, vehicle, window)));
         let count = self.extents.len();
@@ -119,7 +120,7 @@ impl Windows {
             self.sort();
             let few = count * (count - 1) / 2 <= KEPT;
             if halvings == 0 && !few && results.closest.threshold == f64::INFINITY {
-                self.compare_neighbours(vehicles, window, &mut results.closest);
+                self.compare_neighbours(vehicles, window, results);
             }
             let segments: usize = self.extents.iter().map(|extent| extent.segments.len()).sum();
             let curved = self.extents.iter().any(|extent| extent.chord.curved);
@@ -137,7 +138,7 @@ impl Windows {
                 for near in &self.near {
                     self.sweep_vehicles(vehicles, near, window, results);
                 }
-                if done == count {
+                if done == count || results.interruption.is_set() {
                     break;
                 }
                 done = self.collect(results, done, most);
@@ -165,14 +166,15 @@ impl Windows {
     }
 
     /// Finds out how close the closest pairs come, and no more: every pair that matters is swept after this.
-    fn compare_neighbours(&self, vehicles: &[Vehicle], window: Interval, closest: &mut ClosestPairs) {
-        let mut rough = Results { closest: mem::take(closest), ..Results::default() };
+    fn compare_neighbours(&self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
+        let interruption = results.interruption.clone();
+        let mut rough = Results { closest: mem::take(&mut results.closest), interruption, ..Results::default() };
         let count = self.extents.len();
         let pairs = |apart: u32| (0..).zip(apart..).take(count.saturating_sub(apart as usize));
         for (a, b) in (1..=FIRST_NEIGHBOURS).flat_map(pairs) {
             self.sweep_vehicles(vehicles, &Near::new(&self.extents, a, b), window, &mut rough);
         }
-        *closest = rough.closest;
+        results.closest = rough.closest;
     }
 
     /// Lists the pairs that could matter of the extents from one on with later ones, until they are more than `most`; returns
@@ -185,6 +187,9 @@ impl Windows {
         let threshold = results.closest.threshold;
         let reach = threshold.max(limit(radius, radius));
         for (k, a) in (0_u32..).zip(extents.iter()).skip(from) {
+            if results.interruption.is_set() {
+                return extents.len();
+            }
             let until = a.high[0] + reach;
             for (l, b) in (k + 1..).zip(extents[k as usize + 1..].iter()).take_while(|(_, b)| b.low[0] <= until) {
                 let aside = (a.low[1] - b.high[1])
@@ -206,6 +211,9 @@ impl Windows {
     }
 
     fn sweep_vehicles(&self, vehicles: &[Vehicle], near: &Near, window: Interval, results: &mut Results) {
+        if !results.goes_on() {
+            return;
+        }
         let (a, b) = (&self.extents[near.first as usize], &self.extents[near.second as usize]);
         let (a, b) = if a.vehicle < b.vehicle { (a, b) } else { (b, a) };
         let pair = ObjectPair::Vehicles(Pair::new(a.vehicle, b.vehicle));
@@ -228,6 +236,9 @@ impl Windows {
             let path = &path[within(path, window)];
             let place = Chord::over(path, window);
             for extent in self.extents.iter().filter(|extent| !extent.grounded) {
+                if !results.goes_on() {
+                    return;
+                }
                 let pair = ObjectPair::Obstacle { vehicle: extent.vehicle, obstacle: index };
                 let limit = self.limits.of_obstacle(obstacle, extent.radius);
                 let (cutoff, chord) = (results.obstacles.cutoff(pair, limit), &extent.chord);

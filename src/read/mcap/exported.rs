@@ -48,12 +48,13 @@ pub(crate) struct Instant {
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let topics = TopicReader::open(&source.path)?;
     let notes = options.accept_unfinished(topics.is_complete())?;
-    let instants = Instants { names: Names::default(), epoch_ns: 0, count: 0 };
+    let instants = Instants { names: Names::default(), axes: None, epoch_ns: 0, count: 0 };
     let mut exported = Exported { path: source.path.clone(), topics, instants };
     exported.next(&mut Vec::new())?;
+    let is_planar = exported.instants.axes == Some(2);
     let none = Fault::content("it holds no instant", "export again");
     let mut about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
-    about.epoch_ns = exported.instants.epoch_ns;
+    (about.epoch_ns, about.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;
     Ok(Box::new(Ordered::open(exported, about)?))
 }
@@ -68,6 +69,8 @@ struct Exported {
 /// What the messages so far amount to.
 struct Instants {
     names: Names,
+    /// Number of axes of all positions.
+    axes: Option<usize>,
     epoch_ns: i64,
     count: u64,
 }
@@ -77,33 +80,41 @@ impl Instants {
     fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), String> {
         if message.of.schema == TRACKS.schema_name {
             self.count += 1;
-            return take(&decode(message.bytes)?, self.names.all().len(), self.count, rows);
+            let instant: Instant = decode(message.bytes)?;
+            let axes = if instant.positions_m.len() == 2 * instant.vehicles.len() { 2 } else { 3 };
+            if !instant.vehicles.is_empty() && *self.axes.get_or_insert(axes) != axes {
+                return Err("some of its positions have heights and some have none".to_owned());
+            }
+            return take(&instant, axes, self.names.all().len(), (self.count, rows));
         }
         if message.of.schema == VEHICLES.schema_name {
             let Vehicles { names, epoch_ns } = decode(message.bytes)?;
             if !names.starts_with(self.names.all()) {
                 return Err("the vehicles are not those of before".to_owned());
             }
-            self.names = Names::from_list(names);
+            self.names = Names::from_list(names).map_err(|fault| fault.to_string())?;
             self.epoch_ns = epoch_ns;
         }
         Ok(())
     }
 }
 
-/// Appends the rows of an instant; the error says what is wrong with it.
-fn take(instant: &Instant, vehicles: usize, number: u64, rows: &mut Vec<Row>) -> Result<(), String> {
+/// Appends the rows of an instant of this number, whose positions have so many axes; the error says what is wrong with it.
+fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &mut Vec<Row>)) -> Result<(), String> {
     let count = instant.vehicles.len();
     let fits = |length: usize, each: usize| length == each * count;
     let velocities = !instant.velocities_m_s.is_empty();
     let radii = !instant.radii_m.is_empty();
-    if !(fits(instant.positions_m.len(), 3)
-        && (!velocities || fits(instant.velocities_m_s.len(), 3))
+    if !(fits(instant.positions_m.len(), axes)
+        && (!velocities || fits(instant.velocities_m_s.len(), axes))
         && (!radii || fits(instant.radii_m.len(), 1)))
     {
         return Err(format!("its arrays do not belong to {count} vehicles"));
     }
-    let vector = |numbers: &[f64], k: usize| Vector3::from_column_slice(&numbers[3 * k..3 * k + 3]);
+    let vector = |numbers: &[f64], k: usize| {
+        let of = &numbers[axes * k..axes * (k + 1)];
+        Vector3::new(of[0], of[1], of.get(2).copied().unwrap_or(0.0))
+    };
     for (k, &vehicle) in instant.vehicles.iter().enumerate() {
         let vehicle = usize::try_from(vehicle).ok().filter(|&vehicle| vehicle < vehicles);
         let vehicle = vehicle.ok_or("it speaks of a vehicle without a name")?;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
+use super::super::earth::is_no_fix;
 use super::super::error::{Fault, Place, ReadError, quoted};
 use super::messages::{EARTH, FIXES, Seen, What, Who};
 use super::rigid::Placed;
@@ -134,7 +135,7 @@ impl Outline {
         }
         let told = self.topics.entry(topic.clone()).or_default();
         told.schema.clone_from(&message.of.schema);
-        if seen.frame == EARTH && self.first_fix.is_none() {
+        if seen.frame == EARTH && self.first_fix.is_none() && !is_no_fix(&seen.position) {
             self.first_fix = Some(seen.position);
         }
         if !told.frames.contains(&seen.frame) {

@@ -247,10 +247,15 @@ impl Plan {
         }
     }
 
+    /// The frame of places on the Earth, where these are read.
+    pub(super) fn local(&self) -> Option<Local> {
+        self.earth.filter(|_| self.wanted.is_none())
+    }
+
     /// What a person should know.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.notes.clone();
-        notes.extend(self.earth.filter(|_| self.wanted.is_none()).map(|local| local.note()));
+        notes.extend(self.local().map(|local| local.note()));
         if self.outline.topics.values().any(|told| told.schema == "nav_msgs/msg/Odometry") {
             let why = "publishers differ on the frame that they are given in";
             notes.push(format!("velocities of odometry are not used: {why}"));

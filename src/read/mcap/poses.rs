@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::super::clock::Stamp;
+use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{Fault, ReadError, UNSEEN, quoted};
 use super::super::names::Names;
 use super::super::order::Row;
@@ -23,6 +24,8 @@ pub(super) struct Poses {
     /// Vehicle of the last row.
     vehicle: usize,
     pub(super) messages: u64,
+    /// Fixes that are none.
+    no_fixes: u64,
     brought: Brought,
 }
 
@@ -40,12 +43,12 @@ struct Brought {
 impl Poses {
     pub(super) fn new(plan: Plan) -> Self {
         let brought = Brought::default();
-        Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, brought }
+        Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, no_fixes: 0, brought }
     }
 
     /// Starts again with the first message.
     pub(super) fn rewind(&mut self) {
-        (self.messages, self.brought) = (0, Brought::default());
+        (self.messages, self.no_fixes, self.brought) = (0, 0, Brought::default());
     }
 
     /// Appends the rows of a message.
@@ -63,14 +66,17 @@ impl Poses {
             return if is_static(topic) { Ok(()) } else { self.append_bodies(&seen, turn, topic, time_ns, rows) };
         }
         check_finite(&seen.position)?;
+        if seen.frame == EARTH && is_no_fix(&seen.position) {
+            self.no_fixes += 1;
+            return Ok(());
+        }
         let Some(position) = self.position(&seen, topic, time_ns)? else { return Ok(()) };
         let name = match seen.who {
             Who::Topic => topic.clone(),
             Who::Listed(number) => format!("{topic}/{number}"),
             Who::Named(name) => name,
         };
-        self.push(&name, time_ns, position, rows);
-        Ok(())
+        self.push(&name, time_ns, position, rows)
     }
 
     /// A pose in the frame that all is brought into; none where it cannot be brought there.
@@ -124,15 +130,16 @@ impl Poses {
             let Some(position) = position else { continue };
             let several = self.plan.outline.trees.len() > 1;
             let name = if several && !space.is_empty() { format!("{space}/{}", body.frame) } else { body.frame };
-            self.push(&name, time_ns, position, rows);
+            self.push(&name, time_ns, position, rows)?;
         }
         Ok(())
     }
 
-    fn push(&mut self, name: &str, time_ns: i64, position: Vector3<f64>, rows: &mut Vec<Row>) {
-        self.vehicle = self.names.index(name, self.vehicle);
+    fn push(&mut self, name: &str, time_ns: i64, position: Vector3<f64>, rows: &mut Vec<Row>) -> Result<(), Fault> {
+        self.vehicle = self.names.index(name, self.vehicle)?;
         let (stamp, vehicle) = (Stamp::Whole(time_ns), self.vehicle);
         rows.push(Row { stamp, place: self.messages, vehicle, position, velocity: None, radius: None });
+        Ok(())
     }
 
     /// Refuses a position in another frame than those before.
@@ -159,6 +166,7 @@ impl Poses {
     /// What a person should know.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.plan.notes();
+        notes.extend(no_fixes(self.no_fixes, ""));
         let Brought { exactly, guessed, unknown } = self.brought;
         if exactly + guessed + unknown > 0 {
             let into = self.plan.wanted.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));

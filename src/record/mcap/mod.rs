@@ -1,7 +1,7 @@
 //! `run.mcap`: a run as an [MCAP](https://mcap.dev/spec) file.
 //!
 //! Messages are in CDR (little-endian, as ROS 2 writes it), schemas are ROS 2 message definitions in plain text, so
-//! general MCAP tools show every field without knowing this program. Four topics:
+//! general MCAP tools show every field without knowing this program. Five topics:
 //!
 //! | topic | schema | when | holds |
 //! | --- | --- | --- | --- |
@@ -9,6 +9,7 @@
 //! | `/summary` | `tautline_msgs/msg/Summary` | each sample | closest approach and energy |
 //! | `/swarm` | `tautline_msgs/msg/Swarm` | each sample | positions, velocities, controls |
 //! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
+//! | `/verdict` | `tautline_msgs/msg/Verdict` | once, last | the run's verdict, and hashes of everything before it |
 //!
 //! Each [`Channel`](super::Channel) of the samples has a topic `/vehicles/<name>` of `tautline_msgs/msg/Channel`, declared
 //! with its first values. An [`ExtraTopic`] may add one of another kind, such as the 3-D scene on `/scene`; readers pass
@@ -34,6 +35,10 @@
 //!
 //! ```text
 #![doc = include_str!("channel.msg")]
+//! ```
+//!
+//! ```text
+#![doc = include_str!("verdict.msg")]
 //! ```
 //!
 //! `log_time` and `publish_time` are simulated nanoseconds since the start; nothing in the file depends on the clock
@@ -72,6 +77,32 @@ pub struct Header {
     pub delta_m: f64,
     /// The resolved scenario as TOML.
     pub scenario_toml: String,
+}
+
+/// What a run says of itself when it closes its recording: the fields of `verdict.msg`, in order.
+///
+/// The hashes tell whether the recording is what the run wrote. They are no signature: a program that changes a recording can
+/// compute them anew.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunVerdict {
+    /// `clear`, `violation` or `undecided`: the run's judge, over every step and every obstacle.
+    pub status: String,
+    /// Why the run ended before its time; empty where it was flown to its end.
+    pub ended_early: String,
+    /// Smallest distance of two centres over the run \[m\]; NaN where that is not known.
+    pub separation_m: f64,
+    /// When it occurred \[s\].
+    pub separation_time_s: f64,
+    /// The pair, numbered from 1; zeros where that is not known.
+    pub pair: [u64; 2],
+    /// Steps that were judged.
+    pub steps: u64,
+    /// Time flown \[s\].
+    pub duration_s: f64,
+    /// [`StateHash`](super::StateHash) of every sample.
+    pub state_sha256: String,
+    /// Hash of the messages of `/scenario`, `/summary` and `/events`; the recorder computes it.
+    pub told_sha256: String,
 }
 
 impl Header {

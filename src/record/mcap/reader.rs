@@ -5,9 +5,10 @@ use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
-use super::Header;
-use super::message::{CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, fault};
+use super::message::{CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, VERDICT, fault};
 use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
+use super::{Header, RunVerdict};
+use crate::record::hash::MessageHash;
 use crate::record::{Event, OwnedSample, ReadFault, RecordError};
 
 /// What a recording gives back, in the order in which it was written.
@@ -64,6 +65,18 @@ impl McapRecording {
         self.topics.is_complete()
     }
 
+    /// What the run said of itself when it closed the recording; known once everything was read, and none where it did not.
+    #[must_use]
+    pub fn verdict(&self) -> Option<&RunVerdict> {
+        self.contents.verdict.as_ref()
+    }
+
+    /// Hash of what was read of `/scenario`, `/summary` and `/events`, as [`RunVerdict::told_sha256`] has it.
+    #[must_use]
+    pub fn told_sha256(&self) -> String {
+        self.contents.told.digits()
+    }
+
     /// All remaining samples and events, each in order.
     ///
     /// # Errors
@@ -114,6 +127,9 @@ struct Contents {
     /// The last message of each channel since the last state.
     channels: Vec<ChannelMessage<String, Vec<String>, Vec<f64>>>,
     ready: VecDeque<Entry>,
+    verdict: Option<RunVerdict>,
+    /// Over the messages of all own topics but the states.
+    told: MessageHash,
 }
 
 impl Contents {
@@ -142,7 +158,11 @@ impl Contents {
 
     fn take(&mut self, message: &Message<'_>) -> Result<(), ReadFault> {
         let Declared { topic, schema, encoding, .. } = message.of;
-        match Own::of(topic) {
+        let own = Own::of(topic);
+        if own.is_some_and(Own::is_told) {
+            self.told.take(topic, message.bytes);
+        }
+        match own {
             Some(Own::Scenario) => {
                 let header = content(message)?;
                 self.header.get_or_insert(header);
@@ -156,6 +176,9 @@ impl Contents {
             }
             Some(Own::Events) => {
                 self.ready.push_back(Entry::Event(content::<EventMessage<String>>(message)?.into_event()?));
+            }
+            None if topic == VERDICT.name && schema == VERDICT.schema_name && encoding == CDR => {
+                self.verdict = Some(content(message)?);
             }
             None if schema == CHANNEL_SCHEMA && encoding == CDR => {
                 let channel = content::<ChannelMessage<String, Vec<String>, Vec<f64>>>(message)?;

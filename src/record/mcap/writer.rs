@@ -9,11 +9,12 @@ use mcap::WriteOptions;
 use mcap::write::NoSeek;
 use serde::Serialize;
 
-use super::Header;
 use super::message::{
-    ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
+    ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, VERDICT, channel_topic, topic_of_channel,
 };
 use super::topic::{Topic, TopicWriter, encode, log_time_ns};
+use super::{Header, RunVerdict};
+use crate::record::hash::MessageHash;
 use crate::record::{Channel, Event, RecordError, Sample, Sink};
 
 /// A chunk is closed and handed to the system with the first message this long after the chunk before \[simulated s\].
@@ -60,6 +61,8 @@ pub struct McapRecorder {
     message: Vec<u8>,
     waiting_bytes: usize,
     flushed_at_s: f64,
+    /// Over the messages of all topics of its own but the states.
+    told: MessageHash,
 }
 
 impl McapRecorder {
@@ -77,6 +80,7 @@ impl McapRecorder {
             message: Vec::new(),
             waiting_bytes: 0,
             flushed_at_s: f64::NEG_INFINITY,
+            told: MessageHash::default(),
         };
         recorder.write(Own::Scenario as usize, 0.0, header)?;
         Ok(recorder)
@@ -100,8 +104,23 @@ impl McapRecorder {
         self.with_out(Out::finish)
     }
 
+    /// Writes what the finished run says of itself, and closes the file as [`McapRecorder::finish`] does.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] when the system refuses, or has refused before.
+    pub fn close(mut self, verdict: RunVerdict) -> Result<(), RecordError> {
+        let verdict = RunVerdict { told_sha256: self.told.digits(), ..verdict };
+        let place = self.with_out(|out| out.declare(&VERDICT))?;
+        self.write_if_due(place, verdict.duration_s, |bytes| encode(&verdict, bytes).map(|()| true))?;
+        self.finish()
+    }
+
     fn write(&mut self, topic: usize, time_s: f64, message: &impl Serialize) -> Result<(), RecordError> {
-        self.write_if_due(topic, time_s, |bytes| encode(message, bytes).map(|()| true))
+        self.write_if_due(topic, time_s, |bytes| encode(message, bytes).map(|()| true))?;
+        if let Some(own) = Own::ALL.get(topic).filter(|own| own.is_told()) {
+            self.told.take(own.topic().name, &self.message);
+        }
+        Ok(())
     }
 
     /// Writes the message that `fill` makes, if it says that one is due.

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::named::OfVehicle;
-use crate::audit::Status;
-use crate::audit::envelope::{Exceeding, Limit, LimitOutcome};
+use crate::audit::envelope::{Corner, Exceeding, Limit, LimitOutcome};
 use crate::audit::recorded::Outcome;
-use crate::text::{at_least, at_most, exact, fixed, seconds};
+use crate::audit::{Status, Tally};
+use crate::text::{at_least, at_most, counted, exact, fixed, seconds};
 
 /// What was found of one limit on each vehicle by itself.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -20,10 +20,17 @@ pub struct OfLimit {
     /// The value that came nearest to the limit or went farthest beyond it; null where nothing tells any.
     pub extreme: Option<OfVehicle<Exceeding>>,
     /// What was taken for granted to tell it, beyond what happens between samples; null where nothing was.
-    pub assumes: Option<&'static str>,
-    /// Every time that a vehicle was beyond it.
+    pub assumes: Option<String>,
+    /// Corners of curves, at which the velocity jumps and nothing is held against the limit: how many, and the largest; null where
+    /// there are none.
+    pub corners: Option<OfCorners>,
+    /// How many times a vehicle was beyond it, and how many are listed.
+    pub violations_tally: Tally,
+    /// How many times it cannot be told, likewise.
+    pub undecided_tally: Tally,
+    /// Times that a vehicle was beyond it; of many the worst, and the first of each vehicle.
     pub violations: Vec<OfVehicle<Exceeding>>,
-    /// Every time of which it cannot be told.
+    /// Times of which it cannot be told, likewise.
     pub undecided: Vec<OfVehicle<Exceeding>>,
     /// Vehicles of which nothing tells it at all.
     pub unknown: Vec<String>,
@@ -31,15 +38,45 @@ pub struct OfLimit {
     limit: Limit,
 }
 
+/// Corners of curves.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfCorners {
+    /// How many there are, of all vehicles.
+    pub count: u64,
+    /// The one at which the velocity jumps most.
+    pub largest: OfVehicle<Corner>,
+}
+
+impl OfCorners {
+    /// What a clear verdict takes for granted of them.
+    fn assumed(&self) -> String {
+        let OfVehicle { vehicle, finding } = &self.largest;
+        format!(
+            "vehicles round {} (velocity jumps by at most {} m/s, {vehicle} at {}; --accel-window judges them)",
+            counted(self.count, "corner", "corners"),
+            at_most(finding.by_m_s, 3),
+            seconds(finding.at_s)
+        )
+    }
+}
+
 impl OfLimit {
     pub(super) fn new(found: &LimitOutcome, outcome: &Outcome) -> Self {
         let named = |of: &Exceeding| OfVehicle { vehicle: outcome.name(of.vehicle), finding: *of };
+        let corners = found.corners.map(|of| OfCorners {
+            count: of.count,
+            largest: OfVehicle { vehicle: outcome.name(of.largest.vehicle), finding: of.largest },
+        });
+        let assumes: Vec<_> = found.assumes.iter().cloned().chain(corners.as_ref().map(OfCorners::assumed)).collect();
         Self {
             quantity: found.limit.quantity.key(),
             allowed: found.limit.allowed,
             status: found.status,
             extreme: found.extreme.as_ref().map(named),
-            assumes: found.assumes,
+            assumes: (!assumes.is_empty()).then(|| assumes.join(" and ")),
+            corners,
+            violations_tally: found.violations_tally,
+            undecided_tally: found.undecided_tally,
             violations: found.violations.iter().map(named).collect(),
             undecided: found.undecided.iter().map(named).collect(),
             unknown: found.unknown.iter().map(|&vehicle| outcome.name(vehicle)).collect(),
@@ -70,7 +107,6 @@ impl OfLimit {
     fn value(&self, of: &Exceeding) -> String {
         let (lower, upper) = (of.lower, of.upper);
         let number = match (lower.is_finite(), upper.is_finite()) {
-            (false, false) if lower > 0.0 => return "without bound where its curve has a corner".to_owned(),
             (false, false) => return "not known".to_owned(),
             (true, false) => format!("at least {}", at_least(lower, 3)),
             (false, true) => format!("at most {}", at_most(upper, 3)),

@@ -8,7 +8,7 @@ mod named;
 mod report;
 mod words;
 
-pub use envelope::OfLimit;
+pub use envelope::{OfCorners, OfLimit};
 pub use named::{OfPair, OfVehicle};
-pub use report::{Basis, Between, Clock, Obstacles, RecordedAudit, RecordedReport, Source};
+pub use report::{Basis, Between, Clock, EarlyEnd, Obstacles, RecordedAudit, RecordedReport, Seen, SeenWhen, Source};
 pub use words::interval;

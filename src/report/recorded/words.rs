@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use super::envelope::OfLimit;
 use super::named::{OfPair, OfVehicle};
-use super::report::RecordedReport;
+use super::report::{EarlyEnd, RecordedReport, Seen};
 use crate::audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
-use crate::audit::{Status, Undecided, Violation};
+use crate::audit::{LISTED, Status, Tally, Undecided, Violation};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};
@@ -15,16 +15,38 @@ use crate::text::{at_least, at_most, counted, exact, fixed, in_order, metres_bel
 /// Violations that are listed in words, and on the page.
 const LISTED_IN_WORDS: usize = 10;
 const LISTED_ON_PAGE: usize = 100;
+/// Vehicles that are not seen throughout and are named in the headline.
+const NAMED_IN_HEADLINE: usize = 3;
 
 impl RecordedReport {
     fn unit(&self) -> &'static str {
         if self.measure == "metres" { " m" } else { " ellipsoids" }
     }
 
-    /// The verdict in one line.
+    /// The verdict in one line, with the window that it is about, and which vehicles are not seen throughout.
     #[must_use]
     pub fn headline(&self) -> String {
         one_line(&format!("{}: {}", self.verdict(), self.finding()))
+    }
+
+    /// The window that the verdict is about, and the first vehicles that are not seen throughout.
+    fn window(&self) -> String {
+        let presence = &self.presence;
+        let window = presence.window_s.map_or(String::new(), |(from_s, to_s)| format!("; from {}", span(from_s, to_s)));
+        if presence.partly == 0 {
+            return if self.status == Status::Clear { window } else { String::new() };
+        }
+        let named = presence.listed.iter().take(NAMED_IN_HEADLINE).map(OfVehicle::<Seen>::words);
+        let rest = presence.partly.saturating_sub(NAMED_IN_HEADLINE);
+        let more = (rest > 0).then(|| format!("and {rest} more"));
+        let named = named.chain(more).collect::<Vec<_>>().join(", ");
+        let all = presence.partly + presence.throughout;
+        let required = if presence.required { ", which --require-presence asks for" } else { "" };
+        format!(
+            "{window}, over which {} of {all} vehicles {} not seen throughout{required}: {named}",
+            presence.partly,
+            if presence.partly == 1 { "is" } else { "are" }
+        )
     }
 
     /// The verdict alone, such as `PROVED CLEAR`.
@@ -32,18 +54,33 @@ impl RecordedReport {
     pub fn verdict(&self) -> String {
         match self.status {
             Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
+            Status::Clear if self.audit.judged_by_run => format!("CLEAR {}", self.motion),
             Status::Clear => format!("CLEAR if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
             Status::Violation => "VIOLATION".to_owned(),
             Status::Undecided => "UNDECIDED".to_owned(),
         }
     }
 
-    /// The headline behind the verdict: of pairs, and of the limits that decide it.
+    /// The headline behind the verdict.
     fn finding(&self) -> String {
+        match (&self.ended_early, &self.until_then) {
+            (None, _) => self.finding_of_motion(),
+            (Some(end), Some(until_then)) => format!("{}; until then {until_then}", end.words()),
+            (Some(end), None) => format!("{}; {}", self.finding_of_motion(), end.words()),
+        }
+    }
+
+    /// The finding on what was recorded: of pairs, and of the limits that decide it.
+    fn finding_of_motion(&self) -> String {
         let decides = |limit: &&OfLimit| limit.status == self.status;
         let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
         let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
-        of_pairs.then(|| self.finding_of_pairs()).into_iter().chain(limits).collect::<Vec<_>>().join("; ")
+        let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
+        let pairs = of_pairs.then(|| self.finding_of_pairs());
+        let found = pairs.into_iter().chain(limits).collect::<Vec<_>>();
+        // All that was asked for is kept while vehicles are seen, which is not throughout.
+        let nothing = found.is_empty().then(|| "not every vehicle is seen throughout".to_owned());
+        found.into_iter().chain(nothing).chain(in_plane).collect::<Vec<_>>().join("; ") + &self.window()
     }
 
     fn finding_of_pairs(&self) -> String {
@@ -63,8 +100,8 @@ impl RecordedReport {
             Status::Violation => {
                 let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
                 let deepest = self.violations.iter().min_by(|a, b| over(a).total_cmp(&over(b)));
-                let others = match self.violations.len() {
-                    0 | 1 => String::new(),
+                let others = match counted_in_words(self.findings.violations) {
+                    _ if self.findings.violations.count <= 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
                 deepest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
@@ -105,8 +142,9 @@ impl RecordedReport {
         }
         let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
         if let Some(OfPair { who: [first, second], finding }) = closest {
-            let rate =
-                self.rate_hz().map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
+            let rate = self
+                .deciding_rate_hz
+                .map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
             let (low, high, at) = (at_least(finding.lower_m, 6), at_most(finding.upper_m, 6), seconds(finding.to_s));
             return if finding.upper_m.is_finite() {
                 format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
@@ -124,26 +162,59 @@ impl RecordedReport {
                 format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
             }
             [OfVehicle { vehicle, finding }, ..] => {
-                let (count, at) = (self.gaps.len(), seconds(finding.from_s));
+                let (count, at) = (counted_in_words(self.findings.gaps), seconds(finding.from_s));
                 format!("{count} gaps, the first of {vehicle} at {at}; {joined}")
             }
         }
     }
 
-    /// The sampling rate that would decide everything undecided \[Hz\]; `None` where some of it no rate is known for.
-    fn rate_hz(&self) -> Option<f64> {
-        self.undecided.iter().map(|u| u.finding.rate_hz).try_fold(0.0, |most: f64, rate| Some(most.max(rate?)))
-    }
-
-    /// What was found of each kind, a sentence each.
-    fn lists(&self) -> [(&'static str, Vec<String>); 3] {
+    /// What was found of each kind: how much, and a sentence for each finding that is listed.
+    fn lists(&self) -> [(&'static str, String, Vec<String>); 3] {
+        let of_limits = |tally: fn(&OfLimit) -> Tally| self.limits.iter().map(tally).collect::<Vec<_>>();
+        let unknown = self.limits.iter().map(|limit| limit.unknown.len()).sum();
+        let all = |of: Tally, more: Vec<Tally>| more.into_iter().fold(of, sum);
         let beyond = self.limits.iter().flat_map(OfLimit::violations_in_words);
         let undecided = self.limits.iter().flat_map(OfLimit::undecided_in_words);
+        let found = [
+            all(self.findings.violations, of_limits(|limit| limit.violations_tally)),
+            all(
+                self.findings.undecided,
+                [of_limits(|limit| limit.undecided_tally), vec![Tally::all(unknown)]].concat(),
+            ),
+            self.findings.gaps,
+        ];
+        let [violations, open, gaps] = found.map(shortened_in_words);
         [
-            ("Violations", self.violations.iter().map(OfPair::<Violation<_>>::words).chain(beyond).collect()),
-            ("Undecided", self.undecided.iter().map(OfPair::<Undecided<_>>::words).chain(undecided).collect()),
-            ("Gaps", self.gaps.iter().map(OfVehicle::words).collect()),
+            (
+                "Violations",
+                violations,
+                self.violations.iter().map(OfPair::<Violation<_>>::words).chain(beyond).collect(),
+            ),
+            ("Undecided", open, self.undecided.iter().map(OfPair::<Undecided<_>>::words).chain(undecided).collect()),
+            ("Gaps", gaps, self.gaps.iter().map(OfVehicle::<Gap>::words).collect()),
         ]
+    }
+
+    /// What is left out of lists that are too long, a sentence each.
+    #[must_use]
+    pub fn shortened(&self) -> Vec<String> {
+        let of_pairs = [
+            ("violations", self.findings.violations),
+            ("undecided times", self.findings.undecided),
+            ("gaps", self.findings.gaps),
+        ];
+        let of_limits = self.limits.iter().flat_map(|limit| {
+            [("violations", limit.violations_tally), ("undecided times", limit.undecided_tally)]
+                .map(|(what, tally)| (format!("{what} of {}", limit.quantity), tally))
+        });
+        let all = of_pairs.map(|(what, tally)| (what.to_owned(), tally)).into_iter().chain(of_limits);
+        let shortened = all.filter(|(_, tally)| tally.is_shortened());
+        shortened
+            .map(|(what, tally)| {
+                let (count, listed) = (counted_in_words(tally), tally.listed);
+                format!("{count} {what} were found and {listed} are listed: the worst, and the first of each pair or vehicle, {LISTED} of either at most")
+            })
+            .collect()
     }
 
     /// The closest pairs and what was found, a line each, with a line end.
@@ -175,11 +246,17 @@ impl RecordedReport {
             line("limits on each vehicle".to_owned());
             self.limits.iter().for_each(|limit| line(format!("  {}", limit.brief())));
         }
-        for (heading, lines) in self.lists() {
+        if self.presence.partly > 0 {
+            line(format!("seen throughout: {}, not throughout: {}", self.presence.throughout, self.presence.partly));
+            let lines = self.presence.listed.iter().map(OfVehicle::<Seen>::words).collect();
+            listed(lines, self.presence.partly, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
+        }
+        for (heading, count, lines) in self.lists() {
             if !lines.is_empty() {
-                line(format!("{}: {}", heading.to_lowercase(), lines.len()));
+                line(format!("{}: {count}", heading.to_lowercase()));
             }
-            listed(lines, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
+            let all = lines.len();
+            listed(lines, all, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
         }
         text
     }
@@ -209,9 +286,19 @@ impl RecordedReport {
         if !self.obstacles.closest.is_empty() {
             sections.push(section("Obstacles", &[closest_table(&self.obstacles.closest)]));
         }
-        for (heading, lines) in self.lists().into_iter().chain([("How it was read", self.source.notes.clone())]) {
+        if self.presence.partly > 0 {
+            let columns = ["vehicle", "seen from [s]", "to [s]"];
+            let time = |time_s: Option<f64>| time_s.map_or("never".to_owned(), |time_s| fixed(time_s, 3));
+            let rows = self.presence.listed.iter().take(LISTED_ON_PAGE);
+            let rows = rows.map(|of| [of.vehicle.clone(), time(of.finding.from_s), time(of.finding.to_s)]);
+            let title = format!("The first of {} that are not seen throughout", self.presence.partly);
+            sections.push(section("Presence", &[page::numbers(&title, &columns, rows)]));
+        }
+        let lists = self.lists().map(|(heading, _, lines)| (heading, lines));
+        for (heading, lines) in lists.into_iter().chain([("How it was read", self.source.notes.clone())]) {
             if !lines.is_empty() {
-                let lines: Vec<_> = listed(lines, LISTED_ON_PAGE).collect();
+                let all = lines.len();
+                let lines: Vec<_> = listed(lines, all, LISTED_ON_PAGE).collect();
                 sections.push(section(heading, &[page::list(&lines)]));
             }
         }
@@ -246,11 +333,38 @@ fn one_line(words: &str) -> String {
     in_order(words).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
-/// The first of some lines, and how many more there are.
-fn listed(mut lines: Vec<String>, most: usize) -> impl Iterator<Item = String> {
-    let rest = lines.len().saturating_sub(most);
+/// How many of some findings are listed, and how many more there are.
+fn sum(a: Tally, b: Tally) -> Tally {
+    Tally { count: a.count + b.count, listed: a.listed + b.listed, is_exact: a.is_exact && b.is_exact }
+}
+
+/// How many there are, such as `at least 12`.
+fn counted_in_words(tally: Tally) -> String {
+    let least = if tally.is_exact { "" } else { "at least " };
+    format!("{least}{}", tally.count)
+}
+
+/// The same, and how many of them are listed where that is not all.
+fn shortened_in_words(tally: Tally) -> String {
+    let count = counted_in_words(tally);
+    if tally.is_shortened() { format!("{count}, of which {} are listed", tally.listed) } else { count }
+}
+
+/// The first of some lines of so many, and how many more there are.
+fn listed(mut lines: Vec<String>, all: usize, most: usize) -> impl Iterator<Item = String> {
+    let rest = all.saturating_sub(most);
     lines.truncate(most);
     lines.into_iter().chain((rest > 0).then(|| format!("and {rest} more")))
+}
+
+impl EarlyEnd {
+    /// Returns where the flight ended and why, in a clause.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let (at, duration) = (seconds(self.at_s), seconds(self.duration_s));
+        let reason = self.reason.as_ref().map(|reason| format!(" ({reason})"));
+        format!("the flight ended early, at {at} of {duration}{}", reason.unwrap_or_default())
+    }
 }
 
 impl OfPair<Violation<ObjectPair>> {
@@ -286,6 +400,17 @@ impl OfPair<Undecided<ObjectPair>> {
 impl OfVehicle<Gap> {
     pub(super) fn words(&self) -> String {
         format!("{} was not seen from {}", self.vehicle, span(self.finding.from_s, self.finding.to_s))
+    }
+}
+
+impl OfVehicle<Seen> {
+    pub(super) fn words(&self) -> String {
+        match self.finding {
+            Seen { from_s: Some(from_s), to_s: Some(to_s) } => {
+                format!("{} is seen from {}", self.vehicle, span(from_s, to_s))
+            }
+            _ => format!("{} is not seen", self.vehicle),
+        }
     }
 }
 

@@ -3,14 +3,15 @@
 use std::time::{Duration, Instant};
 
 use super::super::controller::Controller;
-use super::super::ending::{Breakdown, Ending, MAX_BEND_M};
+use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
+use super::super::integration::Part;
 use super::super::judge::longest_move_m;
 use super::Simulation;
 use crate::feedback::Feedback as _;
-use crate::law::{Law, Void};
+use crate::law::{Law, LawError, Void};
 use crate::record::Event;
 use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
-use crate::swarm::{Rows, Swarm, first_row_not_finite, largest_row_norm};
+use crate::swarm::{Rows, Swarm, first_row_beyond, largest_row_norm};
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
@@ -49,13 +50,20 @@ impl Simulation {
         flown
     }
 
-    /// The law's fastest rate at the present state \[1/s\]; 0 in continuous time, which chooses its own steps.
-    fn rate_per_s(&self) -> f64 {
-        if !self.motion.holds_commands() {
+    /// Fastest rate of the law at the present state \[1/s\]. It is 0 in continuous time, which chooses its own steps, and
+    /// under commands from outside, for which the law is not asked.
+    fn rate_per_s(&self, length_s: f64) -> f64 {
+        if self.overruled || !self.motion.holds_commands() {
             return 0.0;
         }
-        let Self { controller, scenario, judge, .. } = self;
-        rate_per_s(controller.law.as_ref(), scenario, (judge.nearest_m, judge.room_m))
+        let Self { controller: Controller { law, links, .. }, scenario, judge, state, .. } = self;
+        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, judge.room_m));
+        let of_any_pair = rate(judge.nearest_m);
+        // The nearest pair may be one that the law does not act on: the exact distance costs a look at every edge.
+        if of_any_pair * length_s <= scenario.time.honest_rate_dt() {
+            return of_any_pair;
+        }
+        rate(judge.nearest_acted_on_m(law.as_ref(), links, state))
     }
 
     /// Whether every part that the law asks for changes the motion: where a command is held for a period of its own, or
@@ -70,12 +78,12 @@ impl Simulation {
         let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
         let (mut flown, mut part) = (0, whole);
         while flown < whole {
-            let rate_per_s = self.rate_per_s();
+            let rate_per_s = self.rate_per_s(seconds(part));
             while part > 1 && seconds(part) * rate_per_s > self.scenario.time.max_rate_dt {
                 part /= 2;
                 fineness.shortest = part.min(fineness.shortest);
             }
-            self.move_vehicles(step, seconds(part))?;
+            let undefined = self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();
             let (is_refused, on_the_way_per_s) = self.refuses(seconds(part), rate_per_s);
             if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
@@ -86,11 +94,13 @@ impl Simulation {
                 continue;
             }
             if bend_m > MAX_BEND_M {
-                return Err(Breakdown::Bent { step, bend_m }.into());
+                return Err(undefined.map_or(Breakdown::Bent { step, bend_m }.into(), Ending::LawUndefined));
             }
             let [begun, way] = [rate_per_s.min(on_the_way_per_s), on_the_way_per_s].map(|rate| seconds(part) * rate);
             let is_honest = begun <= TimeSpec::DEFAULT_MAX_RATE_DT && way <= MAX_RATE_DT_ON_THE_WAY;
-            fineness.is_overlong |= !is_honest && self.follows_the_law();
+            let is_overlong = !is_honest && self.follows_the_law();
+            fineness.is_overlong |= is_overlong;
+            self.note_error(seconds(part), rate_per_s.max(on_the_way_per_s), is_overlong);
             flown += part;
             let from_s = self.time_s;
             if flown == whole {
@@ -109,27 +119,53 @@ impl Simulation {
         Ok(())
     }
 
-    /// Moves the vehicles from `state` to `next`.
-    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<(), Ending> {
+    /// Bounds the error of integration after a part of a step, and lets the judge know of it, from the first part on that is
+    /// too long for the law.
+    fn note_error(&mut self, length_s: f64, rate_per_s: f64, is_overlong: bool) {
+        // Commands that are made of late or wrong states do not change at the rate that the law has in the true one.
+        if !self.controller.link.is_exact() || (!is_overlong && self.error.is_none()) {
+            return;
+        }
+        let moved_m = longest_move_m(&self.state, &self.path, &self.next);
+        let limits_m_s2 = [self.controller.law.max_command_m_s2(), self.scenario.actuation.max_accel_m_s2];
+        let limit_m_s2 = limits_m_s2.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        let part = Part { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong };
+        let error = self.error.unwrap_or_default().after(part);
+        self.error = Some(error);
+        self.judge.may_err_by(error.position_m());
+    }
+
+    /// Moves the vehicles from `state` to `next`. The result is why the law had no answer on the way, where they moved on without.
+    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<Option<LawError>, Ending> {
         let began = Instant::now();
         let is_held = self.overruled || self.scenario.time.control_hz.is_some();
         let held = is_held.then_some(&self.control);
         let interval = (step, self.time_s, dt_s);
-        self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
+        let undefined = self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
         self.performance.physics += began.elapsed();
         match self.next.first_not_finite() {
             Some(vehicle) => Err(Breakdown::StateNotFinite { step, vehicle }.into()),
-            None => Ok(()),
+            None => Ok(undefined),
         }
     }
 
     /// Whether the move that was just made is to be made in halves: it comes too near to the barrier, or to where the law is
     /// too fast for a step of this length \[s\]. Behind it the fastest rate that the law had on the way \[1/s\], at most; that at
-    /// its start where the law has no barrier.
+    /// its start where the law has no barrier, or is not asked.
     fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
-        let Self { controller: Controller { law, links, .. }, judge, state, path, next, scenario, motion, .. } = self;
+        let Self {
+            controller: Controller { law, links, link, .. },
+            judge,
+            state,
+            path,
+            next,
+            scenario,
+            motion,
+            overruled,
+            ..
+        } = self;
         let (of, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
-        let Some(barrier_m) = law.barrier_m() else { return (false, at_start_per_s) };
+        let Some(barrier_m) = law.barrier_m().filter(|_| !*overruled) else { return (false, at_start_per_s) };
         let moved_m = longest_move_m(state, path, next);
         if !motion.holds_commands() {
             return (judge.refuses(of, moves, moved_m), at_start_per_s);
@@ -137,9 +173,14 @@ impl Simulation {
         let (room_m, most) = (judge.room_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
         let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, room_m));
         let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
-        let on_the_way_per_s = rate(judge.nearest_over(of, moves, moved_m, enough));
+        let may_leap = link.is_exact() && judge.nearest_m > barrier_m;
+        let nearest_m = judge.nearest_over(of, moves, moved_m, enough);
+        let on_the_way_per_s = rate(nearest_m);
         let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
-        (is_too_fast || judge.refuses(of, moves, moved_m), on_the_way_per_s)
+        let is_refused = is_too_fast || judge.refuses(of, moves, moved_m);
+        // A law may know no rate at or inside its barrier, and no part is short enough to leap it.
+        let leaps = may_leap && nearest_m <= barrier_m;
+        (is_refused, if leaps { f64::INFINITY } else { on_the_way_per_s })
     }
 
     /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
@@ -200,7 +241,10 @@ impl Simulation {
     /// Lets the vehicles hold the command from now on, where there is one.
     fn hold(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
         self.performance.law += took;
-        let checked = commanded.and_then(|()| match first_row_not_finite(&self.control) {
+        let checked = commanded.and_then(|()| match first_row_beyond(&self.control, MAX_COMMAND_M_S2) {
+            Some(vehicle) if self.control.row(vehicle).iter().all(|x| x.is_finite()) => {
+                Err(Breakdown::CommandOutOfRange { step, vehicle }.into())
+            }
             Some(vehicle) => Err(Breakdown::CommandNotFinite { step, vehicle }.into()),
             None => Ok(()),
         });

@@ -1,0 +1,291 @@
+//! Findings on pairs, those of one pair that go on as one.
+
+use std::collections::BTreeMap;
+use std::ops::Deref;
+
+use super::shortlist::{Finding, LISTED, Shortlist, Tally};
+use super::sweep::Interval;
+
+/// Findings that are held before those that nothing can continue are settled.
+const FEWEST_HELD: usize = 1 << 14;
+/// Findings that may still be continued, at most: beyond, the least of them are settled where they are cut.
+const MOST_OPEN: usize = 1 << 16;
+
+/// Findings in the order in which they were found; dereferences to their list.
+///
+/// Where their number is bounded, motion is swept window after window, and in a window pair after pair. A finding that ended
+/// before what is still to be swept of its pair is settled: it is counted, and kept only among the worst ones and the first ones
+/// of their pairs.
+#[derive(Clone, Debug)]
+pub(super) struct Episodes<T: Finding> {
+    all: Vec<T>,
+    /// Indices of each pair's findings, in order of time.
+    of_pair: BTreeMap<T::On, Vec<usize>>,
+    settled: Option<Settled<T>>,
+    /// Findings that were counted and are not listed, and how many were counted when the sweep ended.
+    dropped: u64,
+    counted: Option<u64>,
+    is_exact: bool,
+    /// Whether the list is corrected after the sweep.
+    is_corrected: bool,
+}
+
+#[derive(Clone, Debug)]
+struct Settled<T: Finding> {
+    list: Shortlist<T>,
+    count: u64,
+    /// The window that is swept.
+    window: Interval,
+    /// Findings from this one on are of pairs that were swept over the window.
+    swept_from: usize,
+    /// How many are held before the next look.
+    most_held: usize,
+}
+
+impl<T: Finding> Default for Episodes<T> {
+    fn default() -> Self {
+        Self {
+            all: Vec::new(),
+            of_pair: BTreeMap::new(),
+            settled: None,
+            dropped: 0,
+            counted: None,
+            is_exact: true,
+            is_corrected: false,
+        }
+    }
+}
+
+impl<T: Finding> Deref for Episodes<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.all
+    }
+}
+
+impl<T: Finding> Episodes<T> {
+    /// A bounded number of them.
+    pub(super) fn bounded() -> Self {
+        let window = Interval { from_s: f64::NEG_INFINITY, to_s: f64::INFINITY };
+        let list = Shortlist::new(LISTED);
+        let settled = Settled { list, count: 0, window, swept_from: 0, most_held: FEWEST_HELD };
+        Self { settled: Some(settled), ..Self::default() }
+    }
+
+    /// Keeps more of them, for what corrects them at the end.
+    pub(super) fn expect_corrections(&mut self, capacity: usize) {
+        self.is_corrected = true;
+        if let Some(settled) = &mut self.settled {
+            settled.list.set_capacity(capacity);
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.all.is_empty() && self.settled.as_ref().is_none_or(|settled| settled.list.is_empty())
+    }
+
+    /// Whether some were counted, and are no longer known.
+    pub(super) fn are_some_dropped(&self) -> bool {
+        self.dropped > 0
+    }
+
+    /// Whether a finding was found over the window before: straight motion is judged whole, wherever windows end.
+    pub(super) fn is_of_before(&self, to_s: f64) -> bool {
+        self.settled.as_ref().is_some_and(|settled| to_s < settled.window.from_s)
+    }
+
+    /// The findings of a pair that may be continued, and those around them, by their indices in order of time.
+    pub(super) fn of(&self, pair: T::On) -> &[usize] {
+        self.of_pair.get(&pair).map_or(&[], Vec::as_slice)
+    }
+
+    pub(super) fn get_mut(&mut self, index: usize) -> Option<&mut T> {
+        self.all.get_mut(index)
+    }
+
+    /// Enters a finding that continues none; returns its index.
+    pub(super) fn add(&mut self, new: T) -> usize {
+        self.of_pair.entry(new.on()).or_default().push(self.all.len());
+        self.all.push(new);
+        self.all.len() - 1
+    }
+
+    /// Keeps those of which something holds.
+    pub(super) fn retain(&mut self, holds: impl FnMut(&T) -> bool) {
+        self.all.retain(holds);
+        self.index();
+    }
+
+    fn index(&mut self) {
+        self.of_pair.clear();
+        for (index, of) in self.all.iter().enumerate() {
+            self.of_pair.entry(of.on()).or_default().push(index);
+        }
+    }
+
+    /// The window that is swept from now on, behind all that were.
+    pub(super) fn begin(&mut self, window: Interval) {
+        if let Some(settled) = &mut self.settled {
+            (settled.window, settled.swept_from) = (window, self.all.len());
+        }
+    }
+
+    /// Settles, now and then, what nothing can continue. Is called between two pairs.
+    #[inline]
+    pub(super) fn settle(&mut self) {
+        if self.settled.as_ref().is_some_and(|settled| self.all.len() >= settled.most_held) {
+            self.settle_all();
+        }
+    }
+
+    #[cold]
+    fn settle_all(&mut self) {
+        let Some(settled) = &mut self.settled else { return };
+        let Interval { from_s, to_s } = settled.window;
+        let (mut open, mut swept_from) = (Vec::new(), 0);
+        for (k, of) in self.all.drain(..).enumerate() {
+            let is_swept = k >= settled.swept_from;
+            // What is swept next ends at the end of this window, or later.
+            if of.end_s() < if is_swept { to_s } else { from_s } {
+                settled.list.offer(of);
+                settled.count += 1;
+            } else {
+                swept_from += usize::from(!is_swept);
+                open.push(of);
+            }
+        }
+        if open.len() > MOST_OPEN {
+            // Those that were swept and go on: what continues them is found again, and counted then.
+            let mut going_on = open.split_off(swept_from);
+            going_on.sort_by(|a, b| b.excess().total_cmp(&a.excess()).then(a.on().cmp(&b.on())));
+            let cut = going_on.split_off(going_on.len().min(MOST_OPEN / 2));
+            self.is_exact &= cut.is_empty();
+            settled.list.extend(cut);
+            open.extend(going_on);
+        }
+        settled.swept_from = swept_from;
+        settled.most_held = (2 * open.len()).max(FEWEST_HELD);
+        self.all = open;
+        self.index();
+    }
+
+    /// Ends the sweep: all that are kept are in the list from here on.
+    pub(super) fn close(&mut self) {
+        let Some(Settled { list, mut count, .. }) = self.settled.take() else { return };
+        count += self.all.len() as u64;
+        let mut all = list.into_list();
+        all.append(&mut self.all);
+        self.dropped = count.saturating_sub(all.len() as u64);
+        self.counted = Some(count);
+        self.all = all;
+        self.index();
+    }
+
+    /// The list, in the order of their beginning and then by pair, shortened where it is long, and how many there are.
+    pub(super) fn finish(mut self, is_bounded: bool) -> (Vec<T>, Tally) {
+        self.close();
+        let known = self.all.len() as u64;
+        let (count, is_exact) = match self.counted {
+            Some(counted) if !self.is_corrected => (counted, self.is_exact),
+            // Of those that are no longer known any may have been corrected.
+            _ => (known, self.is_exact && self.dropped == 0),
+        };
+        let mut list = self.all;
+        if is_bounded && list.len() > LISTED {
+            let mut shortlist = Shortlist::new(LISTED);
+            // The first of each pair comes first.
+            list.sort_by(|a, b| a.start_s().total_cmp(&b.start_s()).then(a.on().cmp(&b.on())));
+            shortlist.extend(list);
+            list = shortlist.into_list();
+        } else {
+            list.sort_by(|a, b| a.start_s().total_cmp(&b.start_s()).then(a.on().cmp(&b.on())));
+        }
+        let tally = Tally { count, listed: list.len(), is_exact };
+        (list, tally)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Found {
+        pair: u32,
+        from_s: f64,
+        to_s: f64,
+    }
+
+    impl Finding for Found {
+        type On = u32;
+
+        fn on(&self) -> u32 {
+            self.pair
+        }
+
+        fn start_s(&self) -> f64 {
+            self.from_s
+        }
+
+        fn end_s(&self) -> f64 {
+            self.to_s
+        }
+
+        fn excess(&self) -> f64 {
+            f64::from(self.pair)
+        }
+    }
+
+    /// Sweeps a window in which each of so many pairs has a finding over a time, which goes on with what is open before it.
+    fn sweep(episodes: &mut Episodes<Found>, window: [f64; 2], pairs: u32, [from_s, to_s]: [f64; 2]) -> usize {
+        let mut most = 0;
+        episodes.begin(Interval { from_s: window[0], to_s: window[1] });
+        for pair in 0..pairs {
+            let open = episodes.of(pair).last().copied().filter(|&k| episodes[k].to_s >= from_s);
+            match open.and_then(|open| episodes.get_mut(open)) {
+                Some(open) => open.to_s = to_s,
+                None => {
+                    episodes.add(Found { pair, from_s, to_s });
+                }
+            }
+            episodes.settle();
+            most = most.max(episodes.len());
+        }
+        most
+    }
+
+    #[test]
+    fn what_ended_is_settled_and_what_goes_on_is_one_finding() {
+        let mut episodes = Episodes::bounded();
+        let most = (0..40).map(|k| {
+            let from_s = f64::from(k);
+            sweep(&mut episodes, [from_s, from_s + 1.0], 5000, [from_s + 0.25, from_s + 0.5])
+        });
+        assert!(most.max().is_some_and(|most| most <= FEWEST_HELD), "they are not all held");
+        let (list, tally) = episodes.finish(true);
+        assert_eq!((tally.count, tally.is_exact), (200_000, true));
+        // The worst thousand are of pair 4999 down to 4975, and the first thousand pairs begin first.
+        assert_eq!((list.len(), list[0].pair), (2 * LISTED, 0));
+        let mut going_on = Episodes::bounded();
+        for k in 0..40 {
+            let from_s = f64::from(k);
+            sweep(&mut going_on, [from_s, from_s + 1.0], 5000, [from_s, from_s + 1.0]);
+        }
+        let (list, tally) = going_on.finish(true);
+        assert_eq!((tally.count, tally.is_exact), (5000, true));
+        assert!(list.iter().all(|of| (of.from_s, of.to_s) == (0.0, 40.0)));
+    }
+
+    #[test]
+    fn more_that_goes_on_than_is_held_is_counted_once_at_most_and_said_to_be_inexact() {
+        let mut episodes = Episodes::bounded();
+        let pairs = 140_000;
+        let most =
+            [0.0, 1.0, 2.0].map(|from_s| sweep(&mut episodes, [from_s, from_s + 1.0], pairs, [from_s, from_s + 1.0]));
+        assert!(most.into_iter().all(|most| most <= 4 * MOST_OPEN), "{most:?}");
+        let (list, tally) = episodes.finish(true);
+        assert!(!tally.is_exact && list.len() <= 2 * LISTED);
+        assert!(tally.count <= u64::from(pairs) && tally.count > u64::from(pairs / 2), "{tally:?}");
+    }
+}

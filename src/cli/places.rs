@@ -1,0 +1,129 @@
+//! Questions about heights and places that a recording cannot answer.
+
+use super::Failure;
+use super::audit_arguments::AuditArguments;
+use crate::audit::Obstacle;
+use crate::audit::envelope::Quantity;
+use crate::audit::recorded::Settings;
+use crate::read::ReadError;
+use crate::track::{EarthOrigin, Item, Tracks};
+
+/// Largest distance of level ground below the level plane of the origin at which z counts as a height \[m\].
+const MOST_DROP_M: f64 = 1.0;
+
+/// Mean radius of the Earth \[m\].
+const EARTH_RADIUS_M: f64 = 6_371_000.0;
+
+/// What is asked about places.
+struct Asked<'a> {
+    settings: &'a Settings,
+}
+
+impl Asked<'_> {
+    fn limit(&self, is_asked: fn(Quantity) -> bool) -> Option<String> {
+        let limit = self.settings.envelope.limits.iter().find(|limit| is_asked(limit.quantity));
+        limit.map(|limit| format!("the limit `{}`", limit.quantity.name()))
+    }
+
+    fn fence(&self) -> Option<String> {
+        self.settings.envelope.fence.as_ref().map(|_| "the fence".to_owned())
+    }
+
+    fn fence_with_heights(&self) -> Option<String> {
+        let fence = self.settings.envelope.fence.as_ref().filter(|fence| fence.height_m().is_some());
+        fence.map(|_| "the fence with `height_m`".to_owned())
+    }
+
+    fn above(&self) -> Option<String> {
+        self.settings.above_m.map(|_| "--above".to_owned())
+    }
+
+    fn obstacle(&self, is_asked: fn(&Obstacle) -> bool) -> Option<String> {
+        let obstacle = self.settings.obstacles.iter().find(|obstacle| is_asked(obstacle));
+        obstacle.map(|obstacle| format!("the obstacle `{}`", obstacle.name))
+    }
+
+    /// What needs the height of each vehicle.
+    fn of_heights(&self) -> Option<String> {
+        let upright = || {
+            let tilted = self.obstacle(|of| !of.is_upright_through_ground())?;
+            Some(format!("{tilted}, which is not upright through height 0,"))
+        };
+        let limit = self.limit(Quantity::needs_height);
+        limit.or_else(|| self.fence_with_heights()).or_else(|| self.above()).or_else(upright)
+    }
+
+    /// What depends on where positions are measured from.
+    fn of_places(&self) -> Option<String> {
+        let limit = self.limit(Quantity::needs_origin);
+        limit.or_else(|| self.fence()).or_else(|| self.above()).or_else(|| self.obstacle(|_| true))
+    }
+
+    /// What takes z for a height above level ground.
+    fn of_level(&self) -> Option<String> {
+        self.limit(Quantity::needs_origin).or_else(|| self.fence_with_heights()).or_else(|| self.above())
+    }
+}
+
+/// Looks whether z is a height wherever vehicles are, where a question needs that.
+pub(super) struct Level<'a> {
+    settings: &'a Settings,
+    /// What is asked; none where nothing is to be looked at.
+    asked: Option<String>,
+}
+
+/// Refuses questions about heights where the recording has none, and about places where nobody says what they are measured
+/// from.
+pub(super) fn refuse_unknown<'a>(
+    arguments: &AuditArguments,
+    settings: &'a Settings,
+    recording: &dyn Tracks<Error = ReadError>,
+) -> Result<Level<'a>, Failure> {
+    let asked = Asked { settings };
+    let of_heights = || {
+        let asked = asked.of_heights().filter(|_| recording.is_planar())?;
+        let help = "name the column of the height with --column z=NAME, or leave the question out";
+        Some((format!("the heights of its vehicles are not known, and {asked} needs them"), help))
+    };
+    let origin = recording.earth_origin();
+    let of_places = || {
+        let EarthOrigin { place, .. } = origin.filter(|origin| origin.is_inferred)?;
+        let asked = asked.of_places()?;
+        let help = "say what they are measured from with --origin LAT,LON,HEIGHT; a HEIGHT of 0 is the ellipsoid";
+        Some((format!("places are measured from the first one, {place}, and {asked} depends on that"), help))
+    };
+    let Some((problem, help)) = of_heights().or_else(of_places) else {
+        return Ok(Level { settings, asked: origin.and_then(|_| asked.of_level()) });
+    };
+    let asked_by = arguments.asked_by.as_ref().map_or(String::new(), |note| format!(" ({note})"));
+    Err(Failure::input(format!("{}: {problem}", arguments.reading.called()), format!("{help}{asked_by}")))
+}
+
+impl Level<'_> {
+    /// Refuses positions that are judged and so far from the origin that level ground is well below its level plane.
+    pub(super) fn check(&self, path: &str, names: &[String], items: &[Item]) -> Result<(), Failure> {
+        let Some(asked) = &self.asked else { return Ok(()) };
+        let Settings { from_s, to_s, only, .. } = self.settings;
+        let is_judged = |name: &str, time_s: f64| {
+            from_s.is_none_or(|from_s| time_s >= from_s)
+                && to_s.is_none_or(|to_s| time_s <= to_s)
+                && only.as_ref().is_none_or(|only| only.contains(name))
+        };
+        for item in items {
+            let Item::Sample(sample) = item else { continue };
+            let name = names.get(sample.vehicle).map_or("", String::as_str);
+            let away_m = sample.position_m.xy().norm();
+            let drop_m = away_m * away_m / (2.0 * EARTH_RADIUS_M);
+            if drop_m > MOST_DROP_M && is_judged(name, sample.time_s) {
+                let (time_s, away_km) = (sample.time_s, away_m / 1000.0);
+                let message = format!(
+                    "{path}: {name} is {away_km:.1} km from --origin at {time_s:?} s, where level ground is {drop_m:.1} m \
+                     lower, and {asked} needs heights above the ground"
+                );
+                let help = "give an --origin within 3 km of all vehicles, or judge a part with --ids, --from and --to";
+                return Err(Failure::input(message, help));
+            }
+        }
+        Ok(())
+    }
+}

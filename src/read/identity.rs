@@ -1,0 +1,203 @@
+//! Whether the rows of a table say which vehicle they are of: columns that could name vehicles, by their names and by their
+//! values.
+
+use std::collections::{BTreeMap, HashMap};
+
+use nalgebra::Vector3;
+
+use super::error::{Fault, quoted};
+
+/// Distinct values of a column beyond which it names no vehicles.
+const MOST_VALUES: usize = 1000;
+
+/// Positions between two others of the same value from which on positions tell whether a column names vehicles.
+const ENOUGH: u64 = 8;
+
+/// Part of the distance of positions from the straight line between their neighbours that is left where rows of several
+/// vehicles are told apart.
+const APART: f64 = 0.5;
+
+/// What names vehicles as text: names that are the same number, or the same letters in upper and lower case, have one key.
+pub(super) fn spelling(name: &str) -> String {
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let (whole, fraction) = name.split_once('.').unwrap_or((name, "0"));
+    let is_whole = digits(whole) && fraction.bytes().all(|byte| byte == b'0');
+    if is_whole { whole.trim_start_matches('0').to_owned() + "#" } else { name.trim().to_lowercase() }
+}
+
+/// That two names are those of one vehicle, or nearly.
+pub(super) fn alike(first: &str, second: &str) -> Fault {
+    let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
+    Fault::content(problem, "write one name for one vehicle, and names for two that differ in more than that")
+}
+
+/// A second column that could name the vehicles of the rows, beside the one that does.
+#[derive(Clone, Debug)]
+pub(super) struct Rival {
+    pub(super) column: usize,
+    /// Its value for each vehicle, and the vehicle of each of its values.
+    of: Vec<Option<Box<str>>>,
+    vehicles: BTreeMap<Box<str>, usize>,
+    contradicts: bool,
+}
+
+impl Rival {
+    pub(super) fn new(column: usize) -> Self {
+        Self { column, of: Vec::new(), vehicles: BTreeMap::new(), contradicts: false }
+    }
+
+    /// Takes its value in a row of a vehicle.
+    pub(super) fn see(&mut self, vehicle: usize, value: &str) {
+        if value.is_empty() || (self.contradicts && self.vehicles.len() > 1) {
+            return;
+        }
+        if vehicle >= self.of.len() {
+            self.of.resize(vehicle + 1, None);
+        }
+        let known = self.of[vehicle].get_or_insert_with(|| value.into());
+        self.contradicts |= **known != *value;
+        match self.vehicles.get(value) {
+            Some(&first) => self.contradicts |= first != vehicle,
+            None => {
+                self.vehicles.insert(value.into(), vehicle);
+            }
+        }
+    }
+
+    /// Whether it tells vehicles apart otherwise than the column that was read: a value that is the same everywhere tells none.
+    pub(super) fn is_one(&self) -> bool {
+        self.contradicts && self.vehicles.len() > 1
+    }
+}
+
+/// A column that is not read, in a table of one vehicle: its values may be those of several.
+#[derive(Clone, Debug)]
+pub(super) struct Suspect {
+    pub(super) column: usize,
+    values: HashMap<Box<str>, Value>,
+    last: Option<Box<str>>,
+    /// The last two rows, whatever their value.
+    track: Track,
+    rows: u64,
+    changes: u64,
+    /// Changes to a value that was there before.
+    returns: u64,
+    /// Times that go back, and those at which the value changes.
+    backwards: [u64; 2],
+    /// Positions that were compared with those of the rows around them, and how far they are off in all: among rows of the same
+    /// value, and among all.
+    compared: u64,
+    off: [f64; 2],
+    /// Whether it cannot name vehicles.
+    cleared: bool,
+}
+
+/// Rows of one value.
+#[derive(Clone, Copy, Debug, Default)]
+struct Value {
+    rows: u64,
+    track: Track,
+}
+
+/// The last two rows of several, each with its time.
+#[derive(Clone, Copy, Debug, Default)]
+struct Track([Option<(f64, Vector3<f64>)>; 2]);
+
+impl Track {
+    /// Takes the next row, and gives how far the one before is off the straight line between its neighbours.
+    fn push(&mut self, time: f64, position: Vector3<f64>) -> Option<f64> {
+        let [first, middle] = self.0;
+        self.0 = [middle, Some((time, position))];
+        let ((from, start), (at, place)) = (first?, middle?);
+        let part = (at - from) / (time - from);
+        part.is_finite().then(|| (place - start.lerp(&position, part)).norm())
+    }
+}
+
+impl Suspect {
+    pub(super) fn new(column: usize) -> Self {
+        Self {
+            column,
+            values: HashMap::new(),
+            last: None,
+            track: Track::default(),
+            rows: 0,
+            changes: 0,
+            returns: 0,
+            backwards: [0; 2],
+            compared: 0,
+            off: [0.0; 2],
+            cleared: false,
+        }
+    }
+
+    pub(super) fn is_cleared(&self) -> bool {
+        self.cleared
+    }
+
+    /// Takes its value in the next row.
+    pub(super) fn see(&mut self, value: &str, time: f64, position: Vector3<f64>) {
+        let is_decimal = value.parse::<f64>().is_ok_and(|number| number.fract() != 0.0 || !number.is_finite());
+        if is_decimal || self.values.len() > MOST_VALUES {
+            // Numbers with decimals measure something.
+            (self.cleared, self.values) = (true, HashMap::new());
+        }
+        if self.cleared || value.is_empty() {
+            return;
+        }
+        let changes = self.last.as_deref().is_some_and(|last| last != value);
+        let went_back = self.track.0[1].is_some_and(|(before, _)| time < before);
+        self.backwards[0] += u64::from(went_back);
+        self.backwards[1] += u64::from(went_back && changes);
+        self.rows += 1;
+        if changes || self.last.is_none() {
+            self.changes += u64::from(changes);
+            self.returns += u64::from(changes && self.values.contains_key(value));
+            self.last = Some(value.into());
+        }
+        let among_all = self.track.push(time, position);
+        let of = match self.values.get_mut(value) {
+            Some(of) => of,
+            None => self.values.entry(value.into()).or_default(),
+        };
+        of.rows += 1;
+        let among_own = of.track.push(time, position);
+        if let (Some(all), Some(own)) = (among_all, among_own) {
+            self.compared += 1;
+            self.off[0] += own;
+            self.off[1] += all;
+        }
+    }
+
+    /// Whether its values are those of several vehicles, by all that is known: few values that come again while time goes on,
+    /// and words that change from row to row, or rows of one value that are on a smoother way than all rows.
+    fn names_vehicles(&self) -> bool {
+        let values = self.values.len() as u64;
+        if self.cleared || values < 2 || 2 * values > self.rows + 1 {
+            return false;
+        }
+        let is_sequence = self.backwards[0] > 0 && self.backwards == [self.changes; 2];
+        let alternates = 3 * self.changes >= self.rows - 1;
+        let is_smoother = self.off[0] < APART * self.off[1];
+        // Measured text, such as a mode, seldom changes.
+        let is_text = self.values.keys().all(|value| value.parse::<f64>().is_err());
+        let is_told = if is_text || self.compared < ENOUGH { alternates || is_smoother } else { is_smoother };
+        is_sequence || (self.returns > 0 && is_told)
+    }
+
+    /// The fault of a table of one vehicle in which this column, which is called so, names several.
+    pub(super) fn fault(&self, called: &str) -> Option<Fault> {
+        if !self.names_vehicles() {
+            return None;
+        }
+        let count = self.values.len();
+        let problem = format!(
+            "its rows look like those of several vehicles: column {} has {count} values that alternate",
+            quoted(called)
+        );
+        let remedy = format!(
+            "name the column of the vehicle with --column id={called}; where all rows are of one vehicle, say so with --one-vehicle"
+        );
+        Some(Fault::content(problem, remedy))
+    }
+}

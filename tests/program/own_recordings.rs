@@ -1,0 +1,180 @@
+//! A recording of a run has the verdict of the run, as long as it is what the run wrote.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use tautline::record::Sink as _;
+use tautline::record::mcap::{Entry, McapRecorder, McapRecording};
+use tempfile::TempDir;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+/// Every built-in scenario, and for how long it is flown where tests are short \[s\].
+const BUILT_IN: [(&str, &str); 12] = [
+    ("pentagon", "4"),
+    ("circle", "2"),
+    ("pentagon-laplacian", "5"),
+    ("pentagon-collinear", "2"),
+    ("pentagon-leader", "2"),
+    ("leader-lossy", "10"),
+    ("swap", "2"),
+    ("show", "0.2"),
+    ("thousand", "0.2"),
+    ("obstacles", "2"),
+    ("gusts", "26"),
+    ("crazyflies", "1"),
+];
+
+fn fly(folder: &Path, scenario: &str, sets: &[&str]) {
+    let fixed = ["run", scenario, "--out", "flown", "--no-snapshots", "--no-figures", "--quiet", "--force"];
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
+    let ran = ran_by(TAUTLINE, folder, &fixed.into_iter().chain(sets).collect::<Vec<_>>());
+    assert!(matches!(ran.exit, Some(0 | 1)), "{scenario}: {ran:?}");
+}
+
+fn audit(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, &[&["audit"], arguments].concat())
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect("JSON alone")
+}
+
+fn pentagon() -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    fly(folder.path(), "pentagon", &["time.duration_s=4", "arrival.hold_s=4"]);
+    folder
+}
+
+#[test]
+fn the_recordings_of_all_built_in_scenarios_have_the_verdicts_of_their_runs() {
+    let is_long = std::env::var_os("TAUTLINE_LONG").is_some();
+    for (scenario, duration_s) in BUILT_IN {
+        let folder = tempfile::tempdir().expect("a folder");
+        let short = ["time.duration_s", "arrival.hold_s"].map(|key| format!("{key}={duration_s}"));
+        let sets: Vec<&str> = short.iter().filter(|_| !is_long).map(String::as_str).collect();
+        fly(folder.path(), scenario, &sets);
+        let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
+        let judged = audit(folder.path(), &["flown", "--json"]);
+        let found = json(&judged.out);
+        assert_eq!(found["status"], report["audit"]["status"], "{scenario}: {judged:?}");
+        for key in ["delta_m", "min_m", "min_pair", "min_at_s"] {
+            // Around ellipsoids the run counts in its delta, and the audit in half axes.
+            if report["separation"]["ellipsoid"].is_null() {
+                assert_eq!(found["separation"][key], report["separation"][key], "{scenario}: {key}");
+            }
+        }
+        if found["status"] == "clear" {
+            let is_word = found["audit"]["judged_by_run"] == true || found["audit"]["proved"] == true;
+            assert!(is_word && found["audit"]["assumes"].is_null(), "{scenario}: {}", found["audit"]);
+        }
+    }
+}
+
+#[test]
+fn a_recording_is_clear_as_its_run_judged_and_says_so() {
+    let folder = pentagon();
+    let judged = audit(folder.path(), &["flown"]);
+    assert_eq!(judged.exit, Some(0), "{judged:?}");
+    let said = "CLEAR as the run judged every step: never closer than 2.460355 m, 2 and 3 at 2.15 s (delta 2.000 m); from 0.000 s to 4.000 s";
+    assert_eq!(judged.out.lines().next(), Some(said));
+    let found = json(&audit(folder.path(), &["flown", "--json"]).out);
+    assert_eq!((&found["audit"]["proved"], &found["audit"]["judged_by_run"]), (&false.into(), &true.into()));
+    // Of a part, of some vehicles and against a smaller distance too.
+    for more in [&["--from", "1", "--to", "3"][..], &["--ids", "1,2,3"], &["--delta", "1.5"], &["--radius", "0.9"]] {
+        let part = audit(folder.path(), &[&["flown"], more].concat());
+        assert!(part.exit == Some(0) && part.out.starts_with("CLEAR as the run judged"), "{more:?}: {part:?}");
+    }
+}
+
+#[test]
+fn what_the_run_did_not_judge_is_not_said_by_its_word() {
+    let folder = pentagon();
+    for more in [&["--limit", "speed=100"][..], &["--independent"], &["--motion", "linear"]] {
+        let drawn = audit(folder.path(), &[&["flown"], more].concat());
+        assert!(
+            drawn.exit == Some(0) && drawn.out.starts_with("CLEAR if straight between samples: "),
+            "{more:?}: {drawn:?}"
+        );
+    }
+    // More than the run kept.
+    let more = audit(folder.path(), &["flown", "--delta", "2.5"]);
+    assert!(more.exit == Some(1) && more.out.starts_with("VIOLATION: 2 and 3 came to 2.460 m"), "{more:?}");
+    // By other clocks.
+    let later = audit(folder.path(), &["flown", "--offset", "1=0.001"]);
+    assert!(!later.out.contains("as the run judged"), "{later:?}");
+}
+
+/// Writes a recording anew, with what `change` makes of it, and its verdict where `is_closed`.
+fn rewritten(folder: &Path, to: &str, is_closed: bool, change: impl Fn(&mut Entry)) {
+    let mut recording = McapRecording::open(&folder.join("flown/run.mcap")).expect("a recording");
+    let mut recorder = McapRecorder::create(&folder.join(to), recording.header()).expect("made");
+    for entry in recording.by_ref() {
+        let mut entry = entry.expect("whole");
+        change(&mut entry);
+        match &entry {
+            Entry::Sample(sample) => recorder.sample(&sample.as_sample()).expect("recorded"),
+            Entry::Event(event) => recorder.event(event).expect("recorded"),
+        }
+    }
+    let verdict = recording.verdict().expect("a verdict").clone();
+    if is_closed { recorder.close(verdict) } else { recorder.finish() }.expect("closed");
+}
+
+#[test]
+fn a_recording_that_was_changed_or_cut_does_not_profit_from_its_run() {
+    let folder = pentagon();
+    let said = |arguments: &[&str]| audit(folder.path(), arguments);
+    rewritten(folder.path(), "same.mcap", true, |_| {});
+    assert!(said(&["same.mcap"]).out.starts_with("CLEAR as the run judged every step: "));
+    // One place of one sample, by a millimetre.
+    rewritten(folder.path(), "moved.mcap", true, |entry| {
+        if let Entry::Sample(sample) = entry
+            && (sample.time_s - 2.0).abs() < 1e-3
+        {
+            sample.swarm.positions_m[(0, 0)] += 1e-3;
+        }
+    });
+    let moved = said(&["moved.mcap"]);
+    assert!(moved.exit == Some(0) && moved.out.starts_with("CLEAR if straight between samples: "), "{moved:?}");
+    assert!(moved.err.contains("is not as the run wrote it"), "{moved:?}");
+    // Moved upon another between two samples that were left as they are: the run's word of that time does not hide it.
+    rewritten(folder.path(), "near.mcap", true, |entry| {
+        if let Entry::Sample(sample) = entry
+            && (1.9..2.4).contains(&sample.time_s)
+        {
+            let beside = sample.swarm.positions_m.row(2).clone_owned();
+            sample.swarm.positions_m.row_mut(0).copy_from(&beside);
+        }
+    });
+    let near = said(&["near.mcap"]);
+    assert!(near.exit == Some(1) && near.out.starts_with("VIOLATION: "), "{near:?}");
+    // Closed without a verdict, as by a run that failed.
+    rewritten(folder.path(), "open.mcap", false, |_| {});
+    assert!(said(&["open.mcap"]).out.starts_with("CLEAR if straight between samples: "));
+    // Cut off.
+    let bytes = fs::read(folder.path().join("flown/run.mcap")).expect("a recording");
+    fs::write(folder.path().join("cut.mcap"), &bytes[..bytes.len() - 200]).expect("written");
+    assert_eq!(said(&["cut.mcap"]).exit, Some(2));
+    let cut = said(&["cut.mcap", "--allow-unfinished"]);
+    assert!(!cut.out.contains("as the run judged"), "{cut:?}");
+}
+
+#[test]
+fn a_run_that_ended_early_gives_no_word_for_its_recording() {
+    let folder = pentagon();
+    let mut recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
+    let mut recorder = McapRecorder::create(&folder.path().join("early.mcap"), recording.header()).expect("made");
+    for entry in recording.by_ref() {
+        match entry.expect("whole") {
+            Entry::Sample(sample) => recorder.sample(&sample.as_sample()).expect("recorded"),
+            Entry::Event(event) => recorder.event(&event).expect("recorded"),
+        }
+    }
+    let mut verdict = recording.verdict().expect("a verdict").clone();
+    verdict.ended_early = "interrupted".to_owned();
+    recorder.close(verdict).expect("closed");
+    let early = audit(folder.path(), &["early.mcap"]);
+    assert!(early.out.starts_with("CLEAR if straight between samples: "), "{early:?}");
+}

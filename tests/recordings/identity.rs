@@ -1,0 +1,223 @@
+//! Rows are of the vehicle that they name, or the recording is refused.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use tautline::read::{ReadError, ReadOptions};
+
+use crate::messages::read_bytes;
+use crate::recording::Whole;
+
+fn read(text: &str) -> Result<Whole, ReadError> {
+    read_bytes("flight.csv", text.as_bytes(), &ReadOptions::default())
+}
+
+fn by_column(text: &str, column: &str) -> Result<Whole, ReadError> {
+    let mut options = ReadOptions::default();
+    options.columns.set("id", column);
+    read_bytes("flight.csv", text.as_bytes(), &options)
+}
+
+/// A folder of these files.
+fn folder(files: &[(&str, &str)]) -> Result<Whole, ReadError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, content) in files {
+        fs::write(folder.path().join(name), content).expect("written");
+    }
+    Whole::read(folder.path(), &ReadOptions::default())
+}
+
+fn is_refused(found: Result<Whole, ReadError>, said: &[&str]) {
+    let error = match found {
+        Ok(whole) => panic!("read: {:?}, {:?}", whole.vehicles, whole.notes),
+        Err(error) => format!("{error}\n{}", error.help()),
+    };
+    for said in said {
+        assert!(error.contains(said), "{error}\ninstead of {said}");
+    }
+}
+
+/// Rows of some vehicles, 5 m apart, one after the other in time.
+fn interleaved(header: &str, names: &[&str], times: usize) -> String {
+    let mut text = format!("{header}\n");
+    for row in 0..times * names.len() {
+        let (vehicle, t) = (row % names.len(), row as f64 / 10.0);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{t},{},{},{}", names[vehicle], 0.3 * t, 5 * vehicle);
+    }
+    text
+}
+
+const ALONE: &str = "t,x,y\n0,50,50\n1,50,50\n2,50,50\n";
+
+/// What columns of vehicles are called.
+const NAMES: [&str; 44] = [
+    "mmsi",
+    "icao24",
+    "icao",
+    "hex",
+    "hexident",
+    "sysid",
+    "system_id",
+    "tail",
+    "tail_number",
+    "callsign",
+    "flight",
+    "registration",
+    "uav",
+    "uas",
+    "uav_id",
+    "robot",
+    "robot_name",
+    "agent",
+    "agent_id",
+    "track",
+    "track_id",
+    "object",
+    "object_id",
+    "obj_id",
+    "target",
+    "vessel",
+    "ship",
+    "imo",
+    "aircraft",
+    "plane",
+    "quad",
+    "rover",
+    "entity",
+    "actor",
+    "person_id",
+    "ped_id",
+    "pedestrian",
+    "player",
+    "node",
+    "node_id",
+    "tag",
+    "model",
+    "unit",
+    "drone name",
+];
+
+#[test]
+fn common_names_of_vehicles_are_read_as_such() {
+    for name in NAMES {
+        let header = format!("t,{name},x,y");
+        let found = read(&interleaved(&header, &["205", "211"], 3)).expect(name);
+        assert_eq!(found.vehicles, ["205", "211"], "{name}");
+        // In a folder each file is one vehicle.
+        let files = [("a.csv", &*interleaved(&header, &["205", "211"], 3)), ("b.csv", ALONE)];
+        is_refused(folder(&files), &["a.csv: it holds several vehicles"]);
+    }
+    for header in ["t,valid,x,y", "t,idle,x,y", "t,width,x,y", "t,video,x,y"] {
+        assert!(read(&interleaved(header, &["1", "2"], 3)).is_err(), "{header} names no vehicle");
+    }
+}
+
+#[test]
+fn vehicles_under_a_name_that_nobody_knows_are_not_merged() {
+    let alone = ("b.csv", ALONE);
+    for times in [2, 3, 40] {
+        for names in [&["1", "2"][..], &["alpha", "bravo", "charlie"], &["7", "9", "11", "13"], &["1.0", "2.0"]] {
+            let file = interleaved("t,whose,x,y", names, times);
+            is_refused(folder(&[("a.csv", &file), alone]), &["a.csv", "column `whose` has", "--column id=whose"]);
+            // The one name of all rows that is known does not hide it.
+            let file = interleaved("t,whose,x,y,id", names, times).replace('\n', ",cf1\n").replacen(",cf1", "", 1);
+            is_refused(folder(&[("a.csv", &file), alone]), &["column `whose` has"]);
+        }
+    }
+    // In parts of ten rows.
+    let parts: Vec<_> = (0..200).map(|k| if k / 10 % 2 == 0 { "p" } else { "q" }).collect();
+    let rows = parts.iter().enumerate().map(|(k, part)| format!("{k},{part},0,{}\n", if *part == "p" { 0 } else { 7 }));
+    let file = format!("t_s,whose,x,y\n{}", rows.collect::<String>());
+    is_refused(folder(&[("a.csv", &file), alone]), &["column `whose`"]);
+    // One after the other: time starts again.
+    let file = "t,whose,x,y\n0,p,0,0\n1,p,0,0\n2,p,0,0\n0,q,9,0\n1,q,9,0\n2,q,9,0\n";
+    is_refused(folder(&[("a.csv", file), alone]), &["column `whose`"]);
+}
+
+#[test]
+fn what_one_vehicle_measures_is_no_name() {
+    let rows = |value: &dyn Fn(usize) -> String| {
+        let place = |k: usize| (k as f64 / 9.0).sin();
+        (0..200)
+            .map(|k| format!("{},{},{},{}\n", k as f64 / 10.0, place(k), place(2 * k), value(k)))
+            .collect::<String>()
+    };
+    let odd: [&dyn Fn(usize) -> String; 7] = [
+        &|k| (60 + k * 7 % 3).to_string(),
+        &|k| if k / 20 % 2 == 0 { "AUTO".to_owned() } else { "LOITER".to_owned() },
+        &|k| (k % 2).to_string(),
+        &|k| (k % 256).to_string(),
+        &|k| format!("12.{}", k * 7 % 3),
+        &|k| k.to_string(),
+        &|_| "iris".to_owned(),
+    ];
+    for value in odd {
+        let file = format!("t,x,y,whose\n{}", rows(value));
+        let found = folder(&[("a.csv", &file), ("b.csv", ALONE)]).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(found.vehicles, ["a", "b"]);
+    }
+}
+
+const NUMBERED: &str = "id,timestamp,drone,x,y,z\n1,0.0,a,0,0,0\n2,0.0,b,2,0,0\n3,0.5,a,1,0,0\n4,0.5,b,1,0,0\n";
+
+#[test]
+fn a_column_that_numbers_rows_names_no_vehicle() {
+    is_refused(read(NUMBERED), &["column `id` has another value in each row", "`drone`", "--column id="]);
+    is_refused(read(&NUMBERED.replace("drone", "whose")), &["column `id`", "`whose`"]);
+    assert_eq!(by_column(NUMBERED, "drone").expect("read").vehicles, ["a", "b"]);
+    // One instant of several vehicles, or one that the user names.
+    let instant = "t,id,x,y\n0,1,0,0\n0,2,5,0\n0,3,9,0\n";
+    assert_eq!(read(instant).expect("read").vehicles.len(), 3);
+    assert_eq!(by_column(NUMBERED, "id").expect("read").vehicles.len(), 4);
+}
+
+#[test]
+fn two_columns_of_names_agree_or_are_asked_about() {
+    let table = |rows: &[&str]| format!("t,id,callsign,x,y\n{}\n", rows.join("\n"));
+    for rows in [
+        // A value of one of them is of two of the other.
+        &["0,1,A,0,0", "0,2,B,5,0", "1,1,B,0,0", "1,2,A,5,0"][..],
+        &["0,1,A,0,0", "0.5,1,B,5,0", "1,1,A,0,0", "1.5,1,B,5,0"],
+        &["0,1,A,0,0", "0,2,A,5,0", "0,3,B,9,0", "1,1,A,0,0"],
+    ] {
+        is_refused(read(&table(rows)), &["`id`", "`callsign`", "--column id=id or --column id=callsign"]);
+        by_column(&table(&rows[..2]), "id").expect("the user says which");
+    }
+    for rows in [
+        &["0,1,A,0,0", "0,2,B,5,0", "1,1,A,0,0", "1,2,B,5,0"][..],
+        &["0,1,A,0,0", "0,2,A,5,0", "1,1,A,0,0", "1,2,A,5,0"],
+        &["0,1,,0,0", "0,2,B,5,0", "1,1,A,0,0", "1,2,B,5,0"],
+    ] {
+        assert_eq!(read(&table(rows)).expect("read").vehicles, ["1", "2"]);
+    }
+}
+
+#[test]
+fn a_name_that_is_spelled_in_two_ways_is_refused() {
+    for [first, second] in [["1", "1.0"], ["Cf1", "cf1"], ["7", "007"], ["UAV-a", "uav-A"]] {
+        let rows = format!("t,id,x,y\n0,{first},0,0\n0,b,5,0\n1,{second},0,0\n1,b,5,0\n");
+        let quoted = [format!("`{first}`"), format!("`{second}`")];
+        let error = read(&rows).expect_err("refused");
+        assert!(error.to_string().contains("line 4"), "{error}");
+        is_refused(Err(error), &[&quoted[0], &quoted[1], "write one name for one vehicle"]);
+        let wide = format!("t,{first}.x,{first}.y,{second}.x,{second}.y\n0,1,2,3,4\n");
+        if !first.starts_with(|c: char| c.is_ascii_digit()) {
+            is_refused(read(&wide), &["write one name for one vehicle"]);
+        }
+        let (a, b) = (format!("{first}.csv"), format!("{second}.csv"));
+        is_refused(folder(&[(&a, ALONE), (&b, ALONE)]), &["is called"]);
+        // By what the rows of files say.
+        let file = |name: &str| format!("t,id,x,y\n0,{name},0,0\n1,{name},0,0\n");
+        let files = [("p.csv", file(first)), ("q.csv", file(second)), ("r.csv", file("other"))];
+        let files: Vec<_> = files.iter().map(|(name, text)| (*name, text.as_str())).collect();
+        is_refused(folder(&files), &["q.csv", "are of the vehicle", "p.csv"]);
+    }
+    for [first, second] in [["1", "10"], ["cf1", "cf01"], ["4e5012", "4e5013"], ["3e0001", "30"], ["1.5", "1"]] {
+        let rows = format!("t,id,x,y\n0,{first},0,0\n0,{second},5,0\n1,{first},0,0\n1,{second},5,0\n");
+        assert_eq!(read(&rows).expect("read").vehicles.len(), 2, "{first} {second}");
+    }
+    // What all files say of their rows is no name of one of them.
+    let file = "t,child_frame_id,x,y\n0,base_link,0,0\n1,base_link,0,0\n";
+    assert_eq!(folder(&[("r1.csv", file), ("r2.csv", file)]).expect("read").vehicles, ["r1", "r2"]);
+}
