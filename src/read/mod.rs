@@ -17,6 +17,7 @@ mod axes;
 mod bag;
 mod capture;
 mod clock;
+mod columns;
 mod conventions;
 mod crazyflie;
 mod csv;
@@ -42,6 +43,7 @@ mod options;
 mod order;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet;
+mod places;
 mod recognise;
 mod skybrush;
 mod source;
