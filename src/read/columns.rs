@@ -5,10 +5,27 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::error::{Fault, list, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, VELOCITY, is_angle, is_velocity};
 use super::heights::Heights;
-use super::layout::Body;
 use super::options::{ColumnNames, ReadOptions};
 use super::turned;
 use super::units;
+
+/// The columns of a position, and of what else is known of a vehicle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Body {
+    /// x, y and z, if there is one; or latitude, longitude and height.
+    pub(super) position: [Option<usize>; 3],
+    pub(super) velocity: Option<[Option<usize>; 3]>,
+    pub(super) radius: Option<usize>,
+}
+
+impl Body {
+    /// The same without a height.
+    pub(super) fn flattened(mut self) -> Self {
+        self.position[2] = None;
+        self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
+        self
+    }
+}
 
 const WORDS: [&str; 12] = [
     "time",
@@ -53,7 +70,9 @@ impl<'a> Columns<'a> {
     pub(super) fn heights_used(&self, bodies: &[Body], options: &ReadOptions) -> Result<Option<String>, Fault> {
         let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
         let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
-        turned::refuse_turned_height(options, &self.header[first])?;
+        if self.place != EARTH {
+            turned::refuse_turned_height(options, &self.header[first])?;
+        }
         let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
         let turned = if is_turned { ", with the sign turned" } else { "" };
         let scale = options.scale;

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
-use super::columns::{Columns, missing};
+use super::columns::{Body, Columns, missing};
 use super::conventions::Convention;
 use super::error::{Fault, list, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle, is_velocity};
@@ -16,24 +16,6 @@ use super::order::PLANAR;
 use super::time_columns::{self, Rest};
 use super::turned;
 use super::units;
-
-/// The columns of a position, and of what else is known of a vehicle.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Body {
-    /// x, y and z, if there is one; or latitude, longitude and height.
-    pub(super) position: [Option<usize>; 3],
-    pub(super) velocity: Option<[Option<usize>; 3]>,
-    pub(super) radius: Option<usize>,
-}
-
-impl Body {
-    /// The same without a height.
-    fn flattened(mut self) -> Self {
-        self.position[2] = None;
-        self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
-        self
-    }
-}
 
 /// The columns of a table.
 #[derive(Clone, Debug, PartialEq)]

@@ -16,6 +16,7 @@ mod archive;
 mod axes;
 mod bag;
 mod capture;
+mod cells;
 mod clock;
 mod columns;
 mod conventions;

@@ -2,13 +2,13 @@
 
 use nalgebra::Vector3;
 
+use super::cells::{Cells, number, vector};
 use super::conventions::GLOBAL;
 use super::earth::{Geodetic, Local, is_no_fix};
 use super::error::{Fault, ReadError};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Row;
-use super::table::{Cells, number, vector};
 use super::turned;
 
 /// The frame of places on the Earth, where a table gives such: where the user says, or at the first place of the table.
