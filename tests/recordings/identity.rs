@@ -140,7 +140,7 @@ fn what_one_vehicle_measures_is_no_name() {
     let rows = |value: &dyn Fn(usize) -> String| {
         let place = |k: usize| (k as f64 / 9.0).sin();
         (0..200)
-            .map(|k| format!("{},{},{},{}\n", k as f64 / 10.0, place(k), place(2 * k), value(k)))
+            .flat_map(|k| [(k as f64 / 10.0).to_string(), place(k), place(2 * k), value(k)].join(",") + "\n")
             .collect::<String>()
     };
     let odd: [&dyn Fn(usize) -> String; 7] = [
