@@ -2,7 +2,9 @@
 
 use super::candidates::{Candidates, pair_count, pairs, pairs_of};
 use super::error::AuditError;
+use super::exact::ExactMotion;
 use super::ledger::Ledger;
+use super::line::Line;
 use super::outcome::{AuditOutcome, Status, StepFinding, Violation};
 use super::parry::KeepOut;
 use super::sweep::{ClosestPoint, Interval, MAX_LENGTH_M, MIN_LIMIT_M, RelativeMotion};
@@ -102,10 +104,10 @@ impl Auditor {
     #[must_use]
     pub fn finish(self) -> AuditOutcome {
         let decided = self.time_s.is_some() && self.outcome.refused == 0 && self.ledger.is_decided();
-        let Ledger { unresolved, parry, .. } = self.ledger;
+        let parry = self.ledger.parry;
         let violations = self.ledger.into_lists().violations;
         let status = Status::new(!violations.is_empty(), decided);
-        AuditOutcome { status, violations, unresolved, parry, ..self.outcome }
+        AuditOutcome { status, violations, parry, ..self.outcome }
     }
 
     fn admit<T>(&mut self, checked: Result<T, AuditError>) -> Result<T, AuditError> {
@@ -135,7 +137,8 @@ impl Auditor {
             let contact = keep_out.cast(&motion);
             if contact.is_some() || keep_out.is_near(&motion, point) {
                 let known = ledger.violations.len();
-                if let Some(index) = ledger.near(Pair::new(i, j), step, keep_out, &motion, point, contact) {
+                let exact = exact_motion([from, to], [i, j], step);
+                if let Some(index) = ledger.near(Pair::new(i, j), keep_out, &motion, contact, &exact) {
                     let violation = ledger.violations[index];
                     if index == known {
                         began.push(violation);
@@ -147,9 +150,26 @@ impl Auditor {
             }
         }
 
+        let mut separation_m = closest.separation_m();
+        // The smallest separation is exact, and so is its pair among those that rounding does not tell apart.
+        let motion_of = |i, j| RelativeMotion::new(row(from, j) - row(from, i), row(to, j) - row(to, i));
+        if pair.0 != pair.1 {
+            let near_m = separation_m + motion_of(pair.0, pair.1).resolution_m();
+            separation_m = f64::INFINITY;
+            for (i, j) in pairs(listed, self.vehicles) {
+                let motion = motion_of(i, j);
+                let point = motion.closest();
+                if point.separation_m() - motion.resolution_m() <= near_m {
+                    let exact = exact_motion([from, to], [i, j], step);
+                    if exact.is_below(separation_m) {
+                        (pair, closest, separation_m) = ((i, j), point, exact.separation());
+                    }
+                }
+            }
+        }
         self.outcome.pairs_checked += swept;
         self.outcome.pairs_excluded += pair_count(self.vehicles) - swept;
-        let (separation_m, time_s) = (closest.separation_m(), step.at(closest.at));
+        let time_s = step.at(closest.at);
         let pair = (pair.0 != pair.1).then(|| Pair::new(pair.0, pair.1));
         let closest = pair.map(|pair| ClosestApproach { pair, separation_m, time_s });
         if let Some(new) = closest
@@ -162,6 +182,13 @@ impl Auditor {
         self.time_s = Some(step.to_s);
         StepFinding { closest, began: &self.began, ended: &self.ended }
     }
+}
+
+/// The straight motion of a pair over a step, from one instant to the next.
+fn exact_motion([from, to]: [&Rows; 2], [i, j]: [usize; 2], over: Interval) -> ExactMotion {
+    let Interval { from_s, to_s } = over;
+    let line = |of| Line { from_s, to_s, from: row(from, of), to: row(to, of) };
+    ExactMotion { first: line(i), second: line(j), over }
 }
 
 /// Whether an instant can be judged: a time, and a position for each vehicle, that are not beyond what is computed with.
