@@ -138,7 +138,9 @@ impl Auditor {
             if contact.is_some() || keep_out.is_near(&motion, point) {
                 let known = ledger.violations.len();
                 let exact = exact_motion([from, to], [i, j], step);
-                if let Some(index) = ledger.near(Pair::new(i, j), keep_out, &motion, contact, &exact) {
+                // The number that the closest approach of the step has, and below the limit where it is rounded up to that.
+                let least_m = || point.separation_m().min(keep_out.delta_m.next_down());
+                if let Some(index) = ledger.near(Pair::new(i, j), keep_out, &motion, contact, &exact, least_m) {
                     let violation = ledger.violations[index];
                     if index == known {
                         began.push(violation);
@@ -150,26 +152,9 @@ impl Auditor {
             }
         }
 
-        let mut separation_m = closest.separation_m();
-        // The smallest separation is exact, and so is its pair among those that rounding does not tell apart.
-        let motion_of = |i, j| RelativeMotion::new(row(from, j) - row(from, i), row(to, j) - row(to, i));
-        if pair.0 != pair.1 {
-            let near_m = separation_m + motion_of(pair.0, pair.1).resolution_m();
-            separation_m = f64::INFINITY;
-            for (i, j) in pairs(listed, self.vehicles) {
-                let motion = motion_of(i, j);
-                let point = motion.closest();
-                if point.separation_m() - motion.resolution_m() <= near_m {
-                    let exact = exact_motion([from, to], [i, j], step);
-                    if exact.is_below(separation_m) {
-                        (pair, closest, separation_m) = ((i, j), point, exact.separation());
-                    }
-                }
-            }
-        }
         self.outcome.pairs_checked += swept;
         self.outcome.pairs_excluded += pair_count(self.vehicles) - swept;
-        let time_s = step.at(closest.at);
+        let (separation_m, time_s) = (closest.separation_m(), step.at(closest.at));
         let pair = (pair.0 != pair.1).then(|| Pair::new(pair.0, pair.1));
         let closest = pair.map(|pair| ClosestApproach { pair, separation_m, time_s });
         if let Some(new) = closest

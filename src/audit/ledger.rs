@@ -116,7 +116,7 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
     }
 
     /// Judges a straight motion that is below the limit, close to it, or in contact by the cast; returns the index of its
-    /// violation, if it is one.
+    /// violation, if it is one. `least_m` gives the smallest separation of a violation.
     #[cold]
     pub(super) fn near(
         &mut self,
@@ -125,6 +125,7 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         motion: &RelativeMotion,
         contact: Option<f64>,
         exact: &ExactMotion,
+        least_m: impl FnOnce() -> f64,
     ) -> Option<usize> {
         let (limit_m, over, approach) = (keep_out.delta_m, exact.over, motion.closest());
         let resolution_m = motion.resolution_m();
@@ -137,7 +138,7 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         if self.violations.is_of_before(to_s) {
             return None;
         }
-        let violation = Violation { pair, from_s, to_s, min_m: exact.separation(), min_at_s, limit_m };
+        let violation = Violation { pair, from_s, to_s, min_m: least_m(), min_at_s, limit_m };
         let start_m = motion.from_squared.sqrt();
         let is_near = (start_m - limit_m).abs() <= resolution_m;
         let from_start = if is_near { exact.starts_below(limit_m) } else { start_m < limit_m };

@@ -179,7 +179,8 @@ impl PairSweep<'_> {
     fn straight(&self, overlap: &Overlap<'_>, motion: &RelativeMotion, closest: ClosestPoint, results: &mut Results) {
         let contact = self.keep_out.cast(motion);
         if contact.is_some() || self.keep_out.is_near(motion, closest) {
-            results.ledger.near(self.pair, &self.keep_out, motion, contact, &overlap.exact());
+            let exact = overlap.exact();
+            results.ledger.near(self.pair, &self.keep_out, motion, contact, &exact, || exact.separation());
         }
     }
 
