@@ -140,8 +140,9 @@ fn what_one_vehicle_measures_is_no_name() {
     let rows = |value: &dyn Fn(usize) -> String| {
         let place = |k: usize| (k as f64 / 9.0).sin();
         (0..200)
-            .flat_map(|k| [(k as f64 / 10.0).to_string(), place(k), place(2 * k), value(k)].join(",") + "\n")
-            .collect::<String>()
+            .map(|k| format!("{},{},{},{}\n", k as f64 / 10.0, place(k), place(2 * k), value(k)))
+            .collect::<Vec<_>>()
+            .concat()
     };
     let odd: [&dyn Fn(usize) -> String; 7] = [
         &|k| (60 + k * 7 % 3).to_string(),
