@@ -224,7 +224,7 @@ def audit(
     vehicle was not seen; ``notes`` names whoever was not seen from the first instant to the last. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
 
     ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
-    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``scale``, ``dimensions``, ``column``, ``start``, ``layout``,
+    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``sort``, ``duplicates``, ``one_vehicle``, ``scale``, ``axes``, ``dimensions``, ``column``, ``start``, ``layout``,
     ``frame``, ``topic``, ``origin``, ``allow_unfinished``.
 
     ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep

@@ -123,7 +123,11 @@ def reading(
     time_unit: str | None = None,
     fps: float | None = None,
     time_scale: float | None = None,
-    scale: float | None = None,
+    sort: bool = False,
+    duplicates: str | None = None,
+    one_vehicle: bool = False,
+    scale: float | Iterable[float] | None = None,
+    axes: str | None = None,
     dimensions: str | None = None,
     column: Mapping[str, str] | None = None,
     start: Mapping[str, Iterable[float]] | None = None,
@@ -140,13 +144,16 @@ def reading(
         time_unit=time_unit,
         fps=fps,
         time_scale=time_scale,
-        scale=scale,
+        duplicates=duplicates,
+        axes=axes,
         dimensions=dimensions,
         layout=layout,
         frame=frame,
         topic=topic,
     )
-    words += flags(join=join, allow_unfinished=allow_unfinished)
+    words += flags(sort=sort, one_vehicle=one_vehicle, join=join, allow_unfinished=allow_unfinished)
+    if scale is not None:
+        words += [f"--scale={numbers(scale, 'scale') if isinstance(scale, Iterable) else number(scale, 'scale')}"]
     words += [] if origin is None else [f"--origin={numbers(origin, 'origin')}"]
     words += [f"--column={role}={name}" for role, name in by_name(column, "column").items()]
     return words + [f"--start={name}={numbers(place, 'start')}" for name, place in by_name(start, "start").items()]

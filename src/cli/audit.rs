@@ -195,7 +195,7 @@ fn judged(
             more = recording.read(&mut items)?;
         }
         if first && recording.clock().by_steps {
-            arguments.refuse_guessed_seconds(recording.clock().unit)?;
+            arguments.refuse_guessed_seconds(recording.clock().unit, &items)?;
         }
         first = false;
         level.check(&called, recording.vehicles(), &items)?;

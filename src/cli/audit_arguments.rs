@@ -18,6 +18,7 @@ use crate::audit::recorded::{Motion, Outcome, Settings, VehicleSettings};
 use crate::read::{Format, Recording};
 use crate::report::recorded::{Basis, Between};
 use crate::text::counted;
+use crate::track::Item;
 
 /// Arguments of `tautline audit`.
 #[derive(Clone, Debug, Args)]
@@ -188,6 +189,20 @@ fn axes(text: &str) -> Result<Vector3<f64>, String> {
     Ok(Vector3::new(x, y, z))
 }
 
+/// The largest speed from sample to sample of a vehicle \[m/s\]; 0 of curves.
+fn fastest_m_s(items: &[Item]) -> f64 {
+    let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
+    let samples = items.iter().filter_map(|item| match item {
+        Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
+        Item::Piece(_) => None,
+    });
+    let speeds = samples.filter_map(|(vehicle, (time_s, position_m))| {
+        let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
+        Some((position_m - before_m).norm() / (time_s - before_s))
+    });
+    speeds.fold(0.0, f64::max)
+}
+
 impl AuditArguments {
     /// Opens the recording.
     pub(super) fn open(&self) -> Result<Recording, Failure> {
@@ -284,8 +299,11 @@ impl AuditArguments {
         Ok(())
     }
 
-    /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording.
-    pub(super) fn refuse_guessed_seconds(&self, unit: &str) -> Result<(), Failure> {
+    /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording. Seconds are
+    /// no guess where the vehicles of these first items could not be as fast as milliseconds make them.
+    pub(super) fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
+        /// Speed that no vehicle of a swarm has \[m/s\]: that of sound.
+        const FASTEST_M_S: f64 = 340.0;
         let asked = [
             (matches!(self.motion, Some(Motion::Bounded)), "--motion bounded"),
             (self.from.is_some(), "--from"),
@@ -296,10 +314,18 @@ impl AuditArguments {
         ];
         let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
         let path = self.reading.called();
-        let message = format!(
-            "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
-        );
-        Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")))
+        if unit != "s" {
+            let message = format!(
+                "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
+            );
+            return Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")));
+        }
+        if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
+            return Ok(());
+        }
+        let message =
+            format!("{path}: its times are whole numbers, be they seconds or milliseconds, and {option} depends on it");
+        Err(Failure::input(message, "say --time-unit s, or --time-unit ms"))
     }
 
     /// What is taken to happen between samples of a recording of curves alone, or that may be ours, whose run may have answered

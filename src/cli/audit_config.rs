@@ -40,9 +40,29 @@ struct AuditTable {
     expect_vehicles: Option<usize>,
     layout: Option<String>,
     allow_undecided: Option<bool>,
+    axes: Option<String>,
+    scale: Option<Scale>,
     require_presence: Option<bool>,
     accel_window_s: Option<f64>,
     limits: BTreeMap<String, f64>,
+}
+
+/// Metres per unit of length, of all axes or of each.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(untagged)]
+enum Scale {
+    All(f64),
+    Each([f64; 3]),
+}
+
+impl Scale {
+    /// As `--scale` says it.
+    fn word(self) -> String {
+        match self {
+            Self::All(metres) => format!("{metres:?}"),
+            Self::Each([x, y, z]) => format!("{x:?},{y:?},{z:?}"),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -143,6 +163,8 @@ impl AuditTable {
         if arguments.motion == Some(Motion::Bounded) && arguments.max_accel.is_empty() {
             arguments.max_accel.extend(self.max_accel_m_s2.map(|accel| (None, accel)));
         }
+        let scale = self.scale.map(Scale::word);
+        arguments.reading.fill(self.axes.as_deref(), scale.as_deref()).map_err(wrong)?;
         arguments.obstacles = arguments.obstacles.or(self.obstacles.map(|file| folder.join(file)));
         arguments.fence = arguments.fence.or(self.fence.map(|file| folder.join(file)));
         arguments.above = arguments.above.or(self.above_m);
@@ -207,6 +229,8 @@ mod tests {
             ("[audit]\nmotion = \"spline\"", "line 2: unknown variant `spline`"),
             ("[audit.limits]\nspeed = 5.0", "`speed` is no limit: the limits are speed_m_s,"),
             ("[audit]\nmax_accel_m_s2 = 2.0", "add motion = \"bounded\""),
+            ("[audit]\naxes = \"nes\"", "`nes` is not three directions"),
+            ("[audit]\nscale = [1, 0, 1]", "a scale of 0"),
             ("[audit]\nlayout = \"time,axis\"", "layout: `time,axis` is none of time,vehicle,axis "),
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),

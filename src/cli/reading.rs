@@ -9,12 +9,14 @@ use super::Failure;
 use super::own::OwnRecording;
 use super::run::RECORDING;
 use crate::read::{
-    self, ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Format, ReadError, ReadOptions, Recording, TimeUnit,
+    self, ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, ReadError, ReadOptions, Recording,
+    TimeUnit,
 };
 
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Reading")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct ReadArguments {
     /// The recording: a file, the folder of a run or of a ROS 2 bag, or a folder or archive with a file for each vehicle.
     #[arg(index = 1, value_name = "RECORDING", value_parser = recording())]
@@ -34,12 +36,24 @@ pub(super) struct ReadArguments {
     /// How many seconds a unit of time of the recording lasts.
     #[arg(long, value_name = "SECONDS", conflicts_with = "time_unit", allow_negative_numbers = true)]
     time_scale: Option<f64>,
+    /// Sort rows that go back in time.
+    #[arg(long)]
+    sort: bool,
+    /// Which of several rows of a vehicle at one time is read [default: refuse, unless they say the same].
+    #[arg(long, value_name = "WHICH", value_parser = duplicates())]
+    duplicates: Option<Duplicates>,
+    /// All rows of a table are of one vehicle, whatever other columns it has.
+    #[arg(long)]
+    one_vehicle: bool,
     /// Numbers of a vehicle in a table without a header: x and y, x, y and z, or those and their velocities.
     #[arg(long, value_name = "NUMBERS", value_parser = dimensions())]
     dimensions: Option<Dimensions>,
-    /// Metres per unit of length of the recording.
-    #[arg(long, value_name = "METRES", default_value_t = 1.0, allow_negative_numbers = true)]
-    scale: f64,
+    /// Metres per unit of length of the recording; three numbers, with signs, are of its x, y and z [default: 1].
+    #[arg(long, value_name = "METRES", value_parser = scale, allow_hyphen_values = true)]
+    scale: Option<Scale>,
+    /// Directions of the axes of the recording: enu, ned, nwu and the like, or what becomes x, y and z, such as y,x,-z.
+    #[arg(long, value_name = "AXES", value_parser = axes, allow_hyphen_values = true)]
+    axes: Option<Axes>,
     /// Name of a column: t, id, x, y, z, vx, vy, vz, radius, or lat, lon, alt. In NPZ, t and x name the arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
     columns: Vec<(String, String)>,
@@ -119,10 +133,21 @@ impl ReadArguments {
         std::iter::once(&self.recording).chain(&self.more).map(PathBuf::as_path)
     }
 
+    /// Fills what is not given of the axes and of their scale, as a file of settings says it.
+    ///
+    /// # Errors
+    /// What is wrong with the text of either.
+    pub(super) fn fill(&mut self, axes_as: Option<&str>, scale_as: Option<&str>) -> Result<(), String> {
+        self.axes = self.axes.or(axes_as.map(axes).transpose()?);
+        self.scale = self.scale.or(scale_as.map(scale).transpose()?);
+        Ok(())
+    }
+
     /// The options of the library, with the format if it is given.
     pub(super) fn options(&self, format: Option<Format>) -> Result<ReadOptions, Failure> {
-        if !(self.scale > 0.0 && self.scale.is_finite()) {
-            let message = format!("--scale is {}", self.scale);
+        let scale = self.scale.unwrap_or(Scale { metres: 1.0, each: [1.0; 3] });
+        if !(scale.metres > 0.0 && scale.metres.is_finite()) {
+            let message = format!("--scale is {}", scale.metres);
             return Err(Failure::input(message, "give a positive number of metres, such as 0.001 for millimetres"));
         }
         for (option, value) in [("--fps", self.frames_per_s), ("--time-scale", self.time_scale)] {
@@ -138,9 +163,12 @@ impl ReadArguments {
             format,
             time_unit: self.time_unit,
             times_per_second: self.frames_per_s.or(self.time_scale.map(f64::recip)),
-            scale: self.scale,
+            sort: self.sort,
+            duplicates: self.duplicates,
+            scale: scale.metres,
+            axes: self.axes.unwrap_or_default().scaled(scale.each),
             dimensions: self.dimensions,
-            one_vehicle: false,
+            one_vehicle: self.one_vehicle,
             starts: self.starts.iter().cloned().collect(),
             columns,
             layout: self.layout,
@@ -149,8 +177,41 @@ impl ReadArguments {
             topics: self.topics.clone(),
             origin: self.origin,
             allow_unfinished: self.allow_unfinished,
+            ..ReadOptions::default()
         })
     }
+}
+
+/// Metres per unit of length: the same for all axes, and what is different among them.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    metres: f64,
+    each: [f64; 3],
+}
+
+fn scale(text: &str) -> Result<Scale, String> {
+    if let Ok(metres) = text.trim().parse() {
+        return Ok(Scale { metres, each: [1.0; 3] });
+    }
+    let each = three(text).map_err(|_| format!("`{text}` is neither a number nor three, such as 1,1,-1"))?;
+    if each.contains(&0.0) {
+        return Err("a scale of 0 makes all places the same".to_owned());
+    }
+    // Axes of one length differ by their signs alone.
+    let metres = each[0].abs();
+    if each.iter().all(|x| x.abs() == metres) {
+        return Ok(Scale { metres, each: each.map(f64::signum) });
+    }
+    Ok(Scale { metres: 1.0, each })
+}
+
+fn axes(text: &str) -> Result<Axes, String> {
+    let help = "three directions such as enu, ned or nwu, or what becomes x, y and z, such as y,x,-z";
+    Axes::from_name(text).ok_or_else(|| format!("`{text}` is not {help}"))
+}
+
+fn duplicates() -> impl TypedValueParser<Value = Duplicates> {
+    one_of(Duplicates::ALL.map(|which| (which.name().into(), which)).into())
 }
 
 /// A path; of the folder of a run, that of what was recorded.
@@ -218,9 +279,12 @@ pub(super) fn format() -> impl TypedValueParser<Value = Format> {
     let help = |format| match format {
         Format::Csv => "A table in text with a header",
         Format::Text => "Numbers between blanks: t x y z x y z ...",
+        Format::Trajnet => "Numbers between blanks: frame, vehicle, x and y",
+        Format::Jsonl => "An object of JSON in each line",
         Format::Parquet => "A table in Parquet",
         Format::Npz => "Arrays t and positions, as numpy.savez saves them",
         Format::Mcap => "MCAP: our own, Foxglove or ROS 2 messages",
+        Format::Ulog => "A log of PX4",
         Format::Crazyflie => "A folder of Crazyflie polynomials",
         Format::Skybrush => "A Skybrush show",
         Format::Vviz => "A VVIZ show of Verge Aero or Finale 3D",

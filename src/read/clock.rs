@@ -42,9 +42,16 @@ impl TimeUnit {
     const fn names(self) -> (&'static [&'static str], i64) {
         match self {
             Self::Seconds => (&["s", "sec", "secs", "second", "seconds"], 1),
-            Self::Milliseconds => (&["ms", "msec", "millis", "milliseconds"], 1_000),
-            Self::Microseconds => (&["us", "µs", "μs", "usec", "micros", "microseconds"], 1_000_000),
-            Self::Nanoseconds => (&["ns", "nsec", "nanos", "nanoseconds"], 1_000_000_000),
+            Self::Milliseconds => {
+                (&["ms", "msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"], 1_000)
+            }
+            Self::Microseconds => (
+                &["us", "µs", "μs", "usec", "usecs", "micros", "microsec", "microsecs", "microsecond", "microseconds"],
+                1_000_000,
+            ),
+            Self::Nanoseconds => {
+                (&["ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"], 1_000_000_000)
+            }
         }
     }
 
@@ -94,6 +101,18 @@ impl Stamp {
             return Some(Self::Whole(whole));
         }
         text.parse().ok().map(Self::Real)
+    }
+
+    /// The whole number that it is; none where it has a part below one.
+    pub(super) fn whole(self) -> Option<i64> {
+        /// Doubles below it are exact to the last unit.
+        const EXACT: f64 = 9_007_199_254_740_992.0;
+        match self {
+            Self::Whole(whole) | Self::Fixed { whole, decimals: 0 } => Some(whole),
+            #[expect(clippy::cast_possible_truncation, reason = "a whole number below 2^53")]
+            Self::Real(real) if real.fract() == 0.0 && real.abs() < EXACT => Some(real as i64),
+            Self::Real(_) | Self::Fixed { .. } => None,
+        }
     }
 
     /// The nearest double \[units\].
@@ -153,16 +172,18 @@ pub(super) struct Probe {
     last: Stamp,
     /// Smallest step between two different times \[units\].
     step: f64,
-    /// Whether all times are whole numbers.
+    /// Whether all times are written as whole numbers.
     whole: bool,
+    /// Whether all times are whole numbers, however they are written.
+    integral: bool,
     /// Whether time never ran backwards.
     pub(super) in_order: bool,
 }
 
 impl Probe {
     pub(super) fn new(first: Stamp) -> Self {
-        let whole = matches!(first, Stamp::Whole(_));
-        Self { first, last: first, step: f64::INFINITY, whole, in_order: true }
+        let (whole, integral) = (matches!(first, Stamp::Whole(_)), first.whole().is_some());
+        Self { first, last: first, step: f64::INFINITY, whole, integral, in_order: true }
     }
 
     pub(super) fn see(&mut self, stamp: Stamp) {
@@ -172,6 +193,7 @@ impl Probe {
         }
         self.in_order &= order == Ordering::Less;
         self.whole &= matches!(stamp, Stamp::Whole(_));
+        self.integral &= stamp.whole().is_some();
         self.step = self.step.min((stamp.since(0) - self.last.since(0)).abs());
         if self.first.compare(stamp) == Ordering::Greater {
             self.first = stamp;
@@ -181,10 +203,12 @@ impl Probe {
 
     /// The unit that times of this size and step are most likely in, and what speaks for it.
     ///
+    /// The last part of the result is whether another unit would fit as well: whole numbers count anything.
+    ///
     /// Times of day since 1970 tell by their size, unless their step is too long for it. Other whole numbers tell by their
     /// step: vehicles are recorded up to 500 times a second, and hardly ever every two seconds. Everything else is in
     /// seconds.
-    fn likely_unit(&self) -> (TimeUnit, &'static str) {
+    fn likely_unit(&self) -> (TimeUnit, &'static str, bool) {
         let size = self.first.approximately();
         let by_size = TimeUnit::ALL.into_iter().find(|unit| {
             let per_second = unit.per_second() as f64;
@@ -192,15 +216,16 @@ impl Probe {
             fits && (1e8 * per_second..1e10 * per_second).contains(&size)
         });
         if let Some(unit) = by_size {
-            return (unit, "because they are of the size of times since 1970");
+            return (unit, "because they are of the size of times since 1970", false);
         }
-        match self.step {
+        let (unit, why) = match self.step {
             step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "because nothing says otherwise"),
             step if step >= 1e6 => (TimeUnit::Nanoseconds, BY_STEPS),
             step if step >= 1e3 => (TimeUnit::Microseconds, BY_STEPS),
             step if step >= 2.0 => (TimeUnit::Milliseconds, BY_STEPS),
             _ => (TimeUnit::Seconds, "because nothing says otherwise"),
-        }
+        };
+        (unit, why, self.integral && self.step.is_finite())
     }
 }
 
@@ -217,10 +242,10 @@ impl Timing {
     /// A clock that fits what was seen, and a sentence where its unit is not known but inferred.
     pub(super) fn settle(probe: &Probe, known: Option<TimeUnit>) -> (Self, Option<String>) {
         let inferred = || {
-            let (unit, why) = probe.likely_unit();
-            (unit, Some(why))
+            let (unit, why, unsure) = probe.likely_unit();
+            (unit, Some(why), unsure)
         };
-        let (unit, why) = known.map_or_else(inferred, |unit| (unit, None));
+        let (unit, why, by_steps) = known.map_or_else(inferred, |unit| (unit, None, false));
         let name = unit.name();
         let note =
             why.map(|why| format!("times carry no unit and are taken as {name}, {why} (--time-unit {name} says so)"));
@@ -230,7 +255,7 @@ impl Timing {
         let seconds = Some(seconds).filter(|&seconds| fits && (seconds as f64).abs() >= EPOCH_FROM_S);
         let epoch = seconds.and_then(|s| Some((s.checked_mul(per_second)?, s.checked_mul(1_000_000_000)?)));
         let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
-        let clock = Clock { unit: name, inferred: why.is_some(), by_steps: why == Some(BY_STEPS), epoch_ns };
+        let clock = Clock { unit: name, inferred: why.is_some(), by_steps, epoch_ns };
         (Self { clock, per_second: per_second as f64, epoch }, note)
     }
 
@@ -293,6 +318,7 @@ mod tests {
             (["0", "10000000"], "ns"),
             (["0", "1"], "s"),
             (["0", "0.02"], "s"),
+            (["0.5", "10.5"], "s"),
             (["1700000000000", "1700000000010"], "ms"),
             (["1700000000000000", "1700000000010000"], "us"),
             (["1700000000", "1700000600"], "s"),
@@ -301,8 +327,17 @@ mod tests {
             (["500000000000", "500010000000"], "ns"),
         ] {
             let clock = timing(&texts, None).0.clock;
-            let by_size = texts[0].starts_with("1700000000");
-            assert_eq!((clock.unit, clock.by_steps), (unit, unit != "s" && !by_size), "{texts:?}");
+            let (by_size, has_parts) = (texts[0].starts_with("1700000000"), texts[1].contains('.'));
+            assert_eq!((clock.unit, clock.by_steps), (unit, !has_parts && !by_size), "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_with_decimals_may_be_of_any_unit() {
+        for (texts, by_steps) in [(["0.0", "10.0"], true), (["0", "1"], true), (["0.0", "10.5"], false)] {
+            let clock = timing(&texts, None).0.clock;
+            assert_eq!((clock.unit, clock.by_steps), ("s", by_steps), "{texts:?}");
+            assert!(!timing(&texts, Some(TimeUnit::Seconds)).0.clock.by_steps);
         }
     }
 

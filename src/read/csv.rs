@@ -4,11 +4,12 @@
 //! over the end of a line where a quote is left open, and knows no fields between any number of blanks.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::str;
 
 use csv_core::ReadRecordResult;
 
-use super::clock::Stamp;
+use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::format::Format;
 use super::headerless;
@@ -18,6 +19,7 @@ use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
 use super::source::{Lines, Source};
 use super::table::{self, Cells};
+use super::time_columns;
 
 /// What stands between two fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,15 +32,21 @@ enum Separator {
 
 const BLANKS: Separator = Separator::Any(b" \t");
 
+/// The columns of a table of `TrajNet`, which has no header.
+const TRAJNET: [&str; 4] = ["frame", "id", "x", "y"];
+
 /// Between the numbers of `t (x,y) (x,y)`.
 const TUPLES: Separator = Separator::Any(b" \t(),");
 
 /// A table in text.
+#[expect(clippy::struct_excessive_bools, reason = "each says something else of the lines")]
 pub(super) struct Text {
     source: Source,
     lines: Lines,
     separator: Separator,
     has_header: bool,
+    /// Whether a row below the header holds units.
+    has_units: bool,
     /// The numbers of the first line below the header, where all are numbers.
     first: Vec<f64>,
     /// Whether names say what the numbers are.
@@ -55,7 +63,12 @@ pub(super) struct Text {
 
 /// Opens a table.
 pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let text = Text::open(source, format)?;
+    let mut text = Text::open(source, format)?;
+    if format == Format::Text && !text.named && is_trajnet(source, text.separator)? {
+        text = Text::open(source, Format::Trajnet)?;
+    }
+    let header_row = text.row();
+    text.take_units()?;
     let (stem, first) = (source.stem(), &text.first);
     let numbers = || {
         let dimensions = options.dimensions.or(text.tuples());
@@ -70,7 +83,7 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
     };
-    let layout = layout.map_err(|fault| fault.at(Text::place(text.row())))?;
+    let layout = layout.map_err(|fault| fault.at(Text::place(header_row)))?;
     table::open(source, text, layout, None, 0, options)
 }
 
@@ -92,6 +105,7 @@ impl Text {
             separator: separator(lines.line(), format),
             lines,
             has_header: true,
+            has_units: false,
             first: Vec::new(),
             named: true,
             comments: false,
@@ -126,6 +140,12 @@ impl Text {
         let above = above.into_iter().filter_map(Result::ok);
         let above =
             above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
+        if format == Format::Trajnet && !(numeric && self.header.len() == TRAJNET.len()) {
+            let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
+            let remedy =
+                "a table of TrajNet has frame, vehicle, x and y in each line, and no header; leave --format away";
+            return Err(Fault::content(problem, remedy));
+        }
         if numeric {
             self.first = self.header.iter().map(|number| number.parse()).collect::<Result<_, _>>().unwrap_or_default();
         }
@@ -133,6 +153,9 @@ impl Text {
             (self.header, self.has_header, self.comments) = (names, false, true);
         } else if !numeric {
             self.header.pop_if(|name| name.is_empty());
+        } else if format == Format::Trajnet {
+            self.header = TRAJNET.map(str::to_owned).into();
+            self.first.clear();
         } else if format == Format::Text {
             self.header = (1..=self.header.len()).map(|number| number.to_string()).collect();
             self.named = false;
@@ -141,6 +164,25 @@ impl Text {
                           a row for each time";
             return Err(Fault::content("the first line holds numbers and no names of columns", remedy));
         }
+        Ok(())
+    }
+
+    /// Takes a row of units below the header for what it says: each into the name of its column.
+    fn take_units(&mut self) -> Result<(), ReadError> {
+        let found = time_columns::find(&self.header, &ReadOptions::default()).ok().flatten();
+        let Some((time, _)) = found.filter(|_| self.has_header) else { return Ok(()) };
+        if !next_line(&mut self.lines, self.comments)? {
+            return Ok(());
+        }
+        let Ok(cells) = names(self.lines.line(), self.separator) else { return Ok(()) };
+        let units: Vec<_> = cells.iter().map(|cell| cell.trim_matches(['[', ']', '(', ')', ' '])).collect();
+        let is_of_time = |unit: &&str| TimeUnit::from_name(&unit.to_lowercase()).is_some();
+        let is_number = |unit: &&str| *unit != "1" && unit.parse::<f64>().is_ok();
+        if !units.get(time).is_some_and(is_of_time) || units.iter().any(is_number) {
+            return Ok(());
+        }
+        self.header = heading::with_units(&self.header, &units).map_err(|fault| fault.at(Self::place(self.row())))?;
+        self.has_units = true;
         Ok(())
     }
 
@@ -191,6 +233,9 @@ impl Cells for Text {
         self.lines = Lines::new(&self.source)?;
         if self.has_header {
             next_line(&mut self.lines, true)?;
+        }
+        if self.has_units {
+            next_line(&mut self.lines, self.comments)?;
         }
         self.time.0.clear();
         Ok(())
@@ -250,6 +295,32 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
+/// Whether numbers without a header can be nothing but those of `TrajNet`: whole numbers of a frame and a vehicle, and two
+/// others; several rows of one frame, and no vehicle twice in it.
+fn is_trajnet(source: &Source, separator: Separator) -> Result<bool, ReadError> {
+    let mut lines = Lines::new(source)?;
+    let (mut fields, mut frame, mut vehicles, mut repeats) = (Fields::default(), None, BTreeSet::new(), false);
+    while next_line(&mut lines, true)? {
+        if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET.len() {
+            return Ok(false);
+        }
+        let whole = |index| {
+            let text = str::from_utf8(fields.bytes(lines.line(), index)).ok()?;
+            Stamp::parse(text.trim())?.whole()
+        };
+        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(false) };
+        if frame.replace(of_frame) == Some(of_frame) {
+            repeats = true;
+        } else {
+            vehicles.clear();
+        }
+        if !vehicles.insert(vehicle) {
+            return Ok(false);
+        }
+    }
+    Ok(repeats)
+}
+
 /// The fields of a line of names.
 fn names(line: &[u8], separator: Separator) -> Result<Vec<String>, Fault> {
     let mut fields = Fields::default();
@@ -263,7 +334,7 @@ fn separator(line: &[u8], format: Format) -> Separator {
     let (comma, semicolon, tab) = (count(b','), count(b';'), count(b'\t'));
     match format {
         Format::Text if line.contains(&b'(') => TUPLES,
-        Format::Text if comma == 0 && semicolon == 0 => BLANKS,
+        Format::Text | Format::Trajnet if comma == 0 && semicolon == 0 => BLANKS,
         _ if semicolon > 0 && semicolon >= comma => Separator::Byte(b';'),
         _ if tab > comma => Separator::Byte(b'\t'),
         _ => Separator::Byte(b','),

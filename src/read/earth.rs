@@ -6,6 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::{Fault, quoted};
+use super::options::ReadOptions;
 use crate::track::EarthOrigin;
 
 /// Half the equator's diameter \[m\].
@@ -43,6 +44,39 @@ impl Local {
             north_sine,
         );
         Ok(Self { origin, centre_m, axes })
+    }
+
+    /// The frame where the user says, or else at this first place.
+    pub(super) fn first(place: Geodetic, options: &ReadOptions) -> Result<Self, Fault> {
+        if let Some(origin) = options.origin {
+            return Self::at(origin.into());
+        }
+        let local = Self::at(place)?;
+        if !options.is_joined {
+            return Ok(local);
+        }
+        // Another file would begin somewhere else.
+        let problem = "nothing says what its places on the Earth are measured from, the same for all files";
+        let remedy = format!("say it with --origin, such as --origin {}", local.origin());
+        Err(Fault::content(problem, remedy))
+    }
+
+    /// A place that is given east, north and up of another origin \[m\].
+    pub(super) fn place_from(&self, other: &Self, place: Vector3<f64>) -> Vector3<f64> {
+        if self == other {
+            return place;
+        }
+        self.axes * (other.axes.transpose() * place + (other.centre_m - self.centre_m))
+    }
+
+    /// A direction that is given east, north and up of another origin.
+    pub(super) fn turn_from(&self, other: &Self, direction: Vector3<f64>) -> Vector3<f64> {
+        if self == other { direction } else { self.axes * (other.axes.transpose() * direction) }
+    }
+
+    /// Whether a place is its origin.
+    pub(super) fn is_at(&self, place: Geodetic) -> bool {
+        self.origin == place
     }
 
     /// A place, east, north and up of the origin \[m\].
@@ -171,6 +205,17 @@ mod tests {
             let above = local.place(origin + vector![0.0, 0.0, 100.0]).expect("a place");
             assert!((above - vector![0.0, 0.0, 100.0]).norm() < 3.0 * ROUNDING_M, "{origin}: {above}");
         }
+    }
+
+    #[test]
+    fn places_around_another_origin_are_the_places_that_they_are() {
+        let (here, there) = (vector![47.0, 8.0, 400.0], vector![47.01, 8.02, 450.0]);
+        let [here, there] = [here, there].map(|place| Local::at(place).expect("a place"));
+        let place = vector![47.011, 8.019, 470.0];
+        let moved = here.place_from(&there, there.place(place).expect("a place"));
+        assert!((moved - here.place(place).expect("a place")).norm() < 4.0 * ROUNDING_M, "{moved}");
+        let step = here.place_from(&there, vector![1.0, 2.0, 3.0]) - here.place_from(&there, Vector3::zeros());
+        assert!((here.turn_from(&there, vector![1.0, 2.0, 3.0]) - step).norm() < ROUNDING_M);
     }
 
     #[test]

@@ -189,7 +189,10 @@ impl Fault {
     /// Time runs backwards where it must not.
     pub(super) fn time_backwards(time_s: f64, before_s: f64) -> Self {
         let problem = format!("time runs backwards: {time_s} s comes after {before_s} s");
-        Self::content(problem, "sort the lines by time, and look whether two recordings were joined")
+        let remedy = "look whether two recordings were joined or the clock was set; where the rows are of several \
+                      vehicles, name the column that tells them apart with --column id=NAME; where the lines are only \
+                      out of order, sort the lines by time, or have them sorted with --sort";
+        Self::content(problem, remedy)
     }
 
     /// Times are numbers of frames, and nobody says how long one lasts.

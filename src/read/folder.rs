@@ -13,7 +13,8 @@ use super::source::Source;
 const LONGEST_NUMBER: usize = 20;
 
 /// Ends of the names of tables.
-const TABLES: [&str; 8] = ["csv", "tsv", "txt", "dat", "tum", "parquet", "npz", "gz"];
+const TABLES: [&str; 12] =
+    ["csv", "tsv", "txt", "dat", "tum", "parquet", "npz", "gz", "jsonl", "ndjson", "ulg", "ulog"];
 
 /// Ends of the names of texts, be they tables or not.
 const TEXTS: [&str; 2] = ["txt", "dat"];
@@ -22,7 +23,7 @@ const TEXTS: [&str; 2] = ["txt", "dat"];
 const NOTES: [&str; 6] = ["readme", "license", "licence", "copying", "changelog", "authors"];
 
 /// Ends of the names of recordings that are given alone, and of archives.
-const ALONE: [&str; 11] = ["mcap", "skyc", "zip", "tar", "tgz", "7z", "rar", "bag", "db3", "ulg", "ulog"];
+const ALONE: [&str; 9] = ["mcap", "skyc", "zip", "tar", "tgz", "7z", "rar", "bag", "db3"];
 
 /// Most files or folders that are named.
 const LISTED: usize = 5;

@@ -7,12 +7,18 @@ pub enum Format {
     Csv,
     /// Numbers between blanks: `t x y z x y z ...`.
     Text,
+    /// Numbers between blanks: frame, vehicle, x and y of `TrajNet`.
+    Trajnet,
+    /// A table with an object of JSON in each line.
+    Jsonl,
     /// A table in Parquet, long or wide.
     Parquet,
     /// `NumPy` arrays `t` and `positions`.
     Npz,
     /// MCAP: our own, Foxglove or ROS 2 messages.
     Mcap,
+    /// A log of PX4.
+    Ulog,
     /// A folder of Crazyflie polynomials, a CSV a vehicle.
     Crazyflie,
     /// A Skybrush show: `.skyc` or its JSON.
@@ -27,12 +33,15 @@ pub enum Format {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 13] = [
         Self::Csv,
         Self::Text,
+        Self::Trajnet,
+        Self::Jsonl,
         Self::Parquet,
         Self::Npz,
         Self::Mcap,
+        Self::Ulog,
         Self::Crazyflie,
         Self::Skybrush,
         Self::Vviz,
@@ -45,9 +54,12 @@ impl Format {
         match self {
             Self::Csv => ["csv", "a table in CSV"],
             Self::Text => ["text", "a table in plain text"],
+            Self::Trajnet => ["trajnet", "a table of TrajNet"],
+            Self::Jsonl => ["jsonl", "a table of JSON objects"],
             Self::Parquet => ["parquet", "a Parquet file"],
             Self::Npz => ["npz", "an NPZ archive"],
             Self::Mcap => ["mcap", "an MCAP file"],
+            Self::Ulog => ["ulog", "a ULog of PX4"],
             Self::Crazyflie => ["crazyflie", "a folder of Crazyflie polynomials"],
             Self::Skybrush => ["skybrush", "a Skybrush show"],
             Self::Vviz => ["vviz", "a VVIZ show"],

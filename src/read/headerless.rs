@@ -1,5 +1,6 @@
 //! Tables of plain numbers without a header.
 
+use super::conventions::Convention;
 use super::error::Fault;
 use super::layout::{Body, Layout};
 use super::options::{Dimensions, ReadOptions};
@@ -23,6 +24,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         let note = format!("there is no header: the numbers are taken as {words}");
         Layout {
             time,
+            rest: None,
             unit: None,
             id: None,
             is_id_given: false,
@@ -31,6 +33,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             names,
             metres: vec![1.0; count],
             on_earth: false,
+            convention: Convention::default(),
             is_planar: bodies.iter().any(|body| body.position[2].is_none()),
             bodies,
             notes: vec![note],

@@ -1,6 +1,7 @@
 //! What the name of a column says: a quantity, perhaps of a vehicle, perhaps in a unit.
 
 use super::clock::TimeUnit;
+use super::error::{Fault, quoted};
 use super::units;
 
 /// What a column gives: its place among [`ColumnNames::ROLES`](super::options::ColumnNames::ROLES). Axes follow each
@@ -275,7 +276,7 @@ pub(crate) fn is_read(name: &str) -> bool {
 }
 
 /// The name of a column of time in lower case without its unit, and the unit.
-fn time_and_unit(name: &str) -> (String, Option<String>) {
+pub(super) fn time_and_unit(name: &str) -> (String, Option<String>) {
     let name = name.to_lowercase();
     let (stem, unit) = units::bracketed(&name);
     let longer = ["min", "mins", "minute", "minutes", "h", "hr", "hrs", "hour", "hours", "day", "days"];
@@ -293,7 +294,9 @@ pub(super) fn is_clock(name: &str) -> bool {
 }
 
 pub(super) fn is_time(name: &str) -> bool {
-    matches!(time_and_unit(name).0.as_str(), "t" | "time" | "timestamp" | "stamp")
+    const NAMES: [&str; 10] =
+        ["t", "time", "timestamp", "stamp", "datetime", "date_time", "utc", "time_utc", "utc_time", "timestamp_utc"];
+    NAMES.contains(&time_and_unit(name).0.as_str())
 }
 
 /// Whether a column counts pictures or steps.
@@ -381,4 +384,38 @@ pub(super) fn is_id(name: &str) -> bool {
 /// A name in lower case without its unit, as one word.
 fn joined(name: &str) -> String {
     units::bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")
+}
+
+/// Names of columns with the units that a row below them says. A name that says the same keeps it, and so does one that is
+/// nothing but the unit of a part of a time.
+pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String>, Fault> {
+    let with_unit = |(name, unit): (&String, &&str)| {
+        let is_time = is_time(name);
+        let is_part =
+            !is_time && TimeUnit::from_name(name.rsplit(['.', '/', '_', ' ']).next().unwrap_or_default()).is_some();
+        if is_part || matches!(*unit, "" | "-" | "1") {
+            return Ok(name.clone());
+        }
+        let said = if is_time {
+            said_unit(name)
+        } else {
+            let ending = || units::endings(name).next().map(|(_, unit, _)| unit);
+            units::bracketed(name).1.or_else(ending).map(str::to_owned)
+        };
+        let Some(said) = said else { return Ok(format!("{name} [{unit}]")) };
+        let is_same = |velocity: bool| {
+            units::size_of(&said, velocity).is_some_and(|size| units::size_of(unit, velocity) == Some(size))
+        };
+        let time = |unit: &str| TimeUnit::from_name(&unit.to_lowercase());
+        if said.eq_ignore_ascii_case(unit) || is_same(false) || is_same(true) || (is_time && time(&said) == time(unit))
+        {
+            return Ok(name.clone());
+        }
+        let problem =
+            format!("column {} says the unit {}, and the row of units {}", quoted(name), quoted(&said), quoted(unit));
+        Err(Fault::content(problem, "take one of the two units out"))
+    };
+    let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
+    named.extend(header.iter().skip(named.len()).cloned());
+    Ok(named)
 }

@@ -195,8 +195,9 @@ impl Suspect {
             "its rows look like those of several vehicles: column {} has {count} values that alternate",
             quoted(called)
         );
-        let remedy =
-            format!("name the column of the vehicle with --column id={called}, or take the column out if it is none");
+        let remedy = format!(
+            "name the column of the vehicle with --column id={called}; where all rows are of one vehicle, say so with --one-vehicle"
+        );
         Some(Fault::content(problem, remedy))
     }
 }

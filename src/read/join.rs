@@ -89,11 +89,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
-        for note in tracks.notes() {
-            if !notes.contains(note) {
-                notes.push(note.clone());
-            }
-        }
+        note_new(&mut notes, tracks.notes());
         let shift_s = own.epoch_ns.saturating_sub(clock.epoch_ns) as f64 / 1e9;
         let waiting = Vec::new().into_iter().peekable();
         joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
@@ -120,6 +116,15 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), Re
     let problem = format!("its rows are of the vehicle {}, and so are those of {}", quoted(name), first.display());
     let remedy = "put all rows of a vehicle into one file, or take the column out that names it";
     Err(ReadError::new(path, Fault::content(problem, remedy)))
+}
+
+/// Appends notes that are not there yet.
+fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
+    for note in of_part {
+        if !notes.contains(note) {
+            notes.push(note.clone());
+        }
+    }
 }
 
 impl Part {
@@ -175,9 +180,9 @@ impl Tracks for Joined {
         items[before..].sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         if items.len() == before {
             // Some of what a person should know shows at the end.
-            let late = self.parts.iter().flat_map(|part| part.tracks.notes());
-            let late: Vec<_> = late.filter(|note| !self.notes.contains(note)).cloned().collect();
-            self.notes.extend(late);
+            for part in &self.parts {
+                note_new(&mut self.notes, part.tracks.notes());
+            }
         }
         Ok(items.len() > before)
     }

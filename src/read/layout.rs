@@ -6,11 +6,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
+use super::conventions::Convention;
 use super::error::{Fault, list, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::heights::Heights;
 use super::options::{ColumnNames, ReadOptions};
 use super::order::PLANAR;
+use super::time_columns::{self, Rest};
+use super::turned;
 use super::units;
 
 /// The columns of a position, and of what else is known of a vehicle.
@@ -36,6 +39,8 @@ impl Body {
 pub(super) struct Layout {
     /// The column of time; none where the number of the row is the time.
     pub(super) time: Option<usize>,
+    /// The column of the rest of the time below a unit of the first.
+    pub(super) rest: Option<Rest>,
     /// The unit in the name of the column of time.
     pub(super) unit: Option<TimeUnit>,
     /// The column of the vehicle in a long table.
@@ -54,6 +59,8 @@ pub(super) struct Layout {
     pub(super) metres: Vec<f64>,
     /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
     pub(super) on_earth: bool,
+    /// What the names of the columns say of frames and of programs.
+    pub(super) convention: Convention,
     /// Whether some vehicle has no column of its height: then no vehicle has one.
     pub(super) is_planar: bool,
     /// What a person should know about the columns.
@@ -84,6 +91,10 @@ fn missing(header: &[String], role: Role, of: &str) -> Fault {
 impl Layout {
     /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
+        let convention = Convention::of(header, options)?;
+        if convention.has_directions {
+            turned::refuse_known(options, "its header")?;
+        }
         let mut columns = Columns {
             header,
             found: BTreeMap::new(),
@@ -101,15 +112,24 @@ impl Layout {
             let unit = unit.filter(|unit| is_angle(role) || units::size_of(unit, is_velocity(role)).is_some());
             columns.units.extend(unit.map(|unit| (column, unit)));
         }
-        let first = |is: fn(&str) -> bool| header.iter().position(|name| is(name));
-        let time = columns.get("", TIME).or_else(|| first(heading::is_time)).or_else(|| first(heading::is_frame));
-        let time = time.ok_or_else(|| missing(header, TIME, ""))?;
-        let unit = unit_of_time(&header[time], options)?;
+        let found = match columns.get("", TIME) {
+            Some(given) => Some((given, None)),
+            None => time_columns::find(header, options)?,
+        };
+        let (time, rest) = found.ok_or_else(|| missing(header, TIME, ""))?;
+        let unit = match rest {
+            Some(rest) => Some(rest.unit),
+            None => {
+                unit_of_time(&header[time], options)?.or(convention.counts_from_boot.then_some(TimeUnit::Microseconds))
+            }
+        };
         let (id, rivals) = naming_columns(header, time, columns.get("", ID));
         let is_id_given = columns.get("", ID).is_some();
 
-        let others = (0..header.len()).filter(|&column| column != time && id != Some(column));
-        let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&header[column])?))).collect();
+        let is_taken = |column| column == time || id == Some(column) || rest.is_some_and(|rest| rest.column == column);
+        let others = (0..header.len()).filter(|&column| !is_taken(column));
+        let names = &convention.header;
+        let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
         // Metres go before degrees where a table has both.
         let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
@@ -136,54 +156,86 @@ impl Layout {
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
-        let without_height = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
-        let without_height: Vec<_> = without_height.map(|(vehicle, _)| vehicle.clone()).collect();
-        let (is_planar, metres, notes) = (!without_height.is_empty(), Vec::new(), Vec::new());
+        let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
+        let flat: Vec<_> = flat.map(|(vehicle, _)| vehicle.clone()).collect();
+        let is_planar = !flat.is_empty();
         let bodies = if is_planar { bodies.into_iter().map(Body::flattened).collect() } else { bodies };
-        let suspects = Vec::new();
         let mut layout = Self {
             time: Some(time),
+            rest,
             unit,
             id,
             is_id_given,
             rivals,
-            suspects,
+            suspects: Vec::new(),
             names,
             bodies,
-            metres,
+            metres: Vec::new(),
             on_earth,
+            convention: Convention::default(),
             is_planar,
-            notes,
+            notes: Vec::new(),
         };
         let used = layout.columns();
         layout.metres = columns.metres(&used, options.scale)?;
-        let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
-        if id.is_some() || one {
-            layout.suspects = unused
-                .clone()
-                .filter(|column| heading::may_name(&header[*column]) && !layout.rivals.contains(column))
-                .collect();
-        }
-        let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
-        if id.is_none() && one && !options.one_vehicle && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
-            return Err(missing(header, ID, ""));
-        }
+        layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
+        layout.notes.extend(convention.note.clone());
         if is_planar {
-            let of = if without_height.len() < vehicles.len() {
-                format!(" of {}", list(&without_height, 12))
-            } else {
-                String::new()
-            };
+            let of = if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
             layout.notes.push(format!("there is no column for the height{of}: {PLANAR}"));
         }
-        layout.notes.extend(columns.heights_used(&layout.bodies, options.scale));
-        if !unused.is_empty() {
-            layout.notes.push(format!("columns not used: {}", unused.join(", ")));
-        }
-        if !layout.names.is_empty() && !options.one_vehicle {
-            layout.notes.push(format!("vehicles, going by the names of columns: {}", list(&layout.names, 50)));
-        }
+        layout.notes.extend(columns.heights_used(&layout.bodies, options)?);
+        layout.convention = convention;
+        layout.check(header, options, one)?;
         Ok(layout)
+    }
+
+    /// Refuses what the columns do not say of the vehicles, and notes what a person should know. `one`: the columns of a position
+    /// name no vehicle.
+    fn check(&mut self, header: &[String], options: &ReadOptions, one: bool) -> Result<(), Fault> {
+        let (convention, used) = (&self.convention, self.columns());
+        if convention.reference.is_some() && options.scale != 1.0 {
+            let problem = format!("its positions are in metres, and --scale {} says another unit", options.scale);
+            return Err(Fault::content(problem, "leave --scale away"));
+        }
+        let several = self
+            .id
+            .map(|id| format!("column {}", quoted(&header[id])))
+            .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
+        if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
+            return Err(Fault::content(format!("{namer} names the vehicles"), "leave --one-vehicle away"));
+        }
+        let is_one_vehicle = options.one_vehicle || options.is_joined;
+        let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
+        // A user who says that all rows are of one vehicle knows.
+        if (self.id.is_some() || one) && !options.one_vehicle {
+            let may_name =
+                |column: &usize| heading::may_name(&header[*column]) && !time_columns::is_part(&header[*column]);
+            let suspects = unused.clone().filter(|column| may_name(column) && !self.rivals.contains(column));
+            self.suspects = suspects.collect();
+        }
+        let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
+        let is_told = is_one_vehicle || convention.is_one_vehicle;
+        if self.id.is_none() && one && !is_told && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+            return Err(match missing(header, ID, "") {
+                Fault::Content { problem, remedy } => {
+                    let remedy = format!("{remedy}; where all rows are of one vehicle, say so with --one-vehicle");
+                    Fault::content(problem, remedy)
+                }
+                fault => fault,
+            });
+        }
+        if let Some((time, rest)) = self.time.zip(self.rest) {
+            let (whole, rest) = (quoted(&header[time]), quoted(&header[rest.column]));
+            self.notes.push(format!("a time is {whole} and, below a unit of that, {rest}"));
+        }
+        if !unused.is_empty() {
+            self.notes.push(format!("columns not used: {}", unused.join(", ")));
+        }
+        if !self.names.is_empty() && !is_one_vehicle {
+            self.notes.push(format!("vehicles, going by the names of columns: {}", list(&self.names, 50)));
+        }
+        Ok(())
     }
 
     /// The columns that are read or looked at, each once, in rising order.
@@ -203,8 +255,15 @@ impl Layout {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
-        let columns: BTreeSet<_> = self.bodies.iter().flat_map(of).chain(self.time).chain(self.id).collect();
+        let beside = self.convention.reference.into_iter().flatten().chain(self.convention.valid.iter().copied());
+        let columns: BTreeSet<_> =
+            self.bodies.iter().flat_map(of).chain(self.of_time()).chain(self.id).chain(beside).collect();
         columns.into_iter().collect()
+    }
+
+    /// The columns of the time.
+    pub(super) fn of_time(&self) -> impl Iterator<Item = usize> {
+        self.time.into_iter().chain(self.rest.map(|rest| rest.column))
     }
 }
 
@@ -223,7 +282,9 @@ fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, F
     if heading::is_frame(name) {
         return Err(Fault::frames(format!("its times are the numbers of frames in column {}", quoted(name))));
     }
-    let Some(unit) = heading::said_unit(name) else { return Ok(None) };
+    // `time (utc)` says a zone.
+    let is_zone = |unit: &String| matches!(unit.as_str(), "utc" | "gmt" | "iso8601" | "iso 8601");
+    let Some(unit) = heading::said_unit(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} says a unit of time that is not known, {}", quoted(name), quoted(&unit));
         let remedy =
@@ -248,19 +309,22 @@ impl<'a> Columns<'a> {
         self.found.get(&(vehicle.to_owned(), role)).copied()
     }
 
-    /// What a person should know of columns that are read because their names are those of heights.
-    fn heights_used(&self, bodies: &[Body], scale: f64) -> Option<String> {
+    /// What a person should know of columns that are read because their names are those of heights, which are up whatever
+    /// the user says of the other axes.
+    fn heights_used(&self, bodies: &[Body], options: &ReadOptions) -> Result<Option<String>, Fault> {
         let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
-        let &(first, is_turned) = used.first()?;
+        let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
+        turned::refuse_turned_height(options, &self.header[first])?;
         let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
         let turned = if is_turned { ", with the sign turned" } else { "" };
+        let scale = options.scale;
         let unit = match self.units.get(&first) {
             None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m as --scale says"),
             None if self.place == EARTH => ", in metres: the name says no unit (--scale gives another)".to_owned(),
             _ => String::new(),
         };
         let columns = if used.len() > 1 { "columns" } else { "column" };
-        Some(format!("heights are those of {columns} {}{turned}{unit}", list(&names, 12)))
+        Ok(Some(format!("heights are those of {columns} {}{turned}{unit}", list(&names, 12))))
     }
 
     fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {

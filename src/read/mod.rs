@@ -8,17 +8,20 @@
 //! not is sorted, in memory, and says so in [`Tracks::notes`](crate::track::Tracks::notes).
 //!
 //! # What is refused
-//! Numbers that are not finite, a vehicle that is in two places at a time, time that runs backwards where each time is a
-//! row, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
+//! Numbers that are not finite, a vehicle that is in two places at a time or goes back in time, two columns of time that are
+//! no parts of one, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
 mod archive;
+mod axes;
 mod bag;
 mod capture;
 mod clock;
+mod conventions;
 mod crazyflie;
 mod csv;
 mod curves;
+mod dates;
 mod earth;
 mod error;
 mod folder;
@@ -34,6 +37,7 @@ mod motive;
 mod names;
 mod npy;
 mod npz;
+mod objects;
 mod options;
 mod order;
 #[cfg(feature = "parquet")]
@@ -43,18 +47,22 @@ mod skybrush;
 mod source;
 mod stranger;
 mod table;
+mod time_columns;
+mod turned;
+mod ulog;
 mod units;
 mod vicon;
 mod vviz;
 
 #[cfg(feature = "parquet")]
 pub use self::parquet::is_guarded;
+pub use axes::Axes;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
 pub use format::Format;
 pub(crate) use heading::is_read;
 pub use mcap::Channels;
-pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, ReadOptions};
+pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions};
 pub use order::Recording;
 
 use std::fs;
@@ -75,7 +83,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened.map_err(|error| error.of(path))
+    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(path))
 }
 
 /// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
@@ -95,7 +103,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.map_err(|error| error.of(Path::new(&called(paths))))
+    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
 }
 
 /// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
@@ -168,7 +176,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     if !folder.folders.is_empty() {
         return Err(folder.of_folders().into());
     }
-    let options = ReadOptions { one_vehicle: true, ..options.clone() };
+    let options = ReadOptions { is_joined: true, ..options.clone() };
     let open = |file: Source| {
         let shown = file.shown();
         Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))
@@ -194,9 +202,11 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
     }
     let source = &source;
     match format {
-        Format::Csv | Format::Text => csv::open(source, format, options),
+        Format::Csv | Format::Text | Format::Trajnet => csv::open(source, format, options),
         Format::Crazyflie => crazyflie::open(vec![(source.stem(), vec![source.clone()])], None, options),
+        Format::Jsonl => objects::open(source, options),
         Format::Mcap => mcap::open(source, options),
+        Format::Ulog => ulog::open(source, options),
         Format::Npz => npz::open(source, options),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::open(source, options),

@@ -33,9 +33,15 @@ const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
 /// Opens an archive.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut arrays = Arrays { archive: Archive::open(&source.path)? };
-    let time = options.columns.get("t").cloned().or_else(|| arrays.first_of(&TIMES));
+    let time = match options.columns.get("t") {
+        Some(given) => Some(given.clone()),
+        None => arrays.only_of(&TIMES, "t")?,
+    };
     let time = time.filter(|name| arrays.holds(name)).ok_or_else(|| arrays.missing("times", "t"))?;
-    let positions = options.columns.get("x").cloned().or_else(|| arrays.first_of(&POSITIONS));
+    let positions = match options.columns.get("x") {
+        Some(given) => Some(given.clone()),
+        None => arrays.only_of(&POSITIONS, "x")?,
+    };
     let positions =
         positions.filter(|name| arrays.holds(name)).ok_or_else(|| arrays.missing("positions", "positions"))?;
 
@@ -132,11 +138,19 @@ impl Arrays {
         self.archive.holds(&format!("{name}.npy"))
     }
 
-    fn first_of(&self, names: &[&str]) -> Option<String> {
+    /// The array that is called by one of these names, perhaps with a unit of time behind it. Of two neither is ignored.
+    fn only_of(&self, names: &[&str], option: &str) -> Result<Option<String>, Fault> {
         let units = TimeUnit::ALL.map(|unit| format!("_{}", unit.name()));
         let ends = std::iter::once("").chain(units.iter().map(String::as_str));
-        let mut candidates = ends.flat_map(|end| names.iter().map(move |name| format!("{name}{end}")));
-        candidates.find(|name| self.holds(name))
+        let candidates = ends.flat_map(|end| names.iter().map(move |name| format!("{name}{end}")));
+        let mut found = candidates.filter(|name| self.holds(name));
+        match (found.next(), found.next()) {
+            (Some(first), Some(second)) => {
+                let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
+                Err(Fault::content(problem, format!("name the one that is meant with --column {option}=NAME")))
+            }
+            (first, _) => Ok(first),
+        }
     }
 
     fn missing(&self, role: &str, usual: &str) -> Fault {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::axes::Axes;
 use super::clock::TimeUnit;
 use super::error::Fault;
 use super::format::Format;
@@ -96,6 +97,32 @@ impl Dimensions {
     }
 }
 
+/// Which of several rows of a vehicle at one time is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Duplicates {
+    /// The first in the file.
+    First,
+    /// The last in the file.
+    Last,
+    /// None: such a recording is refused, even where the rows say the same.
+    Refuse,
+}
+
+impl Duplicates {
+    /// All that are known.
+    pub const ALL: [Self; 3] = [Self::First, Self::Last, Self::Refuse];
+
+    /// What `--duplicates` calls it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::First => "first",
+            Self::Last => "last",
+            Self::Refuse => "refuse",
+        }
+    }
+}
+
 /// Names of columns, where they are not the usual ones: one for each of [`ColumnNames::ROLES`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ColumnNames([Option<String>; 12]);
@@ -124,6 +151,7 @@ impl ColumnNames {
 
 /// What the user knows about a recording that its file does not say.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub struct ReadOptions {
     /// The format, instead of recognising it by the content.
     pub format: Option<Format>,
@@ -131,12 +159,22 @@ pub struct ReadOptions {
     pub time_unit: Option<TimeUnit>,
     /// How many units of time there are in a second, where they are those of no clock: frames, steps, minutes.
     pub times_per_second: Option<f64>,
+    /// Whether rows that go back in time are sorted; such a recording is refused otherwise.
+    pub sort: bool,
+    /// Which of several rows of a vehicle at one time is read. Where nothing is said, rows that say the same are read once
+    /// and others are refused.
+    pub duplicates: Option<Duplicates>,
     /// Metres per unit of length of the file; velocities and radii are scaled too.
     pub scale: f64,
+    /// What becomes x, y and z. The lengths of its axes are those of the file times `scale`.
+    pub axes: Axes,
     /// The numbers of a vehicle in a table without a header, where their count does not tell.
     pub dimensions: Option<Dimensions>,
     /// Whether a table whose rows name no vehicle is of one, whatever other columns it has.
     pub one_vehicle: bool,
+    /// Whether the file is one of several of a recording, which share an origin and a clock; [`open_joined`](super::open_joined)
+    /// sets it.
+    pub is_joined: bool,
     /// Names of columns of a table.
     pub columns: ColumnNames,
     /// Where the curves of vehicles start, if they are relative to that \[m\].
@@ -153,7 +191,7 @@ pub struct ReadOptions {
     /// What places on the Earth are measured from: latitude and longitude \[degrees\] and height above the ellipsoid
     /// \[m\]; the first place where nothing is said.
     pub origin: Option<[f64; 3]>,
-    /// Whether to accept an MCAP file that was not closed, for what it holds.
+    /// Whether to accept an MCAP file or a log of PX4 that was not closed, for what it holds.
     pub allow_unfinished: bool,
 }
 
@@ -164,9 +202,13 @@ impl Default for ReadOptions {
             format: None,
             time_unit: None,
             times_per_second: None,
+            sort: false,
+            duplicates: None,
             scale: 1.0,
+            axes: Axes::default(),
             dimensions: None,
             one_vehicle: false,
+            is_joined: false,
             starts: BTreeMap::new(),
             columns: ColumnNames::default(),
             layout: None,
@@ -190,16 +232,25 @@ impl ReadOptions {
             let problem = format!("its times cannot be counted with {rate} in a second");
             return Err(Fault::content(problem, "give a positive number with --fps or --time-scale"));
         }
+        if !self.axes.are_finite() {
+            let problem = "the lengths of its axes cannot be multiplied by 0, nor by what is not finite";
+            return Err(Fault::content(problem, "give three numbers with --scale that are not 0, such as 1,1,-1"));
+        }
         Ok(())
     }
 
     /// Refuses an option that means nothing for a format.
     pub(super) fn refuse_needless(&self, format: Format) -> Result<(), Fault> {
-        let is_table = matches!(format, Format::Csv | Format::Text | Format::Parquet | Format::Npz);
-        let (is_npz, is_mcap) = (format == Format::Npz, format == Format::Mcap);
+        let is_text = matches!(format, Format::Csv | Format::Text | Format::Trajnet | Format::Jsonl);
+        let is_table = is_text || matches!(format, Format::Parquet | Format::Npz);
+        let (is_npz, is_mcap, is_ulog) = (format == Format::Npz, format == Format::Mcap, format == Format::Ulog);
+        let has_curves = matches!(format, Format::Crazyflie | Format::Skybrush);
+        let has_axes = matches!(format, Format::Motive | Format::Vviz);
         let given = [
             (self.time_unit.is_some() && !is_table, "--time-unit", "has a unit of time of its own"),
             (self.times_per_second.is_some() && !is_table, "--fps and --time-scale", "has a unit of time of its own"),
+            (self.sort && has_curves, "--sort", "holds curves in order of time"),
+            (self.duplicates.is_some() && has_curves, "--duplicates", "holds curves, and no rows"),
             (self.dimensions.is_some() && format != Format::Text, "--dimensions", "says which numbers are a vehicle's"),
             (
                 !self.starts.is_empty() && format != Format::Crazyflie,
@@ -208,10 +259,16 @@ impl ReadOptions {
             ),
             (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
             (self.layout.is_some() && !is_npz, "--layout", "has no arrays"),
-            (self.origin.is_some() && !is_mcap && (!is_table || is_npz), "--origin", "has no latitudes and longitudes"),
+            (
+                self.origin.is_some() && !is_mcap && !is_ulog && (!is_table || is_npz),
+                "--origin",
+                "has no latitudes and longitudes",
+            ),
             (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
-            (!self.topics.is_empty() && !is_mcap, "--topic", "has no topics"),
-            (self.allow_unfinished && !is_mcap, "--allow-unfinished", "cannot be read before it is closed"),
+            (!self.topics.is_empty() && !is_mcap && !is_ulog, "--topic", "has no topics"),
+            (!self.axes.is_identity() && has_axes, "--axes", "gives the directions of its axes"),
+            (self.one_vehicle && !self.is_joined && !is_table, "--one-vehicle", "names its vehicles"),
+            (self.allow_unfinished && !is_mcap && !is_ulog, "--allow-unfinished", "cannot be read before it is closed"),
         ];
         match given.into_iter().find(|(needless, ..)| *needless) {
             Some((_, option, why)) => {
@@ -221,7 +278,7 @@ impl ReadOptions {
         }
     }
 
-    /// What is to be said of an MCAP file that was not closed, or the fault that it is.
+    /// What is to be said of a file that was not closed, or the fault that it is.
     pub(super) fn accept_unfinished(&self, complete: bool) -> Result<Vec<String>, Fault> {
         let note = "the recording was not closed: it is read up to the last part that was written";
         match (complete, self.allow_unfinished) {

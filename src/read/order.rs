@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
-use super::options::ReadOptions;
+use super::options::{Duplicates, ReadOptions};
 use super::source::Source;
 use crate::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 
@@ -63,6 +63,11 @@ pub(super) trait Rows {
     /// The place that a row's number means.
     fn place(&self, number: u64) -> Place;
 
+    /// The file that a row is in, of a recording in several files: within one, rows of a vehicle do not go back in time.
+    fn file(&self, _number: u64) -> usize {
+        0
+    }
+
     /// Whether each time is a row of the file, so that time can only run forwards.
     fn is_wide(&self) -> bool {
         true
@@ -86,6 +91,37 @@ pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, Re
     Ok(probe)
 }
 
+/// What the times of these rows look like; none where there are no rows.
+fn probe(rows: &[Row]) -> Option<Probe> {
+    let mut probe = Probe::new(rows.first()?.stamp);
+    rows.iter().for_each(|row| probe.see(row.stamp));
+    Some(probe)
+}
+
+/// Refuses rows of a vehicle that go back in time, in the order of the file.
+fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -> Result<(), ReadError> {
+    let mut last: Vec<Option<&Row>> = Vec::new();
+    for row in rows {
+        if row.vehicle >= last.len() {
+            last.resize(row.vehicle + 1, None);
+        }
+        let Some(before) = last[row.vehicle].replace(row) else { continue };
+        if row.stamp.compare(before.stamp).is_lt() && of.file(row.place) == of.file(before.place) {
+            let name = quoted(of.vehicles().get(row.vehicle).map_or("", String::as_str));
+            let (time_s, before_s) = (timing.seconds(row.stamp), timing.seconds(before.stamp));
+            let problem = format!(
+                "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
+                of.place(before.place)
+            );
+            let remedy = "look whether its clock was set; where the rows are of several vehicles, name the column that \
+                          tells them apart with --column id=NAME; where they are only out of order, have them sorted \
+                          with --sort";
+            return Err(Fault::content(problem, remedy).at(of.place(row.place)));
+        }
+    }
+    Ok(())
+}
+
 /// A recording being read.
 pub type Recording = Box<dyn Tracks<Error = ReadError>>;
 
@@ -100,6 +136,10 @@ pub(super) struct About {
     pub(super) epoch_ns: i64,
     /// Metres per unit of length.
     pub(super) scale: f64,
+    /// Whether rows that go back in time are sorted.
+    pub(super) sort: bool,
+    /// Which of several rows of a vehicle at one time is read.
+    pub(super) duplicates: Option<Duplicates>,
     /// Whether its rows have no height.
     pub(super) is_planar: bool,
     /// What its places on the Earth are measured from.
@@ -119,13 +159,14 @@ impl About {
         none: Fault,
     ) -> Self {
         let unit = options.time_unit.or(said);
-        let (path, times_per_second) = (source.shown(), options.times_per_second);
         Self {
-            path,
+            path: source.shown(),
             unit,
-            times_per_second,
+            times_per_second: options.times_per_second,
             epoch_ns: 0,
             scale: options.scale,
+            sort: options.sort,
+            duplicates: options.duplicates,
             is_planar: false,
             earth_origin: None,
             notes,
@@ -137,7 +178,9 @@ impl About {
 /// Samples in order of time.
 ///
 /// A recording with a row for each time is streamed, and must not run backwards. One with a row for each vehicle and
-/// time is surveyed first: it is streamed where time never runs backwards, and sorted in memory where it does.
+/// time is surveyed first: it is streamed where time never runs backwards, and sorted in memory where it does. The rows of a
+/// vehicle must not go back in time: that is a clock that was set, or two vehicles under one name. A user who knows better
+/// has them sorted.
 pub(super) struct Ordered<R> {
     path: PathBuf,
     rows: R,
@@ -157,24 +200,30 @@ pub(super) struct Ordered<R> {
     now: Option<(Stamp, f64)>,
     /// Time of each vehicle's last row, and the row.
     last: Vec<Option<(f64, Row)>>,
+    /// Place of each vehicle's last row among the items of the current call, where a later row may replace it.
+    given: Vec<usize>,
+    duplicates: Option<Duplicates>,
+    /// Rows left out because an earlier or a later one of the vehicle is of the same time.
+    left_out: u64,
 }
 
 impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { path, unit, times_per_second, epoch_ns, scale, is_planar, earth_origin, mut notes, none } = about;
+        let About { path, unit, times_per_second, epoch_ns, scale, sort, duplicates, mut notes, none, .. } = about;
+        let (is_planar, earth_origin) = (about.is_planar, about.earth_origin);
         let mut first = Vec::new();
         let mut ended = false;
-        let probe = if rows.is_wide() {
+        let probe = if rows.is_wide() && sort {
+            while rows.next(&mut first)? {}
+            ended = true;
+            probe(&first)
+        } else if rows.is_wide() {
             ended = !rows.next(&mut first)?;
-            first.first().map(|row| {
-                let mut probe = Probe::new(row.stamp);
-                for row in &first {
-                    probe.see(row.stamp);
-                }
-                probe.in_order = true;
-                probe
-            })
+            let mut probe = probe(&first);
+            // Rows that go back are refused as they are reached.
+            probe.iter_mut().for_each(|probe| probe.in_order = true);
+            probe
         } else {
             rows.survey()?
         };
@@ -192,6 +241,9 @@ impl<R: Rows> Ordered<R> {
         }
         if !probe.in_order {
             while rows.next(&mut first)? {}
+            if !sort {
+                refuse_steps_back(&first, &rows, &timing)?;
+            }
             // Stable: rows of one time stay in the order of the file.
             first.sort_by(|a, b| a.stamp.compare(b.stamp));
             ended = true;
@@ -212,6 +264,9 @@ impl<R: Rows> Ordered<R> {
             finished: false,
             now: None,
             last: Vec::new(),
+            given: Vec::new(),
+            duplicates,
+            left_out: 0,
         })
     }
 
@@ -233,16 +288,48 @@ impl<R: Rows> Ordered<R> {
         Ok(time_s)
     }
 
-    fn sample(&mut self, row: &Row) -> Result<Sample, ReadError> {
+    /// Appends a row as a sample, unless it repeats another one.
+    fn give(&mut self, row: &Row, items: &mut Vec<Item>) -> Result<(), ReadError> {
         let time_s = self.time_of(row)?;
         if row.vehicle >= self.last.len() {
             self.last.resize(row.vehicle + 1, None);
+            self.given.resize(row.vehicle + 1, 0);
         }
-        if let Some((before_s, before)) = self.last[row.vehicle].replace((time_s, *row))
-            && (before_s == time_s || before.radius.is_some() != row.radius.is_some())
-        {
-            return Err(self.error(row, self.contradiction(before_s == time_s, time_s, &before, row)));
+        if let Some((before_s, before)) = self.last[row.vehicle] {
+            if before_s == time_s {
+                return self.repeat(row, &before, time_s, items);
+            }
+            if before.radius.is_some() != row.radius.is_some() {
+                return Err(self.error(row, self.radius_missing(&before, row)));
+            }
         }
+        let sample = self.sample(row, time_s)?;
+        self.last[row.vehicle] = Some((time_s, *row));
+        self.given[row.vehicle] = items.len();
+        items.push(Item::Sample(sample));
+        Ok(())
+    }
+
+    /// Leaves out one of two rows of a vehicle at one time, or refuses both.
+    #[cold]
+    fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
+        let says_the_same =
+            (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
+        match self.duplicates.or(says_the_same.then_some(Duplicates::First)) {
+            Some(Duplicates::First) => {}
+            Some(Duplicates::Last) => {
+                let sample = self.sample(row, time_s)?;
+                // All rows of a time are given out in one call.
+                items[self.given[row.vehicle]] = Item::Sample(sample);
+                self.last[row.vehicle] = Some((time_s, *row));
+            }
+            None | Some(Duplicates::Refuse) => return Err(self.error(row, self.twice(time_s, before, row))),
+        }
+        self.left_out += 1;
+        Ok(())
+    }
+
+    fn sample(&self, row: &Row, time_s: f64) -> Result<Sample, ReadError> {
         let sample = Sample {
             vehicle: row.vehicle,
             time_s,
@@ -261,31 +348,57 @@ impl<R: Rows> Ordered<R> {
         Err(self.error(row, Fault::out_of_range()))
     }
 
-    /// What a row of a vehicle says against its row before: it is there twice, or has a radius in one of them alone.
+    fn name(&self, row: &Row) -> String {
+        quoted(self.rows.vehicles().get(row.vehicle).map_or("", String::as_str))
+    }
+
     #[cold]
-    fn contradiction(&self, twice: bool, time_s: f64, before: &Row, row: &Row) -> Fault {
-        let vehicle = quoted(self.rows.vehicles().get(row.vehicle).map_or("", String::as_str));
-        let first = self.rows.place(before.place);
-        if twice {
-            let problem = format!("vehicle {vehicle} is there a second time at {time_s} s; the first is {first}");
-            return Fault::content(problem, "take one of the two out: a vehicle is in one place at a time");
-        }
+    fn twice(&self, time_s: f64, before: &Row, row: &Row) -> Fault {
+        let (vehicle, first) = (self.name(row), self.rows.place(before.place));
+        let problem = format!("vehicle {vehicle} is there a second time at {time_s} s; the first is {first}");
+        let remedy = "take one of the two out, or say which is read with --duplicates first or --duplicates last: a \
+                      vehicle is in one place at a time; where the rows are of several, name the column that tells \
+                      them apart with --column id=NAME";
+        Fault::content(problem, remedy)
+    }
+
+    #[cold]
+    fn radius_missing(&self, before: &Row, row: &Row) -> Fault {
+        let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let which = if row.radius.is_some() { "a radius here and none" } else { "no radius here and one" };
         let remedy = "fill the empty cells, or leave all radii of the vehicle empty";
         Fault::content(format!("vehicle {vehicle} has {which} at {first}"), remedy)
     }
 
-    fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+    /// The next row, which stays the next one until it is taken.
+    fn peek(&mut self) -> Result<Option<&Row>, ReadError> {
         if self.batch.len() == 0 && !self.ended {
             let mut batch = Vec::with_capacity(BATCH);
             self.ended = !self.rows.next(&mut batch)?;
             self.batch = batch.into_iter();
         }
+        Ok(self.batch.as_slice().first())
+    }
+
+    /// Whether the next row is of the time of the last one.
+    fn goes_on_at_once(&mut self) -> Result<bool, ReadError> {
+        let Some((_, now_s)) = self.now else { return Ok(false) };
+        let next = self.peek()?.map(|row| row.stamp);
+        Ok(next.is_some_and(|stamp| self.timing.seconds(stamp) == now_s))
+    }
+
+    fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
-        while items.len() < before + BATCH
-            && let Some(row) = self.batch.next()
-        {
-            items.push(Item::Sample(self.sample(&row)?));
+        let waits = self.duplicates == Some(Duplicates::Last);
+        while items.len() < before + BATCH || (waits && self.goes_on_at_once()?) {
+            let Some(&row) = self.peek()? else { break };
+            self.batch.next();
+            self.give(&row, items)?;
+        }
+        if items.len() == before && self.left_out > 0 {
+            let rows = std::mem::take(&mut self.left_out);
+            let which = if waits { "a later" } else { "an earlier" };
+            self.notes.push(format!("rows left out because {which} one of the vehicle is of the same time: {rows}"));
         }
         if items.len() == before && !self.finished {
             self.finished = true;

@@ -9,16 +9,19 @@ use super::error::{Fault, ReadError};
 use super::format::Format;
 use super::heading;
 use super::motive;
+use super::objects;
 use super::skybrush::SHOW;
 use super::source::{GZIP_MAGIC, Source};
 use super::stranger;
+use super::ulog;
 use super::vicon;
 
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;
 
 /// How files of a format begin, where all of them do. Other archives begin as NPZ does.
-const MAGICS: [(Format, &[u8]); 4] = [
+const MAGICS: [(Format, &[u8]); 5] = [
+    (Format::Ulog, ulog::MAGIC),
     (Format::Parquet, b"PAR1"),
     (Format::Mcap, b"\x89MCAP0\r\n"),
     (Format::Npz, b"PK\x03\x04"),
@@ -112,6 +115,9 @@ fn format_of(head: &[u8]) -> Result<Format, Fault> {
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
     if memchr::memchr(0, text).is_some() {
         return Err(Fault::UnknownFormat);
+    }
+    if objects::are_in(text) {
+        return Ok(Format::Jsonl);
     }
     if text.starts_with(b"{") {
         let is_vviz = VVIZ_KEYS.iter().any(|key| memchr::memmem::find(text, key).is_some());

@@ -210,7 +210,8 @@ fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Ve
         return Err(Fault::content(problem, "a drone is in one place at a time: take one out"));
     }
     if to_s < from_s {
-        return Err(Fault::time_backwards(to_s, from_s));
+        let problem = format!("time runs backwards: {to_s} s comes after {from_s} s");
+        return Err(Fault::content(problem, "look at the order of the points, and export the show again"));
     }
     let degree = point.2.len() + 1;
     if degree > HIGHEST_DEGREE {

@@ -3,14 +3,9 @@
 use super::error::Fault;
 
 /// Beginnings of files, what they are, and what helps.
-const STRANGERS: [(&[u8], &str, &str); 13] = [
-    (b"#ROSBAG V", "a ROS 1 bag", "convert it with `rosbags-convert` to a ROS 2 bag in MCAP, and give its .mcap file"),
+const STRANGERS: [(&[u8], &str, &str); 12] = [
+    (b"#ROSBAG V", "a ROS 1 bag", BAG),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
-    (
-        b"ULog\x01\x12\x35",
-        "a ULog of PX4",
-        "write its vehicle_local_position with `ulog2csv`, and give a file for each vehicle",
-    ),
     (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
     (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
@@ -27,18 +22,21 @@ const STRANGERS: [(&[u8], &str, &str); 13] = [
     (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
-pub(super) const BAG: &str = "convert it with `ros2 bag convert` to MCAP, and give the .mcap file";
-const DATAFLASH: &str =
-    "write the messages of position with `mavlogdump.py --format csv`, a file for each vehicle in metres";
+pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip install \
+                              rosbags`), and give the folder `flight`";
+const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table t,id,lat,lon,alt \
+                         in degrees and metres";
 const UNPACK: &str = "unpack it, and give the folder";
-pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z";
+pub(super) const TABLE: &str =
+    "give positions over time, such as a table t,id,x,y,z, or an object of JSON in each line";
 const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
 
 /// What a file is and what helps, where it is known and not read.
 pub(super) fn of_bytes(head: &[u8]) -> Option<Fault> {
     // Each message of telemetry has the microseconds since 1970 in front.
     if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
-        let remedy = "write its LOCAL_POSITION_NED with `mavlogdump.py --format csv`, a file for each vehicle";
+        let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from that a table \
+                      t,id,lat,lon,alt in degrees and metres";
         return Some(Fault::content("it is a MAVLink telemetry log, which is not read", remedy));
     }
     if head.get(257..262) == Some(b"ustar") {

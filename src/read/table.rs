@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit};
-use super::earth::{Local, is_no_fix, no_fixes};
+use super::conventions::GLOBAL;
+use super::dates::Date;
+use super::earth::{Geodetic, Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
 use super::identity::{Rival, Suspect};
 use super::layout::{Body, Layout};
@@ -14,6 +16,7 @@ use super::names::Names;
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::Source;
+use super::turned;
 
 /// The cells of the current row of a table.
 pub(super) trait Cells {
@@ -88,6 +91,12 @@ struct Table<C> {
     names: Names,
     /// What turns latitude, longitude and height into metres.
     local: Option<Local>,
+    /// The frame of the place that positions were last measured from, where rows say one.
+    there: Option<Local>,
+    /// Whether the clock of the table starts with its vehicle, and other tables are read beside it.
+    has_own_clock: bool,
+    /// The first time, where times are written as dates.
+    dates: Option<Date>,
     /// Columns that may say otherwise whose rows they are.
     rivals: Vec<Rival>,
     suspects: Vec<Suspect>,
@@ -108,7 +117,16 @@ pub(super) fn open<C: Cells + 'static>(
     epoch_ns: i64,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
-    let mut about = About::new(source, options, unit.or(layout.unit), layout.notes.clone(), Fault::header_only());
+    if let (Some(rest), Some(_)) = (layout.rest, unit) {
+        let problem = format!("it has a column of time stamps, and {} as well", quoted(&cells.header()[rest.column]));
+        return Err(Fault::content(problem, "name the one that is meant with --column t=NAME").into());
+    }
+    let dates = dates(&mut cells, &layout, options)?;
+    let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
+    let mut about = About::new(source, options, unit, layout.notes.clone(), Fault::header_only());
+    if dates.is_some_and(|first| !first.has_zone) {
+        about.notes.push("times are dates without a zone and are taken as UTC".to_owned());
+    }
     let (names, is_planar) = (Names::from_list(layout.names.clone())?, layout.is_planar);
     let local = origin(&mut cells, &layout, options)?;
     about.notes.extend(local.map(|local| local.note()));
@@ -116,46 +134,93 @@ pub(super) fn open<C: Cells + 'static>(
     cells.restart(&layout.columns_to_see(), true)?;
     // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
     about.scale = if layout.on_earth { 1.0 } else { about.scale };
+    let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
     let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
     let suspects = layout.suspects.iter().copied().map(Suspect::new).collect();
-    let no_fixes = BTreeMap::new();
-    let table = Table { cells, layout, names, local, rivals, suspects, no_fixes, vehicle: 0, count: 0 };
+    let table = Table {
+        cells,
+        layout,
+        names,
+        local,
+        there: None,
+        has_own_clock,
+        dates,
+        rivals,
+        suspects,
+        no_fixes: BTreeMap::new(),
+        vehicle: 0,
+        count: 0,
+    };
     Ok(Box::new(Ordered::open(table, About { epoch_ns, is_planar, ..about })?))
 }
 
-/// The frame of places on the Earth: where the user says, or at the first place of the table.
+/// The first time of a table, where it is a date.
+fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Result<Option<Date>, ReadError> {
+    let Some(column) = layout.time else { return Ok(None) };
+    cells.restart(&[column], false)?;
+    let first = if cells.advance()? { cells.text(column).ok().and_then(|text| Date::parse(&text)) } else { None };
+    if first.is_some() && (options.time_unit.is_some() || options.times_per_second.is_some()) {
+        let problem = format!("the times in column {} are dates", quoted(&cells.header()[column]));
+        return Err(Fault::content(problem, "leave --time-unit, --fps and --time-scale away").into());
+    }
+    Ok(first)
+}
+
+/// The frame of places on the Earth, where a table gives such: where the user says, or at the first place of the table.
 fn origin<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Result<Option<Local>, ReadError> {
-    if !layout.on_earth {
+    let reference = layout.convention.reference;
+    if !layout.on_earth && reference.is_none() {
         let needless = Fault::content("it has no columns of latitude and longitude", "leave --origin away");
         return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
     }
-    if let Some(origin) = options.origin {
-        return Ok(Some(Local::at(origin.into())?));
-    }
+    turned::refuse_known(options, "a table of latitudes and longitudes")?;
     cells.restart(&layout.columns(), true)?;
     let mut unfixed = false;
     while cells.advance()? {
-        for body in &layout.bodies {
-            let place = vector(cells, &body.position, &layout.metres).and_then(|place| {
-                let fix = place.filter(|place| !is_no_fix(place));
-                unfixed |= place.is_some() && fix.is_none();
-                fix.map(Local::at).transpose()
-            });
-            match place.map_err(|fault| fault.at(C::place(cells.row())))? {
-                // Another file would begin somewhere else.
-                Some(local) if options.one_vehicle => {
-                    let problem = "nobody says what its places on the Earth are measured from, the same for all files";
-                    let remedy = format!("say it with --origin, such as --origin {}", local.origin());
-                    return Err(Fault::content(problem, remedy).into());
-                }
-                Some(local) => return Ok(Some(local)),
-                None => {}
-            }
+        let place = match reference {
+            Some(columns) => measured_from(cells, columns),
+            None => fix(cells, layout, &mut unfixed),
+        };
+        let at_row = |fault: Fault| fault.at(C::place(cells.row()));
+        if let Some(place) = place.map_err(at_row)? {
+            return Ok(Some(Local::first(place, options).map_err(at_row)?));
         }
+    }
+    if reference.is_some() {
+        let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
+        return Err(Fault::content(problem, GLOBAL).into());
     }
     if unfixed {
         let problem = "no row has a fix: every latitude and longitude is exactly 0";
         return Err(Fault::content(problem, "record again once the receiver has a fix, or give another file").into());
+    }
+    Ok(None)
+}
+
+/// The place that the positions of a row are measured from; none where it is not known: empty, NaN, or where latitude and
+/// longitude are 0.
+fn measured_from(cells: &impl Cells, columns: [usize; 3]) -> Result<Option<Geodetic>, Fault> {
+    let mut place = Vector3::zeros();
+    for (slot, column) in place.iter_mut().zip(columns) {
+        match cells.number(column) {
+            Some(number) if number.is_nan() => return Ok(None),
+            _ => match number(cells, column)? {
+                Some(number) => *slot = number,
+                None => return Ok(None),
+            },
+        }
+    }
+    Ok(Some(place).filter(|place| !is_no_fix(place)))
+}
+
+/// The first place on the Earth of a row; none where it has none. Sets `unfixed` where it has no fix.
+fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option<Geodetic>, Fault> {
+    for body in &layout.bodies {
+        match vector(cells, &body.position, &layout.metres)? {
+            Some(place) if is_no_fix(&place) => *unfixed = true,
+            None => {}
+            place => return Ok(place),
+        }
     }
     Ok(None)
 }
@@ -170,19 +235,50 @@ impl<C: Cells> Table<C> {
         let Some(column) = self.layout.time else {
             return Ok(Stamp::Whole(self.count));
         };
+        if let Some(first) = self.dates {
+            return self.date(column, first);
+        }
+        let time = self.number_of_units(column)?;
+        match self.layout.rest {
+            None => Ok(time),
+            Some(rest) => rest.join(time, self.number_of_units(rest.column)?, self.cells.header(), column),
+        }
+    }
+
+    /// The time in a column that counts something.
+    #[inline]
+    fn number_of_units(&mut self, column: usize) -> Result<Stamp, Fault> {
         if let Some(stamp) = self.cells.stamp(column).filter(|stamp| stamp.approximately().is_finite()) {
             return Ok(stamp);
         }
         if let Some(of_day) = self.cells.text(column).ok().filter(|text| text.contains(':')) {
-            let problem =
-                format!("column `{}` holds {}, a time of day", self.cells.header()[column], quoted(of_day.trim()));
+            let what = if Date::parse(&of_day).is_some() { "a date below numbers" } else { "a time of day" };
+            let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(of_day.trim()));
             return Err(Fault::content(
                 problem,
-                "write times as numbers: in seconds, or in s, ms, us or ns since 1970",
+                "write all times as numbers, in seconds or in s, ms, us or ns since 1970, or all as dates with a time \
+                 like 2023-11-14T22:13:20.5Z",
             ));
         }
         let number = odd_number(&self.cells, column, "take the row out: each needs a time")?;
         number.map(Stamp::Real).ok_or_else(|| empty(&self.cells, column))
+    }
+
+    /// The time in a column of dates.
+    fn date(&self, column: usize, first: Date) -> Result<Stamp, Fault> {
+        let text = self.cells.text(column)?;
+        if text.trim().is_empty() {
+            return Err(empty(&self.cells, column));
+        }
+        let holds = |what: &str, remedy: &str| {
+            let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(text.trim()));
+            Fault::content(problem, remedy)
+        };
+        match Date::parse(&text) {
+            Some(date) if date.has_zone == first.has_zone => Ok(Stamp::Whole(date.since_1970_ns)),
+            Some(_) => Err(holds("and other rows are dates of another kind", "write the zone in all rows or in none")),
+            None => Err(holds("which is no date with a time", "write it like 2023-11-14T22:13:20.5Z")),
+        }
     }
 
     #[inline]
@@ -207,11 +303,17 @@ impl<C: Cells> Table<C> {
                 *self.no_fixes.entry(row.vehicle).or_default() += 1;
                 continue;
             }
-            if let Some(local) = &self.local {
-                row.position = local.place(row.position)?;
-                if self.layout.is_planar {
-                    row.position.z = 0.0;
+            if let Some(columns) = self.layout.convention.reference {
+                let valid = &self.layout.convention.valid;
+                if !bring(&self.cells, &mut row, (columns, valid), self.local, &mut self.there)? {
+                    continue;
                 }
+            } else if let Some(local) = &self.local {
+                row.position = local.place(row.position)?;
+            }
+            if self.layout.is_planar {
+                row.position.z = 0.0;
+                row.velocity.iter_mut().for_each(|velocity| velocity.z = 0.0);
             }
             rows.push(row);
         }
@@ -262,6 +364,30 @@ impl<C: Cells> Table<C> {
         }
         Ok(())
     }
+}
+
+/// Brings a position that is measured from a place in some columns into the frame `local`; `false` where it is not known, as
+/// other columns may say by a 0. The frame of the place is kept in `there`.
+fn bring(
+    cells: &impl Cells,
+    row: &mut Row,
+    (columns, valid): ([usize; 3], &[usize]),
+    local: Option<Local>,
+    there: &mut Option<Local>,
+) -> Result<bool, Fault> {
+    for &column in valid {
+        if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
+            return Ok(false);
+        }
+    }
+    let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
+    let there = match there.filter(|there| there.is_at(place)) {
+        Some(there) => there,
+        None => *there.insert(Local::at(place)?),
+    };
+    row.position = local.place_from(&there, row.position);
+    row.velocity = row.velocity.map(|velocity| local.turn_from(&there, velocity));
+    Ok(true)
 }
 
 /// The row of a vehicle; none where it was not seen.
@@ -343,10 +469,14 @@ impl<C: Cells> Rows for Table<C> {
         self.layout.id.is_none()
     }
 
+    fn assumed(&self) -> Option<String> {
+        self.has_own_clock.then(|| "the clocks of all vehicles started together".to_owned())
+    }
+
     /// Only times and names are looked at, which is several times faster than reading everything.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let Some(id) = self.layout.id else { return Ok(None) };
-        let mut columns: Vec<usize> = self.layout.time.into_iter().chain([id]).collect();
+        let mut columns: Vec<usize> = self.layout.of_time().chain([id]).collect();
         columns.extend(&self.layout.rivals);
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;

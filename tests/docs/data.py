@@ -17,7 +17,7 @@ WRONG_INPUT = 2
 # Files that an audit is given, by their first key, and the option that takes them.
 ASKED_OF_AUDIT = {"obstacle": "--obstacles", "fence": "--fence", "audit": "--config"}
 
-TWO = "t,id,x,y,z\n0,a,100,100,100\n0,b,110,100,100\n1,a,100,100,100\n1,b,110,100,100\n"
+TWO = "t_s,id,x,y,z\n0,a,100,100,100\n0,b,110,100,100\n1,a,100,100,100\n1,b,110,100,100\n"
 
 
 def wrong_data(block: Block, folder: Path, programs: Path) -> list[str]:

@@ -27,6 +27,7 @@ mod obstacles;
 mod own_recordings;
 mod presence;
 mod proofs;
+mod reading;
 mod reads;
 mod references;
 mod refuses;

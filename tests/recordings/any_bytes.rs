@@ -17,6 +17,7 @@ use tautline::track::Item;
 
 use crate::messages::{cdr, mcap_with};
 use crate::recording::Whole;
+use crate::ulog::Log;
 
 /// Cases of each kind where nobody says otherwise.
 const CASES: u32 = 60;
@@ -51,6 +52,11 @@ const MOTIVE: &str = "Format Version,1.23,Length Units,Meters,Coordinate Space,G
 const VICON: &str = "Trajectories\n100\n,,a:1,,,a:2,,,b,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z\n\
     ,,mm,mm,mm,mm,mm,mm,mm,mm,mm\n1,0,1,2,3,4,5,6,7,8,9\n2,0,1,2,3,,,,7,8,9\n\nDevices\n1000\n";
 const EARTH: &str = "t,id,lat,lon,alt,radius\n0,a,47.3,8.5,400,0.1\n0,b,47.300001,-179.9,401,\n1,a,89.9,8.5,400,0.1\n";
+const JSONL: &str =
+    "{\"t\": 0, \"id\": \"a\", \"pos\": [1, 2, 3]}\n{\"t\": 1.5, \"id\": 7, \"pos\": [1, 2, 3.5], \"q\": null}\n";
+const PX4: &str = "timestamp,x,y,z,ref_lat,ref_lon,ref_alt,xy_valid\n0,1,2,-3,47,8,400,1\n20000,1,2,-3,nan,8,400,1\n";
+const SPLIT: &str = "sec,nanosec,id,north,east,down\ns,ns,-,m,m,m\n1,5,a,1,2,3\n1,999999999,a,1,2,4\n";
+const DATES: &str = "time,id,x,y\n2023-11-14T22:13:20.5Z,a,1,2\n2023-11-14 23:13:21+01:00,a,1,2\n";
 const METADATA: &str = "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n  compression_format: ''\n\
     \x20 compression_mode: ''\n  relative_file_paths:\n  - bag_0.mcap\n  - bag_1.mcap.zstd\n  message_count: 3\n";
 
@@ -76,6 +82,8 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         }
         zip.finish().expect("finished").into_inner()
     };
+    let log = Log::new().gps(1, 1_700_000_000_000_000).global(1_000_000, 47.0, 8.0, 400.0);
+    let log = log.local(1_000_000, [1.0, 2.0, -3.0], 1, [47.0, 8.0]);
     vec![
         ("long", CSV.into()),
         ("wide", WIDE.into()),
@@ -90,6 +98,11 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("parquet", exported(export::Format::Parquet)),
         ("npz", exported(export::Format::Npz)),
         ("mcap", exported(export::Format::Mcap)),
+        ("jsonl", JSONL.into()),
+        ("px4", PX4.into()),
+        ("split", SPLIT.into()),
+        ("dates", DATES.into()),
+        ("ulog", log.bytes()),
         ("vviz", VVIZ.into()),
         ("motive", MOTIVE.into()),
         ("vicon", VICON.into()),

@@ -287,6 +287,18 @@ fn what_was_seen_is_laid_out_as_the_positions_are() {
 }
 
 #[test]
+fn of_two_arrays_of_times_none_is_ignored() {
+    let times = || npy("<f8", "False", "(3,)", &doubles(&[0.0, 0.5, 1.0]));
+    let positions = ("positions.npy", npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3)))));
+    let bytes = archive(&[("t.npy", times()), ("timestamps.npy", times()), positions], true);
+    let refused = read_bytes("two.npz", &bytes, &ReadOptions::default()).expect_err("two clocks");
+    assert!(refused.to_string().contains("`t` and `timestamps` both give the time"), "{refused}");
+    let mut named = ReadOptions::default();
+    assert!(named.columns.set("t", "timestamps"));
+    assert_eq!(read_bytes("two.npz", &bytes, &named).expect("named").samples().len(), 6);
+}
+
+#[test]
 fn no_time_is_refused() {
     let stamps: Vec<u8> = [0_i64, i64::MIN, 1000].iter().flat_map(|ms| ms.to_le_bytes()).collect();
     let t = ("t.npy", npy("<M8[ms]", "False", "(3,)", &stamps));

@@ -4,10 +4,13 @@
 mod recording;
 
 mod any_bytes;
+mod axes;
 mod beside;
 mod capture;
+mod clocks;
 mod columns;
 mod containers;
+mod doors;
 mod earth;
 mod exports;
 mod formats;
@@ -20,4 +23,5 @@ mod parquet;
 mod refusals;
 mod ros;
 mod told_apart;
+mod ulog;
 mod vehicles;

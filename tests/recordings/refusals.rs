@@ -59,7 +59,7 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         (last("0.5,,1,2,3"), line(5), "column `id` is empty", "fill it"),
         (last("0.5,2,1,,3"), line(5), "column `y` is empty", "fill it"),
         (last("0.5,2,1,2"), line(5), "4 fields where 5 are expected", "a field for each column"),
-        (last("0.5,1,1,2,3"), line(5), "vehicle `1` is there a second time at 0.5 s; the first is line 4", "take one"),
+        (last("0.5,1,1,2,4"), line(5), "vehicle `1` is there a second time at 0.5 s; the first is line 4", "take one"),
         (last("0.5,2,1,5,2,3"), line(5), "6 fields where 5", "write them with points"),
         (
             LONG.replace(',', ";").replace("0.5;2", "0,5;2"),
@@ -70,7 +70,7 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         (last("0.5,\"2,1,2,3"), line(5), "quotes are not closed", "close the quotes"),
         ("t,x1,y1,z1\n0,1,2,3\n1,1,2,3\n0.5,1,2,3\n".into(), line(4), "0.5 s comes after 1 s", "sort the lines"),
         (
-            "t,x1,y1,z1\n0,1,2,3\n0,1,2,3\n".into(),
+            "t,x1,y1,z1\n0,1,2,3\n0,1,2,4\n".into(),
             line(3),
             "there a second time at 0 s; the first is line 2",
             "take one",

@@ -192,7 +192,7 @@ fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
         (
             Box::new(text("storage_identifier: mcap", "storage_identifier: sqlite3")),
             "stored as `sqlite3`",
-            "ros2 bag convert",
+            "rosbags-convert",
         ),
         (
             Box::new(text("compression_mode: file", "compression_mode: MESSAGE")),

@@ -194,8 +194,7 @@ fn strangers_are_told_the_way_in() {
     let folder = folder(&[]);
     for (bytes, said, way) in [
         (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag", "rosbags-convert"),
-        (b"SQLite format 3\0\x10", "SQLite", "ros2 bag convert"),
-        (b"ULog\x01\x12\x35\x01", "ULog", "ulog2csv"),
+        (b"SQLite format 3\0\x10", "SQLite", "rosbags-convert --src BAG --dst flight --dst-storage mcap"),
         (b"skyb\x01", "Skybrush", ".skyc"),
         (b"\xa3\x95\x80\x80", "ArduPilot", "mavlogdump"),
         (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n", "ArduPilot", "mavlogdump"),
@@ -217,5 +216,5 @@ fn strangers_are_told_the_way_in() {
     let said = "rosbag2_bagfile_information:\n  storage_identifier: sqlite3\n  relative_file_paths: [flight_0.db3]\n";
     let bag = self::folder(&[("metadata.yaml", said), ("flight_0.db3", "")]);
     let error = whole(bag.path()).expect_err("refused");
-    assert!(error.to_string().contains("`sqlite3`") && error.help().contains("ros2 bag convert"), "{error}");
+    assert!(error.to_string().contains("`sqlite3`") && error.help().contains("rosbags-convert"), "{error}");
 }

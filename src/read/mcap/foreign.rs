@@ -2,7 +2,7 @@
 
 use super::super::clock::TimeUnit;
 use super::super::error::{Place, ReadError};
-use super::super::options::ReadOptions;
+use super::super::options::{Duplicates, ReadOptions};
 use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use super::plan::Plan;
@@ -17,7 +17,9 @@ pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) ->
     let none = plan.none();
     let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
     about.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
-    let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new() };
+    // Messages that are there twice are those of a bag that is.
+    about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
+    let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
     Ok(Box::new(Ordered::open(foreign, about)?))
 }
 
@@ -29,6 +31,8 @@ struct Foreign {
     listed: bool,
     /// The names of the vehicles as they are shown.
     shown: Vec<String>,
+    /// Messages before each file.
+    starts: Vec<u64>,
 }
 
 impl Rows for Foreign {
@@ -36,6 +40,7 @@ impl Rows for Foreign {
         let (before, poses, listed) = (rows.len(), &mut self.poses, &mut self.listed);
         let mut more = true;
         while more && rows.len() < before + BATCH {
+            let (files, messages) = (self.splits.opened_files(), poses.messages);
             more = self.splits.visit(|part| {
                 match part {
                     Part::Message(message) => poses.take(&message, rows)?,
@@ -44,6 +49,9 @@ impl Rows for Foreign {
                 }
                 Ok(())
             })?;
+            if self.splits.opened_files() > files {
+                self.starts.push(messages);
+            }
         }
         Ok(rows.len() > before)
     }
@@ -51,6 +59,7 @@ impl Rows for Foreign {
     fn rewind(&mut self) -> Result<(), ReadError> {
         self.splits.rewind();
         self.poses.rewind();
+        self.starts.clear();
         Ok(())
     }
 
@@ -87,6 +96,10 @@ impl Rows for Foreign {
 
     fn place(&self, number: u64) -> Place {
         Place::Part(format!("message {number} with positions"))
+    }
+
+    fn file(&self, number: u64) -> usize {
+        self.starts.partition_point(|start| *start < number)
     }
 
     fn is_wide(&self) -> bool {

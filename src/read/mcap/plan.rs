@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::super::earth::Local;
 use super::super::error::{Fault, ReadError, quoted};
 use super::super::options::ReadOptions;
+use super::super::turned;
 use super::messages::{EARTH, What, Who};
 use super::outline::{Outline, place, refuse_own_frames};
 use super::rigid::{Known, Placed};
@@ -59,6 +60,9 @@ impl Plan {
             notes: Vec::new(),
             outline,
         };
+        if first_fix.is_some() {
+            turned::refuse_known(options, "a recording with places on the Earth")?;
+        }
         if options.origin.is_some() && first_fix.is_none() {
             return Err(Fault::content("it has no place on the Earth", "leave --origin away").into());
         }

@@ -23,7 +23,7 @@ pub(super) struct Poses {
     pub(super) names: Names,
     /// Vehicle of the last row.
     vehicle: usize,
-    messages: u64,
+    pub(super) messages: u64,
     /// Fixes that are none.
     no_fixes: u64,
     brought: Brought,

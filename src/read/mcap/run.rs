@@ -6,10 +6,12 @@ use super::super::names::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
+use super::super::turned;
 use crate::record::mcap::{Entry, McapRecording};
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let recording = McapRecording::open(&source.path)?;
+    turned::refuse_known(options, "a recording of tautline")?;
     let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };

@@ -24,6 +24,11 @@ impl Splits {
         Self { files, next: 0, open: None, options: options.clone(), least_messages, notes: Vec::new() }
     }
 
+    /// How many files have been opened since the start.
+    pub(super) fn opened_files(&self) -> usize {
+        self.next
+    }
+
     /// Starts again with the first file.
     pub(super) fn rewind(&mut self) {
         (self.next, self.open) = (0, None);

@@ -1,0 +1,150 @@
+//! Axes of recordings turned to x, y and z of ours: east, north and up, or any frame whose z is up.
+
+use nalgebra::Vector3;
+
+/// Which axis of a recording becomes x, y and z, and by what it is multiplied.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    from: [usize; 3],
+    factors: [f64; 3],
+}
+
+impl Default for Axes {
+    /// Axes as they are.
+    fn default() -> Self {
+        Self { from: [0, 1, 2], factors: [1.0; 3] }
+    }
+}
+
+impl Axes {
+    /// Reads the directions of the axes of a recording, such as `enu`, `ned` or `nwu`, or what becomes x, y and z, such as
+    /// `y,x,-z`; none where it is neither.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        let mut found: [Option<(usize, f64)>; 3] = [None; 3];
+        if name.contains(',') {
+            let mut parts = name.split(',');
+            for slot in &mut found {
+                let part = parts.next()?.trim().to_lowercase();
+                let (sign, axis) = match part.strip_prefix('-') {
+                    Some(axis) => (-1.0, axis),
+                    None => (1.0, part.strip_prefix('+').unwrap_or(&part)),
+                };
+                *slot = Some((["x", "y", "z"].iter().position(|known| *known == axis)?, sign));
+            }
+            if parts.next().is_some() {
+                return None;
+            }
+        } else {
+            for (axis, letter) in name.to_lowercase().chars().enumerate() {
+                let (to, sign) = match letter {
+                    'e' => (0, 1.0),
+                    'w' => (0, -1.0),
+                    'n' => (1, 1.0),
+                    's' => (1, -1.0),
+                    'u' => (2, 1.0),
+                    'd' => (2, -1.0),
+                    _ => return None,
+                };
+                let is_first = axis < 3 && found[to].replace((axis, sign)).is_none();
+                if !is_first {
+                    return None;
+                }
+            }
+        }
+        let [x, y, z] = found;
+        let [x, y, z] = [x?, y?, z?];
+        let is_permutation = (0..3).all(|axis| [x.0, y.0, z.0].contains(&axis));
+        is_permutation.then_some(Self { from: [x.0, y.0, z.0], factors: [x.1, y.1, z.1] })
+    }
+
+    /// The same, with the axes of the recording multiplied by these numbers first.
+    #[must_use]
+    pub fn scaled(self, by: [f64; 3]) -> Self {
+        let factors = [0, 1, 2].map(|axis| self.factors[axis] * by[self.from[axis]]);
+        Self { factors, ..self }
+    }
+
+    /// Where an axis of the recording goes, and by what it is multiplied.
+    pub(super) fn of(&self, axis: usize) -> (usize, f64) {
+        let to = self.from.iter().position(|from| *from == axis).unwrap_or(axis);
+        (to, self.factors[to])
+    }
+
+    /// Whether axes stay as they are.
+    pub(super) fn is_identity(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether z stays the third axis: its sign may change, and its length.
+    pub(super) fn keeps_plane(&self) -> bool {
+        self.from[2] == 2
+    }
+
+    /// Whether what is up stays up.
+    pub(super) fn keeps_up(&self) -> bool {
+        self.keeps_plane() && self.factors[2] > 0.0
+    }
+
+    /// Whether lengths stay as they are.
+    pub(super) fn keeps_lengths(&self) -> bool {
+        self.factors.iter().all(|factor| factor.abs() == 1.0)
+    }
+
+    /// Whether all factors can be multiplied by.
+    pub(super) fn are_finite(&self) -> bool {
+        self.factors.iter().all(|factor| factor.is_finite() && *factor != 0.0)
+    }
+
+    pub(super) fn turn(&self, vector: Vector3<f64>) -> Vector3<f64> {
+        // Adding 0 makes a zero positive.
+        Vector3::from_fn(|axis, _| self.factors[axis] * vector[self.from[axis]] + 0.0)
+    }
+
+    /// What a person should know.
+    pub(super) fn note(&self) -> String {
+        let named = |axis: usize| match self.factors[axis] {
+            1.0 => ["x", "y", "z"][self.from[axis]].to_owned(),
+            -1.0 => format!("-{}", ["x", "y", "z"][self.from[axis]]),
+            factor => format!("{factor:?} {}", ["x", "y", "z"][self.from[axis]]),
+        };
+        format!("axes are turned: x, y, z are {}, {}, {} of the recording", named(0), named(1), named(2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+
+    #[test]
+    fn axes_are_read_by_direction_and_by_place() {
+        let file = vector![1.0, 2.0, 3.0];
+        for (name, expected) in [
+            ("enu", [1.0, 2.0, 3.0]),
+            ("x,y,z", [1.0, 2.0, 3.0]),
+            ("NED", [2.0, 1.0, -3.0]),
+            ("y,x,-z", [2.0, 1.0, -3.0]),
+            ("nwu", [-2.0, 1.0, 3.0]),
+            ("eus", [1.0, -3.0, 2.0]),
+            ("+x, -z, +y", [1.0, -3.0, 2.0]),
+        ] {
+            let axes = Axes::from_name(name).unwrap_or_else(|| panic!("{name}"));
+            assert_eq!(axes.turn(file).as_slice(), expected, "{name}");
+        }
+        for name in ["", "en", "enn", "enud", "exu", "x,y", "x,x,z", "x,y,w", "x,y,z,z", "x,y,--z", "ens"] {
+            assert_eq!(Axes::from_name(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_scale_is_of_the_axes_of_the_recording() {
+        let ned = Axes::from_name("ned").expect("axes");
+        assert_eq!(ned.scaled([2.0, 1.0, -1.0]).turn(vector![1.0, 2.0, 3.0]).as_slice(), [2.0, 2.0, 3.0]);
+        assert!(
+            Axes::default().scaled([1.0, -1.0, 1.0]).keeps_lengths() && !ned.scaled([1.0, 2.0, 1.0]).keeps_lengths()
+        );
+        assert!(ned.turn(Vector3::zeros()).iter().all(|x| x.is_sign_positive()));
+    }
+}
