@@ -2,7 +2,9 @@
 
 use super::candidates::{Candidates, pair_count, pairs, pairs_of};
 use super::error::AuditError;
+use super::exact::ExactMotion;
 use super::ledger::Ledger;
+use super::line::Line;
 use super::outcome::{AuditOutcome, Status, StepFinding, Violation};
 use super::parry::KeepOut;
 use super::sweep::{ClosestPoint, Interval, MAX_LENGTH_M, MIN_LIMIT_M, RelativeMotion};
@@ -102,10 +104,10 @@ impl Auditor {
     #[must_use]
     pub fn finish(self) -> AuditOutcome {
         let decided = self.time_s.is_some() && self.outcome.refused == 0 && self.ledger.is_decided();
-        let Ledger { unresolved, parry, .. } = self.ledger;
+        let parry = self.ledger.parry;
         let violations = self.ledger.into_lists().violations;
         let status = Status::new(!violations.is_empty(), decided);
-        AuditOutcome { status, violations, unresolved, parry, ..self.outcome }
+        AuditOutcome { status, violations, parry, ..self.outcome }
     }
 
     fn admit<T>(&mut self, checked: Result<T, AuditError>) -> Result<T, AuditError> {
@@ -135,7 +137,10 @@ impl Auditor {
             let contact = keep_out.cast(&motion);
             if contact.is_some() || keep_out.is_near(&motion, point) {
                 let known = ledger.violations.len();
-                if let Some(index) = ledger.near(Pair::new(i, j), step, keep_out, &motion, point, contact) {
+                let exact = exact_motion([from, to], [i, j], step);
+                // The number that the closest approach of the step has, and below the limit where it is rounded up to that.
+                let least_m = || point.separation_m().min(keep_out.delta_m.next_down());
+                if let Some(index) = ledger.near(Pair::new(i, j), keep_out, &motion, contact, &exact, least_m) {
                     let violation = ledger.violations[index];
                     if index == known {
                         began.push(violation);
@@ -162,6 +167,13 @@ impl Auditor {
         self.time_s = Some(step.to_s);
         StepFinding { closest, began: &self.began, ended: &self.ended }
     }
+}
+
+/// The straight motion of a pair over a step, from one instant to the next.
+fn exact_motion([from, to]: [&Rows; 2], [i, j]: [usize; 2], over: Interval) -> ExactMotion {
+    let Interval { from_s, to_s } = over;
+    let line = |of| Line { from_s, to_s, from: row(from, of), to: row(to, of) };
+    ExactMotion { first: line(i), second: line(j), over }
 }
 
 /// Whether an instant can be judged: a time, and a position for each vehicle, that are not beyond what is computed with.

@@ -24,7 +24,11 @@ const ROUNDING: f64 = 1e-12;
 /// What the second detector says of a segment where the first found this minimum.
 pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minimum, rounding: f64) -> CrossCheck {
     match (search.target, search.exact()) {
-        (Target::Origin, Some(motion)) => keep_out.compare(&motion, motion.closest(), keep_out.cast(&motion)).1,
+        (Target::Origin, Some(motion)) => {
+            let closest = motion.closest();
+            let is_below = closest.separation_m() < keep_out.delta_m;
+            keep_out.compare(&motion, closest, is_below, keep_out.cast(&motion)).1
+        }
         (Target::Origin, None) => along_chords(keep_out, search.r, found, rounding),
         (Target::Shape(shape), _) => from_shape(shape, keep_out.delta_m, found, |u| search.position(u)),
     }

@@ -185,9 +185,9 @@ impl<'a> Search<'a> {
                 self.squared[a + b] += 2.0 * self.part[a].dot(&self.part[b]);
             }
         }
-        let rounding = 2.0 * self.squared.len() as f64 * f64::EPSILON * self.magnitude().powi(2);
+        let rounding = 4.0 * self.squared.len() as f64 * f64::EPSILON * self.magnitude().powi(2);
         let (low, high) = self.basis.range(&self.squared);
-        ((low - rounding).max(0.0).sqrt(), (high + rounding).max(0.0).sqrt())
+        ((low - rounding).max(0.0).sqrt().next_down().max(0.0), (high + rounding).max(0.0).sqrt().next_up())
     }
 
     /// The distance from a convex set, below zero within, changes no faster than the point moves, and is greatest at a

@@ -3,14 +3,11 @@
 use std::fmt;
 
 use super::episodes::Episodes;
+use super::exact::ExactMotion;
 use super::outcome::{Disagreement, ParryEvidence, Undecided, Violation};
 use super::parry::{CrossCheck, KeepOut};
 use super::shortlist::{Finding, Tally};
-use super::sweep::{ClosestPoint, Interval, RESOLUTION, RelativeMotion};
-
-/// Coarsest resolution, as a fraction of the limit, at which a pair that seems clear by less than the resolution is still
-/// called clear.
-const NEGLIGIBLE_RESOLUTION: f64 = 1e-8;
+use super::sweep::{Interval, RelativeMotion};
 
 /// Findings that are kept where the recording itself corrects them at the end.
 const KEPT_FOR_CORRECTION: usize = 1 << 16;
@@ -23,8 +20,6 @@ pub(super) struct Ledger<P: Copy + Ord + fmt::Debug> {
     undecided: Episodes<Undecided<P>>,
     /// The sampling rate that would decide all that is undecided \[Hz\]; none where there is none that would.
     deciding_rate_hz: Option<f64>,
-    /// Sweeps that seem clear with less room than rounding.
-    pub(super) unresolved: u64,
     pub(super) parry: ParryEvidence<P>,
     is_bounded: bool,
 }
@@ -84,7 +79,6 @@ impl<P: Copy + Ord + fmt::Debug> Default for Ledger<P> {
             violations: Episodes::default(),
             undecided: Episodes::default(),
             deciding_rate_hz: Some(0.0),
-            unresolved: 0,
             parry: ParryEvidence::default(),
             is_bounded: false,
         }
@@ -122,35 +116,33 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
     }
 
     /// Judges a straight motion that is below the limit, close to it, or in contact by the cast; returns the index of its
-    /// violation, if it is one.
+    /// violation, if it is one. `least_m` gives the smallest separation of a violation.
     #[cold]
     pub(super) fn near(
         &mut self,
         pair: P,
-        over: Interval,
         keep_out: &KeepOut,
         motion: &RelativeMotion,
-        approach: ClosestPoint,
         contact: Option<f64>,
+        exact: &ExactMotion,
+        least_m: impl FnOnce() -> f64,
     ) -> Option<usize> {
-        let (limit_m, min_m) = (keep_out.delta_m, approach.separation_m());
-        let (span, check) = keep_out.compare(motion, approach, contact);
-        self.cross_check(pair, over, min_m, span.map(|span| span.enter), check);
-        let Some(span) = span else {
-            if is_coarse(motion, min_m, limit_m) {
-                self.unresolved += 1;
-                let Interval { from_s, to_s } = over;
-                let rate_hz = None;
-                self.undecided(Undecided { pair, from_s, to_s, lower_m: min_m, upper_m: min_m, limit_m, rate_hz });
-            }
-            return None;
-        };
+        let (limit_m, over, approach) = (keep_out.delta_m, exact.over, motion.closest());
+        let resolution_m = motion.resolution_m();
+        let is_surely_below = approach.separation_m() + resolution_m < limit_m;
+        let is_below = is_surely_below || exact.is_below(limit_m);
+        let (span, check) = keep_out.compare(motion, approach, is_below, contact);
+        self.cross_check(pair, over, approach.separation_m(), span.map(|span| span.enter), check);
+        let span = span?;
         let (from_s, to_s, min_at_s) = (over.at(span.enter), over.at(span.exit), over.at(approach.at));
-        let violation = Violation { pair, from_s, to_s, min_m, min_at_s, limit_m };
         if self.violations.is_of_before(to_s) {
             return None;
         }
-        Some(self.violated(violation, motion.from_squared.sqrt() < limit_m))
+        let violation = Violation { pair, from_s, to_s, min_m: least_m(), min_at_s, limit_m };
+        let start_m = motion.from_squared.sqrt();
+        let is_near = (start_m - limit_m).abs() <= resolution_m;
+        let from_start = if is_near { exact.starts_below(limit_m) } else { start_m < limit_m };
+        Some(self.violated(violation, from_start))
     }
 
     /// Enters a time below the limit, and says whether it is below from the very start of a segment; returns the index of
@@ -216,12 +208,6 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         let deciding_rate_hz = self.deciding_rate_hz.filter(|_| !undecided.is_empty());
         Lists { violations, undecided, violations_tally, undecided_tally, deciding_rate_hz }
     }
-}
-
-/// Whether a separation is clear by less than rounding, where that is no longer negligible against the limit.
-pub(super) fn is_coarse(motion: &RelativeMotion, min_m: f64, limit_m: f64) -> bool {
-    let resolution_m = RESOLUTION * motion.from_squared.max(motion.to_squared).sqrt();
-    resolution_m > NEGLIGIBLE_RESOLUTION * limit_m && min_m - limit_m < resolution_m
 }
 
 #[cfg(test)]

@@ -7,15 +7,14 @@
 //! nothing passes between samples. Two detectors look at each pair that is swept:
 //!
 //! - the closed form: the smallest |r0 + s d| over s from 0 to 1, where r0 is the relative position at the start of the
-//!   segment and d its change. It gives the verdict. On curves the smallest distance is enclosed;
+//!   segment and d its change. It gives the verdict. Where its rounding leaves a doubt, exact arithmetic on the positions decides. On
+//!   curves the smallest distance is enclosed;
 //! - parry's shape cast of two keep-out balls of radius delta/2. It must agree.
 //!
 //! The second is a cross-check of the formula and no second proof: both are given the same list of pairs and the same
 //! relative motion, so a pair that is wrongly left out, or a motion that is wrongly read, is wrong for both.
 //!
-//! A violation is a separation **strictly** below the limit. Both work on relative positions, so coordinates far from the
-//! origin lose nothing that the positions themselves have not lost. The closed form resolves a separation to 4 eps
-//! (1e-15) of the pair's distance at the ends of the segment.
+//! A violation is a separation **strictly** below the limit, exactly: positions and times are taken as the doubles that they are.
 //!
 //! Large swarms are not swept pair by pair: pairs that a bound on motion proves to be neither too close nor among the
 //! closest are left out, so the answer is that of the full sweep.
@@ -37,13 +36,16 @@ mod auditor;
 mod candidates;
 mod clearance;
 mod cross_check;
+mod double_double;
 mod enclosure;
 pub mod envelope;
 mod episodes;
 mod error;
+mod exact;
 mod interruption;
 mod ledger;
 mod limits;
+mod line;
 mod obstacle;
 mod outcome;
 mod pair_sweep;
@@ -55,6 +57,7 @@ mod segment;
 mod shortlist;
 mod slices;
 mod sweep;
+mod whole_motion;
 
 pub use auditor::Auditor;
 pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};

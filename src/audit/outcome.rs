@@ -181,8 +181,8 @@ pub struct AuditOutcome {
     pub pairs_excluded: u64,
     /// Calls answered by an error: what they offered was not judged.
     pub refused: u64,
-    /// Sweeps that seem clear with less room than the rounding of the closed form, where that rounding is no longer
-    /// negligible against delta (vehicles some ten million delta apart at one end of a step).
+    /// Steps that are clear with less room than the paths of their vehicles may bend; 0 for straight steps, which are judged
+    /// exactly.
     pub unresolved: u64,
     /// What the second detector says.
     pub parry: ParryEvidence,

@@ -4,12 +4,13 @@ use nalgebra::Vector3;
 
 use super::cross_check::cross_check;
 use super::enclosure::{Minimum, Search, Target};
-use super::ledger::is_coarse;
+use super::exact::ExactMotion;
+use super::line::Line;
 use super::outcome::{Approach, ObjectPair, Undecided, Violation};
 use super::parry::KeepOut;
 use super::results::Results;
 use super::segment::Segment;
-use super::sweep::{Interval, RelativeMotion};
+use super::sweep::{ClosestPoint, Interval, RelativeMotion};
 
 /// Two that must keep a distance.
 #[derive(Debug)]
@@ -60,11 +61,69 @@ pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: i
     }
 }
 
+/// The smallest separation of straight segments, where it is below what is known: rough bounds first, and exact numbers of those
+/// that may be the smallest.
+#[derive(Debug)]
+struct Nearest<'a> {
+    cutoff: f64,
+    /// What the smallest separation is not above, and its square with a margin.
+    upper: f64,
+    upper_squared: f64,
+    /// What may be the smallest: a lower bound, where it is closest, and the segments.
+    candidates: Vec<(f64, f64, Overlap<'a>)>,
+}
+
+impl<'a> Nearest<'a> {
+    /// Margin of the rough bound. With e the resolution, (x + e)^2 <= x^2 (1 + m) + e^2 (1 + 1 / m), and e^2 is 64 eps^2 times the
+    /// squared scale.
+    const MARGIN: f64 = 1e-6;
+    const OF_SCALE: f64 = 1e-23;
+
+    fn below(cutoff: f64) -> Self {
+        Self { cutoff, upper: cutoff, upper_squared: cutoff * cutoff * (1.0 + Self::MARGIN), candidates: Vec::new() }
+    }
+
+    #[inline]
+    fn take(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
+        if closest.squared < self.upper_squared + Self::OF_SCALE * motion.scale_squared() {
+            self.take_near(overlap, motion, closest);
+        }
+    }
+
+    #[inline(never)]
+    fn take_near(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
+        let (separation, resolution) = (closest.separation_m(), motion.resolution_m());
+        let (lower, upper) = (separation - resolution, separation + resolution);
+        if lower < self.upper {
+            self.candidates.push((lower, closest.at, *overlap));
+        }
+        if upper < self.upper {
+            (self.upper, self.upper_squared) = (upper, upper * upper * (1.0 + Self::MARGIN));
+        }
+    }
+
+    /// The smallest separation, as the largest double that is not above it, and when it is first reached \[s\].
+    fn finish(self) -> Option<(f64, f64)> {
+        let mut found = None;
+        let mut least = self.cutoff;
+        for (lower, at, overlap) in self.candidates {
+            if lower < least && lower <= self.upper {
+                let exact = overlap.exact();
+                if exact.is_below(least) {
+                    least = exact.separation();
+                    found = Some((least, overlap.over.at(at)));
+                }
+            }
+        }
+        found
+    }
+}
+
 impl PairSweep<'_> {
     /// Judges what two vehicles, or an obstacle and a vehicle, do in a window. Straight segments are judged whole, so that
     /// what is found does not depend on windows; curves within the window.
     pub(super) fn judge(&self, first: &[Segment], second: &[Segment], window: Interval, results: &mut Results) {
-        let (mut nearest_squared, mut nearest_at) = (f64::INFINITY, (window, 0.0));
+        let mut nearest = Nearest::below(self.cutoff);
         let vehicles = matches!(self.target, Target::Origin);
         let mut swept = 0;
         overlaps(first, second, |overlap| {
@@ -74,14 +133,13 @@ impl PairSweep<'_> {
             if self.is_on_ground(overlap.first, overlap.over) && self.is_on_ground(overlap.second, overlap.over) {
                 return;
             }
-            if vehicles && overlap.first.curve.is_none() && overlap.second.curve.is_none() {
+            if vehicles && overlap.is_straight() {
                 swept += 1;
-                let closest = overlap.straight().closest();
-                if closest.squared < nearest_squared {
-                    (nearest_squared, nearest_at) = (closest.squared, (overlap.over, closest.at));
-                }
+                let motion = overlap.straight();
+                let closest = motion.closest();
+                nearest.take(&overlap, &motion, closest);
                 if self.may_violate {
-                    self.straight(&overlap, results);
+                    self.straight(&overlap, &motion, closest, results);
                 }
             } else {
                 let Interval { from_s, to_s } = overlap.over;
@@ -93,10 +151,8 @@ impl PairSweep<'_> {
             }
         });
         results.swept += swept;
-        let lower_m = nearest_squared.sqrt();
-        if lower_m < self.cutoff {
-            let (over, fraction) = nearest_at;
-            self.offer(lower_m, lower_m, over.at(fraction), results);
+        if let Some((separation_m, time_s)) = nearest.finish() {
+            self.offer(separation_m, separation_m, time_s, results);
         }
     }
 
@@ -120,11 +176,11 @@ impl PairSweep<'_> {
 
     /// Two straight segments, by the closed form and by the cast.
     #[inline(never)]
-    fn straight(&self, overlap: &Overlap<'_>, results: &mut Results) {
-        let motion = overlap.straight();
-        let (closest, contact) = (motion.closest(), self.keep_out.cast(&motion));
-        if contact.is_some() || self.keep_out.is_near(&motion, closest) {
-            results.ledger.near(self.pair, overlap.over, &self.keep_out, &motion, closest, contact);
+    fn straight(&self, overlap: &Overlap<'_>, motion: &RelativeMotion, closest: ClosestPoint, results: &mut Results) {
+        let contact = self.keep_out.cast(motion);
+        if contact.is_some() || self.keep_out.is_near(motion, closest) {
+            let exact = overlap.exact();
+            results.ledger.near(self.pair, &self.keep_out, motion, contact, &exact, || exact.separation());
         }
     }
 
@@ -135,7 +191,8 @@ impl PairSweep<'_> {
         let r = overlap.relative();
         let mut search = Search::new(self.target, &r);
         let deviation = first.deviation() + second.deviation();
-        let rounding = if search.straight().is_some() { 0.0 } else { first.rounding() + second.rounding() };
+        // Straight past an obstacle, the distance is that of a formula and no enclosure.
+        let rounding = if overlap.is_straight() { 0.0 } else { first.rounding() + second.rounding() };
         let matters = if self.judges { limit_m.max(self.cutoff) } else { self.cutoff };
         let Some(drawn) = search.minimum(matters + deviation + rounding) else { return };
 
@@ -177,12 +234,8 @@ impl PairSweep<'_> {
                     results.ledger.undecided(undecided(from_s, to_s, lower(&lowest), min_m, &lowest));
                 }
             }
-        } else {
-            let coarse =
-                || search.exact().is_some_and(|motion| deviation == 0.0 && is_coarse(&motion, lower_m, limit_m));
-            if lower_m < limit_m || coarse() {
-                results.ledger.undecided(undecided(over.from_s, over.to_s, lower_m, upper_m, &drawn));
-            }
+        } else if lower_m < limit_m {
+            results.ledger.undecided(undecided(over.from_s, over.to_s, lower_m, upper_m, &drawn));
         }
         if self.may_violate {
             let check = cross_check(&search, &self.keep_out, &drawn, rounding);
@@ -192,39 +245,49 @@ impl PairSweep<'_> {
 }
 
 impl Overlap<'_> {
+    /// Whether both segments are straight.
+    #[inline]
+    fn is_straight(&self) -> bool {
+        self.first.curve().is_none() && self.second.curve().is_none()
+    }
+
     /// The relative motion of two straight segments over the time that they share.
     #[inline]
     pub(super) fn straight(&self) -> RelativeMotion {
         let (a, b) = (self.first, self.second);
-        if a.from_s == b.from_s && a.to_s == b.to_s {
+        let are_samples = a.whole.is_none() && b.whole.is_none();
+        if are_samples && a.from_s == b.from_s && a.to_s == b.to_s {
             RelativeMotion::new(b.from - a.from, b.to - a.to)
         } else {
-            let (from, to) = self.cut();
-            RelativeMotion::new(from, to)
+            self.cut()
         }
     }
 
-    /// The relative positions at both ends of the shared time, where the segments are not over the same time.
+    /// The motion of two straight segments that are not over the same time, or are parts of others.
     /// Displacements are added to the difference of two starting points, never positions to positions: far from the
     /// origin that loses nothing.
     #[inline(never)]
-    fn cut(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let (a, b) = (self.first, self.second);
+    fn cut(&self) -> RelativeMotion {
+        let (a, b) = (self.first.line(), self.second.line());
         let (start, by_a, by_b) = (b.from - a.from, a.to - a.from, b.to - b.from);
         let at = |time_s: f64, end: bool| {
-            let share = |segment: &Segment| {
-                if segment.to_s <= segment.from_s { f64::from(u8::from(end)) } else { segment.fraction(time_s) }
-            };
-            start + (by_b * share(b) - by_a * share(a))
+            let share =
+                |line: &Line| if line.to_s <= line.from_s { f64::from(u8::from(end)) } else { line.fraction(time_s) };
+            start + (by_b * share(&b) - by_a * share(&a))
         };
-        (at(self.over.from_s, false), at(self.over.to_s, true))
+        RelativeMotion::interpolated([at(self.over.from_s, false), at(self.over.to_s, true)], start, [by_a, by_b])
+    }
+
+    /// Both straight segments as they were read.
+    pub(super) fn exact(&self) -> ExactMotion {
+        ExactMotion { first: self.first.line(), second: self.second.line(), over: self.over }
     }
 
     /// The relative position as a polynomial of the fraction of the time that is shared: at least one coefficient, the last
     /// one of several not zero.
     fn relative(&self) -> Vec<Vector3<f64>> {
         let (a, b) = (self.first, self.second);
-        if a.curve.is_none() && b.curve.is_none() {
+        if self.is_straight() {
             let motion = self.straight();
             return vec![motion.from, motion.by];
         }
@@ -243,7 +306,7 @@ impl Overlap<'_> {
     /// The sampling rate of both at which the deviation is no more than the margin: over intervals of h it is the sum of
     /// what each has now, c = peak / `h_now`^2, times h^2.
     fn rate_hz(&self, margin: f64) -> Option<f64> {
-        let curves = [self.first, self.second].into_iter().filter_map(|segment| segment.curve.as_ref());
+        let curves = [self.first, self.second].into_iter().filter_map(|segment| segment.curve());
         let per_s2: f64 = curves.map(|curve| curve.deviation.peak / (curve.to_s - curve.from_s).powi(2)).sum();
         let rate_hz = (per_s2 / margin).sqrt();
         (per_s2 > 0.0 && margin > 0.0 && rate_hz.is_finite()).then_some(rate_hz)

@@ -6,7 +6,7 @@ use parry3d::query::ShapeCastOptions;
 use parry3d::query::details::cast_shapes_ball_ball;
 use parry3d::shape::Ball;
 
-use super::sweep::{ClosestPoint, RelativeMotion, Span};
+use super::sweep::{ClosestPoint, RelativeMotion, Span, larger};
 
 /// Width of the band around delta in which the two detectors may differ, in units of eps (|r0|^2 + delta^2) of squared
 /// separation.
@@ -14,7 +14,7 @@ use super::sweep::{ClosestPoint, RelativeMotion, Span};
 /// The cast decides by b^2 - |d|^2 (|r0|^2 - delta^2) and takes its root. Each sum of three products carries 3 u
 /// (u = eps/2); collected, the discriminant over |d|^2, which is delta^2 less the squared distance of the line, is off by
 /// at most 17 u |r0|^2 + 7 u delta^2, and the root adds 3 u of both. The closed form adds 8 u |r0| delta
-/// ([`super::sweep::RESOLUTION`]). The sum stays below 24 u = 12 eps and is rounded up to a power of two.
+/// (`RelativeMotion::resolution_m` without its margin). Interpolated ends add 16 u S delta, S their scale. The sum stays below 24 u = 12 eps and is rounded up to a power of two.
 /// At |r0| = 10 m and delta = 2 m the band is 1e-13 m wide.
 const GRAZING_BAND: f64 = 16.0 * f64::EPSILON;
 
@@ -75,14 +75,15 @@ impl KeepOut {
         closest.squared <= self.delta_m * self.delta_m + self.grazing_band(motion)
     }
 
-    /// When a motion that is closest here is below delta by the closed form, beside what the cast says.
+    /// When a motion that is closest here is below delta, given whether it is, beside what the cast says.
     pub(super) fn compare(
         &self,
         motion: &RelativeMotion,
         closest: ClosestPoint,
+        is_below: bool,
         contact: Option<f64>,
     ) -> (Option<Span>, CrossCheck) {
-        let below = (closest.separation_m() < self.delta_m).then(|| motion.below(self.delta_m, closest));
+        let below = is_below.then(|| motion.below(self.delta_m, closest));
         (below, CrossCheck { contact, agrees: self.agrees(motion, closest, below, contact) })
     }
 
@@ -119,7 +120,7 @@ impl KeepOut {
     /// Width of the band for this motion \[m^2\].
     #[inline]
     fn grazing_band(&self, motion: &RelativeMotion) -> f64 {
-        GRAZING_BAND * (motion.from_squared + self.delta_m * self.delta_m)
+        GRAZING_BAND * (larger(motion.from_squared, motion.interpolated_squared) + self.delta_m * self.delta_m)
     }
 }
 
@@ -162,7 +163,8 @@ mod tests {
             let Some(motion) = pass(miss_m, before_m, after_m, along, aside) else { return Ok(()) };
             let keep_out = KeepOut::new(DELTA_M);
             let closest = motion.closest();
-            let (below, check) = keep_out.compare(&motion, closest, keep_out.cast(&motion));
+            let is_below = closest.separation_m() < DELTA_M;
+            let (below, check) = keep_out.compare(&motion, closest, is_below, keep_out.cast(&motion));
             prop_assert!(check.agrees, "{below:?} {check:?}");
             // What needs no closer look is clear to both.
             prop_assert!(keep_out.is_near(&motion, closest) || (below.is_none() && check.contact.is_none()));
@@ -174,7 +176,9 @@ mod tests {
         let keep_out = KeepOut::new(DELTA_M);
         let agrees = |miss_m: f64, change: fn(Option<f64>) -> Option<f64>| {
             let motion = pass(miss_m, 10.0, 10.0, [1.0, 2.0, 0.5], [0.0, 1.0, -1.0]).unwrap();
-            keep_out.compare(&motion, motion.closest(), change(keep_out.cast(&motion))).1.agrees
+            let closest = motion.closest();
+            let is_below = closest.separation_m() < DELTA_M;
+            keep_out.compare(&motion, closest, is_below, change(keep_out.cast(&motion))).1.agrees
         };
         for (miss_m, changes) in [
             (1.0, [|_| None, |toi: Option<f64>| toi.map(|toi| toi + 1e-12), |_| Some(f64::NAN)]),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::line::Line;
 use super::polynomial::{rescale, value};
 use super::sweep::Interval;
 
@@ -18,8 +19,17 @@ pub(super) struct Segment {
     pub(super) to: Vector3<f64>,
     /// Whether the vehicle counts as on the ground; `None` where that cannot be told.
     pub(super) grounded: Option<bool>,
+    /// What it is a part of; `None` for a straight line between two samples.
+    pub(super) whole: Option<Arc<Whole>>,
+}
+
+/// A motion that a segment is a part of.
+#[derive(Clone, Debug)]
+pub(super) enum Whole {
+    /// A straight line between two samples: the ends of the part are rounded, and these are not.
+    Line(Line),
     /// Where the segment is not a straight line known for certain.
-    pub(super) curve: Option<Arc<Curve>>,
+    Curve(Curve),
 }
 
 /// The sum of `coefficients[k] (t - from_s)^k`, and how far the vehicle can be from it.
@@ -85,39 +95,66 @@ impl Curve {
         local
     }
 
-    /// Bound on the rounding of [`Curve::local`] and [`Curve::position`]: a few units in the last place of what is summed.
+    /// Bound on the rounding of [`Curve::local`] and [`Curve::position`]: a few units in the last place of what is summed, and more
+    /// where the coefficients are those of a cubic through positions and velocities, which are rounded themselves.
     pub(super) fn rounding(&self) -> f64 {
         let length = self.to_s - self.from_s;
         let magnitude = self.coefficients.iter().rev().fold(0.0, |sum, c| sum * length + c.norm());
-        4.0 * self.coefficients.len() as f64 * f64::EPSILON * magnitude
+        // Of a line: 7 u.
+        let operations = match self.coefficients.len() {
+            _ if self.deviation.hermite => 48.0,
+            ..=2 => 4.0,
+            count => 4.0 * count as f64,
+        };
+        operations * f64::EPSILON * magnitude
     }
 }
 
 impl Segment {
     /// A straight line.
     pub(super) fn straight(from_s: f64, to_s: f64, from: Vector3<f64>, to: Vector3<f64>) -> Self {
-        Self { from_s, to_s, from, to, grounded: Some(false), curve: None }
+        Self { from_s, to_s, from, to, grounded: Some(false), whole: None }
     }
 
     /// A whole curve.
     pub(super) fn curved(curve: Curve) -> Self {
         let (from_s, to_s) = (curve.from_s, curve.to_s);
         let (from, to) = (curve.position(from_s), curve.position(to_s));
-        Self { from_s, to_s, from, to, grounded: Some(false), curve: Some(Arc::new(curve)) }
+        Self { from_s, to_s, from, to, grounded: Some(false), whole: Some(Arc::new(Whole::Curve(curve))) }
+    }
+
+    /// The curve that it is a part of.
+    #[inline]
+    pub(super) fn curve(&self) -> Option<&Curve> {
+        match self.whole.as_deref() {
+            Some(Whole::Curve(curve)) => Some(curve),
+            _ => None,
+        }
+    }
+
+    /// The line between two samples that a straight segment is, or is a part of.
+    #[inline]
+    pub(super) fn line(&self) -> Line {
+        match self.whole.as_deref() {
+            Some(Whole::Line(line)) => *line,
+            _ => Line { from_s: self.from_s, to_s: self.to_s, from: self.from, to: self.to },
+        }
+    }
+
+    /// The part of a straight segment between two instants within it.
+    fn part(&self, from_s: f64, to_s: f64) -> Self {
+        let whole = self.whole.clone().or_else(|| Some(Arc::new(Whole::Line(self.line()))));
+        let (from, to) = (self.position(from_s), self.position(to_s));
+        Self { from_s, to_s, from, to, grounded: self.grounded, whole }
     }
 
     /// The part of it within an interval that it meets; a curve is left whole.
     pub(super) fn within(&self, over: Interval) -> Self {
         let (from_s, to_s) = (self.from_s.max(over.from_s), self.to_s.min(over.to_s));
-        if self.curve.is_some() || self.to_s <= self.from_s || (from_s, to_s) == (self.from_s, self.to_s) {
+        if self.curve().is_some() || self.to_s <= self.from_s || (from_s, to_s) == (self.from_s, self.to_s) {
             return self.clone();
         }
-        let at = |time_s: f64| match time_s {
-            _ if time_s == self.from_s => self.from,
-            _ if time_s == self.to_s => self.to,
-            _ => self.position(time_s),
-        };
-        Self { from_s, to_s, from: at(from_s), to: at(to_s), grounded: self.grounded, curve: None }
+        self.part(from_s, to_s)
     }
 
     /// Whether the vehicle is at two places at one instant.
@@ -127,24 +164,12 @@ impl Segment {
 
     /// How far the vehicle can be from the curve, anywhere on the segment.
     pub(super) fn deviation(&self) -> f64 {
-        self.curve.as_ref().map_or(0.0, |curve| curve.deviation.peak)
+        self.curve().map_or(0.0, |curve| curve.deviation.peak)
     }
 
     /// How far the vehicle can be from the curve at a time.
     pub(super) fn deviation_at(&self, time_s: f64) -> f64 {
-        self.curve.as_ref().map_or(0.0, |curve| curve.deviation_at(time_s))
-    }
-
-    /// The fraction of a straight segment that has passed at a time within it.
-    #[inline]
-    pub(super) fn fraction(&self, time_s: f64) -> f64 {
-        if time_s <= self.from_s {
-            0.0
-        } else if time_s >= self.to_s {
-            1.0
-        } else {
-            (time_s - self.from_s) / (self.to_s - self.from_s)
-        }
+        self.curve().map_or(0.0, |curve| curve.deviation_at(time_s))
     }
 
     /// Where the curve is at a time within the segment.
@@ -154,10 +179,11 @@ impl Segment {
             self.from
         } else if time_s >= self.to_s {
             self.to
-        } else if let Some(curve) = &self.curve {
-            curve.position(time_s)
         } else {
-            self.from + (self.to - self.from) * self.fraction(time_s)
+            match self.whole.as_deref() {
+                Some(Whole::Curve(curve)) => curve.position(time_s),
+                _ => self.line().about(time_s),
+            }
         }
     }
 
@@ -170,27 +196,32 @@ impl Segment {
         if start_s == self.from_s && end_s == self.to_s {
             return Some(self.clone());
         }
+        if self.curve().is_none() {
+            return Some(self.part(start_s, end_s));
+        }
         let (from, to) = (self.position(start_s), self.position(end_s));
         Some(Self { from_s: start_s, to_s: end_s, from, to, ..self.clone() })
     }
 
     /// The segment as a polynomial of the fraction u of an interval within it.
     pub(super) fn local(&self, over: Interval) -> Vec<Vector3<f64>> {
-        match &self.curve {
+        match self.curve() {
             Some(curve) => curve.local(over),
             None if self.to_s <= self.from_s => vec![self.from, self.to - self.from],
             None => {
-                let rate = (over.to_s - over.from_s) / (self.to_s - self.from_s);
-                vec![self.position(over.from_s), (self.to - self.from) * rate]
+                let line = self.line();
+                let rate = (over.to_s - over.from_s) / (line.to_s - line.from_s);
+                vec![line.about(over.from_s), (line.to - line.from) * rate]
             }
         }
     }
 
-    /// Bound on the rounding of positions.
+    /// Bound on the rounding of positions, and of the ends of a part.
     pub(super) fn rounding(&self) -> f64 {
-        self.curve
-            .as_ref()
-            .map_or_else(|| 4.0 * f64::EPSILON * (self.from.amax() + self.to.amax()), |curve| curve.rounding())
+        match self.whole.as_deref() {
+            Some(Whole::Curve(curve)) => curve.rounding(),
+            _ => self.line().rounding(),
+        }
     }
 }
 

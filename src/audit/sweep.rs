@@ -10,13 +10,17 @@ use nalgebra::Vector3;
 pub(super) const MIN_LIMIT_M: f64 = 1e-70;
 /// Largest limit and coordinate that is judged \[m\]: fourth powers of lengths stay finite.
 pub(super) const MAX_LENGTH_M: f64 = 1e70;
-/// Rounding of [`RelativeMotion::closest`]: the separation found is off by at most this many times the larger of |r0|
-/// and |r1|.
+/// Rounding of [`RelativeMotion::closest`]: the separation found is off by at most this many times the scale of the motion,
+/// the larger of |r0| and |r1|.
 ///
 /// To first order in u = eps/2: r0 and r1 carry u each, d one more u, s d two, the sum and the norm three, each relative
 /// to |r0| or less since s |d| <= |r0| at the closest point; that is at most 8 u = 4 eps. An error of s\* itself moves the
-/// point along d, which the separation feels in second order alone unless it is itself of that size.
-pub(super) const RESOLUTION: f64 = 4.0 * f64::EPSILON;
+/// point along d, which the separation feels in second order alone unless it is itself of that size. The bound is twice as
+/// large, which covers what is of higher order.
+///
+/// Where the ends are interpolated, each is off by at most 8 u of the sum of what is added for it, and so is every point
+/// between them: the scale is larger by twice that sum.
+const RESOLUTION: f64 = 8.0 * f64::EPSILON;
 
 /// An interval of time \[s\], from its first to its last instant.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +37,12 @@ impl Interval {
         let time_s = if fraction < 1.0 { 2.0 * (from + fraction * (to - from)) } else { self.to_s };
         time_s.max(self.from_s).min(self.to_s)
     }
+}
+
+/// The larger of two finite numbers; cheaper than `f64::max`, which looks for NaN.
+#[inline]
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 /// Smallest distance of two vehicles \[m\] while their relative position moves on a straight line from `from` to `to`
@@ -55,6 +65,8 @@ pub(super) struct RelativeMotion {
     pub(super) from_squared: f64,
     /// |r1|^2 \[m^2\].
     pub(super) to_squared: f64,
+    /// What interpolated ends are rounded in proportion to, squared \[m^2\]; 0 for differences of two samples.
+    pub(super) interpolated_squared: f64,
 }
 
 /// Where a relative motion is closest to zero.
@@ -76,7 +88,29 @@ pub(super) struct Span {
 impl RelativeMotion {
     #[inline]
     pub(super) fn new(from: Vector3<f64>, to: Vector3<f64>) -> Self {
-        Self { from, to, by: to - from, from_squared: from.norm_squared(), to_squared: to.norm_squared() }
+        let (from_squared, to_squared) = (from.norm_squared(), to.norm_squared());
+        Self { from, to, by: to - from, from_squared, to_squared, interpolated_squared: 0.0 }
+    }
+
+    /// Between ends that are interpolated: each is a difference of starting points plus shares of two displacements.
+    #[inline]
+    pub(super) fn interpolated(ends: [Vector3<f64>; 2], start: Vector3<f64>, by: [Vector3<f64>; 2]) -> Self {
+        let [from, to] = ends;
+        // The square of a sum of three is at most three times the sum of the squares; |r0| is at most that sum.
+        let sum_squared = 3.0 * (start.norm_squared() + by[0].norm_squared() + by[1].norm_squared());
+        Self { interpolated_squared: 9.0 * sum_squared, ..Self::new(from, to) }
+    }
+
+    /// What the separation found is rounded in proportion to, squared \[m^2\].
+    #[inline]
+    pub(super) fn scale_squared(&self) -> f64 {
+        larger(larger(self.from_squared, self.to_squared), self.interpolated_squared)
+    }
+
+    /// How far the separation found can be off \[m\].
+    #[inline]
+    pub(super) fn resolution_m(&self) -> f64 {
+        RESOLUTION * self.scale_squared().sqrt()
     }
 
     /// The closest approach. It is never farther than either end.
@@ -172,7 +206,7 @@ mod tests {
             let exact = { let (above, below) = exact_closest(from, to); (above as f64 / below as f64).sqrt() };
             let motion = motion(from.map(|x| x as f64), to.map(|x| x as f64));
             let found = motion.closest();
-            let resolution = RESOLUTION * motion.from_squared.sqrt();
+            let resolution = 4.0 * f64::EPSILON * motion.from_squared.sqrt();
             prop_assert!((found.separation_m() - exact).abs() <= resolution, "{} {exact}", found.separation_m());
             prop_assert!(found.squared <= motion.from_squared.min(motion.to_squared));
             prop_assert!((0.0..=1.0).contains(&found.at));

@@ -123,7 +123,7 @@ pub struct DamagedPart {
 
 /// The damaged parts, in clauses behind another.
 fn in_words(damaged: &[DamagedPart]) -> String {
-    damaged.iter().map(|part| format!("; {part}")).collect()
+    damaged.iter().flat_map(|part| ["; ".to_owned(), part.to_string()]).collect()
 }
 
 impl CampaignError {

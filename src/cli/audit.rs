@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use super::Failure;
 use super::audit_arguments::AuditArguments;
+use super::audit_proof;
 use super::caller;
 use super::console::{self, Console};
 use super::open::Open;
@@ -69,6 +70,7 @@ pub(super) fn judge_recorded(
         .map(|own| &own.obstacles)
         .filter(|own| arguments.obstacles.is_none() && settings.ellipsoid_m.is_none() && !own.obstacles.is_empty());
     settings.obstacles.extend(own_obstacles.iter().flat_map(|own| own.obstacles.iter().cloned()));
+    audit_proof::check(arguments, &settings)?;
     let mut auditor = TrackAuditor::new(settings.clone())?;
     if arguments.html.is_some() {
         auditor = auditor.with_smallest();
@@ -145,6 +147,12 @@ pub(super) fn judge_recorded(
     if let Some((html, instants)) = arguments.html.as_ref().zip(instants) {
         let (replay, figures) = replays::of_recording(open, &settings, &outcome, &report, instants)?;
         write_atomically(html, report.to_html(&replay, &figures, &command).as_bytes())?;
+    }
+    if let Some(file) = &arguments.proof {
+        let refused = audit_proof::write(file, arguments, (&settings, &outcome), &report.source.clock, open)?;
+        if let Some(why) = refused {
+            console.warn(&format!("note: {why}"));
+        }
     }
     Ok(report)
 }

@@ -117,6 +117,10 @@ pub(super) struct AuditArguments {
     /// Write a report for people, with figures.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     pub(super) html: Option<PathBuf>,
+    /// Write a proof of the verdict, which `check_proof.py` confirms by exact arithmetic without this program; for a CSV table and
+    /// --delta alone.
+    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    pub(super) proof: Option<PathBuf>,
     /// Write a summary in Markdown, as for the page of a job.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     pub(super) summary: Option<PathBuf>,
@@ -258,6 +262,7 @@ impl AuditArguments {
             ("--events", &self.events),
             ("--junit", &self.junit),
             ("--html", &self.html),
+            ("--proof", &self.proof),
             ("--summary", &self.summary),
         ];
         let outputs: Vec<_> =

@@ -22,6 +22,9 @@ pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
         let help = "give --join if each file holds a vehicle of one recording, or audit one at a time";
         return Err(Failure::input("--html is a page on one recording, and several are given", help));
     }
+    if !is_one && arguments.proof.is_some() {
+        return Err(Failure::input("--proof is about one recording, and several are given", "audit one at a time"));
+    }
     arguments.check_outputs()?;
     let asked: Vec<_> = recordings
         .into_iter()

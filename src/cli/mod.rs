@@ -7,6 +7,7 @@ mod attack;
 mod audit;
 mod audit_arguments;
 mod audit_config;
+mod audit_proof;
 mod audits;
 mod call;
 mod caller;

@@ -82,6 +82,11 @@ pub(super) struct ReadArguments {
 }
 
 impl ReadArguments {
+    /// Whether one file is read as it is, in metres.
+    pub(super) fn is_read_plainly(&self) -> bool {
+        self.more.is_empty() && self.columns.is_empty() && self.scale.to_bits() == 1.0_f64.to_bits()
+    }
+
     /// Opens the recording.
     pub(super) fn open(&self, options: &ReadOptions) -> Result<Recording, ReadError> {
         if self.more.is_empty() {

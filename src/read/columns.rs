@@ -188,7 +188,9 @@ impl<'a> Columns<'a> {
                 let is_length = |(_, role): &&(String, Role)| !is_angle(*role) && *role >= POSITION;
                 let lengths: BTreeSet<_> =
                     self.found.iter().filter(|(key, _)| is_length(key)).map(|(_, column)| *column).collect();
-                lengths.into_iter().for_each(|column| metres[column] *= scale);
+                for column in lengths {
+                    metres[column] *= scale;
+                }
             }
             return Ok(metres);
         };

@@ -239,8 +239,8 @@ fn height(name: &str) -> Option<Role> {
         let starts = HEIGHT_STARTS.iter().filter_map(|start| name.strip_prefix(start));
         role(name).or_else(|| starts.map(|rest| rest.trim_start_matches('_')).find_map(role))
     };
-    let ends = HEIGHT_ENDS.iter().filter_map(|end| name.strip_suffix(end)?.strip_suffix('_'));
-    behind(name).or_else(|| ends.filter_map(behind).next())
+    let mut ends = HEIGHT_ENDS.iter().filter_map(|end| name.strip_suffix(end)?.strip_suffix('_'));
+    behind(name).or_else(|| ends.find_map(behind))
 }
 
 /// Whether the last word of a name is that of a quantity with axes, as in `cf1_gyro` and `../orientation`.

@@ -16,11 +16,11 @@ impl Heights {
     /// Gives headings of heights and depths the role of the third axis of positions, whose first axis is `place`, where their
     /// vehicle has the other two axes and no third of its own. All others are dropped. `found` are the columns that the user
     /// names.
-    pub(super) fn place<'a>(
+    pub(super) fn place(
         place: Role,
         header: &[String],
         found: &mut BTreeMap<(String, Role), usize>,
-        headings: &mut Vec<(usize, Heading<'a>)>,
+        headings: &mut Vec<(usize, Heading<'_>)>,
     ) -> Self {
         let (third, mut heights) = (place + 2, Self::default());
         // The user may call the third axis by either name; `z` means the numbers as they are.

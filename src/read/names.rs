@@ -8,7 +8,7 @@ use super::identity::{alike, spelling};
 /// Names in the order of their indices, and the way back.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Names {
-    names: Vec<String>,
+    in_order: Vec<String>,
     indices: HashMap<Box<str>, usize>,
     /// Indices by what names are but for their spelling.
     spellings: HashMap<String, usize>,
@@ -36,23 +36,23 @@ impl Names {
     fn ordered(names: Vec<String>) -> Self {
         let spellings = names.iter().enumerate().map(|(index, name)| (spelling(name), index)).collect();
         let indices = names.iter().enumerate().map(|(index, name)| (name.as_str().into(), index)).collect();
-        Self { names, indices, spellings }
+        Self { in_order: names, indices, spellings }
     }
 
     /// Adds a name and gives its index.
     fn add(&mut self, name: String) -> Result<usize, Fault> {
-        let index = self.names.len();
+        let index = self.in_order.len();
         if let Some(&first) = self.spellings.get(&spelling(&name)) {
-            return Err(alike(&self.names[first], &name));
+            return Err(alike(&self.in_order[first], &name));
         }
         self.spellings.insert(spelling(&name), index);
         self.indices.insert(name.as_str().into(), index);
-        self.names.push(name);
+        self.in_order.push(name);
         Ok(index)
     }
 
     pub(super) fn all(&self) -> &[String] {
-        &self.names
+        &self.in_order
     }
 
     /// The index of a name, which is new if need be. Looked for first right after the vehicle before, or at the first
@@ -62,8 +62,8 @@ impl Names {
     /// Where a new name differs from another only in how it is spelled.
     #[inline]
     pub(super) fn index(&mut self, name: &str, before: usize) -> Result<usize, Fault> {
-        let next = if before + 1 < self.names.len() { before + 1 } else { 0 };
-        if self.names.get(next).is_some_and(|known| known == name) {
+        let next = if before + 1 < self.in_order.len() { before + 1 } else { 0 };
+        if self.in_order.get(next).is_some_and(|known| known == name) {
             return Ok(next);
         }
         if let Some(&index) = self.indices.get(name) {
@@ -74,10 +74,10 @@ impl Names {
 
     /// Puts the names in order of value where all are numbers. Indices given before lose their meaning.
     pub(super) fn settle(&mut self) {
-        let numbers: Option<Vec<u64>> = self.names.iter().map(|name| name.parse().ok()).collect();
+        let numbers: Option<Vec<u64>> = self.in_order.iter().map(|name| name.parse().ok()).collect();
         let Some(numbers) = numbers else { return };
-        let mut order: Vec<usize> = (0..self.names.len()).collect();
+        let mut order: Vec<usize> = (0..self.in_order.len()).collect();
         order.sort_by_key(|&index| numbers[index]);
-        *self = Self::ordered(order.iter().map(|&index| self.names[index].clone()).collect());
+        *self = Self::ordered(order.iter().map(|&index| self.in_order[index].clone()).collect());
     }
 }

@@ -177,8 +177,8 @@ fn undecided(findings: &Findings<'_>) -> Option<String> {
     }
     if findings.audit.status == Status::Undecided && findings.audit.unresolved > 0 {
         return Some(
-            "Two vehicles came so near to delta that the audit cannot tell whether they kept it: rounding, or paths that bend \
-             within a step, leave more room than there was."
+            "Two vehicles came so near to delta that the audit cannot tell whether they kept it: paths that bend within a \
+             step leave more room than there was."
                 .to_owned(),
         );
     }

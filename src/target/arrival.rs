@@ -99,10 +99,9 @@ impl Arrival {
         let has_length = |(i, j): (usize, usize)| {
             (separation(positions_m, i, j) - formation.desired_distance(i, j)).abs() <= self.edge_error_m
         };
-        if formation.count() != swarm.count()
-            || !(Distance::disagreement_m_s(swarm, reference, freedom) <= self.disagreement_m_s)
-            || !graph.edges().take(swarm.count()).all(has_length)
-        {
+        let is_slow = Distance::disagreement_m_s(swarm, reference, freedom) <= self.disagreement_m_s;
+        let may_hold = is_slow && formation.count() == swarm.count();
+        if !may_hold || !graph.edges().take(swarm.count()).all(has_length) {
             return false;
         }
         let error_m = PositionError::of(positions_m, formation, reference.position_m, freedom).max_m;

@@ -5,6 +5,8 @@ use proptest::prelude::*;
 use tautline::audit::{AuditError, AuditOutcome, Auditor, Status, Violation};
 use tautline::swarm::{ClosestApproach, Pair, Rows, row, separation, set_row};
 
+use crate::scenes::{exact, exact_squared};
+
 const DELTA_M: f64 = 2.0;
 
 fn rows(positions: &[[f64; 3]]) -> Rows {
@@ -171,18 +173,22 @@ fn what_cannot_be_judged_is_refused_by_name_and_never_called_clear() {
 }
 
 #[test]
-fn a_pass_too_far_away_to_be_resolved_is_never_called_clear() {
+fn a_pass_from_far_away_is_judged_by_its_doubles() {
     let mut stream = Stream(1);
-    let mut unresolved = 0;
-    for _ in 0..1000 {
-        // Through the origin, from 1e20 m away on a slanted line: rounding alone leaves kilometres.
-        let there = stream.vector(1e20);
-        let flight = [there, there * -0.37].map(|at| rows(&[[0.0; 3], [at.x, at.y, at.z]]));
+    let mut counts = [0; 2];
+    for case in 0..1000 {
+        // Past the origin on a slanted line, by the rounding of its ends: some metres, or kilometres.
+        let there = stream.vector(if case % 10 == 0 { 1e20 } else { 2e16 });
+        let ends = [there, there * -0.37];
+        let flight = ends.map(|at| rows(&[[0.0; 3], [at.x, at.y, at.z]]));
         let outcome = judge(DELTA_M, &[(0.0, flight[0].clone()), (1.0, flight[1].clone())]);
-        assert_ne!(outcome.status, Status::Clear);
-        unresolved += outcome.unresolved;
+        let [from, to] = ends.map(|at| [exact(at.x), exact(at.y), exact(at.z)]);
+        let is_below = exact_squared(&from, &to) < exact(DELTA_M) * exact(DELTA_M);
+        let expected = if is_below { Status::Violation } else { Status::Clear };
+        assert_eq!((outcome.status, outcome.unresolved), (expected, 0), "{there:?}");
+        counts[usize::from(is_below)] += 1;
     }
-    assert!(unresolved > 0, "some passes are lost in rounding");
+    assert!(counts.iter().all(|&count| count > 50), "{counts:?}");
 }
 
 /// A deterministic stream of numbers (`SplitMix64`), so that a failing case is named by its seed.

@@ -3,6 +3,7 @@
 mod curves_at_limits;
 mod encounters;
 mod envelope;
+mod exact;
 mod findings;
 mod flown;
 mod many_findings;

@@ -27,7 +27,7 @@ const TIE: f64 = 1e-12;
 const NEAR_M: f64 = 1e-4;
 
 /// `SplitMix64` (Steele, Lea, Flood 2014): the same scenes everywhere.
-struct Random(u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
     fn bits(&mut self) -> u64 {
@@ -38,7 +38,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    fn below(&mut self, limit: u64) -> u64 {
+    pub(crate) fn below(&mut self, limit: u64) -> u64 {
         self.bits() % limit
     }
 
@@ -46,7 +46,7 @@ impl Random {
         usize::try_from(self.below(length as u64)).expect("below a length")
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
     }
 
@@ -56,10 +56,10 @@ impl Random {
 }
 
 /// What each vehicle was seen at.
-type Tracks = Vec<Vec<(f64, Vector3<f64>)>>;
+pub(crate) type Tracks = Vec<Vec<(f64, Vector3<f64>)>>;
 
 /// A scene of one of the kinds that have gone wrong somewhere.
-fn scene(number: u64) -> Tracks {
+pub(crate) fn scene(number: u64) -> Tracks {
     let mut random = Random(number);
     let long = number.is_multiple_of(LONG_EVERY);
     let vehicles = 2 + random.below(29);
@@ -120,7 +120,7 @@ fn graze(tracks: &mut Tracks, origin_m: Vector3<f64>, random: &mut Random) {
     tracks[1] = vec![(0.0, middle + aside * miss_m - along * before), (1.0, middle + aside * miss_m + along * after)];
 }
 
-fn items(tracks: &Tracks) -> Vec<Item> {
+pub(crate) fn items(tracks: &Tracks) -> Vec<Item> {
     let mut items: Vec<_> = tracks
         .iter()
         .enumerate()
@@ -147,7 +147,7 @@ struct Answer {
 }
 
 /// The instants at which either is seen while both are there.
-fn instants(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Vec<f64> {
+pub(crate) fn instants(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Vec<f64> {
     let (from_s, to_s) = (a[0].0.max(b[0].0), a[a.len() - 1].0.min(b[b.len() - 1].0));
     let mut times: Vec<f64> =
         a.iter().chain(b).map(|seen| seen.0).filter(|time_s| from_s <= *time_s && *time_s <= to_s).collect();
@@ -165,11 +165,11 @@ fn place(track: &[(f64, Vector3<f64>)], time_s: f64) -> Vector3<f64> {
     p0 + (p1 - p0) * ((time_s - t0) / (t1 - t0))
 }
 
-fn exact(number: f64) -> BigRational {
+pub(crate) fn exact(number: f64) -> BigRational {
     BigRational::from_float(number).expect("finite")
 }
 
-fn exact_place(track: &[(f64, Vector3<f64>)], time_s: f64) -> [BigRational; 3] {
+pub(crate) fn exact_place(track: &[(f64, Vector3<f64>)], time_s: f64) -> [BigRational; 3] {
     let next = track.partition_point(|seen| seen.0 < time_s);
     let fraction = |axis: usize| exact(track[next].1[axis]);
     if track[next].0 == time_s {
@@ -181,7 +181,7 @@ fn exact_place(track: &[(f64, Vector3<f64>)], time_s: f64) -> [BigRational; 3] {
 }
 
 /// The exact square of the smallest distance between two instants.
-fn exact_squared(from: &[BigRational; 3], to: &[BigRational; 3]) -> BigRational {
+pub(crate) fn exact_squared(from: &[BigRational; 3], to: &[BigRational; 3]) -> BigRational {
     let dot = |a: &[BigRational; 3], b: &[BigRational; 3]| &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2];
     let by = [0, 1, 2].map(|axis| &to[axis] - &from[axis]);
     let zero = exact(0.0);

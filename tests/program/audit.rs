@@ -257,7 +257,7 @@ fn the_page_says_what_the_verdict_says() {
     let scaled = page(&["pass.csv", "--ellipsoid", "0.5,0.5,0.5"]);
     assert!(scaled.contains("distance [ellipsoids]") && scaled.contains("closest 2.000000 ellipsoids"), "{scaled}");
     let doubtful = page(&["pass.csv", "--delta", "0.9", "--motion", "bounded", "--max-accel", "1"]);
-    assert!(doubtful.contains("closest 0.750000 .. 1.250000 m at 0.500 s") && !doubtful.contains("UNDECIDED:"));
+    assert!(doubtful.contains("closest 0.749999 .. 1.250001 m at 0.500 s") && !doubtful.contains("UNDECIDED:"));
 }
 
 #[test]

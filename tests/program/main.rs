@@ -26,6 +26,7 @@ mod margin;
 mod obstacles;
 mod own_recordings;
 mod presence;
+mod proofs;
 mod reading;
 mod reads;
 mod references;

@@ -57,7 +57,7 @@ class Command(Case):
     def test_every_question_of_the_command_line_can_be_asked_in_python(self) -> None:
         asked = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
         self.assertIn("max-gap", asked)
-        answers = {"json", "quiet", "junit", "events", "html", "summary", "annotations", "allow-undecided", "no-config", "help"}
+        answers = {"json", "quiet", "junit", "events", "html", "summary", "annotations", "proof", "allow-undecided", "no-config", "help"}
         taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_words.reading).parameters}
         taken |= {"from", "to"} if {"from_s", "to_s"} <= taken else set()
         self.assertEqual({name for name in asked - answers if name.replace("-", "_") not in taken}, set())

@@ -141,7 +141,8 @@ fn what_one_vehicle_measures_is_no_name() {
         let place = |k: usize| (k as f64 / 9.0).sin();
         (0..200)
             .map(|k| format!("{},{},{},{}\n", k as f64 / 10.0, place(k), place(2 * k), value(k)))
-            .collect::<String>()
+            .collect::<Vec<_>>()
+            .concat()
     };
     let odd: [&dyn Fn(usize) -> String; 7] = [
         &|k| (60 + k * 7 % 3).to_string(),

@@ -169,7 +169,7 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
         PairSample { time_s, distance_m, deviation_m, positions_m, unseen_before: false }
     };
     let mut times_s = vec![from_s, to_s];
-    if first.curve.is_none() && second.curve.is_none() {
+    if first.curve().is_none() && second.curve().is_none() {
         let motion = overlap.straight();
         let closest = match target {
             Target::Origin => motion.closest().at,

@@ -9,6 +9,7 @@ use crate::audit::envelope::Seen;
 use crate::audit::polynomial::{BernsteinBasis, parts_told};
 use crate::audit::segment::{Curve, Deviation, Segment};
 use crate::audit::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
+use crate::audit::whole_motion::compare_height;
 use crate::track::{Item, Piece, Sample};
 
 /// Pieces of a curve that follow each other within this \[s\] leave no gap: times are written with so many digits. What the
@@ -238,7 +239,7 @@ impl Vehicle {
         let h = seen.time_s - last.time_s;
         let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
         // Lengths are divided by the axes of the ellipsoid, so deviations by its shortest.
-        let accel = self.max_accel_m_s2 * self.scale.map_or(1.0, |scale| scale.max());
+        let accel = self.max_accel_m_s2 * self.scale.map_or(1.0, |scale| scale.max()) * (1.0 + 4.0 * f64::EPSILON);
         let (coefficients, deviation) = match last.velocity_m_s.zip(seen.velocity_m_s) {
             Some((start, end)) => {
                 let (by, start, end) = (to - from, self.scaled(start), self.scaled(end));
@@ -359,14 +360,19 @@ fn is_near(v: &Vector3<f64>) -> bool {
 /// are; what cannot be told on a curve within some work is left open.
 fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
     let (low, high) = (segment.from.z.min(segment.to.z), segment.from.z.max(segment.to.z));
-    if segment.curve.is_some() {
+    if segment.curve().is_some() {
         split_curve_at_height(&segment, height, into);
     } else if segment.to_s <= segment.from_s || high <= height || low > height {
         into.push(Segment { grounded: Some(high <= height), ..segment });
     } else {
         let share = (height - segment.from.z) / (segment.to.z - segment.from.z);
-        let at_s = segment.from_s + (segment.to_s - segment.from_s) * share.clamp(0.0, 1.0);
         let starts_low = segment.from.z <= height;
+        let mut at_s = segment.from_s + (segment.to_s - segment.from_s) * share.clamp(0.0, 1.0);
+        // Rounded towards the time on the ground, so that no time in the air is left out.
+        let line = segment.line();
+        while segment.from_s < at_s && at_s < segment.to_s && compare_height(&line, at_s, height).is_gt() {
+            at_s = if starts_low { at_s.next_down() } else { at_s.next_up() };
+        }
         for (from_s, to_s, grounded) in [(segment.from_s, at_s, starts_low), (at_s, segment.to_s, !starts_low)] {
             if to_s > from_s {
                 let part = segment.clipped(Interval { from_s, to_s });

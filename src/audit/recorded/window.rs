@@ -21,7 +21,7 @@ use crate::audit::parry::KeepOut;
 use crate::audit::polynomial::stray;
 use crate::audit::results::{KEPT, Results};
 use crate::audit::segment::Segment;
-use crate::audit::sweep::{Interval, RelativeMotion};
+use crate::audit::sweep::{Interval, RelativeMotion, larger};
 use crate::swarm::Pair;
 
 /// With more pairs left than this for each vehicle a window is halved.
@@ -34,11 +34,9 @@ const FEWEST_SEGMENTS: usize = 4;
 const MOST_HALVINGS: u32 = 12;
 /// Neighbours in the order of the sort that are compared first, so that the closest pairs are known roughly.
 const FIRST_NEIGHBOURS: u32 = 12;
-/// Rounding of a place on a chord, relative to the coordinates it joins: three operations on them, and two differences.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// A pair among the closest is looked at again only where it could come closer by more than this, relative to its
-/// distance: vehicles that stand, or fly side by side, are as close all the time but for rounding.
-const TIE: f64 = 1e-12;
+/// Rounding of a distance from a chord, and of chords from each other, relative to the coordinates that they join: at most
+/// sixteen operations.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// Where a vehicle is over a window.
 #[derive(Clone, Debug)]
@@ -83,10 +81,10 @@ impl Near {
         Self { first, second, squared, stray: a.stray + b.stray }
     }
 
-    /// Whether the two could come closer than a distance; what rounding adds lies within what they stray.
+    /// Whether the two could come closer than a distance; what rounding of positions adds lies within what they stray.
     #[inline]
     fn may_come_within(&self, distance: f64) -> bool {
-        let reach = distance + self.stray;
+        let reach = (distance + self.stray) * (1.0 + ROUNDING);
         self.squared < reach * reach
     }
 }
@@ -220,7 +218,7 @@ impl Windows {
         let limit = self.limits.of_vehicles(a.radius, b.radius);
         let cutoff = results.closest.cutoff(pair, limit);
         let may_violate = self.judges && near.may_come_within(limit);
-        if may_violate || near.may_come_within(cutoff * (1.0 - TIE)) {
+        if may_violate || near.may_come_within(cutoff) {
             let (target, keep_out, above) = (Target::Origin, KeepOut::new(limit), self.limits.above);
             PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
                 a.segments(vehicles),
@@ -244,7 +242,7 @@ impl Windows {
                 let (cutoff, chord) = (results.obstacles.cutoff(pair, limit), &extent.chord);
                 let between = obstacle.shape.closest(chord.from - place.from, chord.to - place.to).0;
                 let least = between - chord.stray - place.stray;
-                if least < limit.max(cutoff * (1.0 - TIE)) {
+                if least < limit.max(cutoff) {
                     let (target, keep_out) = (Target::Shape(&obstacle.shape), KeepOut::new(limit));
                     let (may_violate, above) = (least < limit, self.limits.above);
                     PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
@@ -257,12 +255,6 @@ impl Windows {
             }
         }
     }
-}
-
-/// The larger of two finite numbers; cheaper than `f64::max`, which looks for NaN.
-#[inline]
-fn larger(a: f64, b: f64) -> f64 {
-    if b > a { b } else { a }
 }
 
 /// The straight way over a window, and how far from it segments stray.
@@ -299,9 +291,10 @@ impl Chord {
             }
             (end_s, end) = (part.to_s, part.to);
         }
-        let curved = parts.iter().any(|part| part.curve.is_some());
+        let curved = parts.iter().any(|part| part.curve().is_some());
         let beyond = if curved { stray_of_curves(parts, window) } else { 0.0 };
-        let rounding = ROUNDING * (from.amax() + to.amax());
+        // The ends of the chord are interpolated on the first segment and the last one.
+        let rounding = ROUNDING * (from.amax() + to.amax()) + first.rounding() + last.rounding();
         // Over a time too short to divide by nothing is known of the motion.
         let stray =
             if per_s.is_finite() { squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding } else { f64::INFINITY };
@@ -312,7 +305,7 @@ impl Chord {
 /// How far curves stray from the chords of their corners, at most.
 #[cold]
 fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
-    let curves = parts.iter().filter(|part| part.curve.is_some());
+    let curves = parts.iter().filter(|part| part.curve().is_some());
     let strays = curves.map(|part| {
         let (from_s, to_s) = (part.from_s.max(window.from_s), part.to_s.min(window.to_s));
         stray(&part.local(Interval { from_s, to_s })) + part.deviation() + part.rounding()

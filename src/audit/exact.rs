@@ -1,0 +1,298 @@
+//! The separation of two vehicles on straight lines, exactly.
+//!
+//! A [`Line`] joins two samples, whose times and positions are the doubles that were read. Over the time that two lines
+//! share, the relative position moves on a straight line too, from r0 to r1 = r0 + d, whose coordinates are fractions of
+//! these doubles. It is below x iff |r0| < x, or |r1| < x, or it is so between the ends:
+//!
+//! ```text
+//! r0 . d < 0 < r1 . d   and   |r0|^2 |d|^2 - (r0 . d)^2 < x^2 |d|^2
+//! ```
+//!
+//! Three stages decide it, each where the one before it cannot: doubles ([`RelativeMotion`](super::sweep::RelativeMotion),
+//! whose callers know its rounding), numbers of twice the digits with a bound on their error, and whole numbers: all
+//! coordinates in units of one power of two, all times in units of another, both sides multiplied by what they are divided by.
+
+use std::cmp::Ordering;
+
+use super::double_double::{DoubleDouble, OPERATION, is_shorter};
+use super::line::{INTERPOLATION, Line, Place};
+use super::sweep::Interval;
+use super::whole_motion::WholeMotion;
+
+/// Two lines over a time within both.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ExactMotion {
+    pub(super) first: Line,
+    pub(super) second: Line,
+    pub(super) over: Interval,
+}
+
+/// Squares of lengths between these neither underflow nor overflow in any product of four of them.
+const SQUARES: std::ops::RangeInclusive<f64> = 1e-200..=1e142;
+/// Units in the last place by which a separation is corrected before it is computed in whole numbers.
+const MOST_STEPS: u32 = 4;
+/// Smallest size of a coordinate whose square has all of its digits.
+const SQUARABLE: f64 = 1e-120;
+
+/// Whether a number is below another one, given how far it can be off; `None` where that does not say.
+fn sign(number: DoubleDouble, error: f64) -> Option<Ordering> {
+    match number.high {
+        high if high > error => Some(Ordering::Greater),
+        high if high < -error => Some(Ordering::Less),
+        _ => None,
+    }
+}
+
+fn dot(a: &[DoubleDouble; 3], b: &[DoubleDouble; 3]) -> DoubleDouble {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl ExactMotion {
+    /// Whether the separation falls below a distance.
+    pub(super) fn is_below(&self, distance: f64) -> bool {
+        let is_limited = distance < f64::INFINITY;
+        !is_limited || self.filtered(distance).unwrap_or_else(|| self.whole(distance).is_below())
+    }
+
+    /// Whether the separation is below a distance at the start.
+    pub(super) fn starts_below(&self, distance: f64) -> bool {
+        let [start, _] = self.ends();
+        start.is_below(distance).unwrap_or_else(|| self.whole(distance).starts_below())
+    }
+
+    /// The largest double that the separation never falls below.
+    pub(super) fn separation(&self) -> f64 {
+        let Some(mut distance) = self.about() else { return self.whole(0.0).separation() };
+        let mut is_next_below = false;
+        for _ in 0..MOST_STEPS {
+            if self.is_below(distance) {
+                distance = distance.next_down();
+                is_next_below = true;
+            } else if is_next_below || self.is_below(distance.next_up()) {
+                return distance;
+            } else {
+                distance = distance.next_up();
+            }
+        }
+        self.whole(0.0).separation()
+    }
+
+    /// The largest double that the first time of the smallest separation is not before \[s\].
+    pub(super) fn closest_s(&self) -> f64 {
+        self.whole(0.0).closest_s(self.over)
+    }
+
+    /// The motion in whole numbers.
+    #[cold]
+    fn whole(&self, distance: f64) -> WholeMotion {
+        WholeMotion::new([&self.first, &self.second], self.over, distance)
+    }
+
+    /// The relative position at both ends.
+    fn ends(&self) -> [End; 2] {
+        [(self.over.from_s, false), (self.over.to_s, true)].map(|(time_s, is_end)| {
+            let [first, second] = [&self.first, &self.second].map(|line| line.place(time_s, is_end));
+            if let (Place::Sample(a), Place::Sample(b)) = (&first, &second) {
+                return End { r: [0, 1, 2].map(|axis| DoubleDouble::difference(b[axis], a[axis])), error: 0.0 };
+            }
+            let position = |line: &Line, place| match place {
+                Place::Sample(at) => [0, 1, 2].map(|axis| DoubleDouble::from(at[axis])),
+                Place::Between => line.position(time_s),
+            };
+            let (a, b) = (position(&self.first, first), position(&self.second, second));
+            let size = |line: &Line| line.from.amax() + line.to.amax();
+            let error = INTERPOLATION * (size(&self.first) + size(&self.second));
+            End { r: [0, 1, 2].map(|axis| b[axis] - a[axis]), error }
+        })
+    }
+
+    /// The answer of twice the digits, where their rounding leaves no doubt.
+    fn filtered(&self, distance: f64) -> Option<bool> {
+        let [start, end] = self.ends();
+        if start.is_below(distance)? || end.is_below(distance)? {
+            return Some(true);
+        }
+        if End::are_same(&start, &end) {
+            return Some(false);
+        }
+        let between = Between::of(&start, &end)?;
+        if !between.may_be_closer() {
+            return Some(false);
+        }
+        let squared = DoubleDouble::square_of(distance);
+        SQUARES.contains(&squared.high).then_some(())?;
+        let (by, error) = (between.by_squared, between.error(squared.high));
+        match sign(between.cross_squared - squared * by, error)? {
+            Ordering::Less => between.is_closer().then_some(true),
+            _ => Some(false),
+        }
+    }
+
+    /// The smallest separation, to about a unit in the last place; `None` where its size does not allow it.
+    fn about(&self) -> Option<f64> {
+        let [start, end] = self.ends();
+        let ends = [&start, &end].map(|end| dot(&end.r, &end.r).high);
+        let nearest = ends[0].min(ends[1]);
+        let between = if End::are_same(&start, &end) { None } else { Some(Between::of(&start, &end)?) };
+        let squared = match between.filter(Between::may_be_closer) {
+            Some(between) => between.cross_squared.over(between.by_squared).high.min(nearest),
+            None => nearest,
+        };
+        SQUARES.contains(&squared).then(|| squared.sqrt())
+    }
+}
+
+/// A relative position at an end of the shared time, and how far it can be off.
+struct End {
+    r: [DoubleDouble; 3],
+    error: f64,
+}
+
+impl End {
+    /// Whether nothing moves.
+    fn are_same(start: &Self, end: &Self) -> bool {
+        start.error == 0.0 && end.error == 0.0 && start.r == end.r
+    }
+
+    /// Whether no term of the exact square underflows.
+    fn is_squarable(&self) -> bool {
+        let parts = self.r.iter().flat_map(|x| [x.high, x.low]);
+        parts.into_iter().all(|part| part == 0.0 || part.abs() > SQUARABLE)
+    }
+
+    /// Whether it is nearer than a distance.
+    fn is_below(&self, distance: f64) -> Option<bool> {
+        if self.error == 0.0 && self.r.iter().all(|x| x.high == 0.0) {
+            return Some(distance > 0.0);
+        }
+        let (squared, limit) = (dot(&self.r, &self.r), DoubleDouble::square_of(distance));
+        if !(SQUARES.contains(&squared.high) && SQUARES.contains(&limit.high)) {
+            return None;
+        }
+        let length = squared.high.sqrt();
+        let error = 16.0 * OPERATION * (squared.high + limit.high) + self.error * (4.0 * length + 2.0 * self.error);
+        match sign(squared - limit, error) {
+            Some(order) => Some(order == Ordering::Less),
+            None => (self.error == 0.0 && self.is_squarable()).then(|| is_shorter(&self.r, distance)),
+        }
+    }
+}
+
+/// What decides whether a relative motion is closest between its ends.
+struct Between {
+    /// |r0|^2 |d|^2 - (r0 . d)^2.
+    cross_squared: DoubleDouble,
+    /// |d|^2.
+    by_squared: DoubleDouble,
+    /// r0 . d and r1 . d.
+    rates: [DoubleDouble; 2],
+    rate_error: f64,
+    /// |r0| and |d|.
+    length: f64,
+    by: f64,
+    /// How far the ends can be off.
+    end_error: f64,
+}
+
+impl Between {
+    /// `None` where the sizes leave it open.
+    fn of(start: &End, end: &End) -> Option<Self> {
+        let d = [0, 1, 2].map(|axis| end.r[axis] - start.r[axis]);
+        let end_error = start.error.max(end.error);
+        let (from_squared, by_squared) = (dot(&start.r, &start.r), dot(&d, &d));
+        let (length, by) = (from_squared.high.sqrt(), by_squared.high.sqrt());
+        let is_sized = SQUARES.contains(&from_squared.high) && SQUARES.contains(&by_squared.high);
+        if !is_sized || 4.0 * end_error > length.min(by) {
+            return None;
+        }
+        let rates = [dot(&start.r, &d), dot(&end.r, &d)];
+        let rate_error = 16.0 * OPERATION * (length + by) * by + 4.0 * end_error * (length + by);
+        let cross_squared = from_squared * by_squared - rates[0].square();
+        Some(Self { cross_squared, by_squared, rates, rate_error, length, by, end_error })
+    }
+
+    /// Bound on the error of `cross_squared` less x^2 |d|^2. With E the error of the ends, a = |r0| and b = |d|, and E at most a
+    /// quarter of both: the product |r0 x d| is off by c <= E (1.5 b + 2 a) < a b, its square by c (2 a b + c), and x^2 |d|^2
+    /// by 5 x^2 b E.
+    fn error(&self, squared: f64) -> f64 {
+        let (a, b) = (self.length, self.by);
+        let of_ends = 16.0 * self.end_error * (a * b * b + a * a * b + squared * b);
+        32.0 * OPERATION * (2.0 * a * a + squared) * b * b + of_ends
+    }
+
+    /// Whether the closest point may lie between the ends.
+    fn may_be_closer(&self) -> bool {
+        self.rates[0].high < self.rate_error && self.rates[1].high > -self.rate_error
+    }
+
+    /// Whether it lies there for certain.
+    fn is_closer(&self) -> bool {
+        self.rates[0].high < -self.rate_error && self.rates[1].high > self.rate_error
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Small whole numbers, which meet distances exactly, and numbers of all digits of any size.
+    fn coordinate() -> impl Strategy<Value = f64> {
+        let sized = (-1.0..1.0_f64, -300..200_i32).prop_map(|(x, exponent)| x * 2_f64.powi(exponent));
+        prop_oneof![4 => (-6..7_i32).prop_map(f64::from), 4 => -10.0..10.0_f64, 1 => sized]
+    }
+
+    fn time() -> impl Strategy<Value = f64> {
+        prop_oneof![(0..9_i32).prop_map(f64::from), 0.0..9.0_f64]
+    }
+
+    fn motion() -> impl Strategy<Value = ExactMotion> {
+        let at = || prop::array::uniform3(coordinate()).prop_map(Vector3::from);
+        (prop::array::uniform4(time()), prop::array::uniform4(at()), any::<bool>()).prop_map(
+            |(times, [a, b, c, d], is_together)| {
+                let [t, u, v, w] = times;
+                let (first, second) = ([t.min(u), t.max(u)], if is_together { [t, u] } else { [v, w] });
+                let second = [second[0].min(second[1]).min(first[1]), second[0].max(second[1]).max(first[0])];
+                let over = Interval { from_s: first[0].max(second[0]), to_s: first[1].min(second[1]) };
+                let line = |[from_s, to_s]: [f64; 2], from, to| Line { from_s, to_s, from, to };
+                ExactMotion { first: line(first, a, b), second: line(second, c, d), over }
+            },
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn every_stage_gives_the_answer_of_whole_numbers(motion in motion(), limit in 0..9_i32) {
+            let separation = motion.separation();
+            prop_assert_eq!(separation, motion.whole(0.0).separation());
+            prop_assert!(!motion.is_below(separation) && motion.is_below(separation.next_up()), "{}", separation);
+            for distance in [f64::from(limit), separation, separation.next_up(), separation.next_down().max(0.0)] {
+                let whole = motion.whole(distance);
+                prop_assert_eq!(motion.is_below(distance), whole.is_below());
+                prop_assert_eq!(motion.starts_below(distance), whole.starts_below());
+            }
+            let at_s = motion.closest_s();
+            prop_assert!(motion.over.from_s <= at_s && at_s <= motion.over.to_s);
+        }
+    }
+
+    #[test]
+    fn a_separation_of_the_smallest_size_is_a_double_too() {
+        for size in [5e-324, 3e-310, 1e-170, 1e70] {
+            let line = |y: f64, x: f64| Line {
+                from_s: 0.0,
+                to_s: 1.0,
+                from: Vector3::new(-x, y, 0.0),
+                to: Vector3::new(x, y, 0.0),
+            };
+            let over = Interval { from_s: 0.0, to_s: 1.0 };
+            let motion = ExactMotion { first: line(0.0, 1.0), second: line(size, -1.0), over };
+            assert_eq!((motion.separation(), motion.closest_s()), (size, 0.5));
+            assert!(!motion.is_below(size) && motion.is_below(size.next_up()));
+        }
+    }
+}

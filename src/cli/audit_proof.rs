@@ -1,0 +1,148 @@
+//! `tautline audit --proof`: a verdict that `check_proof.py` confirms without this program.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::path::Path;
+
+use serde::Serialize;
+use sha2::{Digest as _, Sha256};
+
+use super::Failure;
+use super::audit_arguments::AuditArguments;
+use super::open::Open;
+use crate::audit::Status;
+use crate::audit::recorded::{Motion, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
+use crate::report::recorded::Clock;
+use crate::report::write_atomically;
+
+/// Names of the column of time that the checker knows.
+const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];
+/// Names of all other columns that it reads.
+const COLUMNS: [&str; 4] = ["id", "x", "y", "z"];
+
+/// The content of the file.
+#[derive(Serialize)]
+struct ProofFile<'a> {
+    format: &'static str,
+    version: u32,
+    data: Data<'a>,
+    claim: Claim<'a>,
+    windows: &'a [ProofWindow],
+}
+
+/// What the claim is about.
+#[derive(Serialize)]
+struct Data<'a> {
+    recording: &'a str,
+    sha256: String,
+}
+
+/// What is claimed.
+#[derive(Serialize)]
+struct Claim<'a> {
+    status: Status,
+    motion: &'static str,
+    limit_m: f64,
+    #[serde(flatten)]
+    proof: &'a Proof,
+    vehicles: &'a [String],
+    /// Samples farther apart than this are not joined \[s\]; null where all are.
+    max_gaps_s: &'a [f64],
+    offsets_s: BTreeMap<&'a str, f64>,
+    clock: &'a Clock,
+}
+
+/// Refuses questions that a proof does not answer, before the work.
+pub(super) fn check(arguments: &AuditArguments, settings: &Settings) -> Result<(), Failure> {
+    if arguments.proof.is_none() {
+        return Ok(());
+    }
+    let no_proof = |what: &str, remedy: &str| Err(Failure::input(format!("--proof: no proof of {what}"), remedy));
+    let is_other = [
+        (settings.delta_m.is_none(), "a limit that is not --delta"),
+        (settings.motion.is_some_and(|motion| motion != Motion::Linear), "a motion that is not linear"),
+        (settings.radius_m.is_some() || settings.vehicles.values().any(|of| of.radius_m.is_some()), "--radius"),
+        (settings.ellipsoid_m.is_some(), "--ellipsoid"),
+        (!settings.obstacles.is_empty(), "obstacles"),
+        (!settings.envelope.is_empty(), "--limit and --fence"),
+        (settings.above_m.is_some(), "--above"),
+        (settings.from_s.is_some() || settings.to_s.is_some(), "a part of a recording (--from, --to)"),
+        (settings.only.is_some(), "some of the vehicles (--ids)"),
+    ];
+    if let Some((_, what)) = is_other.iter().find(|(is_asked, _)| *is_asked) {
+        return no_proof(what, "ask for --delta alone, with --offset and --max-gap as needed");
+    }
+    if !(is_table(&arguments.reading.recording) && arguments.reading.is_read_plainly()) {
+        let called = arguments.reading.called();
+        let help = "write it as a table with `tautline export RECORDING -o FILE.csv`, and audit that";
+        return no_proof(
+            &format!("{called}: it is not one CSV file with the columns t_s, id, x, y and z in metres"),
+            help,
+        );
+    }
+    Ok(())
+}
+
+/// Whether a file is a table that the checker reads.
+fn is_table(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let mut lines = csv::ReaderBuilder::new().from_reader(file);
+    let Ok(header) = lines.headers() else { return false };
+    let names: Vec<&str> = header.iter().map(|name| name.trim().trim_start_matches('\u{feff}')).collect();
+    let count = |wanted: &[&str]| names.iter().filter(|name| wanted.contains(name)).count();
+    count(&TIMES) == 1 && COLUMNS.iter().all(|column| count(&[column]) == 1)
+}
+
+/// Reads the recording again and writes the proof; what it says where there is none.
+pub(super) fn write(
+    file: &Path,
+    arguments: &AuditArguments,
+    (settings, outcome): (&Settings, &Outcome),
+    clock: &Clock,
+    open: &Open<'_>,
+) -> Result<Option<String>, Failure> {
+    let none = |why: &str| Ok(Some(format!("no proof is written: {why}")));
+    if outcome.status == Status::Undecided {
+        return none("the verdict is undecided");
+    }
+    let mut builder = ProofBuilder::new(settings, outcome);
+    let mut recording = open()?;
+    let (mut items, mut more) = (Vec::new(), true);
+    while more {
+        items.clear();
+        more = recording.read(&mut items)?;
+        builder.push(&items)?;
+    }
+    let Some(proof) = builder.finish(outcome) else {
+        return none("the limit is that of radii which the recording holds, or it is not one of samples");
+    };
+    let path = &arguments.reading.recording;
+    let bytes = fs::read(path).map_err(|error| Failure::machine(format!("cannot read {}: {error}", path.display())))?;
+    let sha256 = Sha256::digest(&bytes).iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    });
+    let recording = arguments.reading.called();
+    let offsets_s = settings.vehicles.iter().map(|(name, of)| (name.as_str(), of.offset_s)).collect();
+    let content = ProofFile {
+        format: "tautline proof",
+        version: 1,
+        data: Data { recording: &recording, sha256 },
+        claim: Claim {
+            status: outcome.status,
+            motion: "linear",
+            limit_m: settings.delta_m.unwrap_or(f64::NAN),
+            proof: &proof,
+            vehicles: &outcome.vehicles,
+            max_gaps_s: &outcome.max_gaps_s,
+            offsets_s,
+            clock,
+        },
+        windows: &proof.windows,
+    };
+    let text =
+        serde_json::to_string(&content).map_err(|error| Failure::machine(format!("cannot write a proof: {error}")))?;
+    write_atomically(file, (text + "\n").as_bytes())?;
+    Ok(None)
+}

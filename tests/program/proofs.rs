@@ -1,0 +1,149 @@
+//! `tautline audit --proof`, and the checker that shares no code with it.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+/// Recordings that are proved, and of `sh tests/run.sh --long`.
+const CASES: u64 = 60;
+const LONG_CASES: u64 = 1000;
+
+const PASS: &str = "t,id,x,y,z\n0,alpha,-5,0,0\n0,bravo,5,1,0\n1,alpha,5,0,0\n1,bravo,-5,1,0\n";
+
+/// `SplitMix64` (Steele, Lea, Flood 2014): the same recordings everywhere.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (z ^ (z >> 31)) % limit
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.below(1 << 53) as f64 / (1_u64 << 53) as f64)
+    }
+}
+
+/// Vehicles on random ways, by one clock or by clocks of their own; numbers of all digits or of three decimals.
+fn recording(number: u64) -> String {
+    let mut random = Random(number);
+    let (vehicles, instants) = (2 + random.below(5), 2 + random.below(30));
+    let (is_together, is_short) = (random.below(2) == 0, random.below(2) == 0);
+    let start_s = if random.below(4) == 0 { 1_700_000_000 } else { 0 };
+    let digits = |x: f64| if is_short { format!("{x:.3}") } else { format!("{x:?}") };
+    let mut rows = String::from("t_s,id,x,y,z\n");
+    for vehicle in 0..vehicles {
+        let shift_s = if is_together { 0.0 } else { random.between(0.0, 0.4) };
+        let mut at = [0; 3].map(|_| random.between(-20.0, 20.0));
+        for instant in 0..instants {
+            let time_s = 0.5 * instant as f64 + shift_s;
+            at = at.map(|x| x + random.between(-3.0, 3.0));
+            let time = if start_s > 0 { format!("{}", start_s as f64 + time_s) } else { digits(time_s) };
+            writeln!(rows, "{time},v{vehicle},{},{},{}", digits(at[0]), digits(at[1]), digits(at[2])).expect("a row");
+        }
+    }
+    rows
+}
+
+fn audit(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, &[&["audit"], arguments].concat())
+}
+
+fn checker() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("python/tautline/check_proof.py")
+}
+
+fn python(folder: &Path, script: &Path, arguments: &[&str]) -> Output {
+    let ran = Command::new("python3").arg(script).args(arguments).current_dir(folder).output();
+    ran.expect("tests/setup.sh looks for python3")
+}
+
+fn smallest_m(folder: &Path, arguments: &[&str]) -> f64 {
+    let report: serde_json::Value = serde_json::from_str(&audit(folder, arguments).out).expect("a report");
+    report["separation"]["min_m"].as_f64().expect("a separation")
+}
+
+#[test]
+fn the_limit_that_is_printed_is_kept_and_the_next_number_is_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for number in 1000..1012 {
+        fs::write(folder.path().join("a.csv"), recording(number)).expect("a file");
+        let least_m = smallest_m(folder.path(), &["a.csv", "--delta", "0.001", "--json"]);
+        for (limit_m, exit) in [(least_m, 0), (least_m.next_up(), 1)] {
+            let ran = audit(folder.path(), &["a.csv", "--delta", &format!("{limit_m:?}")]);
+            assert_eq!(ran.exit, Some(exit), "{number}: {limit_m:?} {ran:?}");
+        }
+    }
+}
+
+#[test]
+fn the_checker_confirms_what_is_proved_and_denies_what_is_altered() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cases = if std::env::var_os("TAUTLINE_LONG").is_some() { LONG_CASES } else { CASES };
+    for number in 0..cases {
+        let (data, proof) = (format!("{number}.csv"), format!("{number}.json"));
+        fs::write(folder.path().join(&data), recording(number)).expect("a file");
+        // A limit that is met exactly, one that is kept, and one that is not.
+        let delta = match number % 3 {
+            0 => format!("{:?}", smallest_m(folder.path(), &[&data, "--delta", "0.01", "--json"])),
+            1 => "0.01".to_owned(),
+            _ => "40".to_owned(),
+        };
+        let ran = audit(folder.path(), &[&data, "--delta", &delta, "--proof", &proof, "--quiet"]);
+        assert_eq!(ran.exit, Some(i32::from(number % 3 == 2)), "{ran:?}");
+    }
+    let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/proofs.py");
+    let ran = python(folder.path(), &driver, &[checker().to_str().expect("a path"), "."]);
+    let out = String::from_utf8_lossy(&ran.stdout);
+    assert!(ran.status.success() && out.starts_with(&format!("{cases} confirmed, ")), "{ran:?}");
+}
+
+#[test]
+fn the_checker_says_it_by_its_exit_code() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("pass.csv"), PASS).expect("a file");
+    assert_eq!(audit(folder.path(), &["pass.csv", "--delta", "1", "--proof", "proof.json"]).exit, Some(0));
+    let check = |proof: &str, data: &str| {
+        let ran = python(folder.path(), &checker(), &[proof, data]);
+        (ran.status.code(), String::from_utf8_lossy(&ran.stdout).into_owned())
+    };
+    let (code, said) = check("proof.json", "pass.csv");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.starts_with("CONFIRMED: clear, never closer than 1.0 m, alpha and bravo (limit 1.0 m)"), "{said}");
+    let text = fs::read_to_string(at("proof.json")).expect("a proof");
+    fs::write(at("wrong.json"), text.replace("\"separation_m\":1.0", "\"separation_m\":1.0000000000000002"))
+        .expect("a file");
+    assert_eq!(check("wrong.json", "pass.csv").0, Some(1));
+    fs::write(at("other.csv"), PASS.replace("5,1,0", "5,1.5,0")).expect("a file");
+    assert_eq!(check("proof.json", "other.csv").0, Some(1));
+    fs::write(at("broken.json"), &text[..text.len() / 2]).expect("a file");
+    for (proof, data) in [("broken.json", "pass.csv"), ("proof.json", "none.csv"), ("pass.csv", "pass.csv")] {
+        assert_eq!(check(proof, data).0, Some(2), "{proof} {data}");
+    }
+}
+
+#[test]
+fn what_cannot_be_proved_is_refused_with_a_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("pass.csv"), PASS).expect("a file");
+    fs::write(folder.path().join("wide.csv"), "t,x1,y1,z1,x2,y2,z2\n0,0,0,0,5,0,0\n1,0,0,0,5,0,0\n").expect("a file");
+    for (arguments, said) in [
+        (&["pass.csv", "--radius", "1"][..], "a limit that is not --delta"),
+        (&["pass.csv", "--delta", "1", "--motion", "hold"], "a motion that is not linear"),
+        (&["pass.csv", "--delta", "1", "--from", "0.5"], "a part of a recording"),
+        (&["pass.csv", "--delta", "1", "--scale", "2"], "tautline export"),
+        (&["wide.csv", "--delta", "1"], "tautline export"),
+        (&["pass.csv", "pass.csv", "--delta", "1"], "audit one at a time"),
+    ] {
+        let ran = audit(folder.path(), &[arguments, &["--proof", "proof.json"]].concat());
+        assert!(ran.exit == Some(2) && ran.err.contains(said), "{arguments:?} {ran:?}");
+        assert!(!folder.path().join("proof.json").exists());
+    }
+}
