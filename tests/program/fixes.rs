@@ -9,7 +9,7 @@ fn fixes_at_zero_and_zero_are_gaps_that_are_counted() {
     let folder = tempfile::tempdir().expect("a folder");
     let audit = |rows: &dyn Fn(i32) -> String| {
         let text: String = (0..10).map(|t| format!("{t},a,47,8,400\n{t},b,{}\n", rows(t))).collect();
-        fs::write(folder.path().join("gps.csv"), format!("t,id,lat,lon,alt\n{text}")).expect("written");
+        fs::write(folder.path().join("gps.csv"), format!("t_s,id,lat,lon,alt\n{text}")).expect("written");
         ran_by(TAUTLINE, folder.path(), &["audit", "gps.csv", "--delta", "1"])
     };
     let there = audit(&|_| "47.001,8,400".to_owned());

@@ -20,11 +20,11 @@ fn recordings() -> tempfile::TempDir {
     let rows = |of: &dyn Fn(i32, f64, &str) -> String| {
         (0..10).flat_map(|t| [of(t, 0.0, "a"), of(t, 5.0, "b")]).collect::<String>()
     };
-    write("flat.csv", format!("t,id,x,y\n{}", rows(&|t, x, id| format!("{t},{id},{x},0\n"))));
-    write("high.csv", format!("t,id,x,y,geoaltitude\n{}", rows(&|t, x, id| format!("{t},{id},{x},0,11826\n"))));
-    write("earth.csv", format!("t,id,lat,lon\n{}", rows(&|t, x, id| format!("{t},{id},{},8\n", 47.0 + x / 1e4))));
-    write("mixed/a.csv", "t,x,y,z\n0,0,0,0\n1,0,0,0\n".to_owned());
-    write("mixed/b.csv", "t,x,y\n0,0.5,0\n1,0.5,0\n".to_owned());
+    write("flat.csv", format!("t_s,id,x,y\n{}", rows(&|t, x, id| format!("{t},{id},{x},0\n"))));
+    write("high.csv", format!("t_s,id,x,y,geoaltitude\n{}", rows(&|t, x, id| format!("{t},{id},{x},0,11826\n"))));
+    write("earth.csv", format!("t_s,id,lat,lon\n{}", rows(&|t, x, id| format!("{t},{id},{},8\n", 47.0 + x / 1e4))));
+    write("mixed/a.csv", "t_s,x,y,z\n0,0,0,0\n1,0,0,0\n".to_owned());
+    write("mixed/b.csv", "t_s,x,y\n0,0.5,0\n1,0.5,0\n".to_owned());
     let venue = |height: &str| format!("[fence]\npolygon_m = [[-9, -9], [9, -9], [9, 9], [-9, 9]]\n{height}");
     write("room.toml", venue("height_m = [0, 10]\n"));
     write("field.toml", venue(""));
@@ -79,7 +79,7 @@ fn what_needs_no_height_is_judged_in_the_plane_and_the_verdict_says_so() {
     ] {
         let ran = audit(folder.path(), &[&["flat.csv"], question].concat());
         let said = ran.out.lines().next().unwrap_or_default().to_owned();
-        assert!(ran.exit == Some(i32::from(question == ["--delta", "6"])) && said.ends_with(in_plane), "{ran:?}");
+        assert!(ran.exit == Some(i32::from(question == ["--delta", "6"])) && said.contains(in_plane), "{ran:?}");
         let high = audit(folder.path(), &[&["high.csv"], question].concat());
         assert!(!high.out.contains(in_plane), "{high:?}");
     }
@@ -95,7 +95,7 @@ fn what_needs_no_height_is_judged_in_the_plane_and_the_verdict_says_so() {
 fn heights_above_a_first_place_that_nobody_named_are_none() {
     let folder = recordings();
     let rows: String = (0..10).map(|t| format!("{t},a,47,8,11826\n{t},b,47.001,8,11826\n")).collect();
-    fs::write(folder.path().join("adsb.csv"), format!("t,id,lat,lon,geoaltitude\n{rows}")).expect("written");
+    fs::write(folder.path().join("adsb.csv"), format!("t_s,id,lat,lon,geoaltitude\n{rows}")).expect("written");
     for question in [
         &["--limit", "height=120"][..],
         &["--limit", "floor=0"],
