@@ -10,6 +10,7 @@
 
 use nalgebra::Vector3;
 
+use super::cells::{Cells as _, number};
 use super::csv::Text;
 use super::curves::{Curves, piece};
 use super::error::{Fault, ReadError, quoted};
@@ -17,7 +18,6 @@ use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
-use super::table::{Cells as _, number};
 use crate::track::Item;
 
 /// Highest power that is read.

@@ -9,6 +9,7 @@ use std::str;
 
 use csv_core::ReadRecordResult;
 
+use super::cells::Cells;
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::format::Format;
@@ -18,7 +19,7 @@ use super::layout::Layout;
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
 use super::source::{Lines, Source};
-use super::table::{self, Cells};
+use super::table;
 use super::time_columns;
 
 /// What stands between two fields.

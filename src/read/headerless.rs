@@ -1,8 +1,9 @@
 //! Tables of plain numbers without a header.
 
+use super::columns::Body;
 use super::conventions::Convention;
 use super::error::Fault;
-use super::layout::{Body, Layout};
+use super::layout::Layout;
 use super::options::{Dimensions, ReadOptions};
 
 /// How far the norm of a quaternion may be from 1.

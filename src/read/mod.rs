@@ -16,7 +16,9 @@ mod archive;
 mod axes;
 mod bag;
 mod capture;
+mod cells;
 mod clock;
+mod columns;
 mod conventions;
 mod crazyflie;
 mod csv;
@@ -42,6 +44,7 @@ mod options;
 mod order;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet;
+mod places;
 mod recognise;
 mod skybrush;
 mod source;

@@ -7,13 +7,14 @@ use std::fmt;
 
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
+use super::cells::Cells;
 use super::clock::Stamp;
 use super::error::{Fault, Place, ReadError, quoted};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::{Lines, Source};
-use super::table::{self, Cells};
+use super::table;
 
 /// Most columns: more are lists of changing length.
 const MOST_COLUMNS: usize = 100_000;

@@ -15,13 +15,14 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
+use super::cells::Cells;
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::{BATCH, Recording};
 use super::source::Source;
-use super::table::{self, Cells};
+use super::table;
 
 /// Key of the metadata that says what time counts from \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";

@@ -1,88 +1,20 @@
 //! Tables row by row, whatever their cells are written as.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
-
+use super::cells::{Cells, empty, number, odd_number, vector};
 use super::clock::{Probe, Stamp, TimeUnit};
-use super::conventions::GLOBAL;
+use super::columns::Body;
 use super::dates::Date;
-use super::earth::{Geodetic, Local, is_no_fix, no_fixes};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::earth::{Local, is_no_fix, no_fixes};
+use super::error::{Fault, Place, ReadError, quoted};
 use super::identity::{Rival, Suspect};
-use super::layout::{Body, Layout};
+use super::layout::Layout;
 use super::names::Names;
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::places::{bring, origin};
 use super::source::Source;
-use super::turned;
-
-/// The cells of the current row of a table.
-pub(super) trait Cells {
-    /// Names of the columns.
-    fn header(&self) -> &[String];
-
-    /// Goes before the first row. Of each row these columns are asked, in rising order; where not `all` that a table
-    /// needs are among them, no more is looked at.
-    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), ReadError>;
-
-    /// Goes to the next row; `false` behind the last one.
-    fn advance(&mut self) -> Result<bool, ReadError>;
-
-    /// Number of the current row.
-    fn row(&self) -> u64;
-
-    /// Where a row of this number is.
-    fn place(row: u64) -> Place;
-
-    /// A cell as it is written; nothing where it is empty.
-    fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault>;
-
-    /// The number in a cell that plainly holds one.
-    fn number(&self, column: usize) -> Option<f64>;
-
-    /// The time in a cell that plainly holds one.
-    fn stamp(&mut self, column: usize) -> Option<Stamp>;
-
-    /// A cell as the name of a vehicle; nothing where it is empty.
-    fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
-        self.text(column)
-    }
-}
-
-fn empty(cells: &impl Cells, column: usize) -> Fault {
-    Fault::empty_cell(&cells.header()[column])
-}
-
-/// The finite number in a cell; none where it is empty.
-#[inline]
-pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, Fault> {
-    match cells.number(column) {
-        Some(number) if number.is_finite() => Ok(Some(number)),
-        _ => odd_number(cells, column, UNSEEN),
-    }
-}
-
-/// The number in a cell that does not plainly hold a finite one; `unseen` helps where it is not finite.
-#[cold]
-fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Result<Option<f64>, Fault> {
-    let (text, column) = (cells.text(column)?, &cells.header()[column]);
-    let text = text.trim();
-    let holds = |what: &str, remedy| {
-        let problem = format!("column `{column}` holds {}, {what}", quoted(text));
-        Err(Fault::content(problem, remedy))
-    };
-    match text.parse::<f64>() {
-        _ if text.is_empty() => Ok(None),
-        Ok(number) if number.is_finite() => Ok(Some(number)),
-        Ok(_) => Err(Fault::not_finite(column, text, unseen)),
-        Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
-            holds("a number with a decimal comma", "write numbers with a decimal point")
-        }
-        Err(_) => holds("which is not a number", "write a number with a decimal point"),
-    }
-}
 
 /// A table, long or wide.
 struct Table<C> {
@@ -164,65 +96,6 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
         return Err(Fault::content(problem, "leave --time-unit, --fps and --time-scale away").into());
     }
     Ok(first)
-}
-
-/// The frame of places on the Earth, where a table gives such: where the user says, or at the first place of the table.
-fn origin<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Result<Option<Local>, ReadError> {
-    let reference = layout.convention.reference;
-    if !layout.on_earth && reference.is_none() {
-        let needless = Fault::content("it has no columns of latitude and longitude", "leave --origin away");
-        return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
-    }
-    turned::refuse_known(options, "a table of latitudes and longitudes")?;
-    cells.restart(&layout.columns(), true)?;
-    let mut unfixed = false;
-    while cells.advance()? {
-        let place = match reference {
-            Some(columns) => measured_from(cells, columns),
-            None => fix(cells, layout, &mut unfixed),
-        };
-        let at_row = |fault: Fault| fault.at(C::place(cells.row()));
-        if let Some(place) = place.map_err(at_row)? {
-            return Ok(Some(Local::first(place, options).map_err(at_row)?));
-        }
-    }
-    if reference.is_some() {
-        let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
-        return Err(Fault::content(problem, GLOBAL).into());
-    }
-    if unfixed {
-        let problem = "no row has a fix: every latitude and longitude is exactly 0";
-        return Err(Fault::content(problem, "record again once the receiver has a fix, or give another file").into());
-    }
-    Ok(None)
-}
-
-/// The place that the positions of a row are measured from; none where it is not known: empty, NaN, or where latitude and
-/// longitude are 0.
-fn measured_from(cells: &impl Cells, columns: [usize; 3]) -> Result<Option<Geodetic>, Fault> {
-    let mut place = Vector3::zeros();
-    for (slot, column) in place.iter_mut().zip(columns) {
-        match cells.number(column) {
-            Some(number) if number.is_nan() => return Ok(None),
-            _ => match number(cells, column)? {
-                Some(number) => *slot = number,
-                None => return Ok(None),
-            },
-        }
-    }
-    Ok(Some(place).filter(|place| !is_no_fix(place)))
-}
-
-/// The first place on the Earth of a row; none where it has none. Sets `unfixed` where it has no fix.
-fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option<Geodetic>, Fault> {
-    for body in &layout.bodies {
-        match vector(cells, &body.position, &layout.metres)? {
-            Some(place) if is_no_fix(&place) => *unfixed = true,
-            None => {}
-            place => return Ok(place),
-        }
-    }
-    Ok(None)
 }
 
 impl<C: Cells> Table<C> {
@@ -366,30 +239,6 @@ impl<C: Cells> Table<C> {
     }
 }
 
-/// Brings a position that is measured from a place in some columns into the frame `local`; `false` where it is not known, as
-/// other columns may say by a 0. The frame of the place is kept in `there`.
-fn bring(
-    cells: &impl Cells,
-    row: &mut Row,
-    (columns, valid): ([usize; 3], &[usize]),
-    local: Option<Local>,
-    there: &mut Option<Local>,
-) -> Result<bool, Fault> {
-    for &column in valid {
-        if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
-            return Ok(false);
-        }
-    }
-    let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
-    let there = match there.filter(|there| there.is_at(place)) {
-        Some(there) => there,
-        None => *there.insert(Local::at(place)?),
-    };
-    row.position = local.place_from(&there, row.position);
-    row.velocity = row.velocity.map(|velocity| local.turn_from(&there, velocity));
-    Ok(true)
-}
-
 /// The row of a vehicle; none where it was not seen.
 #[inline]
 fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[f64]) -> Result<Option<Row>, Fault> {
@@ -404,25 +253,6 @@ fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[
         return Err(Fault::content(problem, "write 0 or more"));
     }
     Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
-}
-
-/// Three numbers, none where all cells are empty.
-#[inline]
-fn vector(cells: &impl Cells, columns: &[Option<usize>; 3], metres: &[f64]) -> Result<Option<Vector3<f64>>, Fault> {
-    let mut vector = Vector3::zeros();
-    let (mut filled, mut missing) = (false, None);
-    for (axis, column) in columns.iter().enumerate() {
-        let Some(column) = *column else { continue };
-        match number(cells, column)? {
-            Some(x) => (vector[axis], filled) = (x * metres[column], true),
-            None => missing = missing.or(Some(column)),
-        }
-    }
-    match missing {
-        None => Ok(Some(vector)),
-        Some(_) if !filled => Ok(None),
-        Some(column) => Err(empty(cells, column)),
-    }
 }
 
 impl<C: Cells> Rows for Table<C> {

@@ -159,3 +159,46 @@ fn axes_that_are_known_are_not_turned_again() {
     let motive = "Format Version,1.23,Length Units,Meters,Coordinate Space,Global\n";
     assert!(read_bytes("take.csv", motive.as_bytes(), &ned).expect_err("known").help().contains("leave --axes away"));
 }
+
+#[test]
+fn heights_are_turned_once() {
+    for (header, z) in [
+        ("t,id,north,east,down", -3.0),
+        ("t,id,north,east,depth", -3.0),
+        ("t,id,north,east,alt", 3.0),
+        ("t,id,x_ned,y_ned,z_ned", -3.0),
+    ] {
+        assert_eq!(read(&format!("{header}\n0,a,1,2,3\n")).samples()[0].2, [2.0, 1.0, z], "{header}");
+    }
+    // The name says which way is up, and so may not the user say another.
+    for name in ["depth", "alt"] {
+        let text = format!("t,id,x,y,{name}\n0,a,1,2,3\n");
+        let z = if name == "alt" { 3.0 } else { -3.0 };
+        for options in [turned("ned", [1.0; 3]), turned("x,y,z", [1.0, 1.0, -1.0]), turned("x,z,y", [1.0; 3])] {
+            let error = read_with(&text, &options).expect_err("both");
+            assert!(error.help().contains(&format!("--column z={name}")), "{error} {}", error.help());
+        }
+        assert_eq!(read_with(&text, &turned("y,x,z", [1.0; 3])).expect("read").samples()[0].2, [2.0, 1.0, z]);
+        let mut plain = turned("ned", [1.0; 3]);
+        plain.columns.set("z", name);
+        assert_eq!(read_with(&text, &plain).expect("read").samples()[0].2, [2.0, 1.0, -3.0]);
+    }
+}
+
+#[test]
+fn a_plane_stays_one_when_it_is_turned() {
+    let folder = folder(&[("flat.csv", b"t,id,x,y,vx,vy\n0,a,1,2,3,4\n")]);
+    let flat = folder.path().join("flat.csv");
+    let ned = turned("ned", [1.0; 3]);
+    assert!(tautline::read::open(&flat, &ned).expect("read").is_planar());
+    assert_eq!(Whole::read(&flat, &ned).expect("read").samples()[0].2, [2.0, 1.0, 0.0]);
+    let error = Whole::read(&flat, &turned("x,z,y", [1.0; 3])).expect_err("no z");
+    assert!(error.help().contains("--column z="), "{error}");
+    // North and east alone are a plane too.
+    std::fs::write(&flat, "t,id,north,east\n0,a,1,2\n").expect("written");
+    let open = || tautline::read::open(&flat, &ReadOptions::default()).expect("read");
+    assert!(
+        open().is_planar()
+            && Whole::read(&flat, &ReadOptions::default()).expect("read").samples()[0].2 == [2.0, 1.0, 0.0]
+    );
+}

@@ -293,7 +293,7 @@ fn of_two_arrays_of_times_none_is_ignored() {
     let bytes = archive(&[("t.npy", times()), ("timestamps.npy", times()), positions], true);
     let refused = read_bytes("two.npz", &bytes, &ReadOptions::default()).expect_err("two clocks");
     assert!(refused.to_string().contains("`t` and `timestamps` both give the time"), "{refused}");
-    let mut named = ReadOptions::default();
+    let mut named = laid_out(0);
     assert!(named.columns.set("t", "timestamps"));
     assert_eq!(read_bytes("two.npz", &bytes, &named).expect("named").samples().len(), 6);
 }

@@ -222,3 +222,24 @@ fn a_name_that_is_spelled_in_two_ways_is_refused() {
     let file = "t,child_frame_id,x,y\n0,base_link,0,0\n1,base_link,0,0\n";
     assert_eq!(folder(&[("r1.csv", file), ("r2.csv", file)]).expect("read").vehicles, ["r1", "r2"]);
 }
+
+#[test]
+fn rows_that_go_back_may_be_of_several_vehicles_or_of_a_clock_that_was_set() {
+    let both = ["goes back in time", "--column id=NAME", "--sort"];
+    is_refused(read("t,id,x,y\n0,a,0,0\n2,a,2,0\n1,a,1,0\n"), &both);
+    is_refused(
+        folder(&[("a.csv", "t,x,y\n0,0,0\n2,2,0\n1,1,0\n"), ("b.csv", ALONE)]),
+        &["runs backwards", both[1], both[2]],
+    );
+    // Sorting does not hide vehicles that a column tells apart; the user may know that it does not.
+    let merged = "t,whose,x,y\n0,p,0,0\n1,p,0,0\n2,p,0,0\n0,q,9,0\n1,q,9,0\n2,q,9,0\n";
+    let files = tempfile::tempdir().expect("a folder");
+    fs::write(files.path().join("a.csv"), merged).expect("written");
+    fs::write(files.path().join("b.csv"), ALONE).expect("written");
+    let sorted = ReadOptions { sort: true, ..ReadOptions::default() };
+    is_refused(Whole::read(files.path(), &sorted), &["column `whose`", "--one-vehicle"]);
+    fs::write(files.path().join("a.csv"), interleaved("t,whose,x,y", &["1", "2"], 3)).expect("written");
+    is_refused(Whole::read(files.path(), &ReadOptions::default()), &["column `whose`", "--one-vehicle"]);
+    let known = ReadOptions { one_vehicle: true, ..ReadOptions::default() };
+    assert_eq!(Whole::read(files.path(), &known).expect("read").vehicles, ["a", "b"]);
+}
