@@ -84,7 +84,9 @@ pub(super) struct ReadArguments {
 impl ReadArguments {
     /// Whether one file is read as it is, in metres.
     pub(super) fn is_read_plainly(&self) -> bool {
-        self.more.is_empty() && self.columns.is_empty() && self.scale.is_none_or(Scale::is_one) && self.axes.is_none()
+        let is_moved = self.scale.is_some() || self.axes.is_some();
+        let is_chosen = self.sort || self.one_vehicle || self.duplicates.is_some();
+        self.more.is_empty() && self.columns.is_empty() && !is_moved && !is_chosen
     }
 
     /// Opens the recording.
@@ -187,13 +189,6 @@ impl ReadArguments {
 struct Scale {
     metres: f64,
     each: [f64; 3],
-}
-
-impl Scale {
-    /// Whether it leaves lengths and signs as they are.
-    fn is_one(self) -> bool {
-        self.metres.to_bits() == 1.0_f64.to_bits() && self.each.iter().all(|x| x.to_bits() == 1.0_f64.to_bits())
-    }
 }
 
 fn scale(text: &str) -> Result<Scale, String> {

@@ -94,7 +94,9 @@ pub(super) fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, Re
 /// What the times of these rows look like; none where there are no rows.
 fn probe(rows: &[Row]) -> Option<Probe> {
     let mut probe = Probe::new(rows.first()?.stamp);
-    rows.iter().for_each(|row| probe.see(row.stamp));
+    for row in rows {
+        probe.see(row.stamp);
+    }
     Some(probe)
 }
 
@@ -222,7 +224,9 @@ impl<R: Rows> Ordered<R> {
             ended = !rows.next(&mut first)?;
             let mut probe = probe(&first);
             // Rows that go back are refused as they are reached.
-            probe.iter_mut().for_each(|probe| probe.in_order = true);
+            if let Some(probe) = &mut probe {
+                probe.in_order = true;
+            }
             probe
         } else {
             rows.survey()?

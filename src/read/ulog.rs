@@ -183,7 +183,7 @@ impl Log {
             }
             b'D' => self.data(body, at)?,
             // Those of no interest, and those of versions to come.
-            b'A'..=b'Z' => {}
+            _ if kind.is_ascii_uppercase() => {}
             _ => return Err(Fault::damaged(format!("a message of kind {kind:#04x}"))),
         }
         Ok(())

@@ -8,7 +8,8 @@ use crate::program::{TAUTLINE, ran_by};
 fn fixes_at_zero_and_zero_are_gaps_that_are_counted() {
     let folder = tempfile::tempdir().expect("a folder");
     let audit = |rows: &dyn Fn(i32) -> String| {
-        let text: String = (0..10).map(|t| format!("{t},a,47,8,400\n{t},b,{}\n", rows(t))).collect();
+        let lines: Vec<_> = (0..10).map(|t| format!("{t},a,47,8,400\n{t},b,{}\n", rows(t))).collect();
+        let text = lines.concat();
         fs::write(folder.path().join("gps.csv"), format!("t_s,id,lat,lon,alt\n{text}")).expect("written");
         ran_by(TAUTLINE, folder.path(), &["audit", "gps.csv", "--delta", "1"])
     };

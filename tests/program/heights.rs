@@ -94,7 +94,8 @@ fn what_needs_no_height_is_judged_in_the_plane_and_the_verdict_says_so() {
 #[test]
 fn heights_above_a_first_place_that_nobody_named_are_none() {
     let folder = recordings();
-    let rows: String = (0..10).map(|t| format!("{t},a,47,8,11826\n{t},b,47.001,8,11826\n")).collect();
+    let rows: Vec<_> = (0..10).map(|t| format!("{t},a,47,8,11826\n{t},b,47.001,8,11826\n")).collect();
+    let rows = rows.concat();
     fs::write(folder.path().join("adsb.csv"), format!("t_s,id,lat,lon,geoaltitude\n{rows}")).expect("written");
     for question in [
         &["--limit", "height=120"][..],

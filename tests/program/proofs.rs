@@ -44,7 +44,7 @@ fn recording(number: u64) -> String {
         for instant in 0..instants {
             let time_s = 0.5 * instant as f64 + shift_s;
             at = at.map(|x| x + random.between(-3.0, 3.0));
-            let time = if start_s > 0 { format!("{}", start_s as f64 + time_s) } else { digits(time_s) };
+            let time = if start_s > 0 { format!("{}", f64::from(start_s) + time_s) } else { digits(time_s) };
             writeln!(rows, "{time},v{vehicle},{},{},{}", digits(at[0]), digits(at[1]), digits(at[2])).expect("a row");
         }
     }

@@ -103,7 +103,8 @@ fn px4(lat: &str, rows: &[(&str, u8)]) -> Vec<u8> {
             .to_owned();
     for (k, (x, valid)) in rows.iter().enumerate() {
         let time = 1_000_000 + 20_000 * k;
-        text += &format!("{time},{time},0,{lat},8.0,{x},0,-10,0,1,2,3,0,0,0,0,0,400,{valid},1,0.1\n");
+        let line = format!("{time},{time},0,{lat},8.0,{x},0,-10,0,1,2,3,0,0,0,0,0,400,{valid},1,0.1\n");
+        text.push_str(&line);
     }
     text.into_bytes()
 }

@@ -20,7 +20,9 @@ impl Log {
     pub(crate) fn new() -> Self {
         let mut log = Self(b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0".to_vec());
         log.message(b'B', &[0; 40]);
-        [GLOBAL, LOCAL, GPS].iter().for_each(|format| log.message(b'F', format.as_bytes()));
+        for format in [GLOBAL, LOCAL, GPS] {
+            log.message(b'F', format.as_bytes());
+        }
         log.message(b'I', b"\x0achar[5] sysPX4");
         for (id, name) in [(0_u16, &b"vehicle_global_position"[..]), (1, b"vehicle_local_position"), (2, b"sensor_gps")]
         {
