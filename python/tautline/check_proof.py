@@ -121,7 +121,8 @@ def number(value: Any, what: str) -> float:
 def read_samples(data: bytes, claim: dict[str, Any]) -> list[list[Sample]]:
     """Samples of each vehicle in order of time: (time, position)."""
     try:
-        rows = csv.reader(data.decode("utf-8-sig").splitlines(), strict=True)
+        lines = data.decode("utf-8-sig").splitlines()
+        rows = csv.reader((line for line in lines if not line.startswith("#")), strict=True)
         header = [name.strip() for name in next(rows)]
         time_column = next(header.index(name) for name in TIMES if name in header)
         id_column, *axes = (header.index(name) for name in ("id", "x", "y", "z"))

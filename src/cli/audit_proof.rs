@@ -87,7 +87,7 @@ pub(super) fn check(arguments: &AuditArguments, settings: &Settings) -> Result<(
 /// Whether a file is a table that the checker reads.
 fn is_table(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
-    let mut lines = csv::ReaderBuilder::new().from_reader(file);
+    let mut lines = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(file);
     let Ok(header) = lines.headers() else { return false };
     let names: Vec<&str> = header.iter().map(|name| name.trim().trim_start_matches('\u{feff}')).collect();
     let count = |wanted: &[&str]| names.iter().filter(|name| wanted.contains(name)).count();

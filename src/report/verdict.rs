@@ -92,13 +92,17 @@ impl Fails {
 
 /// Vehicles are at rest if what they still lack is farther than they would get in this many times the flight's duration.
 const REST_DURATIONS: f64 = 10.0;
+/// Time over which a commanded acceleration adds to the speed \[s\].
+const COMMANDED_S: f64 = 1.0;
 
 /// Whether the vehicles of a formation that is not reached have come to rest elsewhere: at the speeds and commanded
 /// accelerations of the end, ten times the flight's duration would not cover the position error that is too much,
 ///
 /// ```text
-/// v H + u H^2/2 < e - edge_error_m,    H = 10 T
+/// (v + u 1 s) H < e - edge_error_m,    H = 10 T
 /// ```
+///
+/// where laws damp relative velocities at about 1/s, so that a command is worth its acceleration over a second.
 ///
 /// None where that is not known, as of vehicles that stand while they are commanded and something may hold against that.
 pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
@@ -110,7 +114,7 @@ pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
     }
     let horizon_s = REST_DURATIONS * summary.end_s;
     let stands = speed_m_s * horizon_s < lacking_m;
-    let is_left_alone = speed_m_s * horizon_s + 0.5 * command_m_s2 * horizon_s.powi(2) < lacking_m;
+    let is_left_alone = (speed_m_s + command_m_s2 * COMMANDED_S) * horizon_s < lacking_m;
     if stands && !is_left_alone && *is_disturbed { None } else { Some(is_left_alone) }
 }
 

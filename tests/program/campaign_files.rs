@@ -140,7 +140,9 @@ fn a_mistake_is_shown_at_its_line_and_column_of_the_specification() {
 
 #[test]
 fn a_bound_is_said_with_its_kind_in_words_in_json_and_on_the_page() {
-    let place = place(&SPEC.replace("runs = 12", "runs = 20").replace("duration_s = 1.0", "duration_s = 0.1"));
+    let place = place(
+        &SPEC.replace("runs = 12", "runs = 20").replace("duration_s = 1.0", "duration_s = 0.1\narrival.hold_s = 0.1"),
+    );
     let ran = campaign(place.path(), &["run", "spec.toml", "--out", "camp", "--worst", "0"]);
     // 1 - 0.05^(1/20) = 0.1391.
     let sentence = "0 of 20 flights violated: below 14 % with 95 % confidence (one-sided)";

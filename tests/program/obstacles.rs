@@ -31,24 +31,21 @@ delta_m = 1.0
 duration_s = 25
 "#;
 
-/// A leader is flown into the tower.
+/// A vehicle flies into the tower under a law that knows no obstacles.
 const HIT: &str = r#"[swarm]
 count = 2
 [start]
 positions_m = [[-5, 0], [-5, 3]]
+velocities_m_s = [[2, 0], [2, 0]]
 [formation]
 shape = "line"
 spacing_m = 3.0
-[reference]
-kind = "velocity"
-velocity_m_s = [2.0, 0]
-leader = 1
 [[obstacle]]
 name = "tower"
 ball = { radius_m = 1.0 }
 at_m = [0.0, 0.0, 0.0]
 [law]
-kind = "displacement"
+kind = "laplacian"
 delta_m = 1.0
 [time]
 duration_s = 8
