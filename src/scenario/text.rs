@@ -62,6 +62,7 @@ impl<'a> Text<'a> {
 
     /// Whether the type of the key that the last override sets asks for a whole number. The override must give a number that is
     /// none.
+    #[cfg(feature = "reports")]
     pub(super) fn asks_for_whole_number(&self) -> bool {
         let Some((_, before)) = self.overrides.split_last() else { return false };
         let base = before.iter().fold(self.toml.len() + 1, |base, set| base + set.text().len() + 1);

@@ -38,8 +38,8 @@ count = 2
 positions_m = [[-5, 0], [-5, 3]]
 velocities_m_s = [[2, 0], [2, 0]]
 [formation]
-shape = "line"
-spacing_m = 3.0
+shape = "points"
+points_m = [[0, 0], [0, 3]]
 [[obstacle]]
 name = "tower"
 ball = { radius_m = 1.0 }
@@ -123,7 +123,7 @@ fn a_vehicle_that_is_flown_into_an_obstacle_fails_in_every_word_and_in_an_audit_
     let reason = report["verdict"]["reasons"][0].as_str().expect("a reason");
     assert!(reason.starts_with("A vehicle came too near to an obstacle: vehicle 1"), "{reason}");
     let words = ran(&folder, &["run", "among.toml", "--force", "--no-figures", "--no-snapshots"]);
-    assert!(words.out.starts_with("VIOLATION: vehicle 1 came to 0.4"), "{}", words.out);
+    assert!(words.out.starts_with("VIOLATION: vehicle 1 came to 0.25"), "{}", words.out);
     let audited = ran(&folder, &["audit", "out/among/run.mcap"]);
     assert_eq!(audited.exit, Some(1), "{}", audited.out);
     assert!(audited.out.starts_with("VIOLATION: 1 and tower"), "{}", audited.out);
