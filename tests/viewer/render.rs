@@ -269,11 +269,11 @@ const ALARM: [u8; 3] = [0xFF, 0x2F, 0x3C];
 #[test]
 fn a_picture_is_red_where_audit_finds_a_violation_and_nowhere_else() {
     let folder = tempfile::tempdir().expect("a folder");
-    // 1.1 m apart, and 0.66^2 + 0.88^2 is below 1.1^2 by rounding.
-    let still = |t: u32| format!("{t},a,0,0,0\n{t},b,0.66,0.88,0\n");
+    // Exactly 1.25 m apart, which is no violation.
+    let still = |t: u32| format!("{t},a,0,0,0\n{t},b,0.75,1,0\n");
     let table = format!("t,id,x,y,z\n{}{}{}", still(0), still(1), still(2));
     fs::write(folder.path().join("still.csv"), table).expect("written");
-    for (delta, is_violation) in [("1.1", false), ("1.1000001", true)] {
+    for (delta, is_violation) in [("1.25", false), ("1.2500001", true)] {
         let audit = ran(folder.path(), &["audit", "still.csv", "--delta", delta]);
         assert_eq!(audit.exit, Some(i32::from(is_violation)), "{}", audit.out);
         let render = ["render", "still.csv", "--delta", delta, "--at", "1", "--size", "320x180", "--out", delta];
