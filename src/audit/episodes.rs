@@ -237,7 +237,7 @@ mod tests {
         }
     }
 
-    /// Sweeps a window in which each of so many pairs has a finding over a time, which goes on with what is open before it.
+    /// Sweeps a window in which `pairs` pairs have a finding over one interval. A finding continues an open one.
     fn sweep(episodes: &mut Episodes<Found>, window: [f64; 2], pairs: u32, [from_s, to_s]: [f64; 2]) -> usize {
         let mut most = 0;
         episodes.begin(Interval { from_s: window[0], to_s: window[1] });

@@ -61,8 +61,7 @@ pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: i
     }
 }
 
-/// The smallest separation of straight segments, where it is below what is known: rough bounds first, and exact numbers of those
-/// that may be the smallest.
+/// Smallest separation of straight segments below a cutoff. Rounded bounds select the candidates; their separations are exact.
 #[derive(Debug)]
 struct Nearest<'a> {
     cutoff: f64,

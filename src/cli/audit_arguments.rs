@@ -299,8 +299,8 @@ impl AuditArguments {
         Ok(())
     }
 
-    /// Refuses what is asked in seconds of times whose unit is a guess: it would be proved of another recording. Seconds are
-    /// no guess where the vehicles of these first items could not be as fast as milliseconds make them.
+    /// Refuses a question in seconds if the unit of time is a guess. Seconds are accepted if milliseconds would make the vehicles of
+    /// these first items faster than sound.
     pub(super) fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
         /// Speed that no vehicle of a swarm has \[m/s\]: that of sound.
         const FASTEST_M_S: f64 = 340.0;

@@ -72,8 +72,8 @@ pub(super) struct Level<'a> {
     asked: Option<String>,
 }
 
-/// Refuses questions about heights where the recording has none, and about places where nobody says what they are measured
-/// from.
+/// Refuses questions about heights where the recording has none, and about places whose origin
+/// is not given.
 pub(super) fn refuse_unknown<'a>(
     arguments: &AuditArguments,
     settings: &'a Settings,

@@ -109,7 +109,7 @@ pub(super) fn is_no_fix(place: &Geodetic) -> bool {
     place.x == 0.0 && place.y == 0.0
 }
 
-/// What a person should know of so many rows or messages without a fix, `of` some vehicles.
+/// Note on `count` rows or messages of the vehicles `of` that hold no fix.
 pub(super) fn no_fixes(count: u64, of: &str) -> Option<String> {
     let is = if count == 1 { "place is no fix and was" } else { "places are no fixes and were" };
     (count > 0).then(|| format!("{count} {is} left out{of}: latitude and longitude are both exactly 0"))

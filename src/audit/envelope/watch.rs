@@ -13,8 +13,8 @@ use crate::audit::polynomial::{rescale, stray_across, value};
 use crate::audit::sweep::Interval;
 use crate::track::{Item, Piece, Sample};
 
-/// Pieces of a curve that meet within this \[m\], and whose velocities do within this \[m/s\], are one smooth curve: their
-/// coefficients are written with so many digits.
+/// Pieces of a curve that meet within this \[m\], and whose velocities do within this \[m/s\], are one smooth curve: files
+/// write coefficients with about this resolution.
 const SMOOTH: f64 = 1e-3;
 /// Pieces whose times are within this \[s\] meet.
 const SAME_INSTANT_S: f64 = 1e-6;
@@ -46,7 +46,7 @@ pub(in crate::audit) struct Watch {
     window: Interval,
     of: Vec<Followed>,
     vehicles: Vec<Last>,
-    /// Length of the windows over which accelerations are means \[s\], and what is known of each vehicle for them.
+    /// Length of the averaging window of accelerations \[s\], and the recent velocities of each vehicle.
     accel_window_s: Option<f64>,
     means: Vec<MeanAcceleration>,
 }

@@ -149,9 +149,9 @@ impl TrackAuditor {
     }
 
     /// Takes what the recording itself says of the time since the instant before; in order of time, and before anything is judged.
-    /// It goes before what is drawn; where clocks are set right differently, around ellipsoids, or near the ground
-    /// it says too little for that, and contradicts the lines that are drawn, nothing is decided; nor of other pairs then, where
-    /// they might be too close for all that is told of them.
+    /// A reported finding replaces the interpolated one. With different clock offsets, with ellipsoids or near the ground it does not
+    /// say enough: where it then contradicts the interpolation, the pair is undecided, and so is each other pair that it does
+    /// not exclude.
     pub fn tell(&mut self, told: Told) {
         self.results.ledger.expect_corrections();
         self.told.push(told);

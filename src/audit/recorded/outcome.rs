@@ -187,8 +187,8 @@ pub struct Outcome {
     pub deciding_rate_hz: Option<f64>,
     /// How many findings there are.
     pub tallies: Tallies,
-    /// Gaps in which somebody else was there or an obstacle in the way (any gap where single vehicles are asked about), in
-    /// order of time, as many as [`Tallies`] says: what happened is not known.
+    /// Listed gaps in order of time; [`Tallies`] counts all. A gap counts if another vehicle or an obstacle is present, or if
+    /// limits of single vehicles are judged. The motion in a gap is not known.
     pub gaps: Vec<Gap>,
     /// Vehicles that are never there together with another, where they are to keep apart from nothing else: a wrong clock would
     /// look like that.

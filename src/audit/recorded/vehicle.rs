@@ -12,8 +12,8 @@ use crate::audit::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use crate::audit::whole_motion::compare_height;
 use crate::track::{Item, Piece, Sample};
 
-/// Pieces of a curve that follow each other within this \[s\] leave no gap: times are written with so many digits. What the
-/// position jumps by is swept.
+/// Pieces of a curve that follow each other within this \[s\] leave no gap: files write times with about this resolution. A
+/// jump of the position is swept.
 const SAME_INSTANT_S: f64 = 1e-6;
 /// Shortest part of a curve, as a fraction of it, that is looked at for when the ground is left.
 const SHORTEST_PART: f64 = 1e-12;
