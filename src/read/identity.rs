@@ -70,7 +70,7 @@ impl Rival {
     }
 }
 
-/// A column that is not read, in a table of one vehicle: its values may be those of several.
+/// A column that is not read, over the rows of one vehicle: its values may be those of several vehicles.
 #[derive(Clone, Debug)]
 pub(super) struct Suspect {
     pub(super) column: usize,
@@ -88,6 +88,8 @@ pub(super) struct Suspect {
     /// value, and among all.
     compared: u64,
     off: [f64; 2],
+    /// Whether a value is a number with decimals, which measures something or else numbers vehicles in an odd way.
+    has_decimals: bool,
     /// Whether it cannot name vehicles.
     cleared: bool,
 }
@@ -127,6 +129,7 @@ impl Suspect {
             backwards: [0; 2],
             compared: 0,
             off: [0.0; 2],
+            has_decimals: false,
             cleared: false,
         }
     }
@@ -137,9 +140,8 @@ impl Suspect {
 
     /// Takes its value in the next row.
     pub(super) fn see(&mut self, value: &str, time: f64, position: Vector3<f64>) {
-        let is_decimal = value.parse::<f64>().is_ok_and(|number| number.fract() != 0.0 || !number.is_finite());
-        if is_decimal || self.values.len() > MOST_VALUES {
-            // Numbers with decimals measure something.
+        self.has_decimals |= value.parse::<f64>().is_ok_and(|number| number.fract() != 0.0 || !number.is_finite());
+        if self.values.len() > MOST_VALUES {
             (self.cleared, self.values) = (true, HashMap::new());
         }
         if self.cleared || value.is_empty() {
@@ -169,9 +171,10 @@ impl Suspect {
         }
     }
 
-    /// Whether its values are those of several vehicles, by all that is known: few values that come again while time goes on,
-    /// and words that change from row to row, or rows of one value that are on a smoother way than all rows.
-    fn names_vehicles(&self) -> bool {
+    /// Whether its values are those of several vehicles: few values that come again while time goes on, and words that change
+    /// from row to row, or rows of one value that are on a smoother path than all rows. Only the path decides about numbers with
+    /// decimals, and in a table that `names_others`.
+    fn names_vehicles(&self, names_others: bool) -> bool {
         let values = self.values.len() as u64;
         if self.cleared || values < 2 || 2 * values > self.rows + 1 {
             return false;
@@ -179,25 +182,34 @@ impl Suspect {
         let is_sequence = self.backwards[0] > 0 && self.backwards == [self.changes; 2];
         let alternates = 3 * self.changes >= self.rows - 1;
         let is_smoother = self.off[0] < APART * self.off[1];
+        if names_others || self.has_decimals {
+            return self.returns > 0 && self.compared >= ENOUGH && is_smoother;
+        }
         // Measured text, such as a mode, seldom changes.
         let is_text = self.values.keys().all(|value| value.parse::<f64>().is_err());
         let is_told = if is_text || self.compared < ENOUGH { alternates || is_smoother } else { is_smoother };
         is_sequence || (self.returns > 0 && is_told)
     }
 
-    /// The fault of a table of one vehicle in which this column, which is called so, names several.
-    pub(super) fn fault(&self, called: &str) -> Option<Fault> {
-        if !self.names_vehicles() {
+    /// Returns the fault of rows in which this column, `called` so, names several vehicles. `named` holds the name that another
+    /// column gives all of these rows, and what that column is called.
+    pub(super) fn fault(&self, called: &str, named: Option<(&str, &str)>) -> Option<Fault> {
+        if !self.names_vehicles(named.is_some()) {
             return None;
         }
         let count = self.values.len();
+        let (whose, otherwise) = match named {
+            None => ("its rows".to_owned(), "where all rows are of one vehicle, say so with --one-vehicle".to_owned()),
+            Some((name, id)) => {
+                let otherwise = format!("where column {id} does name the vehicles, say so with --column id={id}");
+                (format!("the rows of vehicle {}", quoted(name)), otherwise)
+            }
+        };
         let problem = format!(
-            "its rows look like those of several vehicles: column {} has {count} values that alternate",
+            "{whose} look like those of several vehicles: column {} has {count} values that alternate",
             quoted(called)
         );
-        let remedy = format!(
-            "name the column of the vehicle with --column id={called}; where all rows are of one vehicle, say so with --one-vehicle"
-        );
+        let remedy = format!("name the column of the vehicle with --column id={called}; {otherwise}");
         Some(Fault::content(problem, remedy))
     }
 }

@@ -169,12 +169,26 @@ impl Layout {
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
-        // A user who says that all rows are of one vehicle knows.
-        if (self.id.is_some() || one) && !options.one_vehicle {
+        // A user who says which column names the vehicles, or that all rows are of one vehicle, knows.
+        if (self.id.is_some() || one) && !options.one_vehicle && !self.is_id_given {
             let may_name =
                 |column: &usize| heading::may_name(&header[*column]) && !time_columns::is_part(&header[*column]);
             let suspects = unused.clone().filter(|column| may_name(column) && !self.rivals.contains(column));
             self.suspects = suspects.collect();
+        }
+        // Pandas writes `x.1` for a second column `x`.
+        let repeats = |&column: &usize| {
+            let (stem, number) = header[column].rsplit_once('.')?;
+            let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+            let of = |read: usize| header[read] == stem && Heading::of(&convention.header[read]).is_some();
+            (is_number && used.iter().any(|&read| of(read))).then_some((column, stem))
+        };
+        if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
+            let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
+            return Err(Fault::content(
+                problem,
+                "give the columns of each vehicle a name of their own, or take these out",
+            ));
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         let is_told = is_one_vehicle || convention.is_one_vehicle;

@@ -16,6 +16,9 @@ use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::places::{bring, origin};
 use super::source::Source;
 
+/// Vehicles, the first of a table, whose rows are looked at for several vehicles of one name.
+const MOST_SUSPECTED: usize = 256;
+
 /// A table, long or wide.
 struct Table<C> {
     cells: C,
@@ -31,7 +34,8 @@ struct Table<C> {
     dates: Option<Date>,
     /// Columns that may say otherwise whose rows they are.
     rivals: Vec<Rival>,
-    suspects: Vec<Suspect>,
+    /// Columns that may name several vehicles among the rows of one, for each vehicle.
+    suspects: Vec<Vec<Suspect>>,
     /// How many rows of each vehicle have no fix.
     no_fixes: BTreeMap<usize, u64>,
     /// Vehicle of the last row.
@@ -68,7 +72,6 @@ pub(super) fn open<C: Cells + 'static>(
     about.scale = if layout.on_earth { 1.0 } else { about.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
     let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
-    let suspects = layout.suspects.iter().copied().map(Suspect::new).collect();
     let table = Table {
         cells,
         layout,
@@ -78,7 +81,7 @@ pub(super) fn open<C: Cells + 'static>(
         has_own_clock,
         dates,
         rivals,
-        suspects,
+        suspects: Vec::new(),
         no_fixes: BTreeMap::new(),
         vehicle: 0,
         count: 0,
@@ -191,24 +194,35 @@ impl<C: Cells> Table<C> {
             rows.push(row);
         }
         self.count += 1;
-        if !self.suspects.is_empty() {
+        if !self.layout.suspects.is_empty() {
             self.suspect(rows.last().filter(|row| row.place == self.cells.row()).copied())?;
         }
         Ok(())
     }
 
-    /// Looks at what columns that are not read say of a row, as long as all rows seem to be of one vehicle.
+    /// Looks at what columns that are not read say of a row of a vehicle.
     fn suspect(&mut self, row: Option<Row>) -> Result<(), Fault> {
-        if self.names.all().len() > 1 {
-            self.suspects.clear();
+        let Some(row) = row.filter(|row| row.vehicle < MOST_SUSPECTED) else { return Ok(()) };
+        while self.suspects.len() <= row.vehicle {
+            self.suspects.push(self.layout.suspects.iter().copied().map(Suspect::new).collect());
         }
-        let Some(row) = row else { return Ok(()) };
-        for suspect in &mut self.suspects {
+        let suspects = &mut self.suspects[row.vehicle];
+        for suspect in suspects.iter_mut() {
             let value = self.cells.text(suspect.column)?;
             suspect.see(value.trim(), row.stamp.approximately(), row.position);
         }
-        self.suspects.retain(|suspect| !suspect.is_cleared());
+        suspects.retain(|suspect| !suspect.is_cleared());
         Ok(())
+    }
+
+    /// The fault of a vehicle whose rows look like those of several.
+    fn suspicion(&self) -> Option<Fault> {
+        let header = self.cells.header();
+        let id = self.layout.id.filter(|_| self.names.all().len() > 1);
+        self.suspects.iter().enumerate().find_map(|(vehicle, suspects)| {
+            let named = id.map(|id| (&*self.names.all()[vehicle], &*header[id]));
+            suspects.iter().find_map(|suspect| suspect.fault(&header[suspect.column], named))
+        })
     }
 
     /// Refuses rows that are named by a column that numbers them, or by two columns in two ways.
@@ -260,8 +274,7 @@ impl<C: Cells> Rows for Table<C> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             if !self.cells.advance()? {
-                let fault = self.suspects.iter().find_map(|of| of.fault(&self.cells.header()[of.column]));
-                return fault.map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
+                return self.suspicion().map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
             }
             self.append(rows).map_err(|fault| self.at_row(fault))?;
         }
@@ -271,7 +284,7 @@ impl<C: Cells> Rows for Table<C> {
     fn rewind(&mut self) -> Result<(), ReadError> {
         self.count = 0;
         self.no_fixes.clear();
-        self.suspects = self.layout.suspects.iter().copied().map(Suspect::new).collect();
+        self.suspects.clear();
         self.cells.restart(&self.layout.columns_to_see(), true)
     }
 

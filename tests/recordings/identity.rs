@@ -243,3 +243,48 @@ fn rows_that_go_back_may_be_of_several_vehicles_or_of_a_clock_that_was_set() {
     let known = ReadOptions { one_vehicle: true, ..ReadOptions::default() };
     assert_eq!(Whole::read(files.path(), &known).expect("read").vehicles, ["a", "b"]);
 }
+
+/// Rows of team 1, in which two vehicles cross, and of team 2, which is alone and far away.
+fn teams(column: &str, serials: [&str; 2]) -> String {
+    let mut text = format!("t,id,{column},x,y,z\n");
+    for k in 0..=20 {
+        let (t, x) = (f64::from(k) / 10.0, f64::from(k) / 2.0 - 5.0);
+        let (later, back) = (t + 0.05, -x);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{t},1,{},{x},0,1\n{t},2,c,50,0,1\n{later},1,{},{back},0,1", serials[0], serials[1]);
+    }
+    text
+}
+
+#[test]
+fn a_name_that_several_vehicles_share_is_refused_beside_other_names() {
+    for (column, serials) in [("drone_serial", ["a", "b"]), ("whose", ["11", "12"]), ("whose", ["1.5", "2.5"])] {
+        let table = teams(column, serials);
+        let said = format!("column `{column}` has 2 values that alternate");
+        is_refused(read(&table), &["the rows of vehicle `1`", &said, "--column id="]);
+        assert_eq!(by_column(&table, "id").expect("the user says so").vehicles.len(), 2);
+    }
+    // One vehicle of each name, with a measurement that changes as often.
+    let steady = teams("whose", ["a", "b"]).lines().filter(|line| !line.contains(",b,")).collect::<Vec<_>>().join("\n");
+    assert_eq!(read(&steady).expect("read").vehicles.len(), 2);
+}
+
+#[test]
+fn a_column_that_repeats_another_is_refused_in_wide_tables_too() {
+    for header in ["t,A_x,A_y,A_z,A_x.1,A_y.1,A_z.1,C_x,C_y,C_z", "t,A.x,A.y,A.z,A.x.1,A.y.1,A.z.1,C.x,C.y,C.z"] {
+        let table = format!("{header}\n0,-5,0,1,5,0,1,50,0,0\n1,0,0,1,0,0,1,50,0,0\n2,5,0,1,-5,0,1,50,0,0\n");
+        is_refused(read(&table), &["repeats column", "name of their own"]);
+    }
+    let other = "t,A_x,A_y,A_z,gain.1\n0,-5,0,1,5\n1,0,0,1,0\n2,5,0,1,-5\n";
+    assert_eq!(read(other).expect("read").vehicles.len(), 1);
+}
+
+#[test]
+fn vehicles_of_a_file_that_have_fractional_names_are_told_apart() {
+    for count in [2, 3, 5, 10] {
+        let names: Vec<_> = (1..=count).map(|k| format!("{k}.5")).collect();
+        let names: Vec<_> = names.iter().map(String::as_str).collect();
+        let file = interleaved("t,whose,x,y", &names, 40);
+        is_refused(folder(&[("a.csv", &file), ("b.csv", ALONE)]), &["column `whose`"]);
+    }
+}
