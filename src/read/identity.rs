@@ -17,12 +17,33 @@ const ENOUGH: u64 = 8;
 /// vehicles are told apart.
 const APART: f64 = 0.5;
 
-/// What names vehicles as text: names that are the same number, or the same letters in upper and lower case, have one key.
+/// Key of the name of a vehicle: names that are the same number have one key, and so have names that differ only in upper and
+/// lower case, in zeros before a number, or in marks and blanks that no two digits enclose.
 pub(super) fn spelling(name: &str) -> String {
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    let (whole, fraction) = name.split_once('.').unwrap_or((name, "0"));
-    let is_whole = digits(whole) && fraction.bytes().all(|byte| byte == b'0');
-    if is_whole { whole.trim_start_matches('0').to_owned() + "#" } else { name.trim().to_lowercase() }
+    let unsigned = name.strip_prefix('+').unwrap_or(name);
+    let unsigned =
+        if unsigned.trim_matches(['-', '0', '.']).is_empty() && unsigned.contains('0') { "0" } else { unsigned };
+    let (whole, fraction) = unsigned.split_once('.').unwrap_or((unsigned, "0"));
+    if digits(whole) && fraction.bytes().all(|byte| byte == b'0') {
+        return whole.trim_start_matches('0').to_owned() + "#";
+    }
+    let letters: Vec<char> = name.trim().chars().collect();
+    let is_digit = |k: usize| letters.get(k).is_some_and(char::is_ascii_digit);
+    // Whether zeros count here: behind a digit of the same number, and behind its point.
+    let (mut key, mut in_number) = (String::new(), false);
+    for (k, &letter) in letters.iter().enumerate() {
+        let is_kept = if letter == '0' {
+            in_number || !is_digit(k + 1)
+        } else {
+            letter.is_alphanumeric() || (k.checked_sub(1).is_none_or(is_digit) && is_digit(k + 1))
+        };
+        if is_kept {
+            key.extend(letter.to_lowercase());
+        }
+        in_number = if letter.is_ascii_digit() { in_number || is_kept } else { is_kept && letter == '.' };
+    }
+    if key.is_empty() { name.trim().to_lowercase() } else { key }
 }
 
 /// That two names are those of one vehicle, or nearly.
@@ -211,5 +232,44 @@ impl Suspect {
         );
         let remedy = format!("name the column of the vehicle with --column id={called}; {otherwise}");
         Some(Fault::content(problem, remedy))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_differ_only_in_how_they_are_written_have_one_key() {
+        for (name, other) in [
+            ("1", "1.0"),
+            ("1", "+1"),
+            ("1", "001"),
+            ("0", "-0"),
+            ("Cf1", "cf1"),
+            ("cf1", "cf01"),
+            ("cf1", "cf001"),
+            ("cf-1", "cf_1"),
+            ("cf 1", "cf1"),
+            ("cf1", "cf1."),
+            ("a\u{200b}", "a"),
+        ] {
+            assert_eq!(spelling(name), spelling(other), "{name} {other}");
+        }
+        for (name, other) in [
+            ("1", "-1"),
+            ("1", "10"),
+            ("1.5", "15"),
+            ("1.05", "1.5"),
+            ("v1.10", "v11.0"),
+            ("10-4", "104"),
+            ("cf10", "cf1"),
+            ("cf0", "cf"),
+            ("a", "b"),
+            ("--", "__"),
+            ("", "-"),
+        ] {
+            assert_ne!(spelling(name), spelling(other), "{name} {other}");
+        }
     }
 }
