@@ -323,8 +323,9 @@ impl AuditArguments {
         if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
             return Ok(());
         }
-        let message =
-            format!("{path}: its times are whole numbers, be they seconds or milliseconds, and {option} depends on it");
+        let message = format!(
+            "{path}: its times may be seconds or milliseconds, going by their steps, and {option} depends on it"
+        );
         Err(Failure::input(message, "say --time-unit s, or --time-unit ms"))
     }
 

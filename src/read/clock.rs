@@ -165,6 +165,9 @@ impl Stamp {
     }
 }
 
+/// Step from which on times may be milliseconds: vehicles are recorded up to 500 times a second.
+const LONG_STEP: f64 = 2.0;
+
 /// What the times of a recording look like.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
@@ -203,7 +206,7 @@ impl Probe {
 
     /// The unit that times of this size and step are most likely in, and what speaks for it.
     ///
-    /// The last part of the result is whether another unit would fit as well: whole numbers count anything.
+    /// The last part of the result is whether another unit would fit as well: whole numbers, and long steps, count anything.
     ///
     /// Times of day since 1970 tell by their size, unless their step is too long for it. Other whole numbers tell by their
     /// step: vehicles are recorded up to 500 times a second, and hardly ever every two seconds. Everything else is in
@@ -222,10 +225,11 @@ impl Probe {
             step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "because nothing says otherwise"),
             step if step >= 1e6 => (TimeUnit::Nanoseconds, BY_STEPS),
             step if step >= 1e3 => (TimeUnit::Microseconds, BY_STEPS),
-            step if step >= 2.0 => (TimeUnit::Milliseconds, BY_STEPS),
+            step if step >= LONG_STEP => (TimeUnit::Milliseconds, BY_STEPS),
             _ => (TimeUnit::Seconds, "because nothing says otherwise"),
         };
-        (unit, why, self.integral && self.step.is_finite())
+        // Vehicles that seem to be recorded so seldom may be recorded many times a second, in a smaller unit.
+        (unit, why, self.step.is_finite() && (self.integral || self.step >= LONG_STEP))
     }
 }
 

@@ -187,6 +187,7 @@ fn whole_numbers_may_be_of_any_unit() {
         read(&format!("t,id,x,y\n{first},a,1,2\n{second},a,1,2\n")).expect("read").clock.by_steps
     };
     assert!(unsure("0", "1") && unsure("0.0", "10.0") && unsure("0", "10"));
-    assert!(!unsure("0", "0.5") && !unsure("0.0", "10.5") && !unsure("1700000000", "1700000001"));
+    assert!(unsure("0", "16.667") && unsure("0.0", "10.5"), "milliseconds have decimals too");
+    assert!(!unsure("0", "0.5") && !unsure("0.0", "1.5") && !unsure("1700000000", "1700000001"));
     assert!(!read("t_s,id,x,y\n0,a,1,2\n1,a,1,2\n").expect("read").clock.by_steps, "the name says it");
 }
