@@ -31,6 +31,8 @@ pub struct Auditor {
     ended: Vec<Violation>,
     /// What is counted as steps come, and the closest approach so far.
     outcome: AuditOutcome,
+    /// The motion of the pair in the step of the closest approach.
+    closest_motion: Option<ExactMotion>,
 }
 
 impl Auditor {
@@ -56,6 +58,7 @@ impl Auditor {
             began: Vec::new(),
             ended: Vec::new(),
             outcome: AuditOutcome::default(),
+            closest_motion: None,
         })
     }
 
@@ -100,13 +103,19 @@ impl Auditor {
         self.outcome.closest
     }
 
-    /// The verdict over everything judged.
+    /// The verdict over everything judged. Where it is clear, the smallest separation is rounded down, as that of the same motion
+    /// in a recording is; where there are violations, it is that of the closest one.
     #[must_use]
-    pub fn finish(self) -> AuditOutcome {
+    pub fn finish(mut self) -> AuditOutcome {
         let decided = self.time_s.is_some() && self.outcome.refused == 0 && self.ledger.is_decided();
         let parry = self.ledger.parry;
         let violations = self.ledger.into_lists().violations;
         let status = Status::new(!violations.is_empty(), decided);
+        if let Some((closest, motion)) = self.outcome.closest.as_mut().zip(self.closest_motion)
+            && violations.is_empty()
+        {
+            closest.separation_m = motion.separation();
+        }
         AuditOutcome { status, violations, parry, ..self.outcome }
     }
 
@@ -161,6 +170,8 @@ impl Auditor {
             && self.outcome.closest.is_none_or(|old| new.separation_m < old.separation_m)
         {
             self.outcome.closest = closest;
+            let of = [new.pair.first(), new.pair.second()];
+            self.closest_motion = Some(exact_motion([&self.positions_m, to], of, step));
         }
         self.nearest_m = nearest_squared.sqrt();
         self.positions_m.copy_from(to);

@@ -64,6 +64,8 @@ pub(super) fn judge_recorded(
     settings.delta_m = settings.delta_m.or(own_delta_m);
     settings.ellipsoid_m = settings.ellipsoid_m.or(own_ellipsoid_m);
     settings.is_own_limit = is_silent && arguments.obstacles.is_none();
+    // A recording of ours has all vehicles in each sample: none is absent between two of them.
+    settings.max_gap_s = settings.max_gap_s.or(own.as_ref().filter(|own| own.has_no_gaps()).map(|_| f64::INFINITY));
     settings.is_told_scaled = own.as_ref().is_some_and(|own| own.ellipsoid_m.is_some());
     let own_obstacles = own
         .as_ref()
@@ -92,7 +94,15 @@ pub(super) fn judge_recorded(
         own.bind(&mut outcome, &settings);
     }
     arguments.check_count(&outcome, &settings)?;
-    let judged_clear = own.as_ref().and_then(|own| own.judged_clear.filter(|_| arguments.motion.is_none()));
+    let mut judged_clear = own.as_ref().and_then(|own| own.judged_clear.filter(|_| arguments.motion.is_none()));
+    let claimed = judged_clear.and_then(|judged| judged.closest);
+    if let Some(closest) = claimed.filter(|closest| outcome.contradicts(*closest)) {
+        judged_clear = None;
+        notes.push(format!(
+            "the verdict of the run is not used: it says {:?} m for the smallest separation, and the samples come closer",
+            closest.separation_m
+        ));
+    }
     let judged_clear = judged_clear.filter(|judged| judged.answers(&outcome, &settings, own.as_ref()));
     if let Some(JudgedClear { closest: Some(closest) }) = judged_clear {
         outcome.raise_to(closest);

@@ -126,6 +126,11 @@ impl OwnRecording {
         Self { told: Vec::new(), is_altered: true, has_every_step: false, ..self }
     }
 
+    /// Whether every vehicle is in every sample: the recording is not known to differ from what the run wrote.
+    pub(super) fn has_no_gaps(&self) -> bool {
+        !self.is_altered
+    }
+
     /// Takes no word of the run for what happened between its samples.
     pub(super) fn independent(mut self) -> Self {
         self.told.clear();

@@ -316,29 +316,30 @@ mod tests {
 
     #[test]
     fn units_are_told_by_steps_where_the_size_tells_nothing() {
-        for (texts, unit) in [
-            (["0", "10"], "ms"),
-            (["0", "10000"], "us"),
-            (["0", "10000000"], "ns"),
-            (["0", "1"], "s"),
-            (["0", "0.02"], "s"),
-            (["0.5", "10.5"], "s"),
-            (["1700000000000", "1700000000010"], "ms"),
-            (["1700000000000000", "1700000000010000"], "us"),
-            (["1700000000", "1700000600"], "s"),
-            (["1500000000", "1510000000"], "ns"),
-            (["200000000", "200010000"], "us"),
-            (["500000000000", "500010000000"], "ns"),
+        for (texts, unit, by_steps) in [
+            (["0", "10"], "ms", true),
+            (["0", "10000"], "us", true),
+            (["0", "10000000"], "ns", true),
+            (["0", "1"], "s", true),
+            (["0", "0.02"], "s", false),
+            (["0.5", "10.5"], "s", true),
+            (["1700000000000", "1700000000010"], "ms", false),
+            (["1700000000000000", "1700000000010000"], "us", false),
+            (["1700000000", "1700000600"], "s", false),
+            (["1500000000", "1510000000"], "ns", true),
+            (["200000000", "200010000"], "us", true),
+            (["500000000000", "500010000000"], "ns", true),
         ] {
             let clock = timing(&texts, None).0.clock;
-            let (by_size, has_parts) = (texts[0].starts_with("1700000000"), texts[1].contains('.'));
-            assert_eq!((clock.unit, clock.by_steps), (unit, !has_parts && !by_size), "{texts:?}");
+            assert_eq!((clock.unit, clock.by_steps), (unit, by_steps), "{texts:?}");
         }
     }
 
     #[test]
-    fn whole_numbers_with_decimals_may_be_of_any_unit() {
-        for (texts, by_steps) in [(["0.0", "10.0"], true), (["0", "1"], true), (["0.0", "10.5"], false)] {
+    fn whole_numbers_and_long_steps_may_be_of_any_unit() {
+        for (texts, by_steps) in
+            [(["0.0", "10.0"], true), (["0", "1"], true), (["0.0", "10.5"], true), (["0.0", "1.5"], false)]
+        {
             let clock = timing(&texts, None).0.clock;
             assert_eq!((clock.unit, clock.by_steps), ("s", by_steps), "{texts:?}");
             assert!(!timing(&texts, Some(TimeUnit::Seconds)).0.clock.by_steps);

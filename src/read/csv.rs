@@ -65,8 +65,17 @@ pub(super) struct Text {
 /// Opens a table.
 pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut text = Text::open(source, format)?;
-    if format == Format::Text && !text.named && is_trajnet(source, text.separator)? {
-        text = Text::open(source, Format::Trajnet)?;
+    if format == Format::Text && !text.named && options.dimensions.is_none() {
+        match trajnet(source, text.separator)? {
+            Likeness::Certain => text = Text::open(source, Format::Trajnet)?,
+            Likeness::Possible => {
+                let problem = "its lines may hold a frame, a vehicle, x and y, or a time and x, y and z of one vehicle: the \
+                               first two numbers of each are whole";
+                let remedy = "give --format trajnet, or --dimensions 3 for a time and a position";
+                return Err(Fault::content(problem, remedy).into());
+            }
+            Likeness::None => {}
+        }
     }
     let header_row = text.row();
     text.take_units()?;
@@ -296,30 +305,41 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
-/// Whether numbers without a header can be nothing but those of `TrajNet`: whole numbers of a frame and a vehicle, and two
-/// others; several rows of one frame, and no vehicle twice in it.
-fn is_trajnet(source: &Source, separator: Separator) -> Result<bool, ReadError> {
+/// How far a table of plain numbers looks like one of `TrajNet`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Likeness {
+    /// Its numbers cannot be a frame and a vehicle.
+    None,
+    /// Its first two numbers are whole in each line, and no frame has two vehicles.
+    Possible,
+    /// Several lines have the same frame and different vehicles.
+    Certain,
+}
+
+/// Compares numbers without a header with those of `TrajNet`: a frame and a vehicle, both whole, and two others.
+fn trajnet(source: &Source, separator: Separator) -> Result<Likeness, ReadError> {
     let mut lines = Lines::new(source)?;
-    let (mut fields, mut frame, mut vehicles, mut repeats) = (Fields::default(), None, BTreeSet::new(), false);
+    let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());
+    let mut likeness = Likeness::Possible;
     while next_line(&mut lines, true)? {
         if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET.len() {
-            return Ok(false);
+            return Ok(Likeness::None);
         }
         let whole = |index| {
             let text = str::from_utf8(fields.bytes(lines.line(), index)).ok()?;
             Stamp::parse(text.trim())?.whole()
         };
-        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(false) };
+        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(Likeness::None) };
         if frame.replace(of_frame) == Some(of_frame) {
-            repeats = true;
+            likeness = Likeness::Certain;
         } else {
             vehicles.clear();
         }
         if !vehicles.insert(vehicle) {
-            return Ok(false);
+            return Ok(Likeness::None);
         }
     }
-    Ok(repeats)
+    Ok(likeness)
 }
 
 /// The fields of a line of names.

@@ -259,7 +259,9 @@ pub(super) fn tells_no_vehicle(name: &str) -> bool {
     known.contains(&stem.as_str())
         || is("q", &["x", "y", "z", "w", "0", "1", "2", "3"])
         || ["a", "w", "yaw^"].iter().any(|start| is(start, &["x", "y", "z"]))
-        || stem.rsplit_once(['.', '/', '_']).is_some_and(|(start, _)| start.len() == 1 || says_a_quantity(start))
+        || stem
+            .rsplit_once(['.', '/', '_'])
+            .is_some_and(|(start, _)| LETTERS.contains(&start) || says_a_quantity(start))
 }
 
 /// Whether the values of a column of this name could be those of vehicles.

@@ -96,6 +96,7 @@ impl Layout {
         let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
         columns.place = if on_earth { EARTH } else { POSITION };
+        let elsewhere = vehicles_of(if on_earth { POSITION } else { EARTH }, &headings);
         headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { !is_angle(heading.role) });
         columns.heights = Heights::place(columns.place, header, &mut columns.found, &mut headings);
         let given: BTreeSet<_> = columns.found.keys().map(|(_, role)| *role).collect();
@@ -117,6 +118,10 @@ impl Layout {
             None if one => (vec![String::new()], vec![alone.to_owned()]),
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
+        if !one && id.is_none() {
+            let lost = elsewhere.into_iter().find(|vehicle| !names.iter().any(|name| name == vehicle));
+            lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))?;
+        }
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
         let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
         let flat: Vec<_> = flat.map(|(vehicle, _)| vehicle.clone()).collect();
@@ -241,6 +246,27 @@ impl Layout {
     pub(super) fn of_time(&self) -> impl Iterator<Item = usize> {
         self.time.into_iter().chain(self.rest.map(|rest| rest.column))
     }
+}
+
+/// The vehicles that have both horizontal coordinates of the kind that begins with `first`.
+fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&'a str> {
+    let of = |role: Role| {
+        headings.iter().filter(move |(_, heading)| heading.role == role).map(|(_, heading)| heading.vehicle)
+    };
+    let second: BTreeSet<_> = of(first + 1).collect();
+    of(first).filter(|vehicle| second.contains(vehicle)).collect()
+}
+
+/// The fault of a table that gives a vehicle in another frame than the vehicle `read`.
+fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
+    let kinds = ["metres", "latitude and longitude"];
+    let (kind, other) = if on_earth { (kinds[0], kinds[1]) } else { (kinds[1], kinds[0]) };
+    let problem = format!(
+        "the position of vehicle {} is given in {kind}, that of vehicle {} in {other}",
+        quoted(vehicle),
+        quoted(read)
+    );
+    Fault::content(problem, "give the positions of all vehicles in one frame, or take the columns of one frame out")
 }
 
 /// The column that names the vehicles, and others that could; none where the user says which one it is.

@@ -13,6 +13,11 @@ use crate::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 /// Rows given out at a time.
 pub(super) const BATCH: usize = 10_000;
 
+/// Longest step between two places on the Earth that is never taken for a fault of the receiver \[m\].
+const LONGEST_JUMP_M: f64 = 1000.0;
+/// Speed above which such a step is none of a vehicle \[m/s\]: more than the escape velocity of the Earth.
+const FASTEST_M_S: f64 = 12_000.0;
+
 /// What follows for a recording in which some height is not known.
 pub(super) const PLANAR: &str = "the recording is judged in the plane of x and y";
 
@@ -308,6 +313,12 @@ impl<R: Rows> Ordered<R> {
             }
         }
         let sample = self.sample(row, time_s)?;
+        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.earth_origin.is_some()) {
+            let jump_m = (row.position - before.position).norm();
+            if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * (time_s - before_s) {
+                return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
+            }
+        }
         self.last[row.vehicle] = Some((time_s, *row));
         self.given[row.vehicle] = items.len();
         items.push(Item::Sample(sample));
@@ -363,6 +374,17 @@ impl<R: Rows> Ordered<R> {
         let remedy = "take one of the two out, or say which is read with --duplicates first or --duplicates last: a \
                       vehicle is in one place at a time; where the rows are of several, name the column that tells \
                       them apart with --column id=NAME";
+        Fault::content(problem, remedy)
+    }
+
+    #[cold]
+    fn jumps(&self, before_s: f64, before: &Row, jump_m: f64, time_s: f64) -> Fault {
+        let (vehicle, first) = (self.name(before), self.rows.place(before.place));
+        let (jump_km, within_s) = (jump_m / 1e3, time_s - before_s);
+        let problem =
+            format!("vehicle {vehicle} jumps {jump_km:.0} km in {within_s:.3} s; its place before is at {first}");
+        let remedy = "leave latitude and longitude empty where the receiver had no fix, or set the unit of the times right \
+                      with --time-unit";
         Fault::content(problem, remedy)
     }
 

@@ -162,6 +162,54 @@ fn a_recording_that_was_changed_or_cut_does_not_profit_from_its_run() {
 }
 
 #[test]
+fn a_verdict_that_the_samples_contradict_is_not_used() {
+    let folder = pentagon();
+    let with_closest = |to: &str, change: fn(f64) -> f64| {
+        let mut recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
+        let mut recorder = McapRecorder::create(&folder.path().join(to), recording.header()).expect("made");
+        for entry in recording.by_ref() {
+            match entry.expect("whole") {
+                Entry::Sample(sample) => recorder.sample(&sample.as_sample()).expect("recorded"),
+                Entry::Event(event) => recorder.event(&event).expect("recorded"),
+            }
+        }
+        let mut verdict = recording.verdict().expect("a verdict").clone();
+        verdict.separation_m = change(verdict.separation_m);
+        recorder.close(verdict).expect("closed");
+        audit(folder.path(), &[to])
+    };
+    let same = with_closest("same.mcap", |m| m);
+    assert!(same.out.starts_with("CLEAR as the run judged every step: never closer than 2.460355 m"), "{same:?}");
+    let raised = with_closest("raised.mcap", |m| m + 0.001);
+    assert!(raised.out.starts_with("CLEAR if straight between samples: never closer than 2.460355 m"), "{raised:?}");
+    assert!(raised.err.contains("the verdict of the run is not used"), "{raised:?}");
+    // More than was asked of the samples is not given by a smaller word of the run.
+    let lowered = with_closest("lowered.mcap", |m| m - 0.001);
+    assert_eq!(lowered.exit, Some(0), "{lowered:?}");
+}
+
+#[test]
+fn the_smallest_separation_that_is_printed_is_clear_and_the_next_number_is_not() {
+    let folder = pentagon();
+    let printed = json(&audit(folder.path(), &["flown", "--json"]).out)["separation"]["min_m"].as_f64().expect("known");
+    for (delta_m, exit) in [(printed, 0), (printed.next_up(), 1)] {
+        let judged = audit(folder.path(), &["flown", "--delta", &format!("{delta_m:?}")]);
+        assert_eq!(judged.exit, Some(exit), "{judged:?}");
+    }
+}
+
+#[test]
+fn samples_far_apart_leave_no_gap_in_a_recording_of_a_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fly(folder.path(), "pentagon", &["time.duration_s=6", "arrival.hold_s=6", "time.record_hz=0.2"]);
+    let judged = audit(folder.path(), &["flown"]);
+    assert!(judged.exit == Some(0) && judged.out.starts_with("CLEAR as the run judged every step"), "{judged:?}");
+    // The user's own limit still counts.
+    let short = audit(folder.path(), &["flown", "--max-gap", "2"]);
+    assert!(short.exit == Some(1) && short.out.starts_with("UNDECIDED"), "{short:?}");
+}
+
+#[test]
 fn a_run_that_ended_early_gives_no_word_for_its_recording() {
     let folder = pentagon();
     let mut recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");

@@ -1,6 +1,6 @@
 //! More tables that are read: of known data sets, of one vehicle, with a row of units, with an object in each line.
 
-use tautline::read::{Format, ReadError, ReadOptions};
+use tautline::read::{Dimensions, Format, ReadError, ReadOptions};
 use tautline::track::Item;
 
 use crate::messages::read_bytes;
@@ -62,9 +62,17 @@ fn tables_of_trajnet_are_read_where_they_can_be_nothing_else() {
     let found = read_bytes("biwi_eth.txt", text.as_bytes(), &fps).expect("read");
     let expected = [(31.2, "1", [8.46, 3.59, 0.0]), (31.6, "1", [9.57, 3.79, 0.0]), (31.6, "2", [1.5, 2.5, 0.0])];
     assert_eq!(found.samples(), expected);
-    // One vehicle a frame may be a time, x, y and z, unless the user says what it is.
+    // One vehicle a frame may be a time, x, y and z: the user says what it is.
     let single = "0 1 2 3\n10 1 2 4\n";
-    assert_eq!(whole("t.txt", single).samples()[1].2, [1.0, 2.0, 4.0]);
+    let error = read("t.txt", single).expect_err("two meanings");
+    assert!(
+        error.to_string().contains("a frame, a vehicle, x and y, or a time")
+            && error.help().contains("--format trajnet, or --dimensions 3"),
+        "{error}"
+    );
+    let space = ReadOptions { dimensions: Some(Dimensions::Space), ..ReadOptions::default() };
+    assert_eq!(read_bytes("t.txt", single.as_bytes(), &space).expect("read").samples()[1].2, [1.0, 2.0, 4.0]);
+    assert_eq!(whole("t.txt", "0 1 2 3\n10 1.5 2 4\n").samples()[1].2, [1.5, 2.0, 4.0], "no number of a vehicle");
     let said = ReadOptions { format: Some(Format::Trajnet), ..fps.clone() };
     assert_eq!(read_bytes("t.txt", single.as_bytes(), &said).expect("read").samples()[1], (0.4, "1", [2.0, 4.0, 0.0]));
     let named = read_bytes("t.csv", b"t,id,x,y\n0,1,2,3\n", &said).expect_err("a header");

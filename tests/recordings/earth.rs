@@ -188,6 +188,44 @@ fn a_fix_at_zero_and_zero_is_none() {
 }
 
 #[test]
+fn a_place_that_no_vehicle_reaches_in_the_time_is_refused() {
+    for other in ["0,8", "1e-7,0", "-1,-1", "90,0", "47,188"] {
+        let text = format!("t,id,lat,lon,alt\n0,a,47,8,400\n0.1,a,47,8,400\n0.2,a,{other},400\n0.3,a,47,8,400\n");
+        let error = read(&text, &ReadOptions::default()).expect_err(other);
+        let said = error.to_string();
+        assert!(said.contains("line 4: vehicle `a` jumps") && said.contains("is at line 3"), "{said}");
+        assert!(error.help().contains("where the receiver had no fix"), "{}", error.help());
+    }
+    let kind = "sensor_msgs/msg/NavSatFix";
+    let places = [(0, [47.0, 8.0, 400.0]), (1, [0.0, 8.0, 400.0])];
+    let messages =
+        places.map(|(second, place)| ("/r1/fix", kind, "cdr", 1 + u64::from(second != 0), fix(second, 0, place)));
+    let error = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect_err("refused");
+    assert!(error.to_string().contains("jumps"), "{error}");
+    // A satellite stays below, and a receiver that jumps by less than a kilometre is not taken for wrong.
+    assert_eq!(whole("t,id,lat,lon,alt\n0,a,0,8,400000\n10,a,0,8.6,400000\n").items.len(), 2);
+    assert_eq!(whole("t,id,lat,lon,alt\n0,a,47,8,400\n0.001,a,47.005,8,400\n").items.len(), 2);
+}
+
+#[test]
+fn a_vehicle_in_degrees_beside_one_in_metres_is_refused() {
+    for header in ["t,A.lat,A.lon,A.alt,B_x,B_y,B_z", "t,B_x,B_y,B_z,cf1_lat,cf1_lon,cf1_alt,B_lat,B_lon"] {
+        let cells = "0,".repeat(header.split(',').count());
+        let text = format!("{header}\n{}\n", cells.trim_end_matches(','));
+        let error = read(&text, &ReadOptions::default()).expect_err(header);
+        assert!(error.to_string().contains("in latitude and longitude, that of vehicle `B` in metres"), "{error}");
+        assert!(error.help().contains("in one frame"), "{}", error.help());
+    }
+    let both = whole("t,A.lat,A.lon,A.alt,A.x,A.y,A.z\n0,47,8,400,1,2,3\n");
+    assert_eq!(both.samples(), [(0.0, "A", [1.0, 2.0, 3.0])]);
+    // Columns of a name beside those of rows may be a vehicle of their own.
+    for header in ["t,x,y,z,B.x,B.y,B.z", "t,x,y,z,b.lat,b.lon,b.alt"] {
+        let error = read(&format!("{header}\n0,1,2,3,4,5,6\n"), &ReadOptions::default()).expect_err(header);
+        assert!(error.help().contains("--one-vehicle"), "{}", error.help());
+    }
+}
+
+#[test]
 fn files_of_one_vehicle_each_are_measured_from_one_origin() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, ([lat, lon, alt], _)) in ["a.csv", "b.csv"].iter().zip(KNOWN) {

@@ -243,13 +243,20 @@ impl Outcome {
         }
     }
 
+    /// Whether some two vehicles are known to have come closer than a pair did, by what was judged.
+    #[must_use]
+    pub fn contradicts(&self, closest: ClosestApproach) -> bool {
+        self.closest.iter().any(|of| of.upper_m < closest.separation_m * (1.0 - SAME))
+    }
+
     /// Takes it that no two vehicles came closer than a pair did, as a judge of finer steps found: pairs that are drawn closer, by
-    /// what straight lines and rounding leave, were as far apart at least.
+    /// what straight lines leave, were as far apart at least. Distances of the same instant differ by rounding: the smaller counts.
     pub fn raise_to(&mut self, closest: ClosestApproach) {
-        let (pair, least_m) = (ObjectPair::Vehicles(closest.pair), closest.separation_m);
+        let (pair, claimed_m) = (ObjectPair::Vehicles(closest.pair), closest.separation_m);
         let is_judged = self.span_s.is_some_and(|(from_s, to_s)| from_s <= closest.time_s && closest.time_s <= to_s);
         for of in &mut self.closest {
-            let is_the_same = is_judged && of.lower_m <= least_m * (1.0 + SAME);
+            let is_the_same = is_judged && of.lower_m <= claimed_m * (1.0 + SAME);
+            let least_m = if of.lower_m < claimed_m * (1.0 - SAME) { claimed_m } else { claimed_m.min(of.lower_m) };
             of.lower_m = of.lower_m.max(least_m);
             of.upper_m = of.upper_m.max(of.lower_m);
             if of.pair == pair && is_the_same {
