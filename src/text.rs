@@ -3,10 +3,17 @@
 
 use std::fmt::Write as _;
 
-/// A number with so many decimals, or in powers of ten where that would fill a line.
+/// A number with so many decimals, or in powers of ten where that would fill a line. Zero has no sign.
 pub(crate) fn fixed(number: f64, decimals: usize) -> String {
     const LONG: f64 = 1e15;
-    if number.abs() < LONG { format!("{number:.decimals$}") } else { format!("{number:e}") }
+    if number.abs() >= LONG {
+        return format!("{number:e}");
+    }
+    let shown = format!("{number:.decimals$}");
+    match shown.strip_prefix('-') {
+        Some(size) if size.bytes().all(|byte| matches!(byte, b'0' | b'.')) => size.to_owned(),
+        _ => shown,
+    }
 }
 
 /// Like [`fixed`], rounded down: what is said to be "never closer than" this never is.
@@ -14,11 +21,7 @@ pub(crate) fn at_least(number: f64, decimals: u8) -> String {
     let places = usize::from(decimals);
     let shown = fixed(number, places);
     match shown.parse::<f64>() {
-        Ok(rounded) if rounded > number => {
-            let lower = fixed(rounded - 0.1_f64.powi(i32::from(decimals)), places);
-            // Rounding to zero from below is no number below zero.
-            if number >= 0.0 { lower.trim_start_matches('-').to_owned() } else { lower }
-        }
+        Ok(rounded) if rounded > number => fixed(rounded - 0.1_f64.powi(i32::from(decimals)), places),
         _ => shown,
     }
 }
@@ -55,7 +58,7 @@ pub(crate) fn metres_below(number: f64, limit_m: f64) -> String {
 
 /// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or fill a line.
 pub(crate) fn metres(number: f64) -> String {
-    if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { format!("{number:.3}") } else { format!("{number:.1e}") }
+    if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { fixed(number, 3) } else { format!("{number:.1e}") }
 }
 
 /// Words without what turns the order of letters around, which foreign names may hold: it would turn what follows them.
@@ -152,6 +155,8 @@ mod tests {
         }
         assert_eq!([2.46, 1.001, 1.999_999].map(|length_m| at_least(length_m, 3)), ["2.460", "1.001", "1.999"]);
         assert_eq!([1e300, f64::INFINITY].map(|length_m| at_least(length_m, 3)), ["1e300", "inf"]);
+        assert_eq!([-0.0, -1e-9].map(|length_m| at_most(length_m, 3)), ["0.000"; 2]);
+        assert_eq!([-0.0, 7e-4, -1e-9].map(|length_m| at_least(length_m, 3)), ["0.000", "0.000", "-0.001"]);
     }
 
     #[test]

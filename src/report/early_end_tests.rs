@@ -16,8 +16,10 @@ fn a_flight_that_ended_early_is_undecided_however_clear_it_was_up_to_there() {
     let expected = "UNDECIDED from 120.00 s on: never closer than 2.460 m (delta 2.000 m), formation NOT reached";
     assert!(headline.starts_with(expected) && headline.ends_with("; ended early at 120.00 s"), "{headline}");
     assert!(report.judgement().is_else_known, "what was flown was judged");
+    assert_eq!(report.formation.at_rest, None, "more time may help");
     // The same flight, flown to its end.
     let whole = Case { ended_early: None, ..early() }.report();
+    assert_eq!(whole.formation.at_rest, Some(true));
     assert_eq!(whole.audit.status, Status::Clear);
     assert!(whole.headline().starts_with("CLEAR: never closer than 2.460 m"), "{}", whole.headline());
 }

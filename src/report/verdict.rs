@@ -104,12 +104,14 @@ const COMMANDED_S: f64 = 1.0;
 ///
 /// where laws damp relative velocities at about 1/s, so that a command is worth its acceleration over a second.
 ///
-/// None where that is not known, as of vehicles that stand while they are commanded and something may hold against that.
+/// None where that is not known: of vehicles that stand while they are commanded and something may hold against that, and of a
+/// flight that ended early, whose duration says nothing.
 pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
-    let Findings { summary, judge, is_disturbed, .. } = findings;
+    let Findings { summary, judge, is_disturbed, run, .. } = findings;
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
     let lacking_m = summary.max_edge_error_m.max(summary.max_position_error_m) - judge.edge_error_m;
-    if findings.reached_at_s().is_some() || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
+    let is_void = findings.reached_at_s().is_some() || run.ended_early.is_some();
+    if is_void || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
         return None;
     }
     let horizon_s = REST_DURATIONS * summary.end_s;

@@ -48,7 +48,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
     let mut time = document.time;
     time.control_hz = document.actuation.control_hz(time.control_hz)?;
-    let gives_step = time.gives_step();
+    let (gives_step, gives_halvings) = (time.gives_step(), time.gives_halvings());
     let time = time.complete(count, document.arrival.hold_s, &airframe);
     let mut scenario = Scenario {
         start,
@@ -83,6 +83,9 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     legs(&mut scenario, &document.formation, &document.leg)?;
     if !gives_step {
         scenario.choose_step();
+    }
+    if !gives_halvings {
+        scenario.choose_halvings();
     }
     Ok(scenario)
 }

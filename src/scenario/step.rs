@@ -1,10 +1,12 @@
 //! The step that a law asks for wherever vehicles are, and the one that is chosen where none is given.
 
 #[cfg(feature = "files")]
-use super::limits::MAX_STEPS;
+use super::limits::{MAX_HALVINGS, MAX_STEPS};
 use super::spec::Scenario;
 use super::time::TimeSpec;
 use crate::law::Law;
+#[cfg(feature = "files")]
+use crate::law::LawSpec;
 
 impl TimeSpec {
     /// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
@@ -46,6 +48,22 @@ impl Scenario {
         }
         if chosen.duration_s <= MAX_STEPS * chosen.shortest_step_s() {
             self.time = chosen;
+        }
+    }
+
+    /// Raises the number of halvings until the parts of a step are as short as the potential field asks for at the distance that it
+    /// certifies. It comes near to that distance: its certificate is the energy of one pair, and links of a large gain drive
+    /// pairs together.
+    #[cfg(feature = "files")]
+    pub(super) fn choose_halvings(&mut self) {
+        let LawSpec::Potential(_) = self.law else { return };
+        let Ok(law) = self.law() else { return };
+        let certified_m = self.certificate(law.as_ref()).certified_m;
+        let Some(rate_per_s) = law.fastest_rate_per_s(certified_m, self.velocity_coefficient_per_s()) else { return };
+        while self.time.max_halvings < MAX_HALVINGS
+            && self.time.shortest_step_s() * rate_per_s > self.time.honest_rate_dt()
+        {
+            self.time.max_halvings += 1;
         }
     }
 }

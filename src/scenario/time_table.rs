@@ -29,9 +29,10 @@ pub(super) struct TimeTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     record_hz: Option<f64>,
     /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
-    /// step as it is.
-    #[serde(default = "TimeTable::default_max_halvings")]
-    max_halvings: u32,
+    /// step as it is. Unless given 10, and under `potential` as many up to 20 as its rate at the certified distance needs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_MAX_HALVINGS)))]
+    max_halvings: Option<u32>,
     /// Largest product of a step and the law's fastest rate at the present state; a step that is longer is flown in halves.
     #[serde(default = "TimeTable::default_max_rate_dt", skip_serializing_if = "TimeTable::is_default_max_rate_dt")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_MAX_RATE_DT, "exclusiveMinimum" = 0)))]
@@ -45,10 +46,6 @@ pub(super) struct TimeTable {
 }
 
 impl TimeTable {
-    fn default_max_halvings() -> u32 {
-        TimeSpec::DEFAULT_MAX_HALVINGS
-    }
-
     fn default_max_rate_dt() -> f64 {
         TimeSpec::DEFAULT_MAX_RATE_DT
     }
@@ -63,6 +60,11 @@ impl TimeTable {
         self.dt_s.is_some()
     }
 
+    /// Whether the number of halvings is given.
+    pub(super) fn gives_halvings(&self) -> bool {
+        self.max_halvings.is_some()
+    }
+
     /// Duration and rates of a flight of so many vehicles of this kind that are to keep what they have reached for `hold_s`
     /// seconds.
     pub(super) fn complete(self, count: usize, hold_s: f64, airframe: &Airframe) -> TimeSpec {
@@ -73,6 +75,7 @@ impl TimeTable {
             Airframe::Quadrotor(_) => (QUADROTOR_DT_S, Some(QUADROTOR_CONTROL_HZ)),
         };
         let (dt_s, control_hz) = (dt_s.unwrap_or(default_dt_s), control_hz.or(default_hz));
+        let max_halvings = max_halvings.unwrap_or(TimeSpec::DEFAULT_MAX_HALVINGS);
         TimeSpec { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz }
     }
 }
@@ -80,7 +83,8 @@ impl TimeTable {
 impl From<TimeSpec> for TimeTable {
     fn from(time: TimeSpec) -> Self {
         let TimeSpec { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz } = time;
-        Self { duration_s, dt_s: Some(dt_s), record_hz: Some(record_hz), max_halvings, max_rate_dt, control_hz }
+        let (dt_s, record_hz, max_halvings) = (Some(dt_s), Some(record_hz), Some(max_halvings));
+        Self { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz }
     }
 }
 

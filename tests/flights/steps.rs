@@ -6,7 +6,7 @@ use tautline::audit::Status;
 use tautline::law::{LaplacianKeys, LawError, LawSpec, Void};
 use tautline::record::Event;
 use tautline::run;
-use tautline::scenario::Scenario;
+use tautline::scenario::{Scenario, TimeSpec};
 use tautline::sim::Ending;
 use tautline::swarm::Pair;
 
@@ -202,8 +202,27 @@ fn a_violation_that_is_deeper_than_integration_may_err_is_one_whatever_the_step(
 
 #[test]
 fn a_barrier_that_the_shortest_part_leaps_is_no_violation_of_the_law() {
-    let stiff = builtin("pentagon", &["law.kind=potential", "law.k_per_s2=1e6", "time.duration_s=2"]);
+    let keys = ["law.kind=potential", "law.k_per_s2=1e6", "time.duration_s=2", "time.max_halvings=10"];
+    let stiff = builtin("pentagon", &keys);
     let (flight, _) = fly(&stiff);
     assert!(flight.overlong_steps > 0 && !flight.audit.violations.is_empty());
     assert_eq!(flight.audit.status, Status::Undecided, "the law certifies that no two come so near");
+}
+
+#[test]
+fn a_stiff_potential_halves_its_steps_as_far_as_its_certified_distance_asks() {
+    let keys = |more: &[&'static str]| {
+        let keys = ["law.kind=potential", "law.k_per_s2=1e4", "time.duration_s=1", "arrival.hold_s=0.1"];
+        builtin("pentagon", &[&keys[..], more].concat())
+    };
+    let chosen = keys(&[]);
+    assert!(chosen.time.max_halvings > TimeSpec::DEFAULT_MAX_HALVINGS, "{}", chosen.time.max_halvings);
+    let (flight, _) = fly(&chosen);
+    assert_eq!((flight.audit.status, flight.overlong_steps), (Status::Clear, 0));
+    // With fewer that are given the step is too long, and nothing passes.
+    let given = keys(&["time.max_halvings=10"]);
+    assert_eq!(given.time.max_halvings, 10);
+    assert!(fly(&given).0.overlong_steps > 0);
+    // A gentle field asks for no more.
+    assert_eq!(builtin("pentagon", &["law.kind=potential"]).time.max_halvings, TimeSpec::DEFAULT_MAX_HALVINGS);
 }
