@@ -111,6 +111,7 @@ pub(super) fn judge_recorded(
     let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
+    notes.extend(own.iter().filter_map(|own| own.doubt(outcome.status)));
     notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
     notes.extend(own_ellipsoid_m.map(|axes| {
         format!("the ellipsoid is the recording's own, with half axes of {:?}, {:?} and {:?} m", axes.x, axes.y, axes.z)

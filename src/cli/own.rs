@@ -39,6 +39,8 @@ pub struct OwnRecording {
     pub(super) obstacles: OwnObstacles,
     /// The verdict of the run, where it is clear, finished, and the recording is as the run wrote it.
     pub(super) judged_clear: Option<JudgedClear>,
+    /// Whether the run itself could not decide.
+    is_undecided: bool,
     /// Whether the recording is not what the run wrote.
     is_altered: bool,
     /// The law that was flown, where it is not the scenario's.
@@ -155,6 +157,15 @@ impl OwnRecording {
         ))
     }
 
+    /// Note on violations in the recording of a run that could not decide, as after steps too long for the law.
+    pub(super) fn doubt(&self, status: Status) -> Option<String> {
+        let is_doubtful = self.is_undecided && status == Status::Violation;
+        is_doubtful.then(|| {
+            "the run itself is UNDECIDED: the motion that is judged here may differ from that of the law (see its report)"
+                .to_owned()
+        })
+    }
+
     /// What a person should know about how it was flown and is judged, by clocks that were all set right alike or not.
     pub(super) fn notes(&self, clocks_agree: bool) -> impl Iterator<Item = String> {
         let steps = self.most_steps;
@@ -210,6 +221,7 @@ impl Witness {
             early_end: None,
             obstacles: OwnObstacles::of(scenario, scale),
             judged_clear: None,
+            is_undecided: false,
             is_altered: false,
         };
         let planned = (scenario.time.steps(), scenario.time.duration_s);
@@ -258,7 +270,8 @@ impl Witness {
             time_s: verdict.separation_time_s,
         });
         let is_clear = verdict.status == "clear" && verdict.ended_early.is_empty();
-        OwnRecording { judged_clear: is_clear.then_some(JudgedClear { closest }), ..own }
+        let is_undecided = verdict.status == "undecided";
+        OwnRecording { judged_clear: is_clear.then_some(JudgedClear { closest }), is_undecided, ..own }
     }
 
     /// What the flight says of itself, without a verdict.

@@ -362,6 +362,9 @@ impl Preflight {
                 "where positions are {} m apart from number to number and {needed_m} m count",
                 numbers::significant(spacing_m)
             )
+        } else if self.drift_rounding_m(scenario) > needed_m {
+            let rounding_m = numbers::significant(self.drift_rounding_m(scenario));
+            format!("where the rounding of all steps adds up to {rounding_m} m and {needed_m} m count")
         } else if self.drift_m > LARGEST {
             format!("farther than the {LARGEST:e} m that a flight is meant for")
         } else {
@@ -373,6 +376,16 @@ impl Preflight {
             format!("The mean velocity carries the whole swarm {} m away", numbers::significant(self.drift_m))
         };
         Some(format!("{said}, {unresolved}. Shorten time.duration_s, or reduce what drives the mean velocity."))
+    }
+
+    /// Bound of what rounding adds up to over the steps of the drift \[m\]. A step rounds the position x to eps |x|/2, and the
+    /// velocity to 3 eps |v|/2, which moves the vehicle from then on. With x growing as exp(r t) the sum over steps of dt is
+    /// 4 (eps/2) x/(r dt), and with a constant velocity 2 (eps/2) x T/dt.
+    fn drift_rounding_m(&self, scenario: &Scenario) -> f64 {
+        let time = &scenario.time;
+        let uniform = 2.0 * time.duration_s / time.dt_s;
+        let rate_dt = self.common_mode_rate_per_s.max(0.0) * time.dt_s;
+        0.5 * f64::EPSILON * self.drift_m * uniform.min(4.0 / rate_dt)
     }
 
     fn why_common_mode_grows(&self, scenario: &Scenario) -> &'static str {
