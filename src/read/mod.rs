@@ -46,6 +46,7 @@ mod order;
 pub(crate) mod parquet;
 mod places;
 mod recognise;
+mod rows;
 mod skybrush;
 mod source;
 mod stranger;

@@ -24,7 +24,8 @@ use super::error::{Fault, Place, ReadError};
 use super::names::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{About, BATCH, Ordered, PLANAR, Recording, Row, Rows};
+use super::order::{About, Ordered, PLANAR, Recording};
+use super::rows::{BATCH, Row, Rows};
 use super::source::Source;
 
 const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];

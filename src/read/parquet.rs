@@ -20,7 +20,8 @@ use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
 use super::layout::Layout;
 use super::options::ReadOptions;
-use super::order::{BATCH, Recording};
+use super::order::Recording;
+use super::rows::BATCH;
 use super::source::Source;
 use super::table;
 

@@ -8,7 +8,7 @@ use super::earth::{Geodetic, Local, is_no_fix};
 use super::error::{Fault, ReadError};
 use super::layout::Layout;
 use super::options::ReadOptions;
-use super::order::Row;
+use super::rows::Row;
 use super::turned;
 
 /// The frame of places on the Earth, where a table gives such: where the user says, or at the first place of the table.

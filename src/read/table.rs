@@ -12,8 +12,9 @@ use super::identity::{Rival, Suspect};
 use super::layout::Layout;
 use super::names::Names;
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::order::{About, Ordered, Recording};
 use super::places::{bring, origin};
+use super::rows::{BATCH, Row, Rows};
 use super::source::Source;
 
 /// Vehicles, the first of a table, whose rows are looked at for several vehicles of one name.

@@ -20,7 +20,8 @@ use super::clock::{Stamp, TimeUnit};
 use super::earth::{Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::order::{About, Ordered, Recording};
+use super::rows::{BATCH, Row, Rows};
 use super::source::Source;
 use super::turned;
 

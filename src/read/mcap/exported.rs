@@ -17,7 +17,8 @@ use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
 use super::super::names::Names;
 use super::super::options::ReadOptions;
-use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::super::order::{About, Ordered, Recording};
+use super::super::rows::{BATCH, Row, Rows};
 use super::super::source::Source;
 use crate::record::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 

@@ -3,7 +3,8 @@
 use super::super::clock::TimeUnit;
 use super::super::error::{Place, ReadError};
 use super::super::options::{Duplicates, ReadOptions};
-use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::super::order::{About, Ordered, Recording};
+use super::super::rows::{BATCH, Row, Rows};
 use super::super::source::Source;
 use super::plan::Plan;
 use super::poses::Poses;

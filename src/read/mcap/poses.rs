@@ -6,7 +6,7 @@ use super::super::clock::Stamp;
 use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{Fault, ReadError, UNSEEN, quoted};
 use super::super::names::Names;
-use super::super::order::Row;
+use super::super::rows::Row;
 use super::messages::{EARTH, Seen, What, Who};
 use super::outline::place;
 use super::plan::{Plan, Way};
