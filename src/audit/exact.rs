@@ -14,6 +14,8 @@
 
 use std::cmp::Ordering;
 
+use nalgebra::Vector3;
+
 use super::double_double::{DoubleDouble, OPERATION, is_shorter};
 use super::line::{INTERPOLATION, Line, Place};
 use super::sweep::Interval;
@@ -43,6 +45,13 @@ fn sign(number: DoubleDouble, error: f64) -> Option<Ordering> {
     }
 }
 
+/// Returns b - a, exactly.
+#[inline]
+fn difference(b: &Vector3<f64>, a: &Vector3<f64>) -> [DoubleDouble; 3] {
+    [0, 1, 2].map(|axis| DoubleDouble::difference(b[axis], a[axis]))
+}
+
+#[inline]
 fn dot(a: &[DoubleDouble; 3], b: &[DoubleDouble; 3]) -> DoubleDouble {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -90,10 +99,15 @@ impl ExactMotion {
 
     /// The relative position at both ends.
     fn ends(&self) -> [End; 2] {
+        let Self { first, second, .. } = self;
+        if first.from == first.to && second.from == second.to {
+            let still = End { r: difference(&second.from, &first.from), error: 0.0 };
+            return [still, still];
+        }
         [(self.over.from_s, false), (self.over.to_s, true)].map(|(time_s, is_end)| {
             let [first, second] = [&self.first, &self.second].map(|line| line.place(time_s, is_end));
             if let (Place::Sample(a), Place::Sample(b)) = (&first, &second) {
-                return End { r: [0, 1, 2].map(|axis| DoubleDouble::difference(b[axis], a[axis])), error: 0.0 };
+                return End { r: difference(b, a), error: 0.0 };
             }
             let position = |line: &Line, place| match place {
                 Place::Sample(at) => [0, 1, 2].map(|axis| DoubleDouble::from(at[axis])),
@@ -109,11 +123,12 @@ impl ExactMotion {
     /// The answer of twice the digits, where their rounding leaves no doubt.
     fn filtered(&self, distance: f64) -> Option<bool> {
         let [start, end] = self.ends();
-        if start.is_below(distance)? || end.is_below(distance)? {
-            return Some(true);
+        let is_below = start.is_below(distance)?;
+        if is_below || End::are_same(&start, &end) {
+            return Some(is_below);
         }
-        if End::are_same(&start, &end) {
-            return Some(false);
+        if end.is_below(distance)? {
+            return Some(true);
         }
         let between = Between::of(&start, &end)?;
         if !between.may_be_closer() {
@@ -143,6 +158,7 @@ impl ExactMotion {
 }
 
 /// A relative position at an end of the shared time, and how far it can be off.
+#[derive(Clone, Copy)]
 struct End {
     r: [DoubleDouble; 3],
     error: f64,
@@ -233,7 +249,6 @@ impl Between {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     use super::*;

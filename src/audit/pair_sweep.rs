@@ -93,7 +93,7 @@ impl<'a> Nearest<'a> {
     fn take_near(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
         let (separation, resolution) = (closest.separation_m(), motion.resolution_m());
         let (lower, upper) = (separation - resolution, separation + resolution);
-        if lower < self.upper {
+        if lower < self.upper && !self.candidates.last().is_some_and(|(.., before)| before.stands_like(overlap)) {
             self.candidates.push((lower, closest.at, *overlap));
         }
         if upper < self.upper {
@@ -248,6 +248,13 @@ impl Overlap<'_> {
     #[inline]
     fn is_straight(&self) -> bool {
         self.first.curve().is_none() && self.second.curve().is_none()
+    }
+
+    /// Whether two vehicles stand still at the places of another overlap.
+    #[inline]
+    fn stands_like(&self, other: &Self) -> bool {
+        let is_still = |of: &Segment, other: &Segment| of.from == of.to && of.from == other.from && of.to == other.to;
+        is_still(self.first, other.first) && is_still(self.second, other.second)
     }
 
     /// The relative motion of two straight segments over the time that they share.

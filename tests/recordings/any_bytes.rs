@@ -51,7 +51,8 @@ const MOTIVE: &str = "Format Version,1.23,Length Units,Meters,Coordinate Space,G
     0,0.00,1,2,3,1,2,3\n1,0.01,,,,1,2,3\n2,0.02,1,2,4,,,\n";
 const VICON: &str = "Trajectories\n100\n,,a:1,,,a:2,,,b,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z\n\
     ,,mm,mm,mm,mm,mm,mm,mm,mm,mm\n1,0,1,2,3,4,5,6,7,8,9\n2,0,1,2,3,,,,7,8,9\n\nDevices\n1000\n";
-const EARTH: &str = "t,id,lat,lon,alt,radius\n0,a,47.3,8.5,400,0.1\n0,b,47.300001,-179.9,401,\n1,a,89.9,8.5,400,0.1\n";
+const EARTH: &str =
+    "t,id,lat,lon,alt,radius\n0,a,47.3,8.5,400,0.1\n0,b,47.300001,-179.9,401,\n1,a,47.301,8.5,400,0.1\n";
 const JSONL: &str =
     "{\"t\": 0, \"id\": \"a\", \"pos\": [1, 2, 3]}\n{\"t\": 1.5, \"id\": 7, \"pos\": [1, 2, 3.5], \"q\": null}\n";
 const PX4: &str = "timestamp,x,y,z,ref_lat,ref_lon,ref_alt,xy_valid\n0,1,2,-3,47,8,400,1\n20000,1,2,-3,nan,8,400,1\n";

@@ -179,7 +179,7 @@ fn plain_numbers_that_may_mean_several_things_are_asked_about() {
         assert!(error.help().contains(&format!("--dimensions {ways}:")), "{}", error.help());
     }
     for (count, dimensions, expected) in [
-        (4, None, 1),
+        (4, Some(Dimensions::Space), 1),
         (10, None, 3),
         (3, None, 1),
         (7, Some(Dimensions::Space), 2),

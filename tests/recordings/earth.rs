@@ -20,6 +20,9 @@ const KNOWN: [([f64; 3], [f64; 3]); 4] = [
     ([-33.0, 151.0, 10.0], [3_262_982.205_143_963, 808_222.016_473_88, -11_783_142.139_647_465]),
 ];
 
+/// Time from one of them to the next \[s\]: a vehicle can fly that far.
+const APART_S: i32 = 2000;
+
 fn read(text: &str, options: &ReadOptions) -> Result<Whole, ReadError> {
     read_bytes("gps.csv", text.as_bytes(), options)
 }
@@ -29,7 +32,7 @@ fn whole(text: &str) -> Whole {
 }
 
 fn table(header: &str) -> String {
-    let rows = KNOWN.iter().enumerate().map(|(k, ([lat, lon, alt], _))| format!("{k},a,{lat},{lon},{alt}\n"));
+    let rows = (0..).zip(KNOWN).map(|(k, ([lat, lon, alt], _))| format!("{},a,{lat},{lon},{alt}\n", k * APART_S));
     format!("{header}\n{}", rows.collect::<String>())
 }
 
@@ -44,11 +47,11 @@ fn is_known(found: &Whole) {
 #[test]
 fn places_of_tables_agree_with_proj() {
     for header in [
-        "t,id,lat,lon,alt",
-        "t,id,Latitude,Longitude,Altitude",
-        "t,id,latitude [deg],lng,height (m)",
-        "t,id,gps_lat,gps_lon,gps_alt",
-        "t,id,lat_deg,lon_deg,alt_m",
+        "t_s,id,lat,lon,alt",
+        "t_s,id,Latitude,Longitude,Altitude",
+        "t_s,id,latitude [deg],lng,height (m)",
+        "t_s,id,gps_lat,gps_lon,gps_alt",
+        "t_s,id,lat_deg,lon_deg,alt_m",
     ] {
         let found = whole(&table(header));
         is_known(&found);
@@ -59,7 +62,7 @@ fn places_of_tables_agree_with_proj() {
     for (role, name) in [("lat", "phi"), ("lon", "lambda"), ("alt", "h")] {
         assert!(named.columns.set(role, name));
     }
-    is_known(&read(&table("t,id,phi,lambda,h"), &named).expect("read"));
+    is_known(&read(&table("t_s,id,phi,lambda,h"), &named).expect("read"));
 }
 
 #[test]
@@ -91,7 +94,7 @@ fn wide_tables_and_other_units_say_the_same() {
 #[test]
 fn the_origin_can_be_given_and_metres_go_before_degrees() {
     let origin = ReadOptions { origin: Some(KNOWN[1].0), ..ReadOptions::default() };
-    assert_eq!(read(&table("t,id,lat,lon,alt"), &origin).expect("read").samples()[1].2, [0.0; 3]);
+    assert_eq!(read(&table("t_s,id,lat,lon,alt"), &origin).expect("read").samples()[1].2, [0.0; 3]);
     let both = whole("t,id,x,y,z,lat,lon\n0,a,1,2,3,47,8\n");
     assert_eq!(both.samples(), [(0.0, "a", [1.0, 2.0, 3.0])]);
     assert!(both.notes.iter().any(|note| note == "columns not used: lat, lon"), "{:?}", both.notes);
@@ -159,7 +162,7 @@ fn a_fix_at_zero_and_zero_is_none() {
     let note = "3 places are no fixes and were left out of `a`, `b`: latitude and longitude are both exactly 0";
     assert!(found.notes.iter().any(|said| said == note), "{:?}", found.notes);
     // Where one of them is 0 it is the equator, or the meridian of Greenwich.
-    let near = whole("t,id,lat,lon,alt\n0,a,0,8,0\n1,a,51,0,0\n2,a,0,1e-7,0\n");
+    let near = whole("t,id,lat,lon,alt\n0,a,0,8,0\n0,b,51,0,0\n0,c,0,1e-7,0\n");
     assert_eq!(near.items.len(), 3);
     assert!(!near.notes.iter().any(|said| said.contains("no fix")), "{:?}", near.notes);
     // So are metres.
@@ -203,8 +206,8 @@ fn a_place_that_no_vehicle_reaches_in_the_time_is_refused() {
     let error = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect_err("refused");
     assert!(error.to_string().contains("jumps"), "{error}");
     // A satellite stays below, and a receiver that jumps by less than a kilometre is not taken for wrong.
-    assert_eq!(whole("t,id,lat,lon,alt\n0,a,0,8,400000\n10,a,0,8.6,400000\n").items.len(), 2);
-    assert_eq!(whole("t,id,lat,lon,alt\n0,a,47,8,400\n0.001,a,47.005,8,400\n").items.len(), 2);
+    assert_eq!(whole("t_s,id,lat,lon,alt\n0,a,0,8,400000\n10,a,0,8.6,400000\n").items.len(), 2);
+    assert_eq!(whole("t_s,id,lat,lon,alt\n0,a,47,8,400\n0.001,a,47.005,8,400\n").items.len(), 2);
 }
 
 #[test]
@@ -249,13 +252,13 @@ fn fixes_of_satellites_are_read_and_none_where_there_is_none() {
     let kind = "sensor_msgs/msg/NavSatFix";
     let nan = f64::NAN;
     let mut messages: Vec<_> =
-        (0..).zip(KNOWN).map(|(k, (place, _))| ("/r1/fix", kind, "cdr", 1, fix(k, 0, place))).collect();
+        (0..).zip(KNOWN).map(|(k, (place, _))| ("/r1/fix", kind, "cdr", 1, fix(k * APART_S, 0, place))).collect();
     messages.insert(0, ("/r1/fix", kind, "cdr", 1, fix(-2, -1, [nan; 3])));
     messages.insert(1, ("/r1/fix", kind, "cdr", 1, fix(-1, 0, [47.0, 8.0, nan])));
     let found = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect("read");
     assert_eq!(found.vehicles, ["/r1/fix"]);
     is_known(&found);
-    messages.push(("/r1/fix", kind, "cdr", 1, fix(9, 0, [nan, 8.0, 1.0])));
+    messages.push(("/r1/fix", kind, "cdr", 1, fix(9 * APART_S, 0, [nan, 8.0, 1.0])));
     let refused = |messages: &[Message], options: &ReadOptions| {
         read_bytes("gps.mcap", &mcap_of(messages), options).expect_err("refused")
     };

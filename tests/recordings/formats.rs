@@ -87,7 +87,7 @@ fn times_that_differ_by_less_than_a_double_are_sorted_too() {
 fn a_name_may_begin_with_a_hash_and_comments_stand_above_the_header() {
     let whole = read("hash.csv", "# made up\nid,t_s,x,y,z\nleader,0,0,0,0\n#2,0,0,0,0\n");
     assert_eq!(whole.vehicles, ["leader", "#2"]);
-    assert_eq!(read("hash.txt", "# up\n0 1 2 3\n# down\n1 1 2 3\n").items.len(), 2);
+    assert_eq!(read("hash.txt", "# up\n0 1.5 2 3\n# down\n1 1.5 2 3\n").items.len(), 2);
 }
 
 #[test]
