@@ -55,6 +55,8 @@ impl Feedback for Exact<'_> {
 const FIRST_STEP_S: f64 = 1e-3;
 /// A step, or what is left to the time asked for, that is shorter than this part of that time is rounding.
 const RESOLUTION: f64 = 1e-14;
+/// Most steps of the solver that are tried on the way to one time. Flights of stiff laws need some hundreds for a physics step.
+const MOST_TRIALS: u32 = 100_000;
 /// Time to which a closest approach is found \[s\]. The distance is flat there: it is off by (1e-7 s)^2/2 times its second
 /// derivative, less than 1e-12 m up to 200 m/s^2.
 const CLOSEST_RESOLUTION_S: f64 = 1e-7;
@@ -86,8 +88,9 @@ pub enum IdealError {
         /// Why.
         source: LawError,
     },
-    /// No step is short enough for the tolerances, or the motion leaves the range of numbers.
-    #[error("the solution cannot be continued at {time_s} s: no step is short enough for its tolerances")]
+    /// No step is short enough for the tolerances, more than a hundred thousand steps are needed, or the motion leaves the range of
+    /// numbers.
+    #[error("the solution cannot be continued at {time_s} s: its tolerances need steps that are too short")]
     Stalled {
         /// The last time that was reached \[s\].
         time_s: f64,
@@ -314,11 +317,15 @@ impl<'a, 'law> Solver<'a, 'law> {
             // An empty state has no error to control.
             return Ok(());
         }
-        let mut undefined = None;
+        let (mut undefined, mut trials) = (None, 0);
         while until_s - self.method.t() > RESOLUTION * until_s {
+            trials += 1;
             let (time_s, free_step_s) = (self.method.t(), self.method.h());
             let step_s = free_step_s.min(until_s - time_s).min(self.flow.smooth_s(time_s));
-            if step_s <= RESOLUTION * until_s || (undefined.is_some() && self.moves_nothing(step_s)) {
+            if step_s <= RESOLUTION * until_s
+                || trials > MOST_TRIALS
+                || (undefined.is_some() && self.moves_nothing(step_s))
+            {
                 return Err(
                     undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })
                 );

@@ -106,6 +106,9 @@ impl<T: Finding> Episodes<T> {
 
     /// Enters a finding that continues none; returns its index.
     pub(super) fn add(&mut self, new: T) -> usize {
+        if let Some(counted) = &mut self.counted {
+            *counted += 1;
+        }
         self.of_pair.entry(new.on()).or_default().push(self.all.len());
         self.all.push(new);
         self.all.len() - 1

@@ -93,6 +93,9 @@ pub(super) fn judge_recorded(
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);
     }
+    if let Some(own) = own.as_ref().filter(|own| !own.has_every_step && arguments.motion.is_none()) {
+        own.refute_obstacles(&mut outcome, &settings);
+    }
     arguments.check_count(&outcome, &settings)?;
     let mut judged_clear = own.as_ref().and_then(|own| own.judged_clear.filter(|_| arguments.motion.is_none()));
     let claimed = judged_clear.and_then(|judged| judged.closest);

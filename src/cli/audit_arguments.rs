@@ -210,6 +210,9 @@ impl AuditArguments {
     }
 
     pub(super) fn settings(&self) -> Result<Settings, Failure> {
+        refuse_repeated("--radius", self.radius.iter().map(|(name, _)| name.as_deref()))?;
+        refuse_repeated("--max-accel", self.max_accel.iter().map(|(name, _)| name.as_deref()))?;
+        refuse_repeated("--offset", self.offset.iter().map(|(name, _)| Some(name.as_str())))?;
         let mut vehicles: BTreeMap<String, VehicleSettings> = BTreeMap::new();
         let (mut radius_m, mut max_accel_m_s2) = (None, None);
         for (name, value) in &self.radius {
@@ -358,4 +361,16 @@ impl AuditArguments {
             None => Between { motion, basis },
         }
     }
+}
+
+/// Refuses an option that gives two numbers of one vehicle, or two of all vehicles.
+fn refuse_repeated<'a>(option: &str, names: impl Iterator<Item = Option<&'a str>>) -> Result<(), Failure> {
+    let mut known = BTreeSet::new();
+    for name in names {
+        if !known.insert(name) {
+            let of = name.map_or("all vehicles".to_owned(), |name| format!("the vehicle {name}"));
+            return Err(Failure::input(format!("{option} gives two numbers of {of}"), "give one"));
+        }
+    }
+    Ok(())
 }

@@ -35,6 +35,8 @@ pub struct OwnRecording {
     pub(super) has_every_step: bool,
     /// Most steps between two of its samples.
     pub(super) most_steps: u64,
+    /// Times of its samples \[s\].
+    samples_s: Vec<f64>,
     /// What it was flown past.
     pub(super) obstacles: OwnObstacles,
     /// The verdict of the run, where it is clear, finished, and the recording is as the run wrote it.
@@ -133,6 +135,14 @@ impl OwnRecording {
         !self.is_altered
     }
 
+    /// Drops what straight lines have too close to its obstacles, where the run judged every step of them, by its own clock.
+    pub(super) fn refute_obstacles(&self, outcome: &mut Outcome, settings: &Settings) {
+        let is_by_its_clock = settings.vehicles.values().all(|of| of.offset_s == 0.0);
+        if self.judged_clear.is_some() && is_by_its_clock && settings.obstacles == self.obstacles.obstacles {
+            self.obstacles.refute(outcome, settings, &self.samples_s);
+        }
+    }
+
     /// Takes no word of the run for what happened between its samples.
     pub(super) fn independent(mut self) -> Self {
         self.told.clear();
@@ -217,6 +227,7 @@ impl Witness {
             violations: Vec::new(),
             has_every_step: scenario.has_engine(),
             most_steps: 0,
+            samples_s: Vec::new(),
             other_law: None,
             early_end: None,
             obstacles: OwnObstacles::of(scenario, scale),
@@ -232,6 +243,7 @@ impl Witness {
         let own = &mut self.own;
         sample.swarm.positions_m *= self.scale;
         let last = self.before.as_ref().unwrap_or(&sample);
+        own.samples_s.push(sample.time_s);
         own.most_steps = own.most_steps.max(sample.step.saturating_sub(last.step));
         let lengths = (self.told_scale, own.ellipsoid_m);
         let told = sample.separation.and_then(|closest| told(last, &sample, closest, lengths));

@@ -70,6 +70,34 @@ impl OwnObstacles {
         within.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
+    /// Drops what straight lines between samples have too close to an obstacle, where the run judged every step and found all of them
+    /// clear. `samples_s` are the times of the samples \[s\]: what is so at one of them stays.
+    pub(super) fn refute(&self, outcome: &mut Outcome, settings: &Settings, samples_s: &[f64]) {
+        let has_sample = |from_s: f64, to_s: f64| {
+            samples_s.get(samples_s.partition_point(|&at_s| at_s < from_s)).is_some_and(|&at_s| at_s <= to_s)
+        };
+        let is_refuted = |found: &Violation<ObjectPair>| {
+            matches!(found.pair, ObjectPair::Obstacle { .. }) && !has_sample(found.from_s, found.to_s)
+        };
+        outcome.refute_violations(is_refuted, settings);
+        let are_left = |pair| outcome.violations.iter().any(|found| found.pair == pair);
+        let mut obstacles = outcome.obstacles.clone();
+        for of in obstacles.iter_mut().filter(|of| !are_left(of.pair)) {
+            let told = self.closest.iter().filter(|told| told.pair == of.pair);
+            let told = told.min_by(|a, b| a.lower_m.total_cmp(&b.lower_m));
+            let is_in = |at_s: f64| outcome.span_s.is_some_and(|(from_s, to_s)| (from_s..=to_s).contains(&at_s));
+            match told {
+                Some(told) if is_in(told.time_s) => *of = Approach { limit_m: of.limit_m, ..*told },
+                told => {
+                    of.lower_m = of.lower_m.max(told.map_or(of.limit_m, |told| told.lower_m));
+                    of.upper_m = of.upper_m.max(of.lower_m);
+                }
+            }
+        }
+        obstacles.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m));
+        outcome.obstacles = obstacles;
+    }
+
     /// Adds to what was found in a recording what the run saw between its samples: a violation, or a time that cannot be
     /// told where heights count and are not known; and how close vehicles came.
     pub(super) fn bind(&self, outcome: &mut Outcome, settings: &Settings) {

@@ -8,6 +8,8 @@
 //! | `px`, `py`, `pz` beside `ledr`, `ledg`, `ledb` (trajectories of MAVSDK Drone Show) | north, east, down | one |
 //! | `p_RS_R_x`, ... (ground truth of `EuRoC`) | x, y, z | one |
 
+use std::collections::BTreeSet;
+
 use super::axes::Axes;
 use super::error::Fault;
 use super::options::{ColumnNames, ReadOptions};
@@ -30,8 +32,8 @@ pub(super) struct Convention {
     pub(super) header: Vec<String>,
     /// What the numbers of each column are multiplied by: -1 where an axis points the other way.
     pub(super) signs: Vec<f64>,
-    /// Whether the directions of the axes are known.
-    pub(super) has_directions: bool,
+    /// Columns whose directions their names say.
+    pub(super) directed: BTreeSet<usize>,
     /// Columns of latitude, longitude and height of the place that positions are measured from.
     pub(super) reference: Option<[usize; 3]>,
     /// Columns that hold 0 where the position is not known.
@@ -62,12 +64,17 @@ impl Convention {
         Ok(found.unwrap_or(plain))
     }
 
+    /// Whether the directions of axes are known.
+    pub(super) fn has_directions(&self) -> bool {
+        !self.directed.is_empty()
+    }
+
     /// Gives a column that lies along an axis of these its name, with what the name has before and behind the axis.
     fn turn(&mut self, column: usize, axes: &Axes, axis: usize, [before, behind]: [&str; 2]) {
         let (to, sign) = axes.of(axis);
         self.header[column] = format!("{before}{}{behind}", ["x", "y", "z"][to]);
         self.signs[column] = sign;
-        self.has_directions = true;
+        self.directed.insert(column);
     }
 
     /// Turns the columns of this start and an axis, such as `vx`.
@@ -164,7 +171,7 @@ impl Convention {
                 turned.signs[column] = of.sign;
             }
         }
-        if !turned.has_directions {
+        if !turned.has_directions() {
             return None;
         }
         turned.note = Some("positions are turned to east, north and up, as the names of columns say".to_owned());
@@ -280,8 +287,8 @@ mod tests {
             ("t,pos_n,pos_e,pos_d", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
         ] {
             let found = convention(header);
-            assert_eq!((found.header.join(","), found.signs), (expected.to_owned(), signs.to_vec()), "{header}");
-            assert!(found.has_directions, "{header}");
+            assert_eq!((found.header.join(","), &found.signs[..]), (expected.to_owned(), &signs[..]), "{header}");
+            assert!(found.has_directions(), "{header}");
         }
         let velocities = convention("t,north,east,down,vel_n_m_s,v_east,vd");
         assert_eq!(velocities.header[4..], ["vy_m_s", "vx", "vz"]);
@@ -300,7 +307,7 @@ mod tests {
             "t,end_x,end_y,max_ned",
         ] {
             let found = convention(header);
-            assert_eq!((found.header.join(","), found.has_directions), (header.to_owned(), false), "{header}");
+            assert_eq!((found.header.join(","), found.has_directions()), (header.to_owned(), false), "{header}");
         }
     }
 }

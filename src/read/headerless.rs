@@ -37,6 +37,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             convention: Convention::default(),
             is_planar: bodies.iter().any(|body| body.position[2].is_none()),
             bodies,
+            ids: Vec::new(),
             notes: vec![note],
         }
     };
@@ -52,7 +53,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
     let known: Vec<_> = Dimensions::ALL.into_iter().filter(fits).collect();
     let dimensions = match (options.dimensions, &known[..]) {
         (Some(given), _) if fits(&given) => given,
-        (None, &[only]) => only,
+        (None, &[only]) if count == 1 + only.counts().1 => only,
         (None, [_, ..]) => {
             let problem = format!("it has {count} numbers, and nothing says how many of them are one vehicle's");
             let ways: Vec<_> = known.iter().map(|dimensions| dimensions.name()).collect();
@@ -68,9 +69,13 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             }
             return Ok(one(None, [3, 7, 11], "a pose of one vehicle in each line, as KITTI writes them"));
         }
-        _ => {
-            let problem = format!("it has {count} numbers where time and three for each vehicle are expected");
-            return Err(Fault::content(problem, "write t x y z x y z ..., a line for each time"));
+        (given, _) => {
+            let each = given.map_or(3, |given| given.counts().1);
+            let problem = format!("it has {count} numbers where time and {each} for each vehicle are expected");
+            return Err(Fault::content(
+                problem,
+                "write t x y z x y z ..., a line for each time, or give other --dimensions",
+            ));
         }
     };
     let (axes, each) = dimensions.counts();

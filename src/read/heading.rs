@@ -244,7 +244,7 @@ fn height(name: &str) -> Option<Role> {
 }
 
 /// Whether the last word of a name is that of a quantity with axes, as in `cf1_gyro` and `../orientation`.
-fn says_a_quantity(name: &str) -> bool {
+pub(super) fn says_a_quantity(name: &str) -> bool {
     let name = name.to_lowercase();
     let words = name.split(|c: char| !c.is_alphanumeric());
     let mut words = words.map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));

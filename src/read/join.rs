@@ -48,7 +48,8 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
             return Err(ReadError::new(path, Fault::content(problem, remedy)));
         }
     }
-    check_own_names(&recordings, &paths)?;
+    check_own_names(&recordings, &paths, &vehicles)?;
+    check_frames(&recordings, &paths)?;
     let clocks: Vec<Clock> = recordings.iter().map(|tracks| tracks.clock().clone()).collect();
     let Some(first) = clocks.iter().min_by_key(|clock| clock.epoch_ns) else { return Err(Fault::Empty.into()) };
     for ((name, path), clock) in vehicles.iter().zip(&paths).zip(&clocks) {
@@ -97,9 +98,9 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     Ok(Box::new(Joined { vehicles, parts: joined, clock, notes, is_planar }))
 }
 
-/// Refuses files of which some are of one vehicle, going by the names that their rows have. Where all have one name it is no
-/// vehicle's, but what all are.
-fn check_own_names(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadError> {
+/// Refuses files of which some are of one vehicle, going by the names that their rows have, or whose rows are of the vehicle that
+/// another file is called by. Where all have one name it is no vehicle's, but what all are.
+fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String]) -> Result<(), ReadError> {
     let own = recordings.iter().map(|tracks| match tracks.vehicles() {
         [only] => Some(only.as_str()),
         _ => None,
@@ -112,10 +113,38 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), Re
             twice = twice.or(Some((*name, first, path)));
         }
     }
-    let Some((name, first, path)) = twice.filter(|_| known.len() > 1) else { return Ok(()) };
+    if known.len() < 2 {
+        return Ok(());
+    }
+    for ((name, path), called_so) in own.iter().zip(paths).zip(called) {
+        let Some(name) = name.filter(|name| spelling(name) != spelling(called_so)) else { continue };
+        if called.iter().any(|other| spelling(other) == spelling(name)) {
+            let problem = format!("its rows are of the vehicle {}, and another file is called so", quoted(name));
+            let remedy = "call each file as its vehicle, or take the column out that names it";
+            return Err(ReadError::new(path, Fault::content(problem, remedy)));
+        }
+    }
+    let Some((name, first, path)) = twice else { return Ok(()) };
     let problem = format!("its rows are of the vehicle {}, and so are those of {}", quoted(name), first.display());
     let remedy = "put all rows of a vehicle into one file, or take the column out that names it";
     Err(ReadError::new(path, Fault::content(problem, remedy)))
+}
+
+/// Refuses files of which some say where their axes point and others do not, or whose axes begin at different places.
+fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadError> {
+    let frame = |tracks: &Recording| (tracks.earth_origin().is_some(), tracks.has_directions());
+    let words = |(on_earth, has_directions): (bool, bool)| match (on_earth, has_directions) {
+        (true, _) => "are latitudes and longitudes",
+        (false, true) => "are east, north and up by the names of its columns",
+        (false, false) => "are x, y and z without a direction",
+    };
+    let Some((first, path)) = recordings.first().zip(paths.first()) else { return Ok(()) };
+    let other = recordings.iter().zip(paths).find(|(tracks, _)| frame(tracks) != frame(first));
+    other.map_or(Ok(()), |(tracks, other)| {
+        let [its, those] = [tracks, first].map(|tracks| words(frame(tracks)));
+        let problem = format!("its positions {its}, and those of {} {those}", path.display());
+        Err(ReadError::new(other, Fault::content(problem, "give all files in one frame, and name their columns alike")))
+    })
 }
 
 /// Appends notes that are not there yet.

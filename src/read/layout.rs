@@ -11,6 +11,7 @@ use super::conventions::Convention;
 use super::error::{Fault, list, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle, is_velocity};
 use super::heights::Heights;
+use super::leftovers;
 use super::options::ReadOptions;
 use super::order::PLANAR;
 use super::time_columns::{self, Rest};
@@ -38,6 +39,8 @@ pub(super) struct Layout {
     pub(super) names: Vec<String>,
     /// The columns of each vehicle of a wide table, or of every row of a long one.
     pub(super) bodies: Vec<Body>,
+    /// The column that names the vehicle of each of these, where a wide table has such.
+    pub(super) ids: Vec<usize>,
     /// What the numbers of each column are multiplied by: the size of the unit that its name says \[m or m/s\], or 1.
     pub(super) metres: Vec<f64>,
     /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
@@ -54,7 +57,7 @@ impl Layout {
     /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
         let convention = Convention::of(header, options)?;
-        if convention.has_directions {
+        if convention.has_directions() {
             turned::refuse_known(options, "its header")?;
         }
         let mut columns = Columns {
@@ -137,13 +140,19 @@ impl Layout {
             suspects: Vec::new(),
             names,
             bodies,
+            ids: Vec::new(),
             metres: Vec::new(),
             on_earth,
             convention: Convention::default(),
             is_planar,
             notes: Vec::new(),
         };
+        layout.refuse_other_frames(header, &columns.heights, &convention)?;
         let used = layout.columns();
+        if !one && id.is_none() {
+            let unused: Vec<_> = (0..header.len()).filter(|column| used.binary_search(column).is_err()).collect();
+            layout.ids = leftovers::examine(header, &unused, &layout.names)?;
+        }
         layout.metres = columns.metres(&used, options.scale)?;
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
         layout.notes.extend(convention.note.clone());
@@ -154,7 +163,32 @@ impl Layout {
         layout.notes.extend(columns.heights_used(&layout.bodies, options)?);
         layout.convention = convention;
         layout.check(header, options, one)?;
+        if let [first, ..] = layout.ids[..] {
+            layout.notes.push(format!("vehicles are named by columns such as {}", quoted(&header[first])));
+            layout.names.clear();
+        }
         Ok(layout)
+    }
+
+    /// Refuses positions of which some columns say the directions of their axes and others do not.
+    fn refuse_other_frames(&self, header: &[String], heights: &Heights, convention: &Convention) -> Result<(), Fault> {
+        if !convention.has_directions() || convention.reference.is_some() {
+            return Ok(());
+        }
+        let of_heights: BTreeSet<_> =
+            heights.among(self.bodies.iter().filter_map(|body| body.position[2])).iter().map(|of| of.0).collect();
+        let positions = self.bodies.iter().flat_map(|body| body.position).flatten();
+        let (directed, others): (Vec<_>, Vec<_>) = positions
+            .filter(|column| !of_heights.contains(column))
+            .partition(|column| convention.directed.contains(column));
+        match (&directed[..], &others[..]) {
+            (&[directed, ..], &[other, ..]) => {
+                let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
+                let problem = format!("column {directed} says the direction of its axis, and column {other} says none");
+                Err(Fault::content(problem, "name the axes of all positions in the same way, as in `x_ned` or `north`"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Refuses what the columns do not say of the vehicles, and notes what a person should know. `one`: the columns of a position
@@ -213,7 +247,7 @@ impl Layout {
         if !unused.is_empty() {
             self.notes.push(format!("columns not used: {}", unused.join(", ")));
         }
-        if !self.names.is_empty() && !is_one_vehicle {
+        if !self.names.is_empty() && self.ids.is_empty() && !is_one_vehicle {
             self.notes.push(format!("vehicles, going by the names of columns: {}", list(&self.names, 50)));
         }
         Ok(())
@@ -237,8 +271,15 @@ impl Layout {
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
         let beside = self.convention.reference.into_iter().flatten().chain(self.convention.valid.iter().copied());
-        let columns: BTreeSet<_> =
-            self.bodies.iter().flat_map(of).chain(self.of_time()).chain(self.id).chain(beside).collect();
+        let columns: BTreeSet<_> = self
+            .bodies
+            .iter()
+            .flat_map(of)
+            .chain(self.of_time())
+            .chain(self.id)
+            .chain(beside)
+            .chain(self.ids.iter().copied())
+            .collect();
         columns.into_iter().collect()
     }
 

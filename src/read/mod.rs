@@ -34,6 +34,7 @@ mod heights;
 mod identity;
 mod join;
 mod layout;
+mod leftovers;
 pub(crate) mod mcap;
 mod motive;
 mod names;

@@ -2,7 +2,7 @@
 //! dot, two or three numbers in a list are called x, y and z.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
@@ -23,6 +23,19 @@ const MOST_COLUMNS: usize = 100_000;
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let objects = Objects::open(source)?;
     let layout = Layout::of(&objects.header, options, &source.stem())?;
+    let is_of =
+        |list: &str, column: &usize| objects.header[*column].strip_prefix(list).is_some_and(|end| end.starts_with('.'));
+    let uneven = objects.uneven.iter().filter(|_| layout.id.is_none() && layout.ids.is_empty());
+    if let Some((list, line)) =
+        uneven.into_iter().find(|(list, _)| layout.columns().iter().any(|column| is_of(list, column)))
+    {
+        let problem = format!(
+            "the list {} has another length than in the lines above: which vehicle is missing is not known",
+            quoted(list)
+        );
+        let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";
+        return Err(Fault::content(problem, remedy).at(Place::Line(*line)));
+    }
     table::open(source, objects, layout, None, 0, options)
 }
 
@@ -51,6 +64,8 @@ struct Objects {
     columns: HashMap<String, usize>,
     cells: Vec<Cell>,
     flat: Vec<(String, Cell)>,
+    /// Lists of objects whose length changes, and the first line in which it does.
+    uneven: BTreeMap<String, u64>,
 }
 
 impl Objects {
@@ -63,8 +78,18 @@ impl Objects {
             columns: HashMap::new(),
             cells: Vec::new(),
             flat: Vec::new(),
+            uneven: BTreeMap::new(),
         };
+        let mut lengths: Option<BTreeMap<String, usize>> = None;
         while objects.next_line()? {
+            let here = list_lengths(&objects.flat);
+            let known = lengths.get_or_insert_with(|| here.clone());
+            if *known != here {
+                let differs = |list: &&String| known.get(*list) != here.get(*list);
+                for list in known.keys().chain(here.keys()).filter(differs) {
+                    objects.uneven.entry(list.clone()).or_insert(objects.lines.number());
+                }
+            }
             for (key, _) in &objects.flat {
                 if objects.columns.contains_key(key) {
                     continue;
@@ -94,6 +119,26 @@ impl Objects {
         }
         Ok(false)
     }
+}
+
+/// Lengths of the lists of objects in an object: the keys of their elements have a number between dots.
+fn list_lengths(flat: &[(String, Cell)]) -> BTreeMap<String, usize> {
+    let mut lengths = BTreeMap::new();
+    for (key, _) in flat {
+        let mut at = 0;
+        for part in key.split('.') {
+            let end = at + part.len();
+            if let Ok(index) = part.parse::<usize>()
+                && at > 0
+                && end < key.len()
+            {
+                let length = lengths.entry(key[..at - 1].to_owned()).or_insert(0);
+                *length = index.saturating_add(1).max(*length);
+            }
+            at = end + 1;
+        }
+    }
+    lengths
 }
 
 fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>) -> Result<(), Fault> {

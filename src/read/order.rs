@@ -39,6 +39,8 @@ pub(super) struct About {
     pub(super) duplicates: Option<Duplicates>,
     /// Whether its rows have no height.
     pub(super) is_planar: bool,
+    /// Whether it says where its axes point.
+    pub(super) has_directions: bool,
     /// What its places on the Earth are measured from.
     pub(super) earth_origin: Option<EarthOrigin>,
     pub(super) notes: Vec<String>,
@@ -65,6 +67,7 @@ impl About {
             sort: options.sort,
             duplicates: options.duplicates,
             is_planar: false,
+            has_directions: false,
             earth_origin: None,
             notes,
             none,
@@ -85,6 +88,7 @@ pub(super) struct Ordered<R> {
     notes: Vec<String>,
     assumed: Option<String>,
     is_planar: bool,
+    has_directions: bool,
     earth_origin: Option<EarthOrigin>,
     scale: f64,
     /// Rows read that have not been given out.
@@ -108,7 +112,7 @@ impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
         let About { path, unit, times_per_second, epoch_ns, scale, sort, duplicates, mut notes, none, .. } = about;
-        let (is_planar, earth_origin) = (about.is_planar, about.earth_origin);
+        let (is_planar, has_directions, earth_origin) = (about.is_planar, about.has_directions, about.earth_origin);
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() && sort {
@@ -156,6 +160,7 @@ impl<R: Rows> Ordered<R> {
             notes,
             assumed,
             is_planar,
+            has_directions,
             earth_origin,
             scale,
             batch,
@@ -349,6 +354,10 @@ impl<R: Rows> Tracks for Ordered<R> {
 
     fn is_planar(&self) -> bool {
         self.is_planar
+    }
+
+    fn has_directions(&self) -> bool {
+        self.has_directions || self.earth_origin.is_some()
     }
 
     fn earth_origin(&self) -> Option<&EarthOrigin> {

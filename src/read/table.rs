@@ -64,6 +64,7 @@ pub(super) fn open<C: Cells + 'static>(
     if dates.is_some_and(|first| !first.has_zone) {
         about.notes.push("times are dates without a zone and are taken as UTC".to_owned());
     }
+    about.has_directions = layout.convention.has_directions();
     let (names, is_planar) = (Names::from_list(layout.names.clone())?, layout.is_planar);
     let local = origin(&mut cells, &layout, options)?;
     about.notes.extend(local.map(|local| local.note()));
@@ -174,8 +175,12 @@ impl<C: Cells> Table<C> {
     fn append(&mut self, rows: &mut Vec<Row>) -> Result<(), Fault> {
         let stamp = self.stamp()?;
         let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
-        for (place, body) in self.layout.bodies.iter().enumerate() {
+        for place in 0..self.layout.bodies.len() {
+            let body = &self.layout.bodies[place];
             let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
+            if let Some(&id) = self.layout.ids.get(place) {
+                row.vehicle = self.vehicle(id)?;
+            }
             if self.layout.on_earth && is_no_fix(&row.position) {
                 *self.no_fixes.entry(row.vehicle).or_default() += 1;
                 continue;

@@ -123,6 +123,11 @@ pub trait Tracks {
         false
     }
 
+    /// Whether the recording itself says where its axes point: east, north and up they are then.
+    fn has_directions(&self) -> bool {
+        self.earth_origin().is_some()
+    }
+
     /// What positions are measured from, where the recording has latitudes and longitudes.
     fn earth_origin(&self) -> Option<&EarthOrigin> {
         None

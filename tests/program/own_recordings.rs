@@ -209,6 +209,57 @@ fn samples_far_apart_leave_no_gap_in_a_recording_of_a_run() {
     assert!(short.exit == Some(1) && short.out.starts_with("UNDECIDED"), "{short:?}");
 }
 
+/// A flight past a crate that straight lines between its samples lead into.
+const PAST_A_CRATE: &str = "
+[swarm]
+dimensions = 3
+a22_per_s = 0.0
+hull_radius_m = 0.2
+[start]
+positions_m = [[-1.504, -2.324, 1.809], [-1.371, 1.55, 1.293], [1.958, -1.949, 0.0]]
+velocities_m_s = [[0.65, 0.0, 0.0], [-0.404, 0.0, 0.0], [0.46, 0.0, 0.0]]
+[formation]
+shape = \"helix\"
+radius_m = 2.0
+pitch_m = 2.0
+spacing_m = 1.5
+move_m = [0, 0, 3]
+assignment = \"optimal\"
+[law]
+kind = \"displacement\"
+delta_m = 1.0
+alpha = 10.0
+k_per_s2 = 10.0
+zeta_per_s = 3.0
+[graph]
+kind = \"star\"
+[reference]
+kind = \"circle\"
+period_s = 20.0
+radius_m = 5.0
+[[obstacle]]
+name = \"crate\"
+box = { size_m = [1.0, 2.0, 1.0], yaw_deg = 30.0 }
+at_m = [4.087, -1.172, 1.247]
+[time]
+duration_s = 10.0
+record_hz = 1.0
+dt_s = 0.02
+";
+
+#[test]
+fn straight_lines_past_an_obstacle_do_not_overrule_a_run_that_judged_every_step() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("past.toml"), PAST_A_CRATE).expect("written");
+    fly(folder.path(), "past.toml", &[]);
+    let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
+    let judged = audit(folder.path(), &["flown", "--json"]);
+    let found = json(&judged.out);
+    assert_eq!((&report["audit"]["status"], &found["status"]), (&"clear".into(), &"clear".into()), "{judged:?}");
+    let drawn = audit(folder.path(), &["flown", "--independent"]);
+    assert!(drawn.out.starts_with("VIOLATION: "), "straight lines alone say otherwise: {drawn:?}");
+}
+
 #[test]
 fn a_run_that_ended_early_gives_no_word_for_its_recording() {
     let folder = pentagon();

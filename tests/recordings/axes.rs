@@ -203,3 +203,32 @@ fn a_plane_stays_one_when_it_is_turned() {
             && Whole::read(&flat, &ReadOptions::default()).expect("read").samples()[0].2 == [2.0, 1.0, 0.0]
     );
 }
+
+#[test]
+fn axes_of_which_some_say_their_direction_and_others_do_not_are_refused() {
+    for header in ["t,a_x_ned,a_y_ned,a_z_ned,b_x,b_y,b_z", "t,a.north,a.east,a.down,b.x,b.y,b.z"] {
+        let error = read_with(&format!("{header}\n0,1,2,3,4,5,6\n"), &ReadOptions::default()).expect_err(header);
+        assert!(error.to_string().contains("says none") && error.help().contains("in the same way"), "{error}");
+    }
+    let error = read_with("t,id,north,east,z\n0,a,1,2,3\n", &ReadOptions::default()).expect_err("up or down?");
+    assert!(error.to_string().contains("column `z` says none"), "{error}");
+    assert_eq!(read("t,id,north,east,alt\n0,a,1,2,3\n").samples()[0].2, [2.0, 1.0, 3.0], "a height is up");
+    let (ned, silent): (&[u8], &[u8]) = (b"t,north,east,down\n0,1,2,3\n", b"t,x,y,z\n0,1,2,3\n");
+    let earth: &[u8] = b"t,lat,lon,alt\n0,47,8,400\n";
+    let origin = ReadOptions { origin: Some([47.0, 8.0, 400.0]), ..ReadOptions::default() };
+    for (files, options) in [
+        ([("a.csv", ned), ("b.csv", silent)], ReadOptions::default()),
+        ([("a.csv", silent), ("b.csv", ned)], ReadOptions::default()),
+        ([("a.csv", earth), ("b.csv", silent)], origin),
+    ] {
+        let folder = folder(&files);
+        assert!(Whole::read(folder.path(), &options).is_err(), "{files:?}");
+    }
+    assert_eq!(
+        Whole::read(folder(&[("a.csv", ned), ("b.csv", ned)]).path(), &ReadOptions::default())
+            .expect("read")
+            .items
+            .len(),
+        2
+    );
+}

@@ -191,3 +191,11 @@ fn whole_numbers_may_be_of_any_unit() {
     assert!(!unsure("0", "0.5") && !unsure("0.0", "1.5") && !unsure("1700000000", "1700000001"));
     assert!(!read("t_s,id,x,y\n0,a,1,2\n1,a,1,2\n").expect("read").clock.by_steps, "the name says it");
 }
+
+#[test]
+fn a_time_of_one_vehicle_alone_is_refused() {
+    for header in ["t,x1,y1,t2,x2,y2", "t,a.x,a.y,a.timestamp,b.x,b.y", "t,a_x,a_y,time_b,b_x,b_y"] {
+        let error = read(&format!("{header}\n0,1,2,3,4,5\n")).expect_err(header);
+        assert!(error.to_string().contains("gives a time of vehicle"), "{header}: {error}");
+    }
+}

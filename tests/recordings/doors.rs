@@ -124,6 +124,17 @@ fn an_object_in_each_line_is_a_row() {
 }
 
 #[test]
+fn a_list_of_objects_that_gets_shorter_must_name_its_vehicles() {
+    let nameless = "{\"t\": 0, \"d\": [{\"x\": 0, \"y\": 0}, {\"x\": 5, \"y\": 0}]}\n{\"t\": 0.5, \"d\": [{\"x\": 5, \"y\": 0}]}\n";
+    let error = read("f.jsonl", nameless).expect_err("who is missing?");
+    assert!(error.to_string().contains("line 2: the list `d` has another length"), "{error}");
+    assert!(error.help().contains("\"id\""), "{}", error.help());
+    let named = "{\"t\": 0, \"d\": [{\"id\": \"a\", \"x\": 0, \"y\": 0}, {\"id\": \"b\", \"x\": 5, \"y\": 0}]}\n{\"t\": 0.5, \"d\": [{\"id\": \"b\", \"x\": 5, \"y\": 0}]}\n";
+    let found = whole("f.jsonl", named);
+    assert_eq!(found.samples()[1..], [(0.0, "b", [5.0, 0.0, 0.0]), (0.5, "b", [5.0, 0.0, 0.0])]);
+}
+
+#[test]
 fn an_object_that_is_wrong_is_refused_in_its_line() {
     let first = "{\"t\": 0, \"id\": \"a\", \"x\": 1, \"y\": 2}\n";
     for (second, said) in [

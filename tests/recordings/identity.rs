@@ -290,3 +290,46 @@ fn vehicles_of_a_file_that_have_fractional_names_are_told_apart() {
         is_refused(folder(&[("a.csv", &file), ("b.csv", ALONE)]), &["column `whose`"]);
     }
 }
+
+#[test]
+fn groups_of_columns_that_are_named_in_each_row_are_vehicles_by_these_names() {
+    let head_on = |header: &str| {
+        let rows = (0..10).map(|k| {
+            let [low, high] = if k < 5 { [("a", k), ("b", 9 - k)] } else { [("b", 9 - k), ("a", k)] };
+            format!("{k},{},{},0,0,{},{},0,0\n", low.0, low.1, high.0, high.1)
+        });
+        read(&format!("{header}\n{}", rows.collect::<String>()))
+    };
+    for header in [
+        "t_s,id1,x1,y1,z1,id2,x2,y2,z2",
+        "t_s,name_1,x_1,y_1,z_1,name_2,x_2,y_2,z_2",
+        "t_s,track_id1,x1,y1,z1,track_id2,x2,y2,z2",
+        "t_s,det/0/id,det/0/x,det/0/y,det/0/z,det/1/id,det/1/x,det/1/y,det/1/z",
+        "t_s,m.id,m.x,m.y,m.z,n.id,n.x,n.y,n.z",
+    ] {
+        let found = head_on(header).expect(header);
+        assert_eq!(found.vehicles, ["a", "b"], "{header}");
+        let last = found.samples()[18..].to_vec();
+        assert_eq!(last, [(9.0, "b", [0.0; 3]), (9.0, "a", [9.0, 0.0, 0.0])], "{header}");
+    }
+    let some = read("t,id1,x1,y1,x2,y2\n0,a,1,2,3,4\n").expect_err("one of two");
+    assert!(some.to_string().contains("there is no such column for `2`"), "{some}");
+    let nobody = read("t,id1,x1,y1,id2,x2,y2\n0,a,1,2,,3,4\n").expect_err("no name");
+    assert!(nobody.to_string().contains("line 2") && nobody.to_string().contains("id2"), "{nobody}");
+    assert_eq!(read("t,id1,x1,y1,id2,x2,y2\n0,a,1,2,,,\n").expect("not seen").vehicles, ["a"]);
+}
+
+#[test]
+fn columns_of_a_further_vehicle_are_not_dropped() {
+    for more in ["x 3,y 3,z 3", "x-3,y-3,z-3", "3x,3y,3z", "p3x,p3y,p3z", "xc,yc,zc", "x_c,y_c,z_c", "c:x,c:y,c:z"] {
+        let error = read(&format!("t,x1,y1,z1,x2,y2,z2,{more}\n0,1,2,3,4,5,6,7,8,9\n")).expect_err(more);
+        assert!(error.to_string().contains("may be the position of a further vehicle"), "{more}: {error}");
+    }
+    for more in ["pos3[0],pos3[1],pos3[2]", "e3,n3,u3", "east3,north3,up3", "x{3},y{3},z{3}"] {
+        assert!(read(&format!("t,x1,y1,z1,x2,y2,z2,{more}\n0,1,2,3,4,5,6,7,8,9\n")).is_err(), "{more}");
+    }
+    for more in ["gyro1_x,gyro1_y,gyro1_z", "qx1,qy1,qz1", "ax1,ay1,az1", "imu.x,imu.y,imu.z", "a_x,a_y,a_z"] {
+        let found = read(&format!("t,x1,y1,z1,x2,y2,z2,{more}\n0,1,2,3,4,5,6,7,8,9\n")).expect(more);
+        assert_eq!(found.vehicles, ["1", "2"], "{more}");
+    }
+}

@@ -81,7 +81,7 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
         ("\n\n".into(), None, "it is empty", "record again"),
         ("0 1 2 3\n0.5 1 2\n".into(), line(2), "3 fields where 4", "a field for each column"),
         ("0 1 2 3 4\n".into(), line(1), "5 numbers, and nothing says how many", "--dimensions 2 or 2+2"),
-        ("0 1 2 3 4 5 6 7\n".into(), line(1), "8 numbers where time and three", "t x y z x y z"),
+        ("0 1 2 3 4 5 6 7\n".into(), line(1), "8 numbers where time and 3", "t x y z x y z"),
         ("0 1 2 3\n1 1 2 3\n0.5 1 2 3\n".into(), line(3), "time runs backwards", "sort the lines"),
         ("t,id,x,y,z,radius\n0,1,1,2,3,-1\n".into(), line(2), "a negative radius", "0 or more"),
         (

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::settings::Settings;
 use crate::audit::envelope::EnvelopeOutcome;
 use crate::audit::obstacle::Obstacle;
 use crate::audit::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
@@ -223,6 +224,25 @@ impl Outcome {
         let gone = before - self.violations.len();
         self.tallies.violations.count = self.tallies.violations.count.saturating_sub(gone as u64);
         self.tallies.violations.listed = self.violations.len();
+    }
+
+    /// Drops violations that something else refutes. Where none is left, and all were listed, the verdict is that without them.
+    pub fn refute_violations(
+        &mut self,
+        mut is_refuted: impl FnMut(&Violation<ObjectPair>) -> bool,
+        settings: &Settings,
+    ) {
+        let Tally { count, listed, is_exact } = self.tallies.violations;
+        let before = self.violations.len();
+        self.retain_violations(|violation| !is_refuted(violation));
+        if self.violations.len() == before || !self.violations.is_empty() || !is_exact || count > listed as u64 {
+            return;
+        }
+        let is_open = !self.undecided.is_empty() || !self.gaps.is_empty();
+        let decided = !is_open && self.contradiction.is_none() && self.parry.disagreements == 0;
+        self.separation = self.separation.map(|_| Status::new(false, decided));
+        let is_everyone_there = !settings.require_presence || self.absences.is_empty();
+        self.status = Status::new(self.envelope.is_exceeded(), decided && self.envelope.is_kept() && is_everyone_there);
     }
 
     /// Adds a time of two that keep a distance that cannot be decided.
