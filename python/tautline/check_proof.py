@@ -157,7 +157,7 @@ def read_time(text: str, clock: dict[str, Any]) -> float:
 
 def read_samples(data: bytes, claim: dict[str, Any]) -> list[list[Sample]]:
     """Samples of each vehicle in the order of the table."""
-    numbered = enumerate((line.removesuffix("\r") for line in data.decode("utf-8-sig").split("\n")), 1)
+    numbered = enumerate(data.decode("utf-8-sig").split("\n"), 1)
     lines = ((place, line) for place, line in numbered if line.strip(" \t\r\f"))
     header = read_header(next((line for _, line in lines if not line.startswith("#")), ""))
     time_column = next(column for column, name in enumerate(header) if name in TIMES)
@@ -202,7 +202,7 @@ def check_window(window: dict[str, Any], tracks: list[list[Segment]], least: Fra
     boxes: dict[int, tuple[Position, Position]] = {}
     for vehicle, *ends in window["boxes"]:
         if type(vehicle) is not int or not 0 <= vehicle < len(tracks) or len(ends) != 6:
-            raise Unreadable(f"proof: a box must have a vehicle below {len(tracks)} and 6 numbers, got {short(vehicle)}")
+            raise Unreadable(f"proof: a box must have a vehicle below {len(tracks)} and 6 numbers, got {short(ends)}")
         corners = tuple(number(end, "the corner of a box") for end in ends)
         boxes[vehicle] = (corners[:3], corners[3:])
     for vehicle, track in enumerate(tracks):
@@ -235,7 +235,7 @@ def check_witness(first: list[Segment], second: list[Segment], time_s: float, se
 
 def check(proof: dict[str, Any], data: bytes) -> str:
     """The claim in words. Raises `Denied` unless it is true of the bytes of a recording."""
-    claim, clock = proof["claim"], proof["claim"]["clock"]
+    claim, clock, windows = proof["claim"], proof["claim"]["clock"], proof["windows"]
     vehicles, pair, offsets_s = claim["vehicles"], claim["pair"], claim["offsets_s"]
     for key, is_met in (
         ("format", proof["format"] == "tautline proof" and proof["version"] == 1 and claim["motion"] == "linear"),
@@ -244,6 +244,7 @@ def check(proof: dict[str, Any], data: bytes) -> str:
         ("pair", type(pair) is list and len(pair) == 2 and len({*pair} & {*vehicles}) == 2),
         ("offsets_s", type(offsets_s) is dict and offsets_s.keys() <= {*vehicles}),
         ("clock", clock["unit"] in PER_SECOND and type(clock["epoch_ns"]) is int and type(clock["inferred"]) is bool),
+        ("windows", type(windows) is list and all(type(window["boxes"]) is list for window in windows)),
     ):
         if not is_met:
             raise Unreadable(f"proof: {key} is malformed, or of another version")
@@ -255,7 +256,6 @@ def check(proof: dict[str, Any], data: bytes) -> str:
         raise Denied("the data is not that of the proof: its SHA-256 differs")
 
     tracks = [read_segments(*of) for of in zip(read_samples(data, claim), vehicles, max_gaps_s, strict=True)]
-    windows = proof["windows"]
     for window in windows:
         check_window(window, tracks, Fraction(separation_m))
     edges_s = [edge_s for window in windows for edge_s in (window["from_s"], window["to_s"])] or [math.inf, -math.inf]
@@ -274,7 +274,7 @@ def check(proof: dict[str, Any], data: bytes) -> str:
     text = f"{expected}, never closer than {separation_m!r} m, {' and '.join(map(shown, pair))} (limit {limit_m!r} m)"
     text += f", with clocks moved: {', '.join(moved)}" if moved else ""
     longest_s = max(segment.to_s - segment.from_s for track in tracks for segment in track)
-    text += f"; straight between samples up to {longest_s:g} s apart" + f", {len(gaps)} gaps not judged" * bool(gaps)
+    text += f"; straight between samples up to {longest_s:g} s apart" + f", gaps not judged: {len(gaps)}" * bool(gaps)
     return f"{text}; times in {clock['unit']}{' (inferred)' if clock['inferred'] else ''}"
 
 

@@ -9,7 +9,7 @@ use super::audit_proof;
 use super::caller;
 use super::console::{self, Console};
 use super::open::Open;
-use super::own::{JudgedClear, OwnRecording};
+use super::own::OwnRecording;
 use super::places;
 use super::replays::{self, Instants};
 use crate::audit::recorded::{Outcome, Presence, RecordedError, Settings, TrackAuditor};
@@ -93,24 +93,10 @@ pub(super) fn judge_recorded(
     if let Some(own) = own_obstacles {
         own.bind(&mut outcome, &settings);
     }
-    if let Some(own) = own.as_ref().filter(|own| !own.has_every_step && arguments.motion.is_none()) {
-        own.refute_obstacles(&mut outcome, &settings);
-    }
     arguments.check_count(&outcome, &settings)?;
-    let mut judged_clear = own.as_ref().and_then(|own| own.judged_clear.filter(|_| arguments.motion.is_none()));
-    let claimed = judged_clear.and_then(|judged| judged.closest);
-    if let Some(closest) = claimed.filter(|closest| outcome.contradicts(*closest)) {
-        judged_clear = None;
-        notes.push(format!(
-            "the verdict of the run is not used: it says {:?} m for the smallest separation, and the samples come closer",
-            closest.separation_m
-        ));
-    }
-    let judged_clear = judged_clear.filter(|judged| judged.answers(&outcome, &settings, own.as_ref()));
-    if let Some(JudgedClear { closest: Some(closest) }) = judged_clear {
-        outcome.raise_to(closest);
-    }
-    let between = arguments.between(curves, own.as_ref(), judged_clear.is_some(), assumed.as_deref());
+    let own_now = own.as_ref().filter(|_| arguments.motion.is_none());
+    let is_judged = own_now.is_some_and(|own| own.settle(&mut outcome, &settings, &mut notes));
+    let between = arguments.between(curves, own.as_ref(), is_judged, assumed.as_deref());
     let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
     let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
     notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));

@@ -40,7 +40,7 @@ pub struct OwnRecording {
     /// What it was flown past.
     pub(super) obstacles: OwnObstacles,
     /// The verdict of the run, where it is clear, finished, and the recording is as the run wrote it.
-    pub(super) judged_clear: Option<JudgedClear>,
+    judged_clear: Option<JudgedClear>,
     /// Whether the run itself could not decide.
     is_undecided: bool,
     /// Whether the recording is not what the run wrote.
@@ -53,16 +53,16 @@ pub struct OwnRecording {
 
 /// The verdict of a finished run whose judge found it clear at every step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct JudgedClear {
+struct JudgedClear {
     /// The closest that any two came; none where that is not known.
-    pub(super) closest: Option<ClosestApproach>,
+    closest: Option<ClosestApproach>,
 }
 
 impl JudgedClear {
     /// Whether the verdict of the run answers what was asked: nothing but distances, none larger than the smallest that the run
     /// saw, in its lengths and by its clock, and no obstacles but its own.
-    pub(super) fn answers(&self, outcome: &Outcome, settings: &Settings, own: Option<&OwnRecording>) -> bool {
-        let Some((own, closest)) = own.zip(self.closest) else { return false };
+    fn answers(&self, outcome: &Outcome, settings: &Settings, own: &OwnRecording) -> bool {
+        let Some(closest) = self.closest else { return false };
         let radii_m = settings.radius_m.into_iter().chain(settings.vehicles.values().filter_map(|of| of.radius_m));
         let by_radii_m = 2.0 * radii_m.fold(0.0, f64::max);
         let touching = settings.ellipsoid_m.map_or(0.0, |_| TOUCHING_ELLIPSOIDS);
@@ -135,12 +135,27 @@ impl OwnRecording {
         !self.is_altered
     }
 
-    /// Drops what straight lines have too close to its obstacles, where the run judged every step of them, by its own clock.
-    pub(super) fn refute_obstacles(&self, outcome: &mut Outcome, settings: &Settings) {
+    /// Brings what was found in the samples together with the verdict of the run that judged every step. Returns whether that verdict
+    /// answers what was asked.
+    pub(super) fn settle(&self, outcome: &mut Outcome, settings: &Settings, notes: &mut Vec<String>) -> bool {
+        let Some(judged) = self.judged_clear else { return false };
         let is_by_its_clock = settings.vehicles.values().all(|of| of.offset_s == 0.0);
-        if self.judged_clear.is_some() && is_by_its_clock && settings.obstacles == self.obstacles.obstacles {
+        if !self.has_every_step && is_by_its_clock && settings.obstacles == self.obstacles.obstacles {
             self.obstacles.refute(outcome, settings, &self.samples_s);
         }
+        let Some(closest) = judged.closest else { return false };
+        if outcome.contradicts(closest) {
+            notes.push(format!(
+                "the verdict of the run is not used: it says {:?} m for the smallest separation, and the samples come closer",
+                closest.separation_m
+            ));
+            return false;
+        }
+        let is_answered = judged.answers(outcome, settings, self);
+        if is_answered {
+            outcome.raise_to(closest);
+        }
+        is_answered
     }
 
     /// Takes no word of the run for what happened between its samples.

@@ -111,8 +111,11 @@ fn a_drift_is_worded_by_what_it_does_and_refused_where_numbers_run_out() {
         harmless.contains("in 120 s rounding grows to about 3.61e-11 m/s and carries the whole swarm 3.61e-10 m away")
     );
     assert!(harmless.ends_with("No distance between vehicles feels that."), "{harmless}");
-    let (code, felt) = said(&["arrival.edge_error_m=1e-6", "time.duration_s=530"]);
+    let fine = ["arrival.edge_error_m=1e-6", "time.duration_s=521", "time.dt_s=0.5", "time.record_hz=1"];
+    let (code, felt) = said(&fine);
     assert!(code == Code::CommonModeUnstable && felt.contains("positions are told to"), "{felt}");
+    let (code, summed) = said(&[&fine[..2], &["time.dt_s=0.01", "time.record_hz=1"]].concat());
+    assert!(code == Code::DriftUnresolved && summed.contains("the rounding of all steps adds up to"), "{summed}");
     let (end, uncounted) = ("time.duration_s=900", "swarm.a22_per_s=100");
     for sets in [&["swarm.a22_per_s=0.5"][..], &[end], &[uncounted], &[uncounted, end]] {
         let (code, ruinous) = said(sets);

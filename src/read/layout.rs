@@ -3,20 +3,19 @@
 //! A *long* table has a row for each vehicle and time, a *wide* one a row for each time. Names are compared without
 //! regard to case. A unit that a name says is honoured, and one that is not known is refused.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::clock::TimeUnit;
 use super::columns::{Body, Columns, missing};
 use super::conventions::Convention;
 use super::error::{Fault, list, quoted};
-use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle, is_velocity};
+use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle};
 use super::heights::Heights;
 use super::leftovers;
 use super::options::ReadOptions;
 use super::order::PLANAR;
 use super::time_columns::{self, Rest};
 use super::turned;
-use super::units;
 
 /// The columns of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,23 +59,7 @@ impl Layout {
         if convention.has_directions() {
             turned::refuse_known(options, "its header")?;
         }
-        let mut columns = Columns {
-            header,
-            found: BTreeMap::new(),
-            units: BTreeMap::new(),
-            heights: Heights::default(),
-            place: POSITION,
-        };
-        for (role, name) in options.columns.given() {
-            let column = header.iter().position(|column| column == name);
-            let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
-            columns.found.insert((String::new(), role), column);
-            // A unit that is not known is the user's affair where the column is.
-            let ending = || units::endings(name).find(|(_, _, velocity)| *velocity == is_velocity(role));
-            let unit = units::bracketed(name).1.or_else(|| ending().map(|(_, unit, _)| unit));
-            let unit = unit.filter(|unit| is_angle(role) || units::size_of(unit, is_velocity(role)).is_some());
-            columns.units.extend(unit.map(|unit| (column, unit)));
-        }
+        let mut columns = Columns::given(header, options)?;
         let found = match columns.get("", TIME) {
             Some(given) => Some((given, None)),
             None => time_columns::find(header, options)?,

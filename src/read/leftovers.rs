@@ -41,8 +41,9 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
         let problem = format!("column {column} may name a vehicle, and there is no such column for {vehicle}");
         return Err(Fault::content(problem, "name each vehicle by a column, or take these columns out"));
     }
-    let others: Vec<_> = unused.iter().filter(|column| Heading::of(&header[**column]).is_none()).collect();
-    if let Some([x, y]) = further(others.iter().map(|&&column| header[column].as_str())) {
+    let others = unused.iter().map(|&column| header[column].as_str()).filter(|name| Heading::of(name).is_none());
+    let others: Vec<_> = others.collect();
+    if let Some([x, y]) = further(&others) {
         let problem = format!("the columns {} and {} may be the position of a further vehicle", quoted(x), quoted(y));
         let remedy = "name columns as those of the other vehicles are named, or take these out";
         return Err(Fault::content(problem, remedy));
@@ -69,7 +70,7 @@ fn of_vehicles<'a>(column: &'a str, vehicles: &[String]) -> Vec<(usize, &'a str)
 }
 
 /// Two names that differ in the axis alone, where the rest of them is no quantity with axes.
-fn further<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<[&'a str; 2]> {
+fn further<'a>(names: &[&'a str]) -> Option<[&'a str; 2]> {
     let lower = |name: &str| {
         let (stem, unit) = units::bracketed(name);
         match unit {
@@ -77,7 +78,7 @@ fn further<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<[&'a str;
             _ => stem.to_lowercase(),
         }
     };
-    let known: BTreeMap<String, &str> = names.clone().map(|name| (lower(name), name)).collect();
+    let known: BTreeMap<String, &str> = names.iter().map(|name| (lower(name), *name)).collect();
     let is_position = |rest: &str, [first, _]: [&str; 2]| {
         let letters: String = rest.chars().filter(char::is_ascii_alphabetic).collect();
         let is_bare = letters.is_empty();

@@ -78,7 +78,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let is_planar = table.axes() == 2;
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::content("it holds no position", "save at least one instant of one vehicle");
-    let mut about = About { is_planar, ..About::new(source, options, unit, notes, none) };
+    let mut about = About::new(source, options, unit, notes, none);
+    about.frame.is_planar = is_planar;
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
         about.epoch_ns = epoch;
     }

@@ -22,6 +22,17 @@ pub(super) const PLANAR: &str = "the recording is judged in the plane of x and y
 /// A recording being read.
 pub type Recording = Box<dyn Tracks<Error = ReadError>>;
 
+/// The frame of the positions of a recording.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Frame {
+    /// Whether there is no height.
+    pub(super) is_planar: bool,
+    /// Whether the recording says where its axes point.
+    pub(super) has_directions: bool,
+    /// What places on the Earth are measured from.
+    pub(super) earth_origin: Option<EarthOrigin>,
+}
+
 /// What is known of a recording beside its rows.
 pub(super) struct About {
     pub(super) path: PathBuf,
@@ -37,12 +48,7 @@ pub(super) struct About {
     pub(super) sort: bool,
     /// Which of several rows of a vehicle at one time is read.
     pub(super) duplicates: Option<Duplicates>,
-    /// Whether its rows have no height.
-    pub(super) is_planar: bool,
-    /// Whether it says where its axes point.
-    pub(super) has_directions: bool,
-    /// What its places on the Earth are measured from.
-    pub(super) earth_origin: Option<EarthOrigin>,
+    pub(super) frame: Frame,
     pub(super) notes: Vec<String>,
     /// The fault of a recording without rows.
     pub(super) none: Fault,
@@ -66,9 +72,7 @@ impl About {
             scale: options.scale,
             sort: options.sort,
             duplicates: options.duplicates,
-            is_planar: false,
-            has_directions: false,
-            earth_origin: None,
+            frame: Frame::default(),
             notes,
             none,
         }
@@ -87,9 +91,7 @@ pub(super) struct Ordered<R> {
     timing: Timing,
     notes: Vec<String>,
     assumed: Option<String>,
-    is_planar: bool,
-    has_directions: bool,
-    earth_origin: Option<EarthOrigin>,
+    frame: Frame,
     scale: f64,
     /// Rows read that have not been given out.
     batch: std::vec::IntoIter<Row>,
@@ -112,7 +114,7 @@ impl<R: Rows> Ordered<R> {
     /// Looks at the recording as far as its order and its clock need.
     pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
         let About { path, unit, times_per_second, epoch_ns, scale, sort, duplicates, mut notes, none, .. } = about;
-        let (is_planar, has_directions, earth_origin) = (about.is_planar, about.has_directions, about.earth_origin);
+        let frame = about.frame;
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() && sort {
@@ -159,9 +161,7 @@ impl<R: Rows> Ordered<R> {
             timing,
             notes,
             assumed,
-            is_planar,
-            has_directions,
-            earth_origin,
+            frame,
             scale,
             batch,
             ended,
@@ -208,7 +208,7 @@ impl<R: Rows> Ordered<R> {
             }
         }
         let sample = self.sample(row, time_s)?;
-        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.earth_origin.is_some()) {
+        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.frame.earth_origin.is_some()) {
             let jump_m = (row.position - before.position).norm();
             if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * (time_s - before_s) {
                 return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
@@ -353,14 +353,14 @@ impl<R: Rows> Tracks for Ordered<R> {
     }
 
     fn is_planar(&self) -> bool {
-        self.is_planar
+        self.frame.is_planar
     }
 
     fn has_directions(&self) -> bool {
-        self.has_directions || self.earth_origin.is_some()
+        self.frame.has_directions || self.frame.earth_origin.is_some()
     }
 
     fn earth_origin(&self) -> Option<&EarthOrigin> {
-        self.earth_origin.as_ref()
+        self.frame.earth_origin.as_ref()
     }
 }

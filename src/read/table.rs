@@ -64,11 +64,12 @@ pub(super) fn open<C: Cells + 'static>(
     if dates.is_some_and(|first| !first.has_zone) {
         about.notes.push("times are dates without a zone and are taken as UTC".to_owned());
     }
-    about.has_directions = layout.convention.has_directions();
-    let (names, is_planar) = (Names::from_list(layout.names.clone())?, layout.is_planar);
+    about.frame.has_directions = layout.convention.has_directions();
+    about.frame.is_planar = layout.is_planar;
+    let names = Names::from_list(layout.names.clone())?;
     let local = origin(&mut cells, &layout, options)?;
     about.notes.extend(local.map(|local| local.note()));
-    about.earth_origin = local.map(|local| local.measured_from(options.origin));
+    about.frame.earth_origin = local.map(|local| local.measured_from(options.origin));
     cells.restart(&layout.columns_to_see(), true)?;
     // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
     about.scale = if layout.on_earth { 1.0 } else { about.scale };
@@ -88,7 +89,7 @@ pub(super) fn open<C: Cells + 'static>(
         vehicle: 0,
         count: 0,
     };
-    Ok(Box::new(Ordered::open(table, About { epoch_ns, is_planar, ..about })?))
+    Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
 }
 
 /// The first time of a table, where it is a date.

@@ -17,7 +17,7 @@ pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) ->
     let plan = Plan::of(&mut splits, options)?;
     let none = plan.none();
     let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
-    about.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
+    about.frame.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
     // Messages that are there twice are those of a bag that is.
     about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
     let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
