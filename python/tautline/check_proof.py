@@ -21,7 +21,6 @@ import math
 import re
 import sys
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
 from datetime import datetime
 from fractions import Fraction
 from reprlib import repr as short
@@ -31,7 +30,7 @@ from typing import Any
 Position = tuple[float, ...]
 Sample = tuple[float, Position]
 
-TIMES, COLUMNS = ("t_s", "t", "time", "time_s"), ("id", "x", "y", "z")
+FORMAT, TIMES, COLUMNS = ("tautline proof", 1, "linear"), ("t_s", "t", "time", "time_s"), ("id", "x", "y", "z")
 PER_SECOND = {"s": 1, "ms": 1_000, "us": 1_000_000, "ns": 1_000_000_000}
 
 # White space of Unicode. `str.isspace` counts four control characters as well.
@@ -83,7 +82,7 @@ def overlaps(first: list[Segment], second: list[Segment], from_s: float, to_s: f
     return [(a, b) for a, others in both for b in others]
 
 
-def dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+def dot(a: list[Fraction], b: list[Fraction]) -> Fraction:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -238,18 +237,19 @@ def check(proof: dict[str, Any], data: bytes) -> str:
     claim, clock, windows = proof["claim"], proof["claim"]["clock"], proof["windows"]
     vehicles, pair, offsets_s = claim["vehicles"], claim["pair"], claim["offsets_s"]
     for key, is_met in (
-        ("format", proof["format"] == "tautline proof" and proof["version"] == 1 and claim["motion"] == "linear"),
+        ("format, version or motion", (proof["format"], proof["version"], claim["motion"]) == FORMAT),
         ("status", claim["status"] in ("clear", "violation")),
         ("vehicles", type(vehicles) is list and len(set(vehicles)) == len(vehicles)),
         ("pair", type(pair) is list and len(pair) == 2 and len({*pair} & {*vehicles}) == 2),
         ("offsets_s", type(offsets_s) is dict and offsets_s.keys() <= {*vehicles}),
-        ("clock", clock["unit"] in PER_SECOND and type(clock["epoch_ns"]) is int and type(clock["inferred"]) is bool),
+        ("clock", type(clock["epoch_ns"]) is int and type(clock["inferred"]) is bool),
+        ("clock.unit (s, ms, us or ns)", clock["unit"] in PER_SECOND),
         ("windows", type(windows) is list and all(type(window["boxes"]) is list for window in windows)),
     ):
         if not is_met:
-            raise Unreadable(f"proof: {key} is malformed, or of another version")
-    limit_m = number(claim["limit_m"], "limit_m", math.ulp(0.0))
-    separation_m, time_s = number(claim["separation_m"], "separation_m", 0.0), number(claim["time_s"], "time_s")
+            raise Unreadable(f"proof: {key} is malformed or not supported")
+    limit_m, time_s = number(claim["limit_m"], "limit_m", math.ulp(0.0)), number(claim["time_s"], "time_s")
+    separation_m = number(claim["separation_m"], "separation_m", 0.0)
     max_gaps_s = [math.inf if gap_s is None else number(gap_s, "max_gaps_s", 0.0) for gap_s in claim["max_gaps_s"]]
     moved = [f"{shown(name)} by {by_s!r} s" for name, by_s in offsets_s.items() if number(by_s, "offsets_s") != 0]
     if hashlib.sha256(data).hexdigest() != proof["data"]["sha256"]:
