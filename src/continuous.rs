@@ -55,7 +55,7 @@ impl Feedback for Exact<'_> {
 const FIRST_STEP_S: f64 = 1e-3;
 /// A step, or what is left to the time asked for, that is shorter than this part of that time is rounding.
 const RESOLUTION: f64 = 1e-14;
-/// Most steps of the solver that are tried on the way to one time. Flights of stiff laws need some hundreds for a physics step.
+/// Most steps of the solver that are tried for one physics step. Flights of stiff laws need some hundreds.
 const MOST_TRIALS: u32 = 100_000;
 /// Time to which a closest approach is found \[s\]. The distance is flat there: it is off by (1e-7 s)^2/2 times its second
 /// derivative, less than 1e-12 m up to 200 m/s^2.
@@ -88,8 +88,7 @@ pub enum IdealError {
         /// Why.
         source: LawError,
     },
-    /// No step is short enough for the tolerances, more than a hundred thousand steps are needed, or the motion leaves the range of
-    /// numbers.
+    /// No step is short enough for the tolerances, more than 100,000 steps are needed, or numbers overflow.
     #[error("the solution cannot be continued at {time_s} s: its tolerances need steps that are too short")]
     Stalled {
         /// The last time that was reached \[s\].
@@ -212,6 +211,7 @@ impl Continuous {
         let motion = FreeMotion { a22_per_s: self.a22_per_s, air: self.air.as_ref(), end_s: dt_s };
         let flow = Flow::new(feedback, &self.swarm, motion, from_s);
         let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), self.step_s.min(dt_s))?;
+        solver.most_trials = Some(MOST_TRIALS);
         let mut turned_m_s = vec![0.0; self.swarm.count()];
         let solved = solver.advance(dt_s, &mut |solver| {
             solver.add_turns(&mut turned_m_s);
@@ -282,6 +282,8 @@ struct Solver<'a, 'law> {
     method: Method,
     flow: &'a Flow<'law>,
     tolerances: Tolerances,
+    /// Largest number of solver steps for one output time; unlimited where `None`.
+    most_trials: Option<u32>,
 }
 
 impl<'a, 'law> Solver<'a, 'law> {
@@ -303,7 +305,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         method.init(flow, time_s, f64::INFINITY, &state.to_vec()).map_err(|_| IdealError::Stalled { time_s })?;
         match flow.take_failure() {
             Some(source) => Err(IdealError::Law { time_s, source }),
-            None => Ok(Self { method, flow, tolerances }),
+            None => Ok(Self { method, flow, tolerances, most_trials: None }),
         }
     }
 
@@ -317,15 +319,13 @@ impl<'a, 'law> Solver<'a, 'law> {
             // An empty state has no error to control.
             return Ok(());
         }
-        let (mut undefined, mut trials) = (None, 0);
+        let (most_trials, mut undefined, mut trials) = (self.most_trials, None, 0_u32);
         while until_s - self.method.t() > RESOLUTION * until_s {
-            trials += 1;
+            trials = trials.saturating_add(1);
+            let is_spent = most_trials.is_some_and(|most| trials > most);
             let (time_s, free_step_s) = (self.method.t(), self.method.h());
             let step_s = free_step_s.min(until_s - time_s).min(self.flow.smooth_s(time_s));
-            if step_s <= RESOLUTION * until_s
-                || trials > MOST_TRIALS
-                || (undefined.is_some() && self.moves_nothing(step_s))
-            {
+            if step_s <= RESOLUTION * until_s || is_spent || (undefined.is_some() && self.moves_nothing(step_s)) {
                 return Err(
                     undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })
                 );

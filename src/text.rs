@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-/// A number with so many decimals, or in powers of ten where that would fill a line. Zero has no sign.
+/// Formats a number with `decimals` decimals, or in powers of ten if it is 1e15 or more. Zero has no sign.
 pub(crate) fn fixed(number: f64, decimals: usize) -> String {
     const LONG: f64 = 1e15;
     if number.abs() >= LONG {

@@ -26,7 +26,7 @@ from fractions import Fraction
 from reprlib import repr as short
 from typing import Any
 
-# A position [m], and when a vehicle was seen there [s].
+# Position [m]; time [s] with the position at that time.
 Position = tuple[float, ...]
 Sample = tuple[float, Position]
 
@@ -39,7 +39,7 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Times that tautline reads digit by digit. It rounds all others to a double first.
 EXACT_TIME = re.compile(r"[+-]?\d+|\d{7,}\.\d{1,18}", re.ASCII)
 DATE = re.compile(r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:[.,](\d{1,9}))?([Zz]|[+-]\d\d:?[0-5]\d)", re.ASCII)
-# Further columns that change what tautline reads: a part of the time, a radius, an origin, the begin of plain text.
+# Further columns that change the reading: a part of the time, a radius, an origin, a number that begins plain text.
 FURTHER = re.compile(
     r"(t|time|timestamp|stamp|date_?time|utc)(_utc|_time)?(\s*[\[(].*|_\w+)?|.*radius.*|ref_lat|ref_lon"
     r"|((.*[./_ ])?(t|time|timestamp|stamp|header|tv|unix)?[./_ ])?(milli|micro|nano|[mnu\u00b5\u03bc])?s(ec(ond)?)?s?"
@@ -87,7 +87,7 @@ def dot(a: list[Fraction], b: list[Fraction]) -> Fraction:
 
 
 def closest(first: Segment, second: Segment) -> tuple[Fraction, Fraction]:
-    """Smallest squared distance of two segments over the time that they share, and the first time of it."""
+    """Smallest squared distance of two segments at a common time, and the first time at which it is reached."""
     from_s, to_s = max(first.from_s, second.from_s), min(first.to_s, second.to_s)
     start, end = ([b - a for a, b in zip(first.at(t), second.at(t))] for t in (from_s, to_s))
     by = [b - a for a, b in zip(start, end)]
@@ -196,7 +196,7 @@ def read_segments(samples: list[Sample], name: str, max_gap_s: float) -> list[Se
 
 
 def check_window(window: dict[str, Any], tracks: list[list[Segment]], least: Fraction) -> None:
-    """No pair comes closer than the smallest separation in a window."""
+    """Raises `Denied` unless all pairs keep the smallest separation in a window."""
     from_s, to_s = number(window["from_s"], "from_s"), number(window["to_s"], "to_s")
     boxes: dict[int, tuple[Position, Position]] = {}
     for vehicle, *ends in window["boxes"]:
@@ -223,7 +223,7 @@ def check_window(window: dict[str, Any], tracks: list[list[Segment]], least: Fra
 
 
 def check_witness(first: list[Segment], second: list[Segment], time_s: float, separation_m: float) -> None:
-    """The pair comes as close as that at the time that is named."""
+    """Raises `Denied` unless two vehicles reach the smallest separation at a time, both to the next double."""
     after_s, above_m = math.nextafter(time_s, math.inf), Fraction(math.nextafter(separation_m, math.inf))
     for a, b in overlaps(first, second, time_s, after_s):
         squared, at_s = closest(a, b)
@@ -233,7 +233,7 @@ def check_witness(first: list[Segment], second: list[Segment], time_s: float, se
 
 
 def check(proof: dict[str, Any], data: bytes) -> str:
-    """The claim in words. Raises `Denied` unless it is true of the bytes of a recording."""
+    """Returns a claim in words. Raises `Denied` unless the claim is true of the bytes of a recording."""
     claim, clock, windows = proof["claim"], proof["claim"]["clock"], proof["windows"]
     vehicles, pair, offsets_s = claim["vehicles"], claim["pair"], claim["offsets_s"]
     for key, is_met in (
@@ -290,7 +290,7 @@ def main(arguments: list[str]) -> int:
         return 1
     # An uncaught exception exits with 1, which means that the claim is denied.
     except Exception as error:
-        problem = f"{error}" if isinstance(error, Unreadable) else f"malformed file: {type(error).__name__}: {error}"
+        problem = f"{error}" if isinstance(error, Unreadable) else f"{type(error).__name__}: {error}"
         print(f"UNREADABLE: {problem}", file=sys.stderr)
         return 2
     return 0

@@ -31,7 +31,7 @@ pub struct Auditor {
     ended: Vec<Violation>,
     /// What is counted as steps come, and the closest approach so far.
     outcome: AuditOutcome,
-    /// The motion of the pair in the step of the closest approach.
+    /// Motion of the closest pair during the step of the closest approach.
     closest_motion: Option<ExactMotion>,
 }
 
@@ -103,8 +103,10 @@ impl Auditor {
         self.outcome.closest
     }
 
-    /// The verdict over everything judged. Where it is clear, the smallest separation is rounded down, as that of the same motion
-    /// in a recording is; where there are violations, it is that of the closest one.
+    /// Returns the verdict over all judged steps.
+    ///
+    /// Without a violation the smallest separation is rounded down, as in the audit of a recording. With violations it keeps
+    /// the value of the closest approach.
     #[must_use]
     pub fn finish(mut self) -> AuditOutcome {
         let decided = self.time_s.is_some() && self.outcome.refused == 0 && self.ledger.is_decided();

@@ -250,7 +250,7 @@ impl Overlap<'_> {
         self.first.curve().is_none() && self.second.curve().is_none()
     }
 
-    /// Whether two vehicles stand still at the places of another overlap.
+    /// Whether both vehicles stand still at the same positions as in another overlap.
     #[inline]
     fn stands_like(&self, other: &Self) -> bool {
         let is_still = |of: &Segment, other: &Segment| of.from == of.to && of.from == other.from && of.to == other.to;

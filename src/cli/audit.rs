@@ -64,7 +64,7 @@ pub(super) fn judge_recorded(
     settings.delta_m = settings.delta_m.or(own_delta_m);
     settings.ellipsoid_m = settings.ellipsoid_m.or(own_ellipsoid_m);
     settings.is_own_limit = is_silent && arguments.obstacles.is_none();
-    // A recording of ours has all vehicles in each sample: none is absent between two of them.
+    // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two samples.
     settings.max_gap_s = settings.max_gap_s.or(own.as_ref().filter(|own| own.has_no_gaps()).map(|_| f64::INFINITY));
     settings.is_told_scaled = own.as_ref().is_some_and(|own| own.ellipsoid_m.is_some());
     let own_obstacles = own

@@ -363,13 +363,13 @@ impl AuditArguments {
     }
 }
 
-/// Refuses an option that gives two numbers of one vehicle, or two of all vehicles.
+/// Refuses an option that is given twice for one vehicle, or twice for all vehicles.
 fn refuse_repeated<'a>(option: &str, names: impl Iterator<Item = Option<&'a str>>) -> Result<(), Failure> {
     let mut known = BTreeSet::new();
     for name in names {
         if !known.insert(name) {
-            let of = name.map_or("all vehicles".to_owned(), |name| format!("the vehicle {name}"));
-            return Err(Failure::input(format!("{option} gives two numbers of {of}"), "give one"));
+            let of = name.map_or("all vehicles".to_owned(), |name| format!("vehicle {name}"));
+            return Err(Failure::input(format!("{option}: two values for {of}"), "give one value"));
         }
     }
     Ok(())

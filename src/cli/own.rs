@@ -35,20 +35,28 @@ pub struct OwnRecording {
     pub(super) has_every_step: bool,
     /// Most steps between two of its samples.
     pub(super) most_steps: u64,
-    /// Times of its samples \[s\].
+    /// Times of the samples \[s\].
     samples_s: Vec<f64>,
     /// What it was flown past.
     pub(super) obstacles: OwnObstacles,
-    /// The verdict of the run, where it is clear, finished, and the recording is as the run wrote it.
-    judged_clear: Option<JudgedClear>,
-    /// Whether the run itself could not decide.
-    is_undecided: bool,
-    /// Whether the recording is not what the run wrote.
-    is_altered: bool,
+    verdict: OwnVerdict,
     /// The law that was flown, where it is not the scenario's.
     other_law: Option<String>,
     /// Where the flight ended before its time.
     pub(super) early_end: Option<EarlyEnd>,
+}
+
+/// What a recording says of the verdict of its run.
+#[derive(Clone, Copy, Debug)]
+enum OwnVerdict {
+    /// There is none, or it is not asked for.
+    None,
+    /// The hashes of the verdict do not agree: the recording was changed.
+    Altered,
+    Clear(JudgedClear),
+    Undecided,
+    /// Another verdict of the recording as the run wrote it.
+    Other,
 }
 
 /// The verdict of a finished run whose judge found it clear at every step.
@@ -127,29 +135,29 @@ impl OwnRecording {
 
     /// Without what it says of the time between its samples, but for what was too close.
     fn altered(self) -> Self {
-        Self { told: Vec::new(), is_altered: true, has_every_step: false, ..self }
+        Self { told: Vec::new(), verdict: OwnVerdict::Altered, has_every_step: false, ..self }
     }
 
-    /// Whether every vehicle is in every sample: the recording is not known to differ from what the run wrote.
+    /// Whether every sample contains every vehicle. This holds for a recording that is not known to be altered.
     pub(super) fn has_no_gaps(&self) -> bool {
-        !self.is_altered
+        matches!(self.verdict, OwnVerdict::Clear(_) | OwnVerdict::Undecided | OwnVerdict::Other)
     }
 
-    /// Brings what was found in the samples together with the verdict of the run that judged every step. Returns whether that verdict
-    /// answers what was asked.
+    /// Reconciles the outcome of the samples with the verdict of the run, which judged every step. Returns whether the verdict
+    /// of the run answers the question of this audit.
     pub(super) fn settle(&self, outcome: &mut Outcome, settings: &Settings, notes: &mut Vec<String>) -> bool {
-        let Some(judged) = self.judged_clear else { return false };
-        let is_by_its_clock = settings.vehicles.values().all(|of| of.offset_s == 0.0);
-        if !self.has_every_step && is_by_its_clock && settings.obstacles == self.obstacles.obstacles {
-            self.obstacles.refute(outcome, settings, &self.samples_s);
-        }
+        let OwnVerdict::Clear(judged) = self.verdict else { return false };
         let Some(closest) = judged.closest else { return false };
         if outcome.contradicts(closest) {
             notes.push(format!(
-                "the verdict of the run is not used: it says {:?} m for the smallest separation, and the samples come closer",
+                "the verdict of the run is not used: its smallest separation ({:?} m) is larger than that of the samples",
                 closest.separation_m
             ));
             return false;
+        }
+        let is_by_its_clock = settings.vehicles.values().all(|of| of.offset_s == 0.0);
+        if !self.has_every_step && is_by_its_clock && settings.obstacles == self.obstacles.obstacles {
+            self.obstacles.refute(outcome, settings, &self.samples_s);
         }
         let is_answered = judged.answers(outcome, settings, self);
         if is_answered {
@@ -163,7 +171,7 @@ impl OwnRecording {
         self.told.clear();
         self.violations.clear();
         self.obstacles.forget_what_was_seen();
-        Self { judged_clear: None, has_every_step: false, ..self }
+        Self { verdict: OwnVerdict::None, has_every_step: false, ..self }
     }
 
     /// Refuses other lengths than those in which it says what happened between its samples: that would be lost.
@@ -182,18 +190,19 @@ impl OwnRecording {
         ))
     }
 
-    /// Note on violations in the recording of a run that could not decide, as after steps too long for the law.
+    /// Returns a note if the audit finds a violation in the recording of an undecided run. A run is undecided, for example,
+    /// after steps that were too long for the law.
     pub(super) fn doubt(&self, status: Status) -> Option<String> {
-        let is_doubtful = self.is_undecided && status == Status::Violation;
+        let is_doubtful = matches!(self.verdict, OwnVerdict::Undecided) && status == Status::Violation;
         is_doubtful.then(|| {
-            "the run itself is UNDECIDED: the motion that is judged here may differ from that of the law (see its report)"
+            "the run itself is UNDECIDED: the recorded motion may differ from that of the law (see report.json)"
                 .to_owned()
         })
     }
 
     /// What a person should know about how it was flown and is judged, by clocks that were all set right alike or not.
     pub(super) fn notes(&self, clocks_agree: bool) -> impl Iterator<Item = String> {
-        let steps = self.most_steps;
+        let (steps, is_altered) = (self.most_steps, matches!(self.verdict, OwnVerdict::Altered));
         let between = (!self.has_every_step).then(|| {
             let of = if clocks_agree { "" } else { ", for pairs whose clocks were set right alike" };
             format!(
@@ -201,11 +210,11 @@ impl OwnRecording {
                  counts{of}"
             )
         });
-        let altered = self.is_altered.then(|| {
+        let altered = is_altered.then(|| {
             "the recording is not as the run wrote it: what the run says of the time between samples is not believed".to_owned()
         });
         let law = self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"));
-        law.into_iter().chain(between.filter(|_| !self.is_altered)).chain(altered)
+        law.into_iter().chain(between.filter(move |_| !is_altered)).chain(altered)
     }
 }
 
@@ -246,9 +255,7 @@ impl Witness {
             other_law: None,
             early_end: None,
             obstacles: OwnObstacles::of(scenario, scale),
-            judged_clear: None,
-            is_undecided: false,
-            is_altered: false,
+            verdict: OwnVerdict::None,
         };
         let planned = (scenario.time.steps(), scenario.time.duration_s);
         Self { own, scale, told_scale, before: None, near: Near::default(), planned, reason: None }
@@ -296,9 +303,12 @@ impl Witness {
             separation_m: verdict.separation_m * scale,
             time_s: verdict.separation_time_s,
         });
-        let is_clear = verdict.status == "clear" && verdict.ended_early.is_empty();
-        let is_undecided = verdict.status == "undecided";
-        OwnRecording { judged_clear: is_clear.then_some(JudgedClear { closest }), is_undecided, ..own }
+        let verdict = match verdict.status.as_str() {
+            "clear" if verdict.ended_early.is_empty() => OwnVerdict::Clear(JudgedClear { closest }),
+            "undecided" => OwnVerdict::Undecided,
+            _ => OwnVerdict::Other,
+        };
+        OwnRecording { verdict, ..own }
     }
 
     /// What the flight says of itself, without a verdict.

@@ -70,8 +70,9 @@ impl OwnObstacles {
         within.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Drops what straight lines between samples have too close to an obstacle, where the run judged every step and found all of them
-    /// clear. `samples_s` are the times of the samples \[s\]: what is so at one of them stays.
+    /// Removes the obstacle violations that only straight lines between samples show, for a run that judged every step clear.
+    ///
+    /// `samples_s` are the times of the samples \[s\]. A violation that lasts over a sample time stays.
     pub(super) fn refute(&self, outcome: &mut Outcome, settings: &Settings, samples_s: &[f64]) {
         let has_sample = |from_s: f64, to_s: f64| {
             samples_s.get(samples_s.partition_point(|&at_s| at_s < from_s)).is_some_and(|&at_s| at_s <= to_s)

@@ -1,13 +1,13 @@
-//! What the mean velocity does to a flight: how far it carries the swarm, and whether numbers resolve positions there.
+//! Drift of the swarm by its mean velocity: its distance, and whether floating-point numbers resolve positions there.
 
 use super::{Preflight, numbers};
 use crate::scenario::{LARGEST, Scenario};
 
-/// A drift is harmless while so many spacings of numbers fit into what counts as reached.
+/// Fewest spacings of floating-point numbers within the arrival tolerance at which a drift is harmless.
 const FINE_SPACINGS: f64 = 100.0;
 
 impl Preflight {
-    /// What the mean velocity does, and how far that carries the swarm.
+    /// Describes the growth of the mean velocity and the distance over which it carries the swarm.
     fn drift_in_words(&self, scenario: &Scenario, why: &str) -> String {
         let drift = scenario.drift(self.common_mode_rate_per_s);
         let seed = if scenario.start.mean_velocity_m_s().norm() > 0.0 { "it" } else { "rounding" };
@@ -30,7 +30,7 @@ impl Preflight {
             )
         } else if self.drift_rounding_m(scenario) > needed_m {
             let rounding_m = numbers::significant(self.drift_rounding_m(scenario));
-            format!("where the rounding of all steps adds up to {rounding_m} m and {needed_m} m count")
+            format!("where the rounding of all steps adds up to {rounding_m} m; {needed_m} m is required")
         } else if self.drift_m > LARGEST {
             format!("farther than the {LARGEST:e} m that a flight is meant for")
         } else {
@@ -44,9 +44,11 @@ impl Preflight {
         Some(format!("{said}, {unresolved}. Shorten time.duration_s, or reduce what drives the mean velocity."))
     }
 
-    /// Bound of what rounding adds up to over the steps of the drift \[m\]. A step rounds the position x to eps |x|/2, and the
-    /// velocity to 3 eps |v|/2, which moves the vehicle from then on. With x growing as exp(r t) the sum over steps of dt is
-    /// 4 (eps/2) x/(r dt), and with a constant velocity 2 (eps/2) x T/dt.
+    /// Bound of the rounding errors of all steps of the drift \[m\].
+    ///
+    /// A step rounds the position x to eps |x|/2 and the velocity to 3 eps |v|/2. The error of the velocity moves the vehicle
+    /// in all later steps. With x growing as exp(r t) the sum over steps of dt is 4 (eps/2) x/(r dt). With a constant velocity
+    /// it is 2 (eps/2) x T/dt.
     fn drift_rounding_m(&self, scenario: &Scenario) -> f64 {
         let time = &scenario.time;
         let uniform = 2.0 * time.duration_s / time.dt_s;

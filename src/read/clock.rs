@@ -165,7 +165,7 @@ impl Stamp {
     }
 }
 
-/// Step from which on times may be milliseconds: vehicles are recorded up to 500 times a second.
+/// Smallest step of times that may be in milliseconds, since vehicles are recorded at most 500 times a second.
 const LONG_STEP: f64 = 2.0;
 
 /// What the times of a recording look like.
@@ -206,7 +206,7 @@ impl Probe {
 
     /// The unit that times of this size and step are most likely in, and what speaks for it.
     ///
-    /// The last part of the result is whether another unit would fit as well: whole numbers, and long steps, count anything.
+    /// The last part of the result is whether another unit fits as well, as for whole numbers and for long steps.
     ///
     /// Times of day since 1970 tell by their size, unless their step is too long for it. Other whole numbers tell by their
     /// step: vehicles are recorded up to 500 times a second, and hardly ever every two seconds. Everything else is in
@@ -228,7 +228,7 @@ impl Probe {
             step if step >= LONG_STEP => (TimeUnit::Milliseconds, BY_STEPS),
             _ => (TimeUnit::Seconds, "because nothing says otherwise"),
         };
-        // Vehicles that seem to be recorded so seldom may be recorded many times a second, in a smaller unit.
+        // A long step in seconds may be a short step in a smaller unit.
         (unit, why, self.step.is_finite() && (self.integral || self.step >= LONG_STEP))
     }
 }
@@ -266,6 +266,11 @@ impl Timing {
     /// A clock of which so many units make a second.
     pub(super) fn given(per_second: f64) -> Self {
         Self { clock: Clock { unit: "given", ..Clock::default() }, per_second, epoch: 0 }
+    }
+
+    /// The longest time that a difference of two times may be \[s\]: where the unit is a guess, the numbers may be seconds.
+    pub(super) fn longest_s(&self, difference_s: f64) -> f64 {
+        if self.clock.by_steps { difference_s * self.per_second } else { difference_s }
     }
 
     /// Seconds since the epoch.

@@ -61,7 +61,7 @@ pub(super) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// Those that the user names.
+    /// Returns the columns that the user names.
     pub(super) fn given(header: &'a [String], options: &'a ReadOptions) -> Result<Self, Fault> {
         let (heights, place) = (Heights::default(), POSITION);
         let mut columns = Self { header, found: BTreeMap::new(), units: BTreeMap::new(), heights, place };
@@ -69,7 +69,7 @@ impl<'a> Columns<'a> {
             let column = header.iter().position(|column| column == name);
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
             columns.found.insert((String::new(), role), column);
-            // A unit that is not known is the user's affair where the column is.
+            // An unknown unit in the name of a column that the user gives is ignored.
             let ending = || units::endings(name).find(|(_, _, velocity)| *velocity == is_velocity(role));
             let unit = units::bracketed(name).1.or_else(|| ending().map(|(_, unit, _)| unit));
             let unit = unit.filter(|unit| is_angle(role) || units::size_of(unit, is_velocity(role)).is_some());

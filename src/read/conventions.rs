@@ -32,7 +32,7 @@ pub(super) struct Convention {
     pub(super) header: Vec<String>,
     /// What the numbers of each column are multiplied by: -1 where an axis points the other way.
     pub(super) signs: Vec<f64>,
-    /// Columns whose directions their names say.
+    /// Columns that lie along an axis of known direction.
     pub(super) directed: BTreeSet<usize>,
     /// Columns of latitude, longitude and height of the place that positions are measured from.
     pub(super) reference: Option<[usize; 3]>,

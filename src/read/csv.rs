@@ -69,8 +69,8 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
         match trajnet(source, text.separator)? {
             Likeness::Certain => text = Text::open(source, Format::Trajnet)?,
             Likeness::Possible => {
-                let problem = "its lines may hold a frame, a vehicle, x and y, or a time and x, y and z of one vehicle: the \
-                               first two numbers of each are whole";
+                let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
+                               whole";
                 let remedy = "give --format trajnet, or --dimensions 3 for a time and a position";
                 return Err(Fault::content(problem, remedy).into());
             }
@@ -305,18 +305,18 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
-/// How far a table of plain numbers looks like one of `TrajNet`.
+/// Likeness of a table of plain numbers to the format of `TrajNet`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Likeness {
-    /// Its numbers cannot be a frame and a vehicle.
+    /// The numbers cannot be a frame and a vehicle.
     None,
-    /// Its first two numbers are whole in each line, and no frame has two vehicles.
+    /// The first two numbers of each line are whole, and no two successive lines have the same frame.
     Possible,
-    /// Several lines have the same frame and different vehicles.
+    /// Some successive lines have the same frame and different vehicles.
     Certain,
 }
 
-/// Compares numbers without a header with those of `TrajNet`: a frame and a vehicle, both whole, and two others.
+/// Compares a table without a header with `TrajNet`: whole numbers of a frame and a vehicle, and two more numbers.
 fn trajnet(source: &Source, separator: Separator) -> Result<Likeness, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());

@@ -4,6 +4,7 @@ use super::columns::Body;
 use super::conventions::Convention;
 use super::error::Fault;
 use super::layout::Layout;
+use super::leftovers::Slots;
 use super::options::{Dimensions, ReadOptions};
 
 /// How far the norm of a quaternion may be from 1.
@@ -37,7 +38,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             convention: Convention::default(),
             is_planar: bodies.iter().any(|body| body.position[2].is_none()),
             bodies,
-            ids: Vec::new(),
+            slots: Slots::default(),
             notes: vec![note],
         }
     };
@@ -71,7 +72,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         }
         (given, _) => {
             let each = given.map_or(3, |given| given.counts().1);
-            let problem = format!("it has {count} numbers where time and {each} for each vehicle are expected");
+            let problem = format!("the line has {count} numbers where time and {each} for each vehicle are expected");
             return Err(Fault::content(
                 problem,
                 "write t x y z x y z ..., a line for each time, or give other --dimensions",

@@ -383,6 +383,16 @@ pub(super) fn is_id(name: &str) -> bool {
         || behind.into_iter().any(is)
 }
 
+/// How surely a column is a name and not another quantity of a vehicle, 0 for the surest: `id`, then `track_id`, then `name`.
+/// `None` for words that may be a quantity, such as `track`, or a number of a place in a list, such as `object_index`.
+pub(super) fn rank_of_name(name: &str) -> Option<u8> {
+    match joined(name).as_str() {
+        "id" | "uid" | "uuid" => Some(0),
+        name if name.ends_with("id") || name == "callsign" => Some(1),
+        name => name.ends_with("name").then_some(2),
+    }
+}
+
 /// A name in lower case without its unit, as one word.
 fn joined(name: &str) -> String {
     units::bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")

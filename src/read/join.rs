@@ -1,6 +1,6 @@
 //! Files of one vehicle each as one recording.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::error::{Fault, ReadError, quoted};
@@ -98,8 +98,9 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     Ok(Box::new(Joined { vehicles, parts: joined, clock, notes, is_planar }))
 }
 
-/// Refuses files of which some are of one vehicle, going by the names that their rows have, or whose rows are of the vehicle that
-/// another file is called by. Where all have one name it is no vehicle's, but what all are.
+/// Refuses two files whose rows name the same vehicle, and a file whose rows name the vehicle of another file.
+///
+/// A name that all files share is not taken for the name of a vehicle.
 fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String]) -> Result<(), ReadError> {
     let own = recordings.iter().map(|tracks| match tracks.vehicles() {
         [only] => Some(only.as_str()),
@@ -116,13 +117,14 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String
     if known.len() < 2 {
         return Ok(());
     }
-    for ((name, path), called_so) in own.iter().zip(paths).zip(called) {
-        let Some(name) = name.filter(|name| spelling(name) != spelling(called_so)) else { continue };
-        if called.iter().any(|other| spelling(other) == spelling(name)) {
-            let problem = format!("its rows are of the vehicle {}, and another file is called so", quoted(name));
-            let remedy = "call each file as its vehicle, or take the column out that names it";
-            return Err(ReadError::new(path, Fault::content(problem, remedy)));
-        }
+    // Files that are called by each other's names; numbers of files and of vehicles may begin elsewhere.
+    let files: BTreeSet<_> = called.iter().map(|name| spelling(name)).collect();
+    let others = own.iter().zip(paths).zip(called).filter_map(|((name, path), file)| Some(((*name)?, path, file)));
+    let mut others = others.filter(|(name, _, file)| spelling(name) != spelling(file));
+    if let Some((name, path, _)) = others.next().filter(|_| known.keys().eq(&files)) {
+        let problem = format!("the rows name vehicle {}, which is the name of another file", quoted(name));
+        let remedy = "name each file after its vehicle, or remove the column with the name";
+        return Err(ReadError::new(path, Fault::content(problem, remedy)));
     }
     let Some((name, first, path)) = twice else { return Ok(()) };
     let problem = format!("its rows are of the vehicle {}, and so are those of {}", quoted(name), first.display());
@@ -130,7 +132,7 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String
     Err(ReadError::new(path, Fault::content(problem, remedy)))
 }
 
-/// Refuses files of which some say where their axes point and others do not, or whose axes begin at different places.
+/// Refuses files in different frames: on the Earth and in plain metres, or with and without directions of the axes.
 fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadError> {
     let frame = |tracks: &Recording| (tracks.earth_origin().is_some(), tracks.has_directions());
     let words = |(on_earth, has_directions): (bool, bool)| match (on_earth, has_directions) {
@@ -143,7 +145,7 @@ fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadE
     other.map_or(Ok(()), |(tracks, other)| {
         let [its, those] = [tracks, first].map(|tracks| words(frame(tracks)));
         let problem = format!("its positions {its}, and those of {} {those}", path.display());
-        Err(ReadError::new(other, Fault::content(problem, "give all files in one frame, and name their columns alike")))
+        Err(ReadError::new(other, Fault::content(problem, "use one frame and the same column names in all files")))
     })
 }
 

@@ -11,11 +11,14 @@ use super::conventions::Convention;
 use super::error::{Fault, list, quoted};
 use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle};
 use super::heights::Heights;
-use super::leftovers;
+use super::leftovers::{self, Slots};
 use super::options::ReadOptions;
 use super::order::PLANAR;
 use super::time_columns::{self, Rest};
 use super::turned;
+
+/// Names of places that are no vehicles.
+const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
 
 /// The columns of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +41,8 @@ pub(super) struct Layout {
     pub(super) names: Vec<String>,
     /// The columns of each vehicle of a wide table, or of every row of a long one.
     pub(super) bodies: Vec<Body>,
-    /// The column that names the vehicle of each of these, where a wide table has such.
-    pub(super) ids: Vec<usize>,
+    /// Columns that say which vehicle each of these is, where a wide table has such.
+    pub(super) slots: Slots,
     /// What the numbers of each column are multiplied by: the size of the unit that its name says \[m or m/s\], or 1.
     pub(super) metres: Vec<f64>,
     /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
@@ -105,7 +108,12 @@ impl Layout {
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
         if !one && id.is_none() {
-            let lost = elsewhere.into_iter().find(|vehicle| !names.iter().any(|name| name == vehicle));
+            let is_part = |name: &str, of: &str| {
+                name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/', '_']))
+            };
+            let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
+            let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
+            let lost = elsewhere.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
             lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))?;
         }
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
@@ -123,7 +131,7 @@ impl Layout {
             suspects: Vec::new(),
             names,
             bodies,
-            ids: Vec::new(),
+            slots: Slots::default(),
             metres: Vec::new(),
             on_earth,
             convention: Convention::default(),
@@ -134,7 +142,7 @@ impl Layout {
         let used = layout.columns();
         if !one && id.is_none() {
             let unused: Vec<_> = (0..header.len()).filter(|column| used.binary_search(column).is_err()).collect();
-            layout.ids = leftovers::examine(header, &unused, &layout.names)?;
+            layout.slots = leftovers::examine(header, &unused, &layout.names)?;
         }
         layout.metres = columns.metres(&used, options.scale)?;
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
@@ -146,28 +154,31 @@ impl Layout {
         layout.notes.extend(columns.heights_used(&layout.bodies, options)?);
         layout.convention = convention;
         layout.check(header, options, one)?;
-        if let [first, ..] = layout.ids[..] {
-            layout.notes.push(format!("vehicles are named by columns such as {}", quoted(&header[first])));
+        if let [first, ..] = layout.slots.ids[..] {
+            layout
+                .notes
+                .push(format!("the names of vehicles are read from columns such as {}", quoted(&header[first])));
             layout.names.clear();
         }
         Ok(layout)
     }
 
-    /// Refuses positions of which some columns say the directions of their axes and others do not.
+    /// Refuses a header in which some columns of positions give the direction of their axis and others do not.
     fn refuse_other_frames(&self, header: &[String], heights: &Heights, convention: &Convention) -> Result<(), Fault> {
         if !convention.has_directions() || convention.reference.is_some() {
             return Ok(());
         }
         let of_heights: BTreeSet<_> =
             heights.among(self.bodies.iter().filter_map(|body| body.position[2])).iter().map(|of| of.0).collect();
-        let positions = self.bodies.iter().flat_map(|body| body.position).flatten();
+        let of = |body: &Body| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
+        let positions = self.bodies.iter().flat_map(of);
         let (directed, others): (Vec<_>, Vec<_>) = positions
             .filter(|column| !of_heights.contains(column))
             .partition(|column| convention.directed.contains(column));
         match (&directed[..], &others[..]) {
             (&[directed, ..], &[other, ..]) => {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
-                let problem = format!("column {directed} says the direction of its axis, and column {other} says none");
+                let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
                 Err(Fault::content(problem, "name the axes of all positions in the same way, as in `x_ned` or `north`"))
             }
             _ => Ok(()),
@@ -230,7 +241,7 @@ impl Layout {
         if !unused.is_empty() {
             self.notes.push(format!("columns not used: {}", unused.join(", ")));
         }
-        if !self.names.is_empty() && self.ids.is_empty() && !is_one_vehicle {
+        if !self.names.is_empty() && self.slots.ids.is_empty() && !is_one_vehicle {
             self.notes.push(format!("vehicles, going by the names of columns: {}", list(&self.names, 50)));
         }
         Ok(())
@@ -243,6 +254,7 @@ impl Layout {
             .into_iter()
             .chain(self.rivals.iter().copied())
             .chain(self.suspects.iter().copied())
+            .chain(self.slots.watched.iter().flatten().copied())
             .collect();
         columns.into_iter().collect()
     }
@@ -261,7 +273,7 @@ impl Layout {
             .chain(self.of_time())
             .chain(self.id)
             .chain(beside)
-            .chain(self.ids.iter().copied())
+            .chain(self.slots.ids.iter().copied())
             .collect();
         columns.into_iter().collect()
     }
@@ -272,7 +284,7 @@ impl Layout {
     }
 }
 
-/// The vehicles that have both horizontal coordinates of the kind that begins with `first`.
+/// Returns the vehicles that have both horizontal coordinates of a frame. `first` is the role of the first coordinate.
 fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&'a str> {
     let of = |role: Role| {
         headings.iter().filter(move |(_, heading)| heading.role == role).map(|(_, heading)| heading.vehicle)
@@ -281,7 +293,7 @@ fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&
     of(first).filter(|vehicle| second.contains(vehicle)).collect()
 }
 
-/// The fault of a table that gives a vehicle in another frame than the vehicle `read`.
+/// Returns the fault of a table that gives `vehicle` in another frame than the vehicle `read`.
 fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
     let kinds = ["metres", "latitude and longitude"];
     let (kind, other) = if on_earth { (kinds[0], kinds[1]) } else { (kinds[1], kinds[0]) };
@@ -290,7 +302,7 @@ fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
         quoted(vehicle),
         quoted(read)
     );
-    Fault::content(problem, "give the positions of all vehicles in one frame, or take the columns of one frame out")
+    Fault::content(problem, "give the positions of all vehicles in one frame, or remove the columns of the other frame")
 }
 
 /// The column that names the vehicles, and others that could; none where the user says which one it is.

@@ -25,12 +25,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let layout = Layout::of(&objects.header, options, &source.stem())?;
     let is_of =
         |list: &str, column: &usize| objects.header[*column].strip_prefix(list).is_some_and(|end| end.starts_with('.'));
-    let uneven = objects.uneven.iter().filter(|_| layout.id.is_none() && layout.ids.is_empty());
-    if let Some((list, line)) =
-        uneven.into_iter().find(|(list, _)| layout.columns().iter().any(|column| is_of(list, column)))
-    {
+    let (is_named, used) = (layout.id.is_some() || !layout.slots.ids.is_empty(), layout.columns());
+    let mut uneven = objects.uneven.iter().filter(|_| !is_named);
+    if let Some((list, line)) = uneven.find(|(list, _)| used.iter().any(|column| is_of(list, column))) {
         let problem = format!(
-            "the list {} has another length than in the lines above: which vehicle is missing is not known",
+            "the list {} has another length than in the first line, so its elements cannot be assigned to vehicles",
             quoted(list)
         );
         let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";
@@ -64,7 +63,9 @@ struct Objects {
     columns: HashMap<String, usize>,
     cells: Vec<Cell>,
     flat: Vec<(String, Cell)>,
-    /// Lists of objects whose length changes, and the first line in which it does.
+    /// Lists of objects in the line, and their lengths above 0.
+    lists: Vec<(String, usize)>,
+    /// Lists of objects whose length changes, and the line of the first change.
     uneven: BTreeMap<String, u64>,
 }
 
@@ -78,16 +79,14 @@ impl Objects {
             columns: HashMap::new(),
             cells: Vec::new(),
             flat: Vec::new(),
+            lists: Vec::new(),
             uneven: BTreeMap::new(),
         };
-        let mut lengths: Option<BTreeMap<String, usize>> = None;
+        let mut lengths: HashMap<String, usize> = HashMap::new();
         while objects.next_line()? {
-            let here = list_lengths(&objects.flat);
-            let known = lengths.get_or_insert_with(|| here.clone());
-            if *known != here {
-                let differs = |list: &&String| known.get(*list) != here.get(*list);
-                for list in known.keys().chain(here.keys()).filter(differs) {
-                    objects.uneven.entry(list.clone()).or_insert(objects.lines.number());
+            for (list, length) in objects.lists.drain(..) {
+                if *lengths.entry(list.clone()).or_insert(length) != length {
+                    objects.uneven.entry(list).or_insert(objects.lines.number());
                 }
             }
             for (key, _) in &objects.flat {
@@ -109,39 +108,22 @@ impl Objects {
     /// Goes to the next line that is not blank, and takes its object apart.
     fn next_line(&mut self) -> Result<bool, ReadError> {
         self.flat.clear();
+        self.lists.clear();
         while self.lines.advance()? {
             let line = self.lines.line().trim_ascii();
             if line.is_empty() {
                 continue;
             }
-            let flat = &mut self.flat;
-            return take_apart(line, flat).map(|()| true).map_err(|fault| fault.at(Place::Line(self.lines.number())));
+            let (flat, lists) = (&mut self.flat, &mut self.lists);
+            return take_apart(line, flat, lists)
+                .map(|()| true)
+                .map_err(|fault| fault.at(Place::Line(self.lines.number())));
         }
         Ok(false)
     }
 }
 
-/// Lengths of the lists of objects in an object: the keys of their elements have a number between dots.
-fn list_lengths(flat: &[(String, Cell)]) -> BTreeMap<String, usize> {
-    let mut lengths = BTreeMap::new();
-    for (key, _) in flat {
-        let mut at = 0;
-        for part in key.split('.') {
-            let end = at + part.len();
-            if let Ok(index) = part.parse::<usize>()
-                && at > 0
-                && end < key.len()
-            {
-                let length = lengths.entry(key[..at - 1].to_owned()).or_insert(0);
-                *length = index.saturating_add(1).max(*length);
-            }
-            at = end + 1;
-        }
-    }
-    lengths
-}
-
-fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>) -> Result<(), Fault> {
+fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(String, usize)>) -> Result<(), Fault> {
     let refused = |what: String| {
         Fault::content(
             format!("it is no object of JSON: {what}"),
@@ -152,7 +134,7 @@ fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>) -> Result<(), Fault> 
         return Err(refused("it does not begin with a brace".to_owned()));
     }
     let mut json = serde_json::Deserializer::from_slice(line);
-    Flat { key: String::new(), flat }.deserialize(&mut json).map_err(|error| refused(error.to_string()))?;
+    Flat { key: String::new(), flat, lists }.deserialize(&mut json).map_err(|error| refused(error.to_string()))?;
     json.end().map_err(|error| refused(error.to_string()))
 }
 
@@ -160,6 +142,7 @@ fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>) -> Result<(), Fault> 
 struct Flat<'a> {
     key: String,
     flat: &'a mut Vec<(String, Cell)>,
+    lists: &'a mut Vec<(String, usize)>,
 }
 
 impl Flat<'_> {
@@ -221,17 +204,26 @@ impl<'de> Visitor<'de> for Flat<'_> {
             }
             let whole = if self.key.is_empty() { key.clone() } else { format!("{}.{key}", self.key) };
             known.push(key);
-            map.next_value_seed(Flat { key: whole, flat: self.flat })?;
+            map.next_value_seed(Flat { key: whole, flat: self.flat, lists: self.lists })?;
         }
         Ok(())
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
         let (before, mut count) = (self.flat.len(), 0);
-        while list.next_element_seed(Flat { key: format!("{}.{count}", self.key), flat: self.flat })?.is_some() {
+        loop {
+            let element = Flat { key: format!("{}.{count}", self.key), flat: self.flat, lists: self.lists };
+            if list.next_element_seed(element)?.is_none() {
+                break;
+            }
             count += 1;
         }
         let elements = &mut self.flat[before..];
+        let depth = |key: &str| key.bytes().filter(|&byte| byte == b'.').count();
+        let own = depth(&self.key) + 1;
+        if elements.iter().any(|(key, _)| depth(key) > own) {
+            self.lists.push((self.key.clone(), count));
+        }
         let is_number = |cell: &Cell| matches!(cell, Cell::Whole(_) | Cell::Real(_) | Cell::Empty);
         if matches!(count, 2 | 3) && elements.len() == count && elements.iter().all(|(_, cell)| is_number(cell)) {
             for ((key, _), axis) in elements.iter_mut().zip(["x", "y", "z"]) {
@@ -309,7 +301,7 @@ mod tests {
     fn an_object_is_taken_apart() {
         let mut flat = Vec::new();
         let line = br#"{"t": 1, "pose": {"position": [1, 2.5, -3], "q": [0, 0, 0, 1]}, "id": "a", "lost": null}"#;
-        take_apart(line, &mut flat).expect("an object");
+        take_apart(line, &mut flat, &mut Vec::new()).expect("an object");
         let keys: Vec<_> = flat.iter().map(|(key, _)| key.as_str()).collect();
         let expected = "t pose.position.x pose.position.y pose.position.z pose.q.0 pose.q.1 pose.q.2 pose.q.3 id lost";
         assert_eq!(keys.join(" "), expected);

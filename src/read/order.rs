@@ -11,9 +11,9 @@ use super::rows::{BATCH, Row, Rows, probe, refuse_steps_back};
 use super::source::Source;
 use crate::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 
-/// Longest step between two places on the Earth that is never taken for a fault of the receiver \[m\].
+/// Longest step between two positions on the Earth that is accepted at any speed \[m\].
 const LONGEST_JUMP_M: f64 = 1000.0;
-/// Speed above which such a step is none of a vehicle \[m/s\]: more than the escape velocity of the Earth.
+/// Largest accepted speed of a longer step \[m/s\], above the escape velocity of the Earth.
 const FASTEST_M_S: f64 = 12_000.0;
 
 /// What follows for a recording in which some height is not known.
@@ -25,11 +25,11 @@ pub type Recording = Box<dyn Tracks<Error = ReadError>>;
 /// The frame of the positions of a recording.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Frame {
-    /// Whether there is no height.
+    /// Whether positions have no height.
     pub(super) is_planar: bool,
-    /// Whether the recording says where its axes point.
+    /// Whether the recording gives the directions of its axes.
     pub(super) has_directions: bool,
-    /// What places on the Earth are measured from.
+    /// Origin from which positions on the Earth are measured.
     pub(super) earth_origin: Option<EarthOrigin>,
 }
 
@@ -210,7 +210,7 @@ impl<R: Rows> Ordered<R> {
         let sample = self.sample(row, time_s)?;
         if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.frame.earth_origin.is_some()) {
             let jump_m = (row.position - before.position).norm();
-            if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * (time_s - before_s) {
+            if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * self.timing.longest_s(time_s - before_s) {
                 return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
             }
         }
@@ -277,8 +277,8 @@ impl<R: Rows> Ordered<R> {
         let (vehicle, first) = (self.name(before), self.rows.place(before.place));
         let (jump_km, within_s) = (jump_m / 1e3, time_s - before_s);
         let problem =
-            format!("vehicle {vehicle} jumps {jump_km:.0} km in {within_s:.3} s; its place before is at {first}");
-        let remedy = "leave latitude and longitude empty where the receiver had no fix, or set the unit of the times right \
+            format!("vehicle {vehicle} jumps {jump_km:.0} km in {within_s:.3} s; its previous position is at {first}");
+        let remedy = "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the times \
                       with --time-unit";
         Fault::content(problem, remedy)
     }

@@ -5,15 +5,15 @@ use nalgebra::Vector3;
 use super::clock::{Probe, Stamp, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
 
-/// Rows given out at a time.
+/// Number of rows that are read at a time.
 pub(super) const BATCH: usize = 10_000;
 
-/// A vehicle at an instant, as the file has it.
+/// State of a vehicle at an instant, as read from the file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
-    /// When, in the unit of the file.
+    /// Time in the unit of the file.
     pub(super) stamp: Stamp,
-    /// Where in the file: see [`Rows::place`].
+    /// Number of the place in the file; see [`Rows::place`].
     pub(super) place: u64,
     pub(super) vehicle: usize,
     pub(super) position: Vector3<f64>,
@@ -21,57 +21,57 @@ pub(super) struct Row {
     pub(super) radius: Option<f64>,
 }
 
-/// A recording that holds samples, row by row.
+/// Reader of a recording that yields samples row by row.
 pub(super) trait Rows {
-    /// Appends some [`BATCH`] rows in the order of the file; `false` when there was none to append.
+    /// Appends about [`BATCH`] rows in the order of the file. Returns `false` if no row was left.
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
 
-    /// Starts again with the first row. Nothing to do where time only runs forwards, so that rows are read once.
+    /// Restarts at the first row. A reader whose time only runs forwards is read once and need not implement this.
     fn rewind(&mut self) -> Result<(), ReadError> {
         Ok(())
     }
 
-    /// Names of the vehicles met so far.
+    /// Names of the vehicles read so far.
     fn vehicles(&self) -> &[String];
 
-    /// Puts the names in their final order, once all have been met.
+    /// Puts the names in their final order after all of them have been read.
     fn settle_names(&mut self) {}
 
-    /// What a person should know that shows as rows are read.
+    /// Notes for the user that are known while rows are read.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// What a person should know that shows once all rows have been read.
+    /// Notes for the user that are known after all rows have been read.
     fn late_notes(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// What was assumed to know positions at their times, if anything was.
+    /// Assumption that the positions and their times rest on, if there is one.
     fn assumed(&self) -> Option<String> {
         None
     }
 
-    /// The place that a row's number means.
+    /// Returns the place in the file for the number in [`Row::place`].
     fn place(&self, number: u64) -> Place;
 
-    /// The file that a row is in, of a recording in several files: within one, rows of a vehicle do not go back in time.
+    /// Returns the index of the file that contains a row. Within one file the times of a vehicle must not decrease.
     fn file(&self, _number: u64) -> usize {
         0
     }
 
-    /// Whether each time is a row of the file, so that time can only run forwards.
+    /// Whether the file has one row for each time, so that time can only run forwards.
     fn is_wide(&self) -> bool {
         true
     }
 
-    /// Looks at all times and names; none where there are no rows.
+    /// Reads all times and names. Returns `None` if there are no rows.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         survey(self)
     }
 }
 
-/// Looks at all times by reading all rows.
+/// Reads the times of all rows. Returns `None` if there are no rows.
 fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
     let mut probe: Option<Probe> = None;
     let mut batch = Vec::new();
@@ -83,7 +83,7 @@ fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
     Ok(probe)
 }
 
-/// What the times of these rows look like; none where there are no rows.
+/// Returns the properties of the times of these rows, or `None` if there are no rows.
 pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
     let mut probe = Probe::new(rows.first()?.stamp);
     for row in rows {
@@ -92,7 +92,7 @@ pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
     Some(probe)
 }
 
-/// Refuses rows of a vehicle that go back in time, in the order of the file.
+/// Refuses rows of one vehicle whose time decreases in the order of the file.
 pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -> Result<(), ReadError> {
     let mut last: Vec<Option<&Row>> = Vec::new();
     for row in rows {

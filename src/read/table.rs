@@ -10,6 +10,7 @@ use super::earth::{Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::identity::{Rival, Suspect};
 use super::layout::Layout;
+use super::leftovers::Watch;
 use super::names::Names;
 use super::options::ReadOptions;
 use super::order::{About, Ordered, Recording};
@@ -37,6 +38,10 @@ struct Table<C> {
     rivals: Vec<Rival>,
     /// Columns that may name several vehicles among the rows of one, for each vehicle.
     suspects: Vec<Vec<Suspect>>,
+    /// Columns of a wide table that may name vehicles.
+    watches: Vec<Watch>,
+    /// Positions of a wide table whose vehicle a column names.
+    named: usize,
     /// How many rows of each vehicle have no fix.
     no_fixes: BTreeMap<usize, u64>,
     /// Vehicle of the last row.
@@ -75,6 +80,7 @@ pub(super) fn open<C: Cells + 'static>(
     about.scale = if layout.on_earth { 1.0 } else { about.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
     let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
+    let watches = layout.slots.watched.iter().cloned().map(Watch::new).collect();
     let table = Table {
         cells,
         layout,
@@ -85,6 +91,8 @@ pub(super) fn open<C: Cells + 'static>(
         dates,
         rivals,
         suspects: Vec::new(),
+        watches,
+        named: 0,
         no_fixes: BTreeMap::new(),
         vehicle: 0,
         count: 0,
@@ -179,8 +187,9 @@ impl<C: Cells> Table<C> {
         for place in 0..self.layout.bodies.len() {
             let body = &self.layout.bodies[place];
             let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
-            if let Some(&id) = self.layout.ids.get(place) {
+            if let Some(&id) = self.layout.slots.ids.get(place) {
                 row.vehicle = self.vehicle(id)?;
+                self.named += 1;
             }
             if self.layout.on_earth && is_no_fix(&row.position) {
                 *self.no_fixes.entry(row.vehicle).or_default() += 1;
@@ -201,6 +210,11 @@ impl<C: Cells> Table<C> {
             rows.push(row);
         }
         self.count += 1;
+        for watch in &mut self.watches {
+            let texts = watch.columns.iter().map(|&column| Ok(self.cells.text(column)?.trim().to_owned()));
+            let texts = texts.collect::<Result<Vec<_>, Fault>>()?;
+            watch.see(texts, self.cells.header())?;
+        }
         if !self.layout.suspects.is_empty() {
             self.suspect(rows.last().filter(|row| row.place == self.cells.row()).copied())?;
         }
@@ -225,6 +239,13 @@ impl<C: Cells> Table<C> {
     /// The fault of a vehicle whose rows look like those of several.
     fn suspicion(&self) -> Option<Fault> {
         let header = self.cells.header();
+        if let Some(&column) = self.layout.slots.ids.first().filter(|_| self.count > 2)
+            && self.names.all().len() == self.named
+        {
+            let problem =
+                format!("column {} has another value in each row, and so names no vehicle", quoted(&header[column]));
+            return Some(Fault::content(problem, "remove such columns if their values are no names"));
+        }
         let id = self.layout.id.filter(|_| self.names.all().len() > 1);
         self.suspects.iter().enumerate().find_map(|(vehicle, suspects)| {
             let named = id.map(|id| (&*self.names.all()[vehicle], &*header[id]));
@@ -292,6 +313,7 @@ impl<C: Cells> Rows for Table<C> {
         self.count = 0;
         self.no_fixes.clear();
         self.suspects.clear();
+        self.named = 0;
         self.cells.restart(&self.layout.columns_to_see(), true)
     }
 

@@ -104,8 +104,8 @@ const COMMANDED_S: f64 = 1.0;
 ///
 /// where laws damp relative velocities at about 1/s, so that a command is worth its acceleration over a second.
 ///
-/// None where that is not known: of vehicles that stand while they are commanded and something may hold against that, and of a
-/// flight that ended early, whose duration says nothing.
+/// Returns `None` if this is unknown: the flight ended early, or a disturbance may hold vehicles that stand while they are
+/// commanded.
 pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
     let Findings { summary, judge, is_disturbed, run, .. } = findings;
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);

@@ -51,9 +51,10 @@ impl Scenario {
         }
     }
 
-    /// Raises the number of halvings until the parts of a step are as short as the potential field asks for at the distance that it
-    /// certifies. It comes near to that distance: its certificate is the energy of one pair, and links of a large gain drive
-    /// pairs together.
+    /// Raises the number of halvings until the shortest part of a step resolves the potential field at the certified distance.
+    ///
+    /// The certificate assigns the whole energy of the start to one pair. Links of a large gain drive pairs close to the
+    /// certified distance.
     #[cfg(feature = "files")]
     pub(super) fn choose_halvings(&mut self) {
         let LawSpec::Potential(_) = self.law else { return };

@@ -29,7 +29,7 @@ pub(super) struct TimeTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     record_hz: Option<f64>,
     /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
-    /// step as it is. Unless given 10, and under `potential` as many up to 20 as its rate at the certified distance needs.
+    /// step as it is. The default is 10. Under `potential` it rises up to 20, as the rate of the law at the certified distance requires.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_MAX_HALVINGS)))]
     max_halvings: Option<u32>,

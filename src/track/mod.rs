@@ -79,8 +79,8 @@ pub struct Clock {
     pub unit: &'static str,
     /// Whether the unit was inferred from the numbers and not given by the format or by the user.
     pub inferred: bool,
-    /// Whether another unit fits as well: the unit was inferred from whole numbers, or from steps of two units or more, that are not
-    /// of the size of times since 1970. What is asked in seconds should not rest on that.
+    /// Whether another unit fits as well. The unit was then inferred from whole numbers, or from steps of two units or more.
+    /// The numbers are not of the size of times since 1970. Questions in seconds should not rest on that unit.
     pub by_steps: bool,
     /// What was taken from every time so that no digit of a clock in nanoseconds is lost \[ns\].
     pub epoch_ns: i64,
@@ -123,7 +123,7 @@ pub trait Tracks {
         false
     }
 
-    /// Whether the recording itself says where its axes point: east, north and up they are then.
+    /// Whether the recording itself gives the directions of its axes. The axes are then east, north and up.
     fn has_directions(&self) -> bool {
         self.earth_origin().is_some()
     }

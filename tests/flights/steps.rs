@@ -219,10 +219,10 @@ fn a_stiff_potential_halves_its_steps_as_far_as_its_certified_distance_asks() {
     assert!(chosen.time.max_halvings > TimeSpec::DEFAULT_MAX_HALVINGS, "{}", chosen.time.max_halvings);
     let (flight, _) = fly(&chosen);
     assert_eq!((flight.audit.status, flight.overlong_steps), (Status::Clear, 0));
-    // With fewer that are given the step is too long, and nothing passes.
+    // With 10 halvings the shortest part of a step is too long for the law.
     let given = keys(&["time.max_halvings=10"]);
     assert_eq!(given.time.max_halvings, 10);
     assert!(fly(&given).0.overlong_steps > 0);
-    // A gentle field asks for no more.
+    // A field of small gain needs no more halvings than the default.
     assert_eq!(builtin("pentagon", &["law.kind=potential"]).time.max_halvings, TimeSpec::DEFAULT_MAX_HALVINGS);
 }

@@ -183,7 +183,7 @@ fn a_verdict_that_the_samples_contradict_is_not_used() {
     let raised = with_closest("raised.mcap", |m| m + 0.001);
     assert!(raised.out.starts_with("CLEAR if straight between samples: never closer than 2.460355 m"), "{raised:?}");
     assert!(raised.err.contains("the verdict of the run is not used"), "{raised:?}");
-    // More than was asked of the samples is not given by a smaller word of the run.
+    // A verdict with a smaller separation than the samples leaves the audit clear.
     let lowered = with_closest("lowered.mcap", |m| m - 0.001);
     assert_eq!(lowered.exit, Some(0), "{lowered:?}");
 }
@@ -204,12 +204,12 @@ fn samples_far_apart_leave_no_gap_in_a_recording_of_a_run() {
     fly(folder.path(), "pentagon", &["time.duration_s=6", "arrival.hold_s=6", "time.record_hz=0.2"]);
     let judged = audit(folder.path(), &["flown"]);
     assert!(judged.exit == Some(0) && judged.out.starts_with("CLEAR as the run judged every step"), "{judged:?}");
-    // The user's own limit still counts.
+    // A `--max-gap` of the user still applies.
     let short = audit(folder.path(), &["flown", "--max-gap", "2"]);
     assert!(short.exit == Some(1) && short.out.starts_with("UNDECIDED"), "{short:?}");
 }
 
-/// A flight past a crate that straight lines between its samples lead into.
+/// Scenario of a flight past a crate. The straight lines between its samples lead into the crate.
 const PAST_A_CRATE: &str = "
 [swarm]
 dimensions = 3

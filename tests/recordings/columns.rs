@@ -174,7 +174,7 @@ fn plain_numbers_that_may_mean_several_things_are_asked_about() {
         let options = ReadOptions { dimensions, ..ReadOptions::default() };
         read_with("flight.txt", &text(count), &options).map(|whole| whole.vehicles.len())
     };
-    // Ten numbers may be three vehicles, or one with velocity and acceleration; eleven two with a heading and a speed.
+    // Ten numbers may be three vehicles, or one with velocity and acceleration. Eleven may be two with heading and speed.
     for (count, ways) in [(5, "2 or 2+2"), (7, "2 or 3 or 3+3"), (10, "3"), (11, "2"), (13, "2 or 3 or 2+2 or 3+3")] {
         let error = vehicles(count, None).expect_err("asked");
         assert!(error.help().contains(&format!("--dimensions {ways}:")), "{}", error.help());

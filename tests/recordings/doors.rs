@@ -62,11 +62,11 @@ fn tables_of_trajnet_are_read_where_they_can_be_nothing_else() {
     let found = read_bytes("biwi_eth.txt", text.as_bytes(), &fps).expect("read");
     let expected = [(31.2, "1", [8.46, 3.59, 0.0]), (31.6, "1", [9.57, 3.79, 0.0]), (31.6, "2", [1.5, 2.5, 0.0])];
     assert_eq!(found.samples(), expected);
-    // One vehicle a frame may be a time, x, y and z: the user says what it is.
+    // With one vehicle per frame, the numbers may also be a time, x, y and z. The user must choose.
     let single = "0 1 2 3\n10 1 2 4\n";
     let error = read("t.txt", single).expect_err("two meanings");
     assert!(
-        error.to_string().contains("a frame, a vehicle, x and y, or a time")
+        error.to_string().contains("may be a frame, a vehicle, x and y, or a time")
             && error.help().contains("--format trajnet, or --dimensions 3"),
         "{error}"
     );

@@ -20,7 +20,7 @@ const KNOWN: [([f64; 3], [f64; 3]); 4] = [
     ([-33.0, 151.0, 10.0], [3_262_982.205_143_963, 808_222.016_473_88, -11_783_142.139_647_465]),
 ];
 
-/// Time from one of them to the next \[s\]: a vehicle can fly that far.
+/// Time between two successive known places \[s\], long enough for a vehicle to fly from one to the next.
 const APART_S: i32 = 2000;
 
 fn read(text: &str, options: &ReadOptions) -> Result<Whole, ReadError> {
@@ -205,7 +205,7 @@ fn a_place_that_no_vehicle_reaches_in_the_time_is_refused() {
         places.map(|(second, place)| ("/r1/fix", kind, "cdr", 1 + u64::from(second != 0), fix(second, 0, place)));
     let error = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect_err("refused");
     assert!(error.to_string().contains("jumps"), "{error}");
-    // A satellite stays below, and a receiver that jumps by less than a kilometre is not taken for wrong.
+    // A satellite is slower than the limit, and a jump of less than 1 km is accepted.
     assert_eq!(whole("t_s,id,lat,lon,alt\n0,a,0,8,400000\n10,a,0,8.6,400000\n").items.len(), 2);
     assert_eq!(whole("t_s,id,lat,lon,alt\n0,a,47,8,400\n0.001,a,47.005,8,400\n").items.len(), 2);
 }
@@ -221,7 +221,7 @@ fn a_vehicle_in_degrees_beside_one_in_metres_is_refused() {
     }
     let both = whole("t,A.lat,A.lon,A.alt,A.x,A.y,A.z\n0,47,8,400,1,2,3\n");
     assert_eq!(both.samples(), [(0.0, "A", [1.0, 2.0, 3.0])]);
-    // Columns of a name beside those of rows may be a vehicle of their own.
+    // Columns of a named vehicle beside `x`, `y`, `z` may be a second vehicle.
     for header in ["t,x,y,z,B.x,B.y,B.z", "t,x,y,z,b.lat,b.lon,b.alt"] {
         let error = read(&format!("{header}\n0,1,2,3,4,5,6\n"), &ReadOptions::default()).expect_err(header);
         assert!(error.help().contains("--one-vehicle"), "{}", error.help());

@@ -226,7 +226,8 @@ impl Outcome {
         self.tallies.violations.listed = self.violations.len();
     }
 
-    /// Drops violations that something else refutes. Where none is left, and all were listed, the verdict is that without them.
+    /// Removes the violations for which `is_refuted` holds. The verdict is recomputed if no violation remains and all of them
+    /// were listed.
     pub fn refute_violations(
         &mut self,
         mut is_refuted: impl FnMut(&Violation<ObjectPair>) -> bool,
@@ -263,14 +264,16 @@ impl Outcome {
         }
     }
 
-    /// Whether some two vehicles are known to have come closer than a pair did, by what was judged.
+    /// Whether the judged motion contains a pair that came closer than `closest`, beyond rounding.
     #[must_use]
     pub fn contradicts(&self, closest: ClosestApproach) -> bool {
         self.closest.iter().any(|of| of.upper_m < closest.separation_m * (1.0 - SAME))
     }
 
-    /// Takes it that no two vehicles came closer than a pair did, as a judge of finer steps found: pairs that are drawn closer, by
-    /// what straight lines leave, were as far apart at least. Distances of the same instant differ by rounding: the smaller counts.
+    /// Raises closest approaches to the smallest separation that an audit of finer steps found.
+    ///
+    /// Straight lines between samples can lead a pair closer than that. Where the two distances differ only by rounding, the
+    /// smaller one is kept.
     pub fn raise_to(&mut self, closest: ClosestApproach) {
         let (pair, claimed_m) = (ObjectPair::Vehicles(closest.pair), closest.separation_m);
         let is_judged = self.span_s.is_some_and(|(from_s, to_s)| from_s <= closest.time_s && closest.time_s <= to_s);
