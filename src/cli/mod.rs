@@ -36,6 +36,7 @@ mod open;
 mod outputs;
 mod own;
 mod own_obstacles;
+mod own_told;
 mod pictures;
 mod places;
 mod reading;

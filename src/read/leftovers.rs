@@ -112,14 +112,15 @@ impl Watch {
 fn of_vehicles<'a>(column: &'a str, vehicles: &[String]) -> Vec<(usize, &'a str)> {
     let (stem, unit) = units::bracketed(column);
     let rest = |vehicle: &String| {
-        if unit == Some(vehicle) {
+        let ends_in_digit = |name: &str| name.ends_with(|c: char| c.is_ascii_digit());
+        if unit == Some(vehicle) && !ends_in_digit(stem) {
             return Some(stem);
         }
         let is_number = vehicle.bytes().all(|byte| byte.is_ascii_digit());
         let behind = stem.strip_prefix(vehicle.as_str()).and_then(|rest| rest.strip_prefix(SEPARATORS));
         behind.or_else(|| {
             let before = stem.strip_suffix(vehicle.as_str())?;
-            let ends_alone = |before: &&str| is_number && !before.ends_with(|c: char| c.is_ascii_digit());
+            let ends_alone = |before: &&str| is_number && !ends_in_digit(before);
             before.strip_suffix(SEPARATORS).or_else(|| Some(before).filter(ends_alone))
         })
     };

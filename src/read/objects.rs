@@ -307,7 +307,7 @@ mod tests {
         assert_eq!(keys.join(" "), expected);
         assert_eq!((&flat[2].1, &flat[8].1), (&Cell::Real(2.5), &Cell::Text("a".to_owned())));
         for wrong in ["[1]", r#"{"t": 1, "t": 2}"#, r#"{"t": NaN}"#, r#"{"t": 1} x"#, r#"{"t": "#] {
-            assert!(take_apart(wrong.as_bytes(), &mut Vec::new()).is_err(), "{wrong}");
+            assert!(take_apart(wrong.as_bytes(), &mut Vec::new(), &mut Vec::new()).is_err(), "{wrong}");
         }
     }
 }

@@ -132,6 +132,16 @@ fn a_list_of_objects_that_gets_shorter_must_name_its_vehicles() {
     let named = "{\"t\": 0, \"d\": [{\"id\": \"a\", \"x\": 0, \"y\": 0}, {\"id\": \"b\", \"x\": 5, \"y\": 0}]}\n{\"t\": 0.5, \"d\": [{\"id\": \"b\", \"x\": 5, \"y\": 0}]}\n";
     let found = whole("f.jsonl", named);
     assert_eq!(found.samples()[1..], [(0.0, "b", [5.0, 0.0, 0.0]), (0.5, "b", [5.0, 0.0, 0.0])]);
+    let posed = "{\"t\": 0, \"d\": [{\"id\": \"a\", \"pose\": {\"x\": 0, \"y\": 0}}, {\"id\": \"b\", \"pose\": {\"x\": 5, \"y\": 0}}]}\n{\"t\": 0.5, \"d\": [{\"id\": \"b\", \"pose\": {\"x\": 5, \"y\": 0}}]}\n";
+    assert_eq!(whole("f.jsonl", posed).samples()[2], (0.5, "b", [5.0, 0.0, 0.0]));
+    // An element that is null, a list that is empty or missing, and keys that are numbers leave nothing open.
+    let two = "[{\"x\": 0, \"y\": 0}, {\"x\": 5, \"y\": 0}]";
+    for more in ["[{\"x\": 0, \"y\": 0}, null]", "[]", "null"] {
+        let text = format!("{{\"t\": 0, \"d\": {two}}}\n{{\"t\": 0.5, \"d\": {more}}}\n{{\"t\": 1, \"d\": {two}}}\n");
+        assert_eq!(whole("f.jsonl", &text).vehicles, ["d.0", "d.1"], "{more}");
+    }
+    let keyed = "{\"t\": 0, \"d\": {\"7\": {\"x\": 0, \"y\": 0}, \"12\": {\"x\": 5, \"y\": 0}}}\n{\"t\": 0.5, \"d\": {\"7\": {\"x\": 0, \"y\": 0}}}\n";
+    assert_eq!(whole("f.jsonl", keyed).samples().len(), 3);
 }
 
 #[test]

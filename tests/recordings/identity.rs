@@ -333,3 +333,21 @@ fn columns_of_a_further_vehicle_are_not_dropped() {
         assert_eq!(found.vehicles, ["1", "2"], "{more}");
     }
 }
+
+#[test]
+fn quantities_of_a_vehicle_are_no_names_and_no_further_vehicles() {
+    // A course over ground, a type of vehicle, attitudes and accelerations beside positions.
+    for [first, second] in
+        [["track", "track"], ["model", "model"], ["ax", "ay"], ["qx", "qy"], ["tx", "ty"], ["xdot", "ydot"]]
+    {
+        let header = format!("t_s,m.x,m.y,m.{first},m.{second}2,n.x,n.y,n.{first},n.{second}2");
+        let rows: String = (0..4).map(|k| format!("{k},{k},0,{k}.5,1,9,{k},{k}.25,1\n")).collect();
+        let found = read(&format!("{}\n{rows}", header.replace("2,", ",").trim_end_matches('2'))).expect(first);
+        assert_eq!(found.vehicles, ["m", "n"], "{first}");
+    }
+    // Words that may be names are refused where their values change places, and so are names that never come again.
+    let moved = "t_s,m.x,m.y,m.track,n.x,n.y,n.track\n0,0,0,a,9,0,b\n1,8,0,b,1,0,a\n";
+    assert!(read(moved).expect_err("change places").to_string().contains("change places"));
+    let new = "t_s,m.x,m.y,m.id,n.x,n.y,n.id\n0,0,0,1,9,0,2\n1,8,0,3,1,0,4\n2,8,0,5,1,0,6\n";
+    assert!(read(new).expect_err("numbers").to_string().contains("another value in each row"));
+}
