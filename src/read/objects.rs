@@ -134,20 +134,22 @@ fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(Stri
         return Err(refused("it does not begin with a brace".to_owned()));
     }
     let mut json = serde_json::Deserializer::from_slice(line);
-    Flat { key: String::new(), flat, lists }.deserialize(&mut json).map_err(|error| refused(error.to_string()))?;
+    Flat { key: String::new(), cells: flat, lists }
+        .deserialize(&mut json)
+        .map_err(|error| refused(error.to_string()))?;
     json.end().map_err(|error| refused(error.to_string()))
 }
 
 /// What appends a value under its key, or those in it under theirs.
 struct Flat<'a> {
     key: String,
-    flat: &'a mut Vec<(String, Cell)>,
+    cells: &'a mut Vec<(String, Cell)>,
     lists: &'a mut Vec<(String, usize)>,
 }
 
 impl Flat<'_> {
     fn push(self, cell: Cell) {
-        self.flat.push((self.key, cell));
+        self.cells.push((self.key, cell));
     }
 }
 
@@ -204,21 +206,21 @@ impl<'de> Visitor<'de> for Flat<'_> {
             }
             let whole = if self.key.is_empty() { key.clone() } else { format!("{}.{key}", self.key) };
             known.push(key);
-            map.next_value_seed(Flat { key: whole, flat: self.flat, lists: self.lists })?;
+            map.next_value_seed(Flat { key: whole, cells: self.cells, lists: self.lists })?;
         }
         Ok(())
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
-        let (before, mut count) = (self.flat.len(), 0);
+        let (before, mut count) = (self.cells.len(), 0);
         loop {
-            let element = Flat { key: format!("{}.{count}", self.key), flat: self.flat, lists: self.lists };
+            let element = Flat { key: format!("{}.{count}", self.key), cells: self.cells, lists: self.lists };
             if list.next_element_seed(element)?.is_none() {
                 break;
             }
             count += 1;
         }
-        let elements = &mut self.flat[before..];
+        let elements = &mut self.cells[before..];
         let depth = |key: &str| key.bytes().filter(|&byte| byte == b'.').count();
         let own = depth(&self.key) + 1;
         if elements.iter().any(|(key, _)| depth(key) > own) {
