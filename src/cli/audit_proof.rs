@@ -13,6 +13,7 @@ use super::audit_arguments::AuditArguments;
 use super::open::Open;
 use crate::audit::Status;
 use crate::audit::recorded::{Motion, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
+use crate::read;
 use crate::report::recorded::Clock;
 use crate::report::write_atomically;
 
@@ -20,6 +21,8 @@ use crate::report::write_atomically;
 const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];
 /// Names of all other columns that it reads.
 const COLUMNS: [&str; 4] = ["id", "x", "y", "z"];
+/// Names of columns that straight lines between samples do not need.
+const VELOCITIES: [&str; 3] = ["vx", "vy", "vz"];
 
 /// The content of the file.
 #[derive(Serialize)]
@@ -91,7 +94,16 @@ fn is_table(path: &Path) -> bool {
     let Ok(header) = lines.headers() else { return false };
     let names: Vec<&str> = header.iter().map(|name| name.trim().trim_start_matches('\u{feff}')).collect();
     let count = |wanted: &[&str]| names.iter().filter(|name| wanted.contains(name)).count();
-    count(&TIMES) == 1 && COLUMNS.iter().all(|column| count(&[column]) == 1)
+    let is_known = |name: &str| TIMES.contains(&name) || COLUMNS.contains(&name) || VELOCITIES.contains(&name);
+    let are_others_unread = names.iter().all(|name| is_known(name) || !read::is_read(name));
+    let is_plain = count(&TIMES) == 1 && COLUMNS.iter().all(|column| count(&[column]) == 1) && are_others_unread;
+    // A row of units below the header has no digit in the column of the time.
+    let time = names.iter().position(|name| TIMES.contains(name));
+    let first = lines.records().next().and_then(Result::ok);
+    let has_units = time
+        .zip(first)
+        .is_some_and(|(time, row)| row.get(time).is_some_and(|cell| !cell.bytes().any(|byte| byte.is_ascii_digit())));
+    is_plain && !has_units
 }
 
 /// Reads the recording again and writes the proof; what it says where there is none.

@@ -84,7 +84,8 @@ pub(super) struct ReadArguments {
 impl ReadArguments {
     /// Whether one file is read as it is, in metres.
     pub(super) fn is_read_plainly(&self) -> bool {
-        let is_moved = self.scale.is_some() || self.axes.is_some();
+        let is_moved =
+            self.scale.is_some() || self.axes.is_some() || self.frames_per_s.is_some() || self.time_scale.is_some();
         let is_chosen = self.sort || self.one_vehicle || self.duplicates.is_some();
         self.more.is_empty() && self.columns.is_empty() && !is_moved && !is_chosen
     }
