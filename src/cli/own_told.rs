@@ -93,8 +93,8 @@ impl Near {
         std::mem::take(&mut self.ended)
     }
 
-    /// Those that last to the last sample. Where the recording does not tell their smallest distance, nobody came closer than it
-    /// says of all, and at the last sample they are as far apart as it says.
+    /// Returns the violations that last to the last sample. Where the recording does not tell the smallest distance of a pair, the
+    /// smallest distance of all pairs bounds it from below, and the distance at the last sample from above.
     pub(super) fn lasting(
         mut self,
         last: &OwnedSample,

@@ -314,8 +314,8 @@ fn groups_of_columns_that_are_named_in_each_row_are_vehicles_by_these_names() {
     }
     let some = read("t,id1,x1,y1,x2,y2\n0,a,1,2,3,4\n").expect_err("one of two");
     assert!(some.to_string().contains("there is no such column for `2`"), "{some}");
-    let nobody = read("t,id1,x1,y1,id2,x2,y2\n0,a,1,2,,3,4\n").expect_err("no name");
-    assert!(nobody.to_string().contains("line 2") && nobody.to_string().contains("id2"), "{nobody}");
+    let unnamed = read("t,id1,x1,y1,id2,x2,y2\n0,a,1,2,,3,4\n").expect_err("no name");
+    assert!(unnamed.to_string().contains("line 2") && unnamed.to_string().contains("id2"), "{unnamed}");
     assert_eq!(read("t,id1,x1,y1,id2,x2,y2\n0,a,1,2,,,\n").expect("not seen").vehicles, ["a"]);
 }
 
