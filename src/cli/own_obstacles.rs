@@ -240,4 +240,16 @@ mod tests {
         assert_eq!((heights.status, heights.undecided.len()), (Status::Undecided, 1));
         assert_eq!(heights.separation, Some(Status::Undecided));
     }
+
+    #[test]
+    fn a_violation_between_samples_is_dropped_and_one_at_a_sample_stays() {
+        let clear = OwnObstacles { closest: seen().closest, ..seen() };
+        for (samples_s, is_dropped) in [([0.0, 10.0], true), ([0.0, 5.0], false), ([4.0, 10.0], false)] {
+            let mut outcome = judged(&seen(), Settings::default());
+            clear.refute(&mut outcome, &Settings::default(), &samples_s);
+            let expected = if is_dropped { Status::Clear } else { Status::Violation };
+            assert_eq!((outcome.status, outcome.violations.is_empty()), (expected, is_dropped), "{samples_s:?}");
+            assert_eq!(outcome.tallies.violations.count, u64::from(!is_dropped));
+        }
+    }
 }

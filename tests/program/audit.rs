@@ -183,6 +183,11 @@ fn wrong_input_is_named_with_its_remedy_and_exits_with_2() {
         (&["pass.csv", "--delta", "1", "--obstacles", "none.toml"], "none.toml"),
         (&["pass.csv", "--ellipsoid", "1,2"], "three half axes"),
         (&["pass.csv", "--delta", "1", "--offset", "alpha"], "NAME=SECONDS"),
+        (
+            &["pass.csv", "--delta", "1", "--offset", "alpha=1", "--offset", "alpha=2"],
+            "--offset: two values for vehicle alpha",
+        ),
+        (&["pass.csv", "--radius", "0.1", "--radius", "0.2"], "--radius: two values for all vehicles"),
         (&["none.csv", "--delta", "1"], "none.csv"),
         (&["text.csv", "--delta", "1"], "line 2"),
         (&["pass.csv", "--delta", "2", "--ids", "alpha"], "1 vehicle to judge, and nothing to keep apart"),
