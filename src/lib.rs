@@ -35,57 +35,41 @@
 //! per vehicle. Vehicles are counted from 0 in code and from 1 in everything a person reads. Equation numbers are those
 //! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
 
-#[cfg(feature = "reports")]
 pub mod attack;
 pub mod audit;
-#[cfg(feature = "campaigns")]
 pub mod campaign;
-#[cfg(feature = "program")]
 pub mod cli;
-#[cfg(feature = "reports")]
 pub mod compare;
-#[cfg(feature = "ideal")]
 pub mod continuous;
-#[cfg(feature = "recordings")]
 pub mod export;
 pub mod feedback;
-#[cfg(feature = "reports")]
 pub mod figures;
 pub mod formation;
 pub mod graph;
 pub mod law;
 pub mod link;
-#[cfg(feature = "reports")]
 pub mod margin;
 pub mod metrics;
 pub mod observation;
-#[cfg(any(feature = "pictures", feature = "reports"))]
 pub mod plan;
 pub mod plant;
 pub mod preflight;
-#[cfg(feature = "recordings")]
 pub mod read;
 pub mod record;
-#[cfg(feature = "pictures")]
+#[cfg(feature = "viewer")]
 pub mod render;
-#[cfg(feature = "reports")]
 pub mod replay;
-#[cfg(feature = "reports")]
 pub mod report;
-#[cfg(feature = "reports")]
 pub mod run;
 pub mod scenario;
 pub mod sim;
 pub mod space;
-#[cfg(feature = "reports")]
 pub mod splitting;
-#[cfg(feature = "reports")]
 pub mod statistics;
 pub mod swarm;
 pub mod target;
 mod text;
 pub mod track;
-#[cfg(feature = "reports")]
 pub mod validate;
 pub mod vehicle;
 pub mod wind;

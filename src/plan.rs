@@ -7,12 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 use crate::formation::{Formation, Freedom, RigidMotion, best_rigid_motion};
 use crate::graph::Graph;
 use crate::law::LawSpec;
-#[cfg(feature = "pictures")]
+#[cfg(feature = "viewer")]
 use crate::law::{EdgeTension, EdgeTensionKeys};
 use crate::record::Event;
 use crate::scenario::Scenario;
 use crate::space::Obstacle;
-#[cfg(feature = "pictures")]
+#[cfg(feature = "viewer")]
 use crate::swarm::{Pair, row};
 use crate::swarm::{Rows, mean_row};
 use crate::target::{Course, Guidance};
@@ -97,26 +97,23 @@ impl Plan {
     }
 
     /// Where the slots are at a time \[s\], laid over the vehicles \[m\]; none where positions are not known.
-    #[cfg(feature = "pictures")]
+    #[cfg(feature = "viewer")]
     pub(crate) fn slots_at(&self, time_s: f64, positions_m: &Rows) -> Option<Vec<Vector3<f64>>> {
         let (laid, slots_m) = (self.laid_at(time_s, positions_m)?, &self.formation_at(time_s).slots_m);
         Some((0..slots_m.nrows()).map(|k| laid.apply(row(slots_m, k))).collect())
     }
 
     /// From when on each of the formations is under way \[s\], in order of time; the first from the start.
-    #[cfg(feature = "reports")]
     pub(crate) fn formations(&self) -> Vec<(f64, &Formation)> {
         self.course.formations()
     }
 
     /// Safety distance \[m\].
-    #[cfg(feature = "reports")]
     pub(crate) fn delta_m(&self) -> f64 {
         self.delta_m
     }
 
     /// Whether edges have a tension, and are no springs.
-    #[cfg(feature = "reports")]
     pub(crate) fn has_tension(&self) -> bool {
         matches!(self.law, LawSpec::EdgeTension(_))
     }
@@ -126,7 +123,7 @@ impl Plan {
     ///
     /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
     /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: its elongation over the desired distance.
-    #[cfg(feature = "pictures")]
+    #[cfg(feature = "viewer")]
     #[expect(clippy::cast_possible_truncation, reason = "the share of a colour")]
     pub(crate) fn tension(&self, pair: Pair, distance_m: f64, time_s: f64) -> f32 {
         let tension = match self.edge_tension(pair, time_s) {
@@ -145,14 +142,14 @@ impl Plan {
     }
 
     /// How much longer a distance \[m\] is than the desired one, over that one.
-    #[cfg(feature = "pictures")]
+    #[cfg(feature = "viewer")]
     pub(crate) fn elongation(&self, pair: Pair, distance_m: f64, time_s: f64) -> f64 {
         let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
         (distance_m - rest_m) / rest_m
     }
 
     /// Alpha \[m^2/s^2\] and the tension of an edge, where the law has one.
-    #[cfg(feature = "pictures")]
+    #[cfg(feature = "viewer")]
     fn edge_tension(&self, pair: Pair, time_s: f64) -> Option<(f64, EdgeTension)> {
         let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = self.law else { return None };
         let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());

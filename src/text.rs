@@ -1,5 +1,4 @@
 //! Numbers as people read them.
-#![cfg_attr(not(feature = "program"), allow(dead_code, reason = "each feature says some of them"))]
 
 use std::fmt::Write as _;
 

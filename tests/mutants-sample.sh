@@ -15,7 +15,7 @@ seed=${2:-1}
 from=${3:-1}
 to=${4:-$count}
 timeout=${TAUTLINE_MUTANT_TIMEOUT:-100}
-quick="--no-default-features --features=files --lib --test=audit --test=bits"
+quick="--no-default-features --lib --test=audit --test=bits"
 slow="--test=flights --test=allocations --test=program"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 scratch=$(mktemp -d)

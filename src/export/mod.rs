@@ -10,7 +10,6 @@ mod csv;
 mod error;
 mod mcap;
 mod npz;
-#[cfg(feature = "parquet")]
 mod parquet;
 mod sampled;
 mod source;
@@ -24,13 +23,7 @@ use crate::read::{Channels, ReadError, Recording};
 use source::Source;
 
 /// The formats that are written; files of each have its name as their extension.
-pub const WRITTEN: &[Format] = &[
-    Format::Csv,
-    #[cfg(feature = "parquet")]
-    Format::Parquet,
-    Format::Npz,
-    Format::Mcap,
-];
+pub const WRITTEN: &[Format] = &[Format::Csv, Format::Parquet, Format::Npz, Format::Mcap];
 
 /// How a recording is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -82,7 +75,6 @@ pub fn export_with(
     let mut exported = Exported { vehicles: about.names.len(), samples: about.samples, notes: about.notes.clone() };
     match format {
         Format::Csv => exported.notes.extend(csv::write(&source, &about, file)?),
-        #[cfg(feature = "parquet")]
         Format::Parquet => parquet::write(&source, &about, file)?,
         Format::Npz => npz::write(&source, &about, file)?,
         Format::Mcap => mcap::write(&source, &about, file)?,

@@ -3,9 +3,7 @@
 //! Laws that control distances reach a formation only up to a rotation, a reflection and a translation, so the errors
 //! here do not see those either.
 
-#[cfg(feature = "files")]
 mod assignment;
-#[cfg(feature = "shapes")]
 mod drawn;
 mod edges;
 mod fit;
@@ -17,9 +15,7 @@ use nalgebra::Vector3;
 use crate::space::closest_pair;
 use crate::swarm::{Pair, Rows, row, separation, set_row};
 
-#[cfg(feature = "files")]
 pub use assignment::{most_assigned, optimal_slots, optimal_slots_around};
-#[cfg(feature = "shapes")]
 pub use drawn::{Drawing, DrawingError, Ink, MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
 pub use edges::{edges_looked_at, largest_edge_error_m};
 pub use fit::{Freedom, PositionError, RigidMotion, best_rigid_motion, procrustes_rms_m};

@@ -19,8 +19,7 @@ use crate::swarm::{Pair, Rows, row, set_row};
 const LEAST_CLEARANCE: f64 = 1e-6;
 
 /// Keys of `[law]` with `kind = "cbf-qp"`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CbfQpKeys {
     /// Gain of the nominal controller on the way to the slot in 1/s^2.

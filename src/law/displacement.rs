@@ -28,8 +28,7 @@ use crate::swarm::{Pair, Rows, row, set_row};
 use crate::target::{Settling, Target};
 
 /// Keys of `[law]` with `kind = "displacement"`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DisplacementKeys {
     /// Gain on positions over links in 1/s^2, before it is divided by the graph's algebraic connectivity.

@@ -24,8 +24,7 @@ use crate::swarm::{Pair, Rows, Swarm, row, separation};
 use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "edge-tension"`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EdgeTensionKeys {
     /// Scale of the tension in m^2/s^2.

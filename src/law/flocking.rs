@@ -26,8 +26,7 @@ const BUMP: f64 = 0.2;
 const REACH: f64 = 1.2;
 
 /// Keys of `[law]` with `kind = "flocking"`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlockingKeys {
     /// Gain c1 on distances to near vehicles in 1/s^2; velocities are matched with 2 sqrt(c1).

@@ -18,8 +18,7 @@ use crate::observation::Observation;
 use crate::swarm::{Rows, row};
 
 /// Keys of `[law]` with `kind = "laplacian"`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LaplacianKeys {
     /// Gain on positions in 1/s^2.

@@ -22,8 +22,7 @@ use crate::swarm::{Pair, Rows, row, set_row};
 const MARGIN: f64 = 0.01;
 
 /// Keys of `[law]` with `kind = "orca"`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OrcaKeys {
     /// Preferred velocity towards the slot for each metre that it is away, in 1/s.

@@ -19,8 +19,7 @@ use crate::swarm::{Pair, Rows, row, set_row};
 use crate::target::Target;
 
 /// Keys of `[law]` with `kind = "potential"`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PotentialKeys {
     /// Gain on positions over links in 1/s^2.

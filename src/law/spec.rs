@@ -16,8 +16,8 @@ use super::setting::{Gain, Setting};
 macro_rules! laws {
     ($($(#[doc = $doc:literal])+ $kind:ident($keys:ty),)+) => {
         /// A control law and its parameters, as `[law]` of a scenario gives them.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(tag = "kind"))]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+        #[schemars(tag = "kind")]
         #[serde(rename_all = "kebab-case")]
         pub enum LawSpec {
             $($(#[doc = $doc])+ $kind($keys),)+

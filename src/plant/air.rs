@@ -55,7 +55,6 @@ impl Air {
     }
 
     /// How long the wind is smooth from so many seconds before now on \[s\].
-    #[cfg(feature = "ideal")]
     pub(crate) fn smooth_s(&self, before_s: f64) -> f64 {
         let time_s = self.wind.now_s() - before_s;
         self.wind.next_turn_s(time_s) - time_s

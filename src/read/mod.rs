@@ -43,7 +43,6 @@ mod npz;
 mod objects;
 mod options;
 mod order;
-#[cfg(feature = "parquet")]
 pub(crate) mod parquet;
 mod places;
 mod recognise;
@@ -59,7 +58,6 @@ mod units;
 mod vicon;
 mod vviz;
 
-#[cfg(feature = "parquet")]
 pub use self::parquet::is_guarded;
 pub use axes::Axes;
 pub use clock::TimeUnit;
@@ -213,13 +211,7 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
         Format::Mcap => mcap::open(source, options),
         Format::Ulog => ulog::open(source, options),
         Format::Npz => npz::open(source, options),
-        #[cfg(feature = "parquet")]
         Format::Parquet => parquet::open(source, options),
-        #[cfg(not(feature = "parquet"))]
-        Format::Parquet => {
-            let problem = "it is a Parquet file, which this build does not read";
-            Err(Fault::content(problem, "build it with the feature of the format's name").into())
-        }
         Format::Skybrush => skybrush::open(source, options),
         Format::Vviz => vviz::open(source, options),
         Format::Motive => motive::open(source, options),

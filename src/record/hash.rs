@@ -66,11 +66,9 @@ fn append_rows(bytes: &mut Vec<u8>, rows: &Rows) {
 }
 
 /// SHA-256 over messages, each with the name of its topic and its length.
-#[cfg(feature = "recordings")]
 #[derive(Clone, Debug, Default)]
 pub(super) struct MessageHash(Sha256);
 
-#[cfg(feature = "recordings")]
 impl MessageHash {
     pub(super) fn take(&mut self, topic: &str, message: &[u8]) {
         self.0.update(topic.as_bytes());

@@ -6,7 +6,6 @@
 mod beside;
 mod error;
 mod hash;
-#[cfg(feature = "recordings")]
 pub mod mcap;
 
 pub use beside::record_beside;

@@ -1,11 +1,8 @@
 //! `[actuation]`: how commands become accelerations.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
-#[cfg(feature = "files")]
 use serde::{Deserialize, Serialize};
 
-#[cfg(feature = "files")]
 use super::error::ScenarioError;
 
 /// How commands become accelerations: as given and at once unless given.
@@ -18,26 +15,23 @@ pub struct ActuationSpec {
 }
 
 /// How commands become accelerations.
-#[cfg(feature = "files")]
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ActuationTable {
     /// How often the law is asked in Hz, each command being held in between: the same as `time.control_hz`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) control_hz: Option<f64>,
     /// No vehicle is accelerated by more than this in m/s^2: longer commands are shortened, in their direction.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     max_accel_m_s2: Option<f64>,
     /// Time constant in s with which the acceleration follows the command, lag a' = u - a, from none at the start.
     #[serde(skip_serializing_if = "super::sensing::is_off")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0, "minimum" = 0)))]
+    #[schemars(extend("default" = 0.0, "minimum" = 0))]
     lag_s: f64,
 }
 
-#[cfg(feature = "files")]
 impl ActuationTable {
     /// The control rate \[Hz\], of which `[time]` has the same key.
     pub(super) fn control_hz(&self, of_time_hz: Option<f64>) -> Result<Option<f64>, ScenarioError> {
@@ -57,7 +51,6 @@ impl ActuationTable {
     }
 }
 
-#[cfg(feature = "files")]
 impl From<ActuationSpec> for ActuationTable {
     fn from(spec: ActuationSpec) -> Self {
         Self { control_hz: None, max_accel_m_s2: spec.max_accel_m_s2, lag_s: spec.lag_s }

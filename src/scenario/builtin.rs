@@ -47,7 +47,6 @@ const ALL: &[Builtin] = &[
         summary: "twelve vehicles change places across a circle under the displacement law: clear and reached",
         toml: include_str!("../../assets/swap.toml"),
     },
-    #[cfg(feature = "shapes")]
     Builtin {
         name: "show",
         summary: "a hundred vehicles write two words and end in rings, certified through all legs: clear and reached",

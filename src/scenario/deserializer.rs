@@ -28,7 +28,6 @@ pub(super) struct KeyError {
     /// Where it stands in the text.
     pub(super) span: Option<Range<usize>>,
     /// Whether the type of the value asks for a whole number, which the value is not.
-    #[cfg_attr(not(feature = "reports"), allow(dead_code, reason = "only reports vary keys"))]
     pub(super) asks_for_whole: bool,
 }
 

@@ -3,7 +3,6 @@
 //! Read by `deserializer`, made into a flight by `build`; `resolved` makes it back from a flight and writes it. A table
 //! whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all choices.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +16,6 @@ use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::safety::SafetyTable;
 use super::sensing::SensingSpec;
-#[cfg(feature = "shapes")]
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
 use super::shapes::{HelixKeys, SpacingKeys, VKeys};
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG};
@@ -30,12 +28,12 @@ use crate::target::{Arrival, Breathing};
 
 /// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
 /// entries of every list, are counted from 1.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(title = "tautline scenario"))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(title = "tautline scenario")]
 #[serde(deny_unknown_fields)]
 pub(super) struct Document {
     /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`. The file's name unless given.
-    #[cfg_attr(feature = "schema", schemars(length(min = 1, max = 64), pattern("^[A-Za-z0-9_-]+$")))]
+    #[schemars(length(min = 1, max = 64), pattern("^[A-Za-z0-9_-]+$"))]
     pub(super) name: Option<String>,
     /// The vehicles.
     #[serde(default)]
@@ -45,7 +43,7 @@ pub(super) struct Document {
     pub(super) vehicle: VehicleTable,
     /// Air that moves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "WindTable"))]
+    #[schemars(with = "WindTable")]
     pub(super) wind: Option<WindTable>,
     /// What must stay empty around each: a ball unless given.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -62,7 +60,7 @@ pub(super) struct Document {
     pub(super) obstacle: Vec<ObstacleTable>,
     /// A motion that the formations are carried along with; slots are places then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "ReferenceTable"))]
+    #[schemars(with = "ReferenceTable")]
     pub(super) reference: Option<ReferenceTable>,
     /// The control law.
     pub(super) law: LawTable,
@@ -110,17 +108,16 @@ impl Document {
 }
 
 /// The vehicles.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct SwarmTable {
     /// Number of vehicles N. Needed where neither the start nor the formation lists points; checked against them
     /// where they do.
-    #[cfg_attr(feature = "schema", schemars(range(min = 2)))]
+    #[schemars(range(min = 2))]
     pub(super) count: Option<u64>,
     /// 2 keeps the swarm in the plane z = 0, 3 lets it use all axes. Without it: 2 when every position, velocity and
     /// slot has z = 0, otherwise 3.
-    #[cfg_attr(feature = "schema", schemars(range(min = 2, max = 3)))]
+    #[schemars(range(min = 2, max = 3))]
     pub(super) dimensions: Option<u64>,
     /// Mass of points in kg: one number for all vehicles or a list with one for each. Laws command accelerations, so it changes no
     /// motion until hulls touch; the ideal plant's vehicles are points and have no use for it.
@@ -134,8 +131,7 @@ pub(super) struct SwarmTable {
 }
 
 /// Where the vehicles start: `positions_m`, or a `shape` with its parameters.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StartTable {
     /// Position of each vehicle in m.
@@ -145,23 +141,23 @@ pub(super) struct StartTable {
     /// Largest random offset along each axis in m, uniform, added to every position. Along z only in three
     /// dimensions.
     #[serde(default, skip_serializing_if = "is_default")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
+    #[schemars(extend("default" = 0.0))]
     pub(super) jitter_m: f64,
     /// Seed of the random numbers (`ChaCha8`, the same on every machine).
     #[serde(default, skip_serializing_if = "is_default")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 0)))]
+    #[schemars(extend("default" = 0))]
     pub(super) seed: u64,
     /// Whether vehicles take the start's places in an order that is drawn by `seed`.
     #[serde(default, skip_serializing_if = "is_default")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = false)))]
+    #[schemars(extend("default" = false))]
     pub(super) shuffle: bool,
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub(super) shape: Option<StartShape>,
 }
 
 /// A start without a list of positions.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(tag = "shape"))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "shape")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum StartShape {
     /// Vehicles 1, 2, ... along x.
@@ -194,63 +190,60 @@ pub(super) enum StartShape {
 }
 
 /// The slots of the formation. Laws that control distances reach it up to rotation, reflection and translation.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FormationTable {
     /// Who flies to which slot.
     #[serde(default, skip_serializing_if = "is_default")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = "given")))]
+    #[schemars(extend("default" = "given"))]
     pub(super) assignment: Assignment,
     /// The slots are scaled by this about their centre.
     #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 1.0)))]
+    #[schemars(extend("default" = 1.0))]
     pub(super) scale: f64,
     /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
     #[serde(default, skip_serializing_if = "is_default")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
+    #[schemars(extend("default" = 0.0))]
     pub(super) yaw_deg: f64,
     /// Then they are moved by this in m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Point"))]
+    #[schemars(with = "Point")]
     pub(super) move_m: Option<Point>,
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub(super) shape: FormationShape,
 }
 
 /// A formation after the first: a `shape`, or the one before it, placed anew.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LegTable {
     /// Time at which it begins in s, or when the one before it begins if that is later; `"reached"`, once that one is reached,
     /// unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "LegStart"))]
+    #[schemars(with = "LegStart")]
     pub(super) start_s: Option<LegStart>,
     /// Who flies to which slot, from the slots before.
     #[serde(default, skip_serializing_if = "is_default")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = "given")))]
+    #[schemars(extend("default" = "given"))]
     pub(super) assignment: Assignment,
     /// The slots are scaled by this about their centre.
     #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 1.0)))]
+    #[schemars(extend("default" = 1.0))]
     pub(super) scale: f64,
     /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
     #[serde(default, skip_serializing_if = "is_default")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
+    #[schemars(extend("default" = 0.0))]
     pub(super) yaw_deg: f64,
     /// Then they are moved by this in m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Point"))]
+    #[schemars(with = "Point")]
     pub(super) move_m: Option<Point>,
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub(super) shape: Option<FormationShape>,
 }
 
 /// Who flies to which slot.
-#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Assignment {
     /// Each vehicle to the slot of its number.
@@ -266,8 +259,8 @@ pub(super) enum Assignment {
 }
 
 /// A formation and its size.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(tag = "shape"))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "shape")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum FormationShape {
     /// Five slots: the corners of a house of side d, (0,0) (d,0) (d/2, sqrt3 d/2) (0, sqrt3 d) (d, sqrt3 d).
@@ -307,17 +300,13 @@ pub(super) enum FormationShape {
     /// A cubic grid, as near to a cube as the number allows.
     Cube(SpacingKeys),
     /// Letters, in the plane z = 0.
-    #[cfg(feature = "shapes")]
     Text(TextKeys),
     /// An SVG drawing, in the plane z = 0.
-    #[cfg(feature = "shapes")]
     Svg(SvgKeys),
     /// The dark or opaque part of a picture, in the plane z = 0.
-    #[cfg(feature = "shapes")]
     #[serde(alias = "mask")]
     Image(ImageKeys),
     /// A list of slots in a file.
-    #[cfg(feature = "shapes")]
     #[serde(alias = "points-file")]
     File(FileKeys),
     /// A list of slots.
@@ -331,21 +320,19 @@ pub(super) enum FormationShape {
 pub(super) const DEFAULT_KINDS: [(&str, &str); 2] = [("law", "edge-tension"), ("reference", "rest")];
 
 /// The control law and the safety distance.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LawTable {
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub(super) kind: LawSpec,
     /// Safety distance delta in m: every flight is judged by it, whatever the law. Needed unless `[safety]` has an ellipsoid.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "f64"))]
+    #[schemars(with = "f64")]
     pub(super) delta_m: Option<f64>,
 }
 
 /// The bodies that carry out the commands.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct PlantTable {
     /// What moves the vehicles.
@@ -353,8 +340,7 @@ pub(super) struct PlantTable {
 }
 
 /// A plant.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum PlantKind {
     /// Rapier rigid bodies, the command held over each step.

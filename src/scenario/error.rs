@@ -75,7 +75,6 @@ impl ScenarioError {
     }
 
     /// Its keys of `[formation]` are those of a leg after the first.
-    #[cfg(feature = "files")]
     pub(super) fn on_leg(mut self, leg: usize) -> Self {
         self.fields.iter_mut().filter(|field| field.key.starts_with("formation")).for_each(|field| field.leg = leg);
         self
@@ -87,7 +86,6 @@ impl ScenarioError {
         self
     }
 
-    #[cfg(feature = "files")]
     pub(super) fn with_place(mut self, place: Place) -> Self {
         self.place = Some(Box::new(place));
         self
@@ -112,7 +110,6 @@ impl ScenarioError {
     }
 
     /// All keys that are part of what is wrong.
-    #[cfg(feature = "files")]
     pub(super) fn fields(&self) -> &[Field] {
         &self.fields
     }

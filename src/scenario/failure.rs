@@ -1,27 +1,25 @@
 //! `[[failure]]`: a vehicle of which a part fails.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A vehicle of which a part fails, for the rest of the flight.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Failure {
     /// The vehicle, counted from 1.
-    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
+    #[schemars(range(min = 1))]
     pub vehicle: u64,
     /// From when on in s.
     pub at_s: f64,
     /// What fails.
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub kind: FailureKind,
 }
 
 /// What fails.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(tag = "kind"))]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[schemars(tag = "kind")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub enum FailureKind {
     /// It commands nothing any more: a point drifts on, a quadrotor's rotors stop.
@@ -29,11 +27,11 @@ pub enum FailureKind {
     /// A rotor of a quadrotor gives less thrust.
     Rotor {
         /// The rotor, counted from 1 as its model lists them.
-        #[cfg_attr(feature = "schema", schemars(range(min = 1, max = 4)))]
+        #[schemars(range(min = 1, max = 4))]
         rotor: u64,
         /// Share of its thrust that it still gives, from 0 to less than 1: none unless given.
         #[serde(default)]
-        #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0)))]
+        #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
         share: f64,
     },
     /// It sends nothing any more. Needs `network.rate_hz`.

@@ -7,7 +7,6 @@ use std::path::Path;
 use super::error::ScenarioError;
 
 /// The key that names the file of a formation.
-#[cfg(feature = "shapes")]
 pub(super) const KEY: &str = "formation.file";
 
 /// Largest file that is read \[bytes\].

@@ -1,6 +1,5 @@
 //! `[graph]` of the scenario file: its keys, and the graph that they mean.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,17 +13,16 @@ use crate::graph::{Graph, GraphError};
 const DEFAULT_DEGREE: u64 = 4;
 
 /// Which vehicles sense each other.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GraphTable {
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub(super) kind: GraphKind,
 }
 
 /// An undirected, connected graph.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(tag = "kind"))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "kind")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum GraphKind {
     /// Every pair.
@@ -33,7 +31,7 @@ pub(super) enum GraphKind {
     Star {
         /// That vehicle.
         #[serde(default = "first")]
-        #[cfg_attr(feature = "schema", schemars(extend("default" = 1), range(min = 1)))]
+        #[schemars(extend("default" = 1), range(min = 1))]
         hub: u64,
     },
     /// Each vehicle with the next, and the last with the first.
@@ -43,12 +41,12 @@ pub(super) enum GraphKind {
     /// A random tree, and as many random pairs more as it takes.
     Random {
         /// Links of a vehicle in the mean, but at least those of a tree; 4 unless given, or as many as there are others.
-        #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
+        #[schemars(range(min = 1))]
         degree: Option<u64>,
         /// Seed of the random numbers (`ChaCha8`, the same on every machine). Every run of a campaign has the same graph unless
         /// its `[vary]` says `"graph.seed" = "run"`.
         #[serde(default)]
-        #[cfg_attr(feature = "schema", schemars(extend("default" = 0)))]
+        #[schemars(extend("default" = 0))]
         seed: u64,
     },
     /// A list of pairs.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
@@ -16,11 +15,10 @@ use crate::law::LawSpec;
 pub(super) type Laws = BTreeMap<String, OtherLaw>;
 
 /// A law beside that of `[law]`, flown by `tautline compare` alone: the keys of its kind.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OtherLaw {
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub(super) kind: LawSpec,
 }
 

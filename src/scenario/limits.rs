@@ -28,7 +28,6 @@ pub const CONTACT_PREDICTION_M: f64 = 0.02;
 pub(super) const SLOT_MARGIN: f64 = 1e-9;
 
 /// Distance of the nearest slots unless given, as a multiple of delta.
-#[cfg(feature = "files")]
 pub(super) const DEFAULT_SPACING: f64 = 1.5;
 
 /// Longest name \[characters\].
@@ -95,14 +94,12 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
 }
 
 /// Number of pairs of `count` vehicles.
-#[cfg(feature = "files")]
 pub(super) fn pair_count(count: usize) -> u128 {
     let count = count as u128;
     count * count.saturating_sub(1) / 2
 }
 
 /// The next number upwards with four digits, or itself where there is none.
-#[cfg(feature = "files")]
 pub(super) fn rounded_up(number: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(number)) - 3.0);
     let digits = (number / unit).ceil();

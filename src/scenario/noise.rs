@@ -1,12 +1,10 @@
 //! The seed of whatever is random in a flight.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Chance in flight: wind, sensors, radio.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NoiseTable {
     /// Seed of every random number that is drawn in flight (`ChaCha8`, the same on every machine). The start has a seed of

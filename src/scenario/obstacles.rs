@@ -22,7 +22,6 @@
 //! ```
 
 use nalgebra::Vector3;
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,34 +33,33 @@ pub(crate) const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box
                                         at_m = [x, y, z] or, in a file for an audit, a path = [[t, x, y, z], ...]";
 
 /// A solid that is in the way: a name, one shape and where it is.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ObstacleTable {
     /// What it is called.
     pub(crate) name: String,
     /// A ball around its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Ball"))]
+    #[schemars(with = "Ball")]
     ball: Option<Ball>,
     /// A box around its place, upright.
     #[serde(rename = "box", default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Cuboid"))]
+    #[schemars(with = "Cuboid")]
     cuboid: Option<Cuboid>,
     /// Everything within a radius of a straight line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Capsule"))]
+    #[schemars(with = "Capsule")]
     capsule: Option<Capsule>,
     /// Everything behind a plane through its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "HalfSpace"))]
+    #[schemars(with = "HalfSpace")]
     half_space: Option<HalfSpace>,
     /// Its place in m; the origin for a capsule or a half-space unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     at_m: Option<[f64; 3]>,
     /// Times in s and places in m of one that moves, which a scenario has none of.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(skip))]
+    #[schemars(skip)]
     path: Option<Vec<[f64; 4]>>,
     /// Distance in m that the centre of a vehicle must keep from its surface; unless given, half of `law.delta_m`, or 0.02
     /// m more than the radius of the largest hull where that is more.
@@ -70,8 +68,7 @@ pub(crate) struct ObstacleTable {
 }
 
 /// A ball.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Ball {
     /// Its radius in m.
@@ -79,8 +76,7 @@ struct Ball {
 }
 
 /// An upright box.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Cuboid {
     /// Its lengths along x, y and z in m, before it is turned.
@@ -91,8 +87,7 @@ struct Cuboid {
 }
 
 /// A line with a radius.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(clippy::struct_field_names, reason = "each is in metres")]
 struct Capsule {
@@ -105,8 +100,7 @@ struct Capsule {
 }
 
 /// What lies behind a plane.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct HalfSpace {
     /// Points out of it; of any length but zero.

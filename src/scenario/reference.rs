@@ -1,10 +1,8 @@
 //! `[reference]` of the scenario file: its keys, and the motion that they mean.
 
-#[cfg(feature = "shapes")]
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,22 +19,21 @@ const PEAK_OVER_MEAN: f64 = 15.0 / 8.0;
 const JUMP: f64 = 10.0;
 
 /// A motion that the formations are carried along with, and who knows it.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReferenceTable {
     /// Who knows where the reference is: `"all"`, or a list of vehicles; all unless this or `leader` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Vehicles"))]
+    #[schemars(with = "Vehicles")]
     pub(super) known_by: Option<Vehicles>,
     /// A vehicle that flies the reference and listens to nobody: the others follow it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) leader: Option<u64>,
     /// Whether all vehicles are told how the reference accelerates.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = true)))]
+    #[schemars(extend("default" = true))]
     pub(super) feed_forward: bool,
-    #[cfg_attr(feature = "schema", schemars(flatten))]
+    #[schemars(flatten)]
     pub(super) kind: ReferenceKind,
 }
 
@@ -45,8 +42,8 @@ fn yes() -> bool {
 }
 
 /// A motion.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(tag = "kind"))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "kind")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum ReferenceKind {
     /// Always in one place: slots are where they are given, moved there.
@@ -92,7 +89,6 @@ pub(super) enum ReferenceKind {
         times_s: Vec<f64>,
     },
     /// The same through the points of a file.
-    #[cfg(feature = "shapes")]
     File {
         /// A text file with a line for each point: t in s, x, y and, unless it is 0, z in m, with commas, semicolons, tabs or
         /// blanks between; relative to the folder of the scenario file. A first line may name the columns.
@@ -115,7 +111,6 @@ impl ReferenceTable {
     }
 
     /// Puts the points of its file, named relative to a folder, in the place of the file.
-    #[cfg(feature = "shapes")]
     pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
         if let ReferenceKind::File { file } = &self.kind {
             self.kind = ReferenceKind::of_file(&folder.join(file))?;
@@ -131,7 +126,6 @@ impl ReferenceTable {
             ReferenceKind::Velocity { position_m, velocity_m_s } => flat(&[*position_m, *velocity_m_s]),
             ReferenceKind::Circle { centre_m, .. } => flat(&[*centre_m]),
             ReferenceKind::WayPoints { points_m, .. } | ReferenceKind::Spline { points_m, .. } => flat(points_m),
-            #[cfg(feature = "shapes")]
             ReferenceKind::File { .. } => true,
         }
     }
@@ -169,7 +163,6 @@ impl ReferenceTable {
 }
 
 impl ReferenceKind {
-    #[cfg(feature = "shapes")]
     fn of_file(file: &Path) -> Result<Self, ScenarioError> {
         let (times_s, points_m) = super::points::places(file)?;
         Ok(Self::Spline { points_m, times_s })
@@ -226,7 +219,6 @@ impl ReferenceKind {
                     .ok_or_else(|| ScenarioError::new("no curve goes through the points").at("reference.points_m"))?;
                 ReferenceMotion::Table(spline)
             }
-            #[cfg(feature = "shapes")]
             Self::File { file } => Self::of_file(file)?.motion(duration_s)?,
         })
     }

@@ -1,6 +1,5 @@
 //! `[safety]` of the scenario file: the shape of what must stay empty around a vehicle.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +11,7 @@ use super::spec::{Safety, Scenario};
 const ROUNDING: f64 = 1e-9;
 
 /// What must stay empty around a vehicle.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct SafetyTable {
     /// A ball of half of `law.delta_m`, or an upright ellipsoid.
@@ -24,8 +22,7 @@ pub(super) struct SafetyTable {
 }
 
 /// A shape.
-#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum SafetyKind {
     /// Two vehicles keep delta.

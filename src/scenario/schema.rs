@@ -213,7 +213,7 @@ mod tests {
         assert_eq!(tables_with("count"), ["[swarm]"]);
         assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
         assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
-        assert_eq!(tables_with("spacing_m").len(), 5 + 5 + if cfg!(feature = "shapes") { 3 } else { 0 });
+        assert_eq!(tables_with("spacing_m").len(), 13);
         assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
     }
 }

@@ -1,25 +1,21 @@
 //! Keys of the shapes that have some of their own.
 
-#[cfg(feature = "shapes")]
 use std::path::PathBuf;
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-#[cfg(feature = "shapes")]
 use crate::formation::Ink;
 
 /// Keys of `shape = "v"`.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct VKeys {
     /// Distance between neighbours on an arm in m, and of the nearest slots; 1.5 times `law.delta_m` unless given.
     pub(super) spacing_m: Option<f64>,
     /// Angle between the arms in degrees, from 60 to 180.
     #[serde(default = "right_angle_deg")]
-    #[cfg_attr(feature = "schema", schemars(range(min = 60, max = 180)))]
+    #[schemars(range(min = 60, max = 180))]
     pub(super) angle_deg: f64,
 }
 
@@ -28,8 +24,7 @@ fn right_angle_deg() -> f64 {
 }
 
 /// Keys of a shape that has a spacing alone.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SpacingKeys {
     /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless given.
@@ -37,8 +32,7 @@ pub(super) struct SpacingKeys {
 }
 
 /// Keys of `shape = "helix"`.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct HelixKeys {
     /// Radius in m.
@@ -53,13 +47,11 @@ pub(super) struct HelixKeys {
 }
 
 /// Keys of `shape = "text"`.
-#[cfg(feature = "shapes")]
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TextKeys {
     /// What is written; a line break begins a line below.
-    #[cfg_attr(feature = "schema", schemars(length(min = 1, max = 1000)))]
+    #[schemars(length(min = 1, max = 1000))]
     pub(super) text: String,
     /// Height of all that is written in m.
     pub(super) height_m: Option<f64>,
@@ -70,9 +62,7 @@ pub(super) struct TextKeys {
 }
 
 /// Keys of `shape = "svg"`.
-#[cfg(feature = "shapes")]
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SvgKeys {
     /// Path data, as the attribute `d` of SVG has it.
@@ -91,16 +81,14 @@ pub(super) struct SvgKeys {
 }
 
 /// Keys of `shape = "image"`.
-#[cfg(feature = "shapes")]
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ImageKeys {
     /// A PNG picture; relative to the folder of the scenario file.
     pub(super) file: PathBuf,
     /// Which pixels are drawn: the opaque ones of a picture that has others, or else the dark ones, unless given.
     #[serde(default)]
-    #[cfg_attr(feature = "schema", schemars(with = "Ink"))]
+    #[schemars(with = "Ink")]
     pub(super) ink: Option<Ink>,
     /// Height of what is drawn in m.
     pub(super) height_m: Option<f64>,
@@ -111,9 +99,7 @@ pub(super) struct ImageKeys {
 }
 
 /// Keys of `shape = "file"`.
-#[cfg(feature = "shapes")]
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileKeys {
     /// A text file with a line for each slot: x, y and, unless it is 0, z in m, with commas, semicolons, tabs or

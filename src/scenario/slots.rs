@@ -22,20 +22,15 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
         FormationShape::Cube(keys) => Formation::cube(count, spacing(keys.spacing_m, delta_m)?),
         FormationShape::Helix(keys) => helix(keys, count, delta_m)?,
         FormationShape::Points { points_m } => Formation::points(rows(points_m)),
-        #[cfg(feature = "shapes")]
         FormationShape::Text(keys) => super::drawn::text(keys, count, delta_m)?,
-        #[cfg(feature = "shapes")]
         FormationShape::Svg(keys) => super::drawn::svg(keys, count, delta_m)?,
-        #[cfg(feature = "shapes")]
         FormationShape::Image(keys) => super::drawn::image(keys, count, delta_m)?,
-        #[cfg(feature = "shapes")]
         FormationShape::File(keys) => Formation::points(rows(&super::points::slots(&keys.file)?)),
     })
 }
 
 /// Makes a shape's file, named relative to a folder, one that can be opened from where the program runs, and a file of
 /// points a list of them.
-#[cfg(feature = "shapes")]
 pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
     match shape {
         FormationShape::Svg(keys) => keys.file = keys.file.take().map(|file| folder.join(file)),

@@ -110,7 +110,6 @@ impl Scenario {
 pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, ScenarioError> {
     let mut document = text.decode()?;
     document.vehicle.found_from(folder).map_err(|error| text.place(error))?;
-    #[cfg(feature = "shapes")]
     find_files(&mut document, folder).map_err(|error| text.place(error))?;
     Ok(document)
 }
@@ -126,7 +125,6 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
 }
 
 /// Finds the files that shapes of the scenario and its reference name, from a folder.
-#[cfg(feature = "shapes")]
 fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioError> {
     super::slots::found_from(folder, &mut document.formation.shape)?;
     if let Some(reference) = &mut document.reference {

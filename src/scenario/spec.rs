@@ -117,7 +117,6 @@ pub enum PlantSpec {
     /// Rapier rigid bodies.
     Rapier,
     /// The equation of motion solved in continuous time with the law inside.
-    #[cfg(feature = "ideal")]
     Ideal,
 }
 

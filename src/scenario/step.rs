@@ -1,11 +1,9 @@
 //! The step that a law asks for wherever vehicles are, and the one that is chosen where none is given.
 
-#[cfg(feature = "files")]
 use super::limits::{MAX_HALVINGS, MAX_STEPS};
 use super::spec::Scenario;
 use super::time::TimeSpec;
 use crate::law::Law;
-#[cfg(feature = "files")]
 use crate::law::LawSpec;
 
 impl TimeSpec {
@@ -34,7 +32,6 @@ impl Scenario {
     /// Halves a step that nobody gave until it can be made as short as the links of the law ask for. It stays where shorter ones are
     /// of no use: where the law is asked less often than that, and where a flight may not have so many parts of steps. What is wrong
     /// with law or times is left for [`super::validate`] to refuse.
-    #[cfg(feature = "files")]
     pub(super) fn choose_step(&mut self) {
         let Ok(law) = self.law() else { return };
         let Some(needed_s) = self.links_step_s(law.as_ref()).filter(|&needed_s| needed_s > 0.0) else { return };
@@ -55,7 +52,6 @@ impl Scenario {
     ///
     /// The certificate assigns the whole energy of the start to one pair. Links of a large gain drive pairs close to the
     /// certified distance.
-    #[cfg(feature = "files")]
     pub(super) fn choose_halvings(&mut self) {
         let LawSpec::Potential(_) = self.law else { return };
         let Ok(law) = self.law() else { return };

@@ -14,7 +14,6 @@ use super::deserializer::{CHOICES, KeyError, Unknown, Value};
 use super::document::{DEFAULT_KINDS, Document};
 use super::error::{Field, Place, ScenarioError};
 use super::overrides::{OTHER_NAMES, Override};
-#[cfg(feature = "schema")]
 use super::schema::tables_with;
 use super::suggest::suggest;
 
@@ -62,7 +61,6 @@ impl<'a> Text<'a> {
 
     /// Whether the type of the key that the last override sets asks for a whole number. The override must give a number that is
     /// none.
-    #[cfg(feature = "reports")]
     pub(super) fn asks_for_whole_number(&self) -> bool {
         let Some((_, before)) = self.overrides.split_last() else { return false };
         let base = before.iter().fold(self.toml.len() + 1, |base, set| base + set.text().len() + 1);
@@ -277,12 +275,6 @@ fn remove(root: &mut Spanned<DeValue<'_>>, table: &str, key: &str) {
     {
         keys.remove(key);
     }
-}
-
-/// Only the schema knows.
-#[cfg(not(feature = "schema"))]
-fn tables_with(_key: &str) -> Vec<String> {
-    Vec::new()
 }
 
 /// The span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its table

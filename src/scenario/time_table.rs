@@ -1,6 +1,5 @@
 //! The table `[time]`, and the recording rate where it says none.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +11,7 @@ use crate::vehicle::Airframe;
 const RECORDING_BYTES: f64 = (1_u64 << 30) as f64;
 
 /// Duration and rates.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TimeTable {
     /// Length of the flight in s.
@@ -22,7 +20,7 @@ pub(super) struct TimeTable {
     /// 1/240, and 1/500 for quadrotors, halved until its parts can be as short as the law's links ask for, where the law is
     /// asked so often and a flight of such parts has at most 1e9.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_DT_S)))]
+    #[schemars(extend("default" = TimeSpec::DEFAULT_DT_S))]
     dt_s: Option<f64>,
     /// Samples recorded per second of flight in Hz, at most one a step. Unless given 60, or as much less as it takes for a
     /// large swarm's recording to hold at most 1 GiB of numbers and arrivals still to be told.
@@ -31,17 +29,17 @@ pub(super) struct TimeTable {
     /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
     /// step as it is. The default is 10. Under `potential` it rises up to 20, as the rate of the law at the certified distance requires.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_MAX_HALVINGS)))]
+    #[schemars(extend("default" = TimeSpec::DEFAULT_MAX_HALVINGS))]
     max_halvings: Option<u32>,
     /// Largest product of a step and the law's fastest rate at the present state; a step that is longer is flown in halves.
     #[serde(default = "TimeTable::default_max_rate_dt", skip_serializing_if = "TimeTable::is_default_max_rate_dt")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = TimeSpec::DEFAULT_MAX_RATE_DT, "exclusiveMinimum" = 0)))]
+    #[schemars(extend("default" = TimeSpec::DEFAULT_MAX_RATE_DT, "exclusiveMinimum" = 0))]
     max_rate_dt: f64,
     /// How often the law is asked in Hz, at most once a step, where vehicles hold each command in between as a real
     /// controller makes them do. Unless given, commands of points stand for continuous control, and quadrotors are given 100 a
     /// second.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) control_hz: Option<f64>,
 }
 

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::de::{SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -11,8 +10,7 @@ use crate::swarm::{Rows, set_row};
 use crate::target::Begins;
 
 /// One number for all vehicles or a list with one for each.
-#[derive(Clone, Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum PerVehicle {
     /// The same for all.
@@ -22,8 +20,8 @@ pub(super) enum PerVehicle {
 }
 
 /// x, y and, unless it is 0, z.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3)))]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3))]
 #[serde(untagged)]
 pub(super) enum Point {
     /// In the plane z = 0.
@@ -33,8 +31,8 @@ pub(super) enum Point {
 }
 
 /// Two vehicles, counted from 1.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema), schemars(transparent))]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[schemars(transparent)]
 pub(super) struct Edge(pub(super) [u64; 2]);
 
 impl Point {
@@ -48,8 +46,7 @@ impl Point {
 }
 
 /// Some vehicles, counted from 1, or all of them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum Vehicles {
     /// All of them.
@@ -59,8 +56,7 @@ pub(super) enum Vehicles {
 }
 
 /// The word `all`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum All {
     /// All of them.
@@ -68,8 +64,7 @@ pub(super) enum All {
 }
 
 /// When a leg begins.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum LegStart {
     /// Once the one before it is reached.
@@ -79,8 +74,7 @@ pub(super) enum LegStart {
 }
 
 /// The word `reached`.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Reached {
     /// Once the one before it is reached.

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::path::Path;
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
@@ -22,8 +21,7 @@ const POINT: &str = "point";
 const UNICYCLE: &str = "unicycle";
 
 /// What kind of body a vehicle is.
-#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct VehicleTable {
     /// `point`, which carries out accelerations exactly; `unicycle`, which goes where it looks and cannot stop; a quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, a file
@@ -31,15 +29,15 @@ pub(super) struct VehicleTable {
     model: ModelKey,
     /// How often a quadrotor's attitude loop runs in Hz, at most once a step: 500 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_hz: Option<f64>,
     /// Frequency that its attitude loop asks for in rad/s, in the place of the model's.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_rad_s: Option<f64>,
     /// Damping ratio that it asks for, in the place of the model's.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_damping: Option<f64>,
     /// Whether a quadrotor's thrust grows near a ground: a half-space among the obstacles. Not unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -49,24 +47,24 @@ pub(super) struct VehicleTable {
     downwash: Option<bool>,
     /// Least speed of a unicycle in m/s, which cannot stop: 0.2 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     min_speed_m_s: Option<f64>,
     /// Its largest speed in m/s: 3 unless given. At the least one its speed never changes.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     max_speed_m_s: Option<f64>,
     /// Largest rate of its heading in rad/s: 2 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     max_turn_rad_s: Option<f64>,
     /// Its largest acceleration along its heading in m/s^2: 2 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("exclusiveMinimum" = 0)))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     max_accel_m_s2: Option<f64>,
     /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
     /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
     #[serde(skip_serializing_if = "is_none")]
-    #[cfg_attr(feature = "schema", schemars(extend("minimum" = 0)))]
+    #[schemars(extend("minimum" = 0))]
     pub(super) drag_per_s: f64,
 }
 
@@ -76,8 +74,7 @@ fn is_none(drag_per_s: &f64) -> bool {
 }
 
 /// A model by name, by file, or with all of its keys.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 enum ModelKey {
     /// A built-in model, or the path of a file.

@@ -3,7 +3,6 @@
 use std::fmt;
 
 use nalgebra::Vector3;
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::de::{MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -13,25 +12,24 @@ use super::values::Point;
 use crate::wind::{Dryden, Gust, WindSpec};
 
 /// Air that moves. Points feel it where they have a drag (`vehicle.drag_per_s`).
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct WindTable {
     /// Velocity of the air that never changes in m/s; none unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Point"))]
+    #[schemars(with = "Point")]
     mean_m_s: Option<Point>,
     /// A gust, or a list of gusts that add up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "Gusts"))]
+    #[schemars(with = "Gusts")]
     gust: Option<Gusts>,
     /// Dryden turbulence at low altitude (MIL-F-8785C), carried past vehicles at the mean wind's speed, and at 1 m/s at least.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(feature = "schema", schemars(with = "DrydenTable"))]
+    #[schemars(with = "DrydenTable")]
     dryden: Option<DrydenTable>,
     /// Whether all vehicles are in the same turbulence, and not each in its own. Whom a gust meets it says itself.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = true)))]
+    #[schemars(extend("default" = true))]
     shared: bool,
 }
 
@@ -40,8 +38,7 @@ fn yes() -> bool {
 }
 
 /// One gust, or several.
-#[derive(Debug, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 enum Gusts {
     /// One.
@@ -51,8 +48,7 @@ enum Gusts {
 }
 
 /// Air that rises to a velocity as 1 - cos, holds it, and falls back in the same way.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct GustTable {
     /// When it begins in s.
@@ -73,8 +69,7 @@ struct GustTable {
 }
 
 /// How strong turbulence is, and how large its eddies are.
-#[derive(Debug, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct DrydenTable {
     /// Wind speed 20 feet above the ground in m/s: a tenth of it is the standard deviation of the vertical part.

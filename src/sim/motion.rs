@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-#[cfg(feature = "ideal")]
 use crate::continuous::{Continuous, IdealError, Quadrotors};
-#[cfg(feature = "ideal")]
 use crate::feedback::Feedback;
 use crate::law::LawError;
 use crate::plant::{HullContact, Path, Plant, PlantError, Unicycles, rapier};
@@ -21,15 +19,12 @@ pub enum Motion {
     /// A plant that holds the command of the beginning of a step (sample-and-hold).
     Sampled(Box<dyn Plant>),
     /// Continuous time: the law is asked all the way along.
-    #[cfg(feature = "ideal")]
     Continuous(Box<Continuous>),
 }
 
 /// Accelerations that do not change over a step.
-#[cfg(feature = "ideal")]
 struct Held<'a>(&'a Rows);
 
-#[cfg(feature = "ideal")]
 impl Feedback for Held<'_> {
     fn command(&mut self, _time_s: f64, _truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
         command.copy_from(self.0);
@@ -52,7 +47,6 @@ impl Motion {
         }
         match scenario.plant {
             PlantSpec::Rapier => Self::Sampled(rapier::plant(scenario)),
-            #[cfg(feature = "ideal")]
             PlantSpec::Ideal => match scenario.fleet() {
                 Some(fleet) => Self::Sampled(Box::new(Quadrotors::new(fleet))),
                 None => Self::Continuous(Box::new(Continuous::new(scenario))),
@@ -63,7 +57,6 @@ impl Motion {
     /// Moves from `from_s` over `dt_s` seconds, and says where the vehicles are then. In continuous time accelerations that
     /// are `held` stand in the place of the law's. The result is why the law had no answer on the way, where vehicles came to its
     /// barrier and moved on under the accelerations that they had there.
-    #[cfg_attr(not(feature = "ideal"), expect(unused_variables, reason = "a plant is not told the time"))]
     pub(super) fn advance(
         &mut self,
         (step, from_s, dt_s): (u64, f64, f64),
@@ -78,7 +71,6 @@ impl Motion {
                 PlantError::NotFinite { vehicle } => Breakdown::StateNotFinite { step, vehicle }.into(),
                 PlantError::Stalled => Breakdown::Stalled { step }.into(),
             }),
-            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => {
                 let mut still = held.map(Held);
                 let feedback: &mut dyn Feedback = match &mut still {
@@ -99,7 +91,6 @@ impl Motion {
     pub(super) fn apply(&mut self, command: &Rows, state: &mut Swarm) {
         match self {
             Self::Sampled(plant) => plant.apply(command, state),
-            #[cfg(feature = "ideal")]
             Self::Continuous(_) => {}
         }
     }
@@ -107,7 +98,6 @@ impl Motion {
     pub(super) fn count(&self) -> usize {
         match self {
             Self::Sampled(plant) => plant.count(),
-            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.count(),
         }
     }
@@ -121,7 +111,6 @@ impl Motion {
     pub(super) fn reseed(&mut self, seed: u64) {
         match self {
             Self::Sampled(plant) => plant.reseed(seed),
-            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.reseed(seed),
         }
     }
@@ -130,7 +119,6 @@ impl Motion {
     pub(super) fn airframe_time(&self) -> Duration {
         match self {
             Self::Sampled(plant) => plant.airframe_time(),
-            #[cfg(feature = "ideal")]
             Self::Continuous(_) => Duration::ZERO,
         }
     }
@@ -139,7 +127,6 @@ impl Motion {
     pub(super) fn channels(&self) -> Vec<Channel> {
         match self {
             Self::Sampled(plant) => plant.channels(),
-            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.channels(),
         }
     }
@@ -148,7 +135,6 @@ impl Motion {
     pub(super) fn write_channels(&self, channels: &mut [Channel]) {
         match self {
             Self::Sampled(plant) => plant.write_channels(channels),
-            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.write_channels(channels),
         }
     }
@@ -156,7 +142,6 @@ impl Motion {
     pub(super) fn observe(&self, state: &mut Swarm) {
         match self {
             Self::Sampled(plant) => plant.observe(state),
-            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.observe(state),
         }
     }
@@ -164,7 +149,6 @@ impl Motion {
     pub(super) fn restore(&mut self, state: &Swarm) {
         match self {
             Self::Sampled(plant) => plant.restore(state),
-            #[cfg(feature = "ideal")]
             Self::Continuous(solution) => solution.restore(state),
         }
     }
@@ -172,7 +156,6 @@ impl Motion {
     pub(super) fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
         match self {
             Self::Sampled(plant) => plant.keep_out_contacts(pairs),
-            #[cfg(feature = "ideal")]
             Self::Continuous(_) => {}
         }
     }
@@ -180,7 +163,6 @@ impl Motion {
     pub(super) fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
         match self {
             Self::Sampled(plant) => plant.hull_contacts(contacts),
-            #[cfg(feature = "ideal")]
             Self::Continuous(_) => {}
         }
     }

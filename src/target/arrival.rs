@@ -14,8 +14,7 @@ const TIME_ROUNDING_S: f64 = 1e-9;
 /// no vehicle is more than `edge_error_m` from its slot in the formation laid over them: turned and perhaps mirrored under a law
 /// that holds distances, moved alone under one that holds displacements, where the reference has carried it under one that
 /// follows a reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Arrival {
     /// Largest error of a desired distance over the edges of the graph, and of a vehicle's place in the formation, in m.

@@ -1,19 +1,16 @@
 //! Breathing: slots that are spread for a while, so that vehicles that stand in each other's way get past; and before that,
 //! where vehicles are interchangeable, other slots for them.
 
-#[cfg(feature = "files")]
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{Arrival, CurrentTarget, Leg, Target, spread_slots};
 use crate::formation::{Formation, Freedom};
-#[cfg(feature = "files")]
 use crate::formation::{optimal_slots, optimal_slots_around};
 use crate::swarm::{Rows, Swarm, mean_row, row};
 
 /// When slots are spread, or interchangeable vehicles get others.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BreathingMode {
     /// When the swarm is stalled, under a law whose promise is renewed then.
@@ -29,8 +26,7 @@ pub enum BreathingMode {
 }
 
 /// How slots are spread.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Breathing {
     /// When.
@@ -41,7 +37,7 @@ pub struct Breathing {
     pub most: u32,
     /// How long spread slots are held at least in s.
     #[serde(skip_serializing_if = "is_zero")]
-    #[cfg_attr(feature = "schema", schemars(extend("default" = 0.0)))]
+    #[schemars(extend("default" = 0.0))]
     pub hold_s: f64,
 }
 
@@ -270,12 +266,10 @@ impl Breather {
 }
 
 /// The sum of squared ways must become less by more than this part of it.
-#[cfg(feature = "files")]
 const SHORTER: f64 = 1e-9;
 
 /// Whose slot each vehicle gets so that the sum of squared ways is least, where that is less than it is; a leader keeps its
 /// own. Wherever the formation is moved to, the same ones are best.
-#[cfg(feature = "files")]
 fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
     let found = match leader {
         Some(leader) => optimal_slots_around(positions_m, formation, leader)?,
@@ -287,12 +281,6 @@ fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>
     let mean_m = free().map(|i| way(i, i)).sum::<Vector3<f64>>() / free().count().max(1) as f64;
     let sum = |slot: &dyn Fn(usize) -> usize| free().map(|i| (way(i, slot(i)) - mean_m).norm_squared()).sum::<f64>();
     (sum(&|i| found[i]) < sum(&|i| i) * (1.0 - SHORTER)).then_some(found)
-}
-
-/// Assignments are made by a crate of the feature `files`.
-#[cfg(not(feature = "files"))]
-fn shorter_ways(_positions_m: &Rows, _formation: &Formation, _leader: Option<usize>) -> Option<Vec<usize>> {
-    None
 }
 
 impl Leg {
@@ -374,7 +362,6 @@ mod tests {
     }
 
     /// What is changed while vehicles stand so far from their first slots along x.
-    #[cfg(feature = "files")]
     fn changes(leg: &Leg, leader: Option<usize>, at_m: [f64; 3]) -> Vec<Change> {
         let mut target = CurrentTarget::first_of(std::slice::from_ref(leg)).expect("a leg");
         let mut leg = leg.clone();
@@ -395,7 +382,6 @@ mod tests {
         found
     }
 
-    #[cfg(feature = "files")]
     #[test]
     fn interchangeable_vehicles_get_the_nearest_slots_and_breathe_only_where_they_have_them() {
         let given = Leg::first(Formation::line(3, 2.0));

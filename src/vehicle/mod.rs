@@ -12,7 +12,6 @@ mod attitude;
 mod check;
 mod downwash;
 mod dynamics;
-#[cfg(feature = "files")]
 mod file;
 mod fleet;
 mod mixer;
@@ -24,7 +23,6 @@ pub use attitude::{Attitude, LEAST_LIFT, THRUST_RESERVE};
 pub use check::ModelError;
 pub use downwash::{AIR_DENSITY_KG_M3, Downwash};
 pub use dynamics::{Drift, Dynamics, Ground, State, Wrench};
-#[cfg(feature = "files")]
 pub use file::{MODELS, Misread, read};
 pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
 pub use mixer::Mixer;

@@ -1,6 +1,5 @@
 //! The numbers of a quadrotor.
 
-#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -8,8 +7,7 @@ use serde::{Deserialize, Serialize};
 pub const GRAVITY_M_S2: f64 = 9.80665;
 
 /// A quadrotor: what its file in TOML holds, for which the files of the built-in models are patterns.
-#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
     /// What it is called.
@@ -55,8 +53,7 @@ pub struct Model {
 }
 
 /// Which way a rotor turns, seen from above.
-#[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(JsonSchema))]
+#[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Turn {
     /// Counterclockwise: the body is turned clockwise.

@@ -10,6 +10,5 @@ mod spec;
 
 pub use air::Wind;
 pub use dryden::Dryden;
-#[cfg(feature = "reports")]
 pub(crate) use normal::Normals;
 pub use spec::{Gust, WindSpec};

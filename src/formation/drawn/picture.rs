@@ -10,8 +10,7 @@ use super::limits::MAX_PIXELS;
 use super::mask::Mask;
 
 /// Which pixels of a picture are drawn.
-#[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ink {
     /// Those darker than middle grey, on white paper.
