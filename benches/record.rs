@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use tautline::record::mcap::{Header, McapRecorder, McapRecording};
+use tautline::mcap::{Header, McapRecorder, McapRecording};
 use tautline::record::{Sample, Sink, StateHash};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 

@@ -36,7 +36,6 @@
 //! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
 
 pub mod attack;
-pub mod audit;
 pub mod campaign;
 pub mod cli;
 pub mod compare;
@@ -49,13 +48,13 @@ pub mod graph;
 pub mod law;
 pub mod link;
 pub mod margin;
+pub mod mcap;
 pub mod metrics;
 pub mod observation;
 pub mod plan;
 pub mod plant;
 pub mod preflight;
 pub mod read;
-pub mod record;
 #[cfg(feature = "viewer")]
 pub mod render;
 pub mod replay;
@@ -66,10 +65,11 @@ pub mod sim;
 pub mod space;
 pub mod splitting;
 pub mod statistics;
-pub mod swarm;
 pub mod target;
-mod text;
-pub mod track;
 pub mod validate;
 pub mod vehicle;
 pub mod wind;
+
+pub use tautline_audit as audit;
+use tautline_core::text;
+pub use tautline_core::{record, swarm, track};

@@ -11,7 +11,7 @@ use super::run::{Left, RECORDING, RunArguments, fly_into};
 use super::{Exit, Failure};
 use crate::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
 use crate::compare::Outcome;
-use crate::record::mcap::{Header, McapRecorder};
+use crate::mcap::{Header, McapRecorder};
 use crate::replay::PAGE_BYTES;
 use crate::report::page::Picture;
 use crate::splitting::{self, StateAt};

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use super::Failure;
 use super::console::Console;
+use crate::mcap::McapRecording;
 use crate::read::{self, Fault, Format, ReadError, ReadOptions};
-use crate::record::mcap::McapRecording;
 use crate::render::{FARTHEST_M, RenderError, Theme, Timeline, TracksError};
 
 /// Bytes of an MCAP file that hold the name of what wrote it.

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::console;
 use super::{Exit, Failure};
-use crate::record::mcap::McapRecording;
+use crate::mcap::McapRecording;
 use crate::scenario::builtin;
 
 /// Arguments of `tautline list`.

@@ -10,7 +10,7 @@ use super::own_told::{Near, told};
 use super::{Failure, caller};
 use crate::audit::Status;
 use crate::audit::recorded::{Outcome, Settings, Told, ToldViolation};
-use crate::record::mcap::{Entry, McapRecording, RunVerdict};
+use crate::mcap::{Entry, McapRecording, RunVerdict};
 use crate::record::{Event, OwnedSample, RecordError, Sample, Sink, StateHash};
 use crate::report::recorded::EarlyEnd;
 use crate::scenario::{self, Scenario};

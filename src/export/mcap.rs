@@ -8,9 +8,9 @@ use mcap::WriteOptions;
 
 use super::error::ExportError;
 use super::source::{About, Source};
+use crate::mcap::topic::{TopicWriter, encode, log_time_ns};
+use crate::mcap::{ChannelMessage, channel_topic, topic_of_channel};
 use crate::read::mcap::exported::{Instant, TRACKS, VEHICLES, Vehicles};
-use crate::record::mcap::topic::{TopicWriter, encode, log_time_ns};
-use crate::record::mcap::{ChannelMessage, channel_topic, topic_of_channel};
 use crate::track::Sample;
 
 /// Size at which a chunk is closed \[bytes\].

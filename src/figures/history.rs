@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, extent};
 use super::beside::{self, numbers_of};
-use crate::record::mcap::Entry;
+use crate::mcap::Entry;
 use crate::record::{Event, RecordError, Sample, Sink};
 use crate::space::Metric;
 use crate::swarm::{ClosestApproach, Pair, Rows, row, separation};

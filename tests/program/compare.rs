@@ -6,8 +6,8 @@ use std::path::Path;
 use crate::program::{Ran, TAUTLINE, ran_by};
 use assert_cmd::Command;
 use serde_json::Value;
+use tautline::mcap::McapRecording;
 use tautline::record::OwnedSample;
-use tautline::record::mcap::McapRecording;
 use tautline::swarm::row;
 
 /// A start that draws nothing, and is right.

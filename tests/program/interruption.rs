@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 use serde_json::Value;
-use tautline::record::mcap::McapRecording;
+use tautline::mcap::McapRecording;
 use tautline::record::{Event, OwnedSample};
 use tempfile::TempDir;
 

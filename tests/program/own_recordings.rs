@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
+use tautline::mcap::{Entry, McapRecorder, McapRecording};
 use tautline::record::Sink as _;
-use tautline::record::mcap::{Entry, McapRecorder, McapRecording};
 use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};

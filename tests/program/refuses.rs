@@ -140,8 +140,8 @@ fn what_a_file_holds_does_not_steer_the_terminal() {
 #[cfg(unix)]
 mod machine {
     use super::{File, Path, RIGHT, Ran, TAUTLINE, folder, fs, ran, ran_by};
+    use tautline::mcap::McapRecording;
     use tautline::record::Event;
-    use tautline::record::mcap::McapRecording;
 
     const MACHINE_FAILED: Option<i32> = Some(3);
 

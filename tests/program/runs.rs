@@ -6,8 +6,8 @@ use std::process::{Command, Stdio};
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 use serde_json::Value;
+use tautline::mcap::McapRecording;
 use tautline::record::Event;
-use tautline::record::mcap::McapRecording;
 use tautline::scenario::builtin;
 use tempfile::TempDir;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tautline::record::mcap::{Header, McapRecorder};
+use tautline::mcap::{Header, McapRecorder};
 use tautline::record::{Sample, Sink as _};
 use tautline::swarm::{Rows, Swarm};
 use tempfile::TempDir;

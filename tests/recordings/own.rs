@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::op;
 use proptest::prelude::*;
-use tautline::record::mcap::{Entry, FLUSH_BYTES, FLUSH_PERIOD_S, Header, McapRecorder, McapRecording};
+use tautline::mcap::{Entry, FLUSH_BYTES, FLUSH_PERIOD_S, Header, McapRecorder, McapRecording};
 use tautline::record::{Event, OwnedSample, ReadFault, RecordError, Sink, StateHash};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 use tempfile::TempDir;

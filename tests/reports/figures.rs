@@ -5,7 +5,7 @@ use tautline::figures::{self, Criteria, Figure, RunHistory};
 use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::EdgeTension;
-use tautline::record::mcap::{Header, McapRecorder, McapRecording};
+use tautline::mcap::{Header, McapRecorder, McapRecording};
 use tautline::record::{Sample, Sink as _};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, separation, set_row};
 use tautline::target::Leg;

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use tautline::audit::Status;
 use tautline::figures::{Criteria, RunHistory, of_run};
+use tautline::mcap::{Header, McapRecorder};
 use tautline::preflight::Preflight;
-use tautline::record::mcap::{Header, McapRecorder};
 use tautline::run::run_while;
 use tautline::scenario::{Scenario, Source};
 

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
-use tautline::record::mcap::{Header, McapRecorder};
+use tautline::mcap::{Header, McapRecorder};
 use tempfile::TempDir;
 
 const GOOD: Option<i32> = Some(0);

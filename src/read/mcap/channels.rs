@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::super::error::ReadError;
 use super::exported::TRACKS;
-use crate::record::mcap::topic::{Message, Part, TopicReader, decode};
-use crate::record::mcap::{CHANNEL_SCHEMA, ChannelMessage, SWARM_SCHEMA};
+use crate::mcap::topic::{Message, Part, TopicReader, decode};
+use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, SWARM_SCHEMA};
 use crate::record::{Channel, ReadFault};
 
 /// A message as it is read.

@@ -20,7 +20,7 @@ use super::super::options::ReadOptions;
 use super::super::order::{About, Ordered, Recording};
 use super::super::rows::{BATCH, Row, Rows};
 use super::super::source::Source;
-use crate::record::mcap::topic::{Message, Part, Topic, TopicReader, decode};
+use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 
 /// Where the vehicles are named.
 pub(crate) const VEHICLES: Topic<'_> =

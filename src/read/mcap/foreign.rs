@@ -10,7 +10,7 @@ use super::plan::Plan;
 use super::poses::Poses;
 use super::schemas::{is_list, reader_of_topic};
 use super::splits::Splits;
-use crate::record::mcap::topic::Part;
+use crate::mcap::topic::Part;
 
 /// Opens a recording in some files that follow each other; `whole` is what is called so.
 pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {

@@ -36,7 +36,7 @@ use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
-use crate::record::mcap::topic::{Part, TopicReader};
+use crate::mcap::topic::{Part, TopicReader};
 use crate::record::{ReadFault, RecordError};
 use splits::Splits;
 

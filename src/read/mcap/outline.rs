@@ -12,7 +12,7 @@ use super::schemas::{is_of_transforms, reader_of_topic};
 use super::splits::Splits;
 use super::topic_name::{is_static, is_wish, last, namespace, space};
 use super::tree::{Body, Tree};
-use crate::record::mcap::topic::{Declared, Message, Part};
+use crate::mcap::topic::{Declared, Message, Part};
 
 /// Most parts of a topic that may be namespaces of transforms.
 const DEEPEST: usize = 16;

@@ -14,7 +14,7 @@ use super::rigid::{Known, Placed};
 use super::splits::Splits;
 use super::topic_name::{is_static, space};
 use super::tree::{Body, Chain, Tree};
-use crate::record::mcap::topic::Part;
+use crate::mcap::topic::Part;
 
 /// What is read, and how.
 pub(super) struct Plan {

@@ -12,7 +12,7 @@ use super::outline::place;
 use super::plan::{Plan, Way};
 use super::rigid::{Known, Placed};
 use super::topic_name::{is_static, space};
-use crate::record::mcap::topic::Message;
+use crate::mcap::topic::Message;
 
 /// Positions out of messages.
 pub(super) struct Poses {

@@ -4,7 +4,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::messages::{EARTH, FIXES, Reader, Seen, What, Who, nanoseconds};
-use crate::record::mcap::topic::{CDR, decode};
+use crate::mcap::topic::{CDR, decode};
 
 /// What reads the messages of a schema, where they hold positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {

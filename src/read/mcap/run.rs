@@ -8,7 +8,7 @@ use super::super::order::{About, Ordered, Recording};
 use super::super::rows::{BATCH, Row, Rows};
 use super::super::source::Source;
 use super::super::turned;
-use crate::record::mcap::{Entry, McapRecording};
+use crate::mcap::{Entry, McapRecording};
 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let recording = McapRecording::open(&source.path)?;

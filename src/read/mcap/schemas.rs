@@ -2,7 +2,7 @@
 
 use super::messages::Reader;
 use super::{foxglove_poses, ros};
-use crate::record::mcap::topic::{CDR, Declared};
+use crate::mcap::topic::{CDR, Declared};
 
 /// What reads the messages of a schema, where they hold positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {

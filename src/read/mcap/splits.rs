@@ -3,7 +3,7 @@
 use super::super::error::{Fault, ReadError};
 use super::super::options::ReadOptions;
 use super::super::source::Source;
-use crate::record::mcap::topic::{Part, TopicReader};
+use crate::mcap::topic::{Part, TopicReader};
 
 /// The parts of some files, in their order. One that is packed is unpacked while it is read.
 pub(super) struct Splits {

@@ -1,0 +1,309 @@
+//! The audit of a flight among obstacles: straight steps of all vehicles, one after the other.
+
+use super::auditor::check_instant;
+use super::enclosure::Target;
+use super::error::AuditError;
+use super::ledger::Lists;
+use super::obstacle::{Obstacle, ObstacleError};
+use super::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
+use super::pair_sweep::PairSweep;
+use super::parry::KeepOut;
+use super::results::{ClosestPairs, Results};
+use super::segment::Segment;
+use super::sweep::{Interval, MIN_LIMIT_M};
+use tautline_core::swarm::{Rows, row};
+
+/// Rounding of a distance from a surface, as a part of the lengths that it is made of.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Judges a motion past obstacles at rest, instant by instant, as [`Auditor`](super::Auditor) judges that of vehicles past
+/// each other: in closed form over each straight step, with distances measured again by parry.
+///
+/// Each obstacle has a clearance of its own ([`Obstacle::clearance_m`]). A vehicle and an obstacle that cannot have come
+/// near over a step are not swept: a distance changes by no more than the vehicle moves.
+#[derive(Clone, Debug)]
+pub struct ClearanceAuditor {
+    obstacles: Vec<Judged>,
+    vehicles: usize,
+    time_s: Option<f64>,
+    positions_m: Rows,
+    /// Distances at the last instant \[m\], those of a vehicle side by side, and whether they are below the limit.
+    distances_m: Vec<f64>,
+    is_below: Vec<bool>,
+    least_room_m: f64,
+    results: Results,
+    began: Vec<Violation<ObjectPair>>,
+    ended: Vec<Violation<ObjectPair>>,
+    refused: u64,
+}
+
+#[derive(Clone, Debug)]
+struct Judged {
+    obstacle: Obstacle,
+    place_m: nalgebra::Vector3<f64>,
+    keep_out: KeepOut,
+}
+
+/// What one step (or the start) brought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClearanceFinding<'a> {
+    /// The least that any vehicle has beyond a clearance at the end of the step \[m\].
+    pub least_room_m: f64,
+    /// Violations that began in this step.
+    pub began: &'a [Violation<ObjectPair>],
+    /// Violations that ended in this step, complete. One that began and ended within is in both lists.
+    pub ended: &'a [Violation<ObjectPair>],
+}
+
+/// The verdict on a flight past obstacles, and what it rests on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClearanceOutcome {
+    /// The verdict.
+    pub status: Status,
+    /// The approaches of different vehicles and obstacles that came closest to their limits, at most ten, the least room first.
+    pub closest: Vec<Approach>,
+    /// Every violation, in the order of their beginning.
+    pub violations: Vec<Violation<ObjectPair>>,
+    /// Every time at which it cannot be told.
+    pub undecided: Vec<Undecided<ObjectPair>>,
+    /// Steps on which ways bend by more than there was room for.
+    pub unresolved: u64,
+    /// What the second detector says.
+    pub parry: ParryEvidence<ObjectPair>,
+    /// Calls answered by an error: what they offered was not judged.
+    pub refused: u64,
+}
+
+impl ClearanceAuditor {
+    /// An auditor of so many vehicles among obstacles that stand, each with a clearance.
+    ///
+    /// # Errors
+    /// [`ObstacleError`] for one that cannot be judged, moves, or has no clearance above zero.
+    pub fn new(vehicles: usize, obstacles: &[Obstacle]) -> Result<Self, ObstacleError> {
+        let judged = obstacles.iter().map(|obstacle| {
+            obstacle.check()?;
+            let wrong = |reason: &str| ObstacleError { name: obstacle.name.clone(), reason: reason.to_owned() };
+            let [(_, place_m)] = obstacle.path[..] else { return Err(wrong("it moves")) };
+            let limit_m = obstacle.clearance_m.filter(|&limit_m| limit_m >= MIN_LIMIT_M);
+            let limit_m = limit_m.ok_or_else(|| wrong("it has no clearance above 0 m"))?;
+            Ok(Judged { obstacle: obstacle.clone(), place_m, keep_out: KeepOut::new(limit_m) })
+        });
+        Ok(Self {
+            obstacles: judged.collect::<Result<_, _>>()?,
+            vehicles,
+            time_s: None,
+            positions_m: Rows::zeros(0),
+            distances_m: vec![0.0; vehicles * obstacles.len()],
+            is_below: vec![false; vehicles * obstacles.len()],
+            least_room_m: f64::INFINITY,
+            results: Results { obstacles: ClosestPairs::to_limits(), ..Results::default() },
+            began: Vec::new(),
+            ended: Vec::new(),
+            refused: 0,
+        })
+    }
+
+    /// Judges the straight motion from the instant before to this one, or the first instant: `positions_m` is N x 3 \[m\].
+    ///
+    /// # Errors
+    /// [`AuditError`] where the instant cannot be judged. Nothing changes then but the count of refusals, which keeps the
+    /// outcome from being clear.
+    pub fn step(&mut self, time_s: f64, positions_m: &Rows) -> Result<ClearanceFinding<'_>, AuditError> {
+        let checked = match self.time_s {
+            Some(previous_s) if time_s <= previous_s => Err(AuditError::TimeNotIncreasing { previous_s, time_s }),
+            _ => check_instant(self.vehicles, time_s, positions_m),
+        };
+        self.refused += u64::from(checked.is_err());
+        checked?;
+        if self.time_s.is_none() {
+            self.positions_m.clone_from(positions_m);
+        }
+        let step = Interval { from_s: self.time_s.unwrap_or(time_s), to_s: time_s };
+        self.began.clear();
+        self.ended.clear();
+        self.least_room_m = f64::INFINITY;
+        for vehicle in 0..self.vehicles {
+            self.sweep(step, vehicle, positions_m);
+        }
+        self.positions_m.copy_from(positions_m);
+        self.time_s = Some(time_s);
+        Ok(ClearanceFinding { least_room_m: self.least_room_m, began: &self.began, ended: &self.ended })
+    }
+
+    /// Sweeps the way of a vehicle past every obstacle.
+    fn sweep(&mut self, step: Interval, vehicle: usize, positions_m: &Rows) {
+        let (from, to) = (row(&self.positions_m, vehicle), row(positions_m, vehicle));
+        let (moved_m, is_first) = ((to - from).norm(), self.time_s.is_none());
+        for index in 0..self.obstacles.len() {
+            let Judged { obstacle, place_m, keep_out } = &self.obstacles[index];
+            let (place, limit_m) = (vehicle * self.obstacles.len() + index, keep_out.delta_m);
+            let end_m = obstacle.shape.distance(to - place_m);
+            let start_m = if is_first { end_m } else { self.distances_m[place] };
+            self.distances_m[place] = end_m;
+            self.least_room_m = self.least_room_m.min(end_m - limit_m);
+            let pair = ObjectPair::Obstacle { vehicle, obstacle: index };
+            let rounding_m = ROUNDING * ((from - place_m).norm() + (to - place_m).norm() + limit_m);
+            let least_m = 0.5 * (start_m + end_m - moved_m) - rounding_m;
+            let cutoff = self.results.obstacles.cutoff(pair, limit_m);
+            if least_m >= limit_m.max(cutoff) {
+                continue;
+            }
+            let known = self.results.ledger.violations.len();
+            let (target, may_violate) = (Target::Shape(&obstacle.shape), least_m < limit_m);
+            let stands = Segment::straight(step.from_s, step.to_s, *place_m, *place_m);
+            let flies = Segment::straight(step.from_s, step.to_s, from, to);
+            PairSweep { pair, target, keep_out: keep_out.clone(), cutoff, judges: true, may_violate, above: None }
+                .judge(&[stands], &[flies], step, &mut self.results);
+            self.began.extend_from_slice(&self.results.ledger.violations[known..]);
+            let was_below = std::mem::replace(&mut self.is_below[place], end_m < limit_m);
+            let of_step = self.results.ledger.violations.len() > known;
+            if (was_below || of_step) && end_m >= limit_m {
+                let last = self.results.ledger.violations.iter().rev().find(|violation| violation.pair == pair);
+                self.ended.extend(last);
+            }
+        }
+    }
+
+    /// The approaches that came closest to their limits so far, the least room first.
+    #[must_use]
+    pub fn closest(&self) -> &[Approach] {
+        &self.results.obstacles.kept
+    }
+
+    /// Times that a vehicle was nearer to an obstacle than its clearance so far, in the order in which they were found.
+    #[must_use]
+    pub fn violations(&self) -> &[Violation<ObjectPair>] {
+        &self.results.ledger.violations
+    }
+
+    /// The verdict over everything judged.
+    #[must_use]
+    pub fn finish(self) -> ClearanceOutcome {
+        let Results { ledger, obstacles, .. } = self.results;
+        let (parry, decided) = (ledger.parry, self.time_s.is_some() && self.refused == 0 && ledger.is_decided());
+        let Lists { violations, undecided, .. } = ledger.into_lists();
+        let status = Status::new(!violations.is_empty(), decided);
+        let (closest, refused) = (obstacles.kept, self.refused);
+        ClearanceOutcome { status, closest, violations, undecided, unresolved: 0, parry, refused }
+    }
+}
+
+/// Smallest distance \[m\] from the surface of an obstacle at rest of a point that moves on a straight line, below zero
+/// within.
+#[must_use]
+pub fn swept_distance_m(obstacle: &Obstacle, from: nalgebra::Vector3<f64>, to: nalgebra::Vector3<f64>) -> f64 {
+    let place_m = obstacle.path.first().map_or_else(nalgebra::Vector3::zeros, |&(_, place_m)| place_m);
+    obstacle.shape.closest(from - place_m, to - place_m).0
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::obstacle::one_of_each;
+
+    fn standing(shape: super::super::Shape, clearance_m: f64) -> Obstacle {
+        Obstacle { name: "o".to_owned(), shape, clearance_m: Some(clearance_m), path: vec![(0.0, Vector3::zeros())] }
+    }
+
+    fn flown(auditor: &mut ClearanceAuditor, way: &[[f64; 3]]) -> (usize, usize) {
+        let (mut began, mut ended) = (0, 0);
+        for (k, at) in way.iter().enumerate() {
+            let finding = auditor.step(k as f64, &Rows::from_row_slice(at)).unwrap();
+            began += finding.began.len();
+            ended += finding.ended.len();
+        }
+        (began, ended)
+    }
+
+    #[test]
+    fn a_vehicle_that_leaps_over_an_obstacle_between_two_instants_is_too_close() {
+        for shape in one_of_each() {
+            let mut auditor = ClearanceAuditor::new(1, &[standing(shape, 0.5)]).unwrap();
+            let along = if matches!(shape, super::super::Shape::HalfSpace { .. }) {
+                [[0.0, 0.0, 9.0], [0.0, 0.0, 0.5], [0.0, 0.0, 9.0]]
+            } else {
+                [[-9.0, 0.1, 0.0], [9.0, 0.1, 0.0], [9.0, 20.0, 0.0]]
+            };
+            let counts = flown(&mut auditor, &along);
+            let outcome = auditor.finish();
+            assert_eq!((counts, outcome.status, outcome.violations.len()), ((1, 1), Status::Violation, 1), "{shape:?}");
+            assert_eq!(outcome.parry.disagreements, 0, "{shape:?}");
+            let mut clear = ClearanceAuditor::new(1, &[standing(shape, 0.5)]).unwrap();
+            assert_eq!(flown(&mut clear, &[[-9.0, 9.0, 9.0], [9.0, 9.0, 9.0]]), (0, 0));
+            assert_eq!(clear.finish().status, Status::Clear, "{shape:?}");
+        }
+    }
+
+    #[test]
+    fn a_violation_over_several_steps_is_one_and_one_that_lasts_is_not_ended() {
+        let ball = super::super::Shape::Ball { radius_m: 1.0 };
+        let mut auditor = ClearanceAuditor::new(1, &[standing(ball, 1.0)]).unwrap();
+        let way = [[-4.0, 0.0, 0.0], [-1.5, 0.0, 0.0], [1.5, 0.0, 0.0], [4.0, 0.0, 0.0], [1.5, 0.0, 0.0]];
+        assert_eq!(flown(&mut auditor, &way), (2, 1));
+        let outcome = auditor.finish();
+        let times: Vec<_> = outcome.violations.iter().map(|v| (v.from_s, v.to_s, v.min_m)).collect();
+        assert_eq!(times.len(), 2);
+        assert!((times[0].0 - 0.8).abs() < 1e-9 && (times[0].1 - 2.2).abs() < 1e-9 && times[0].2 == -1.0, "{times:?}");
+        assert!((times[1].0 - 3.8).abs() < 1e-9 && times[1].1 == 4.0, "{times:?}");
+        assert_eq!(outcome.closest.len(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_judged_is_refused_and_keeps_it_from_being_clear() {
+        let ball = standing(super::super::Shape::Ball { radius_m: 1.0 }, 1.0);
+        for wrong in [
+            Obstacle { clearance_m: None, ..ball.clone() },
+            Obstacle { clearance_m: Some(0.0), ..ball.clone() },
+            Obstacle { path: vec![(0.0, Vector3::zeros()), (1.0, Vector3::x())], ..ball.clone() },
+            Obstacle { shape: super::super::Shape::Ball { radius_m: -1.0 }, ..ball.clone() },
+        ] {
+            assert!(ClearanceAuditor::new(1, &[wrong]).is_err());
+        }
+        let mut auditor = ClearanceAuditor::new(1, &[ball]).unwrap();
+        let rows = |x: f64| Rows::from_row_slice(&[x, 0.0, 0.0]);
+        assert_eq!(auditor.clone().finish().status, Status::Undecided, "nothing was judged");
+        auditor.step(0.0, &rows(9.0)).unwrap();
+        assert_eq!(auditor.clone().finish().status, Status::Clear);
+        for (time_s, x) in [(0.0, 9.0), (1.0, f64::NAN), (f64::NAN, 9.0), (1.0, 1e80)] {
+            assert!(auditor.step(time_s, &rows(x)).is_err());
+        }
+        assert_eq!((auditor.clone().finish().status, auditor.finish().refused), (Status::Undecided, 4));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+
+        #[test]
+        fn the_smallest_distance_is_that_of_every_step_swept(
+            ways in prop::collection::vec(prop::collection::vec(prop::array::uniform3(-6.0..6.0_f64), 12), 1..4),
+            clearance_m in 0.05..1.5_f64,
+        ) {
+            let limit_m = |k: usize| clearance_m * (1.0 + 2.0 * k as f64);
+            let obstacles: Vec<_> =
+                one_of_each().into_iter().enumerate().map(|(k, shape)| standing(shape, limit_m(k))).collect();
+            let mut auditor = ClearanceAuditor::new(ways.len(), &obstacles).unwrap();
+            for k in 0..12 {
+                let rows: Vec<_> = ways.iter().flat_map(|way| way[k]).collect();
+                auditor.step(k as f64, &Rows::from_row_slice(&rows)).unwrap();
+            }
+            let outcome = auditor.finish();
+            let swept = |way: &[[f64; 3]], obstacle: &Obstacle| {
+                way.windows(2).map(|ends| swept_distance_m(obstacle, ends[0].into(), ends[1].into())).fold(f64::INFINITY, f64::min)
+            };
+            let all: Vec<_> = ways.iter().flat_map(|way| obstacles.iter().map(|o| swept(way, o))).collect();
+            let rooms = all.iter().enumerate().map(|(k, m)| m - limit_m(k % obstacles.len()));
+            let least = rooms.clone().fold(f64::INFINITY, f64::min);
+            prop_assert!((outcome.closest[0].lower_m - outcome.closest[0].limit_m - least).abs() < 1e-12);
+            prop_assert_eq!(outcome.status == Status::Violation, least < 0.0);
+            let too_close = rooms.filter(|&room_m| room_m < 0.0).count();
+            let mut pairs: Vec<_> = outcome.violations.iter().map(|violation| violation.pair).collect();
+            pairs.sort_unstable();
+            pairs.dedup();
+            prop_assert_eq!(pairs.len(), too_close);
+            prop_assert_eq!(outcome.parry.disagreements, 0);
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Where vehicles must stay: within a polygon from above, between two heights.
+
+use nalgebra::{Vector2, Vector3};
+
+use crate::interruption::Interruption;
+use crate::sweep::MAX_LENGTH_M;
+
+/// Corners of a fence: every edge is compared with every other.
+const MOST_CORNERS: usize = 4096;
+/// Part of a distance outside that it is told to.
+const RESOLUTION: f64 = 1e-9;
+/// Parts of a line outside that are looked at.
+const MOST_PARTS: usize = 100;
+
+/// A polygon in the plane of x and y, convex or not, and perhaps a range of heights, that every vehicle must stay within.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "each is in metres")]
+pub struct Fence {
+    corners_m: Vec<Vector2<f64>>,
+    height_m: Option<[f64; 2]>,
+    margin_m: f64,
+}
+
+/// Why something is no fence.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FenceError {
+    /// Too few corners, or too many.
+    #[error("a fence has 3 to {MOST_CORNERS} corners, not {0}")]
+    Corners(usize),
+    /// A number that is not finite or too large.
+    #[error("{what} of the fence must be a finite number below 1e70, not {value:?}")]
+    Number {
+        /// What it is.
+        what: String,
+        /// What was given.
+        value: f64,
+    },
+    /// Two corners that follow each other and are one place.
+    #[error("corners {0} and {1} of the fence are one place")]
+    OnePlace(usize, usize),
+    /// Two edges that cross or touch, by their first corners.
+    #[error("the edges of the fence from corner {0} and from corner {1} meet: a fence does not cross itself")]
+    Crosses(usize, usize),
+    /// Heights that hold nothing.
+    #[error("the heights of the fence go from {from_m:?} m to {to_m:?} m, which holds nothing")]
+    Heights {
+        /// The lower \[m\].
+        from_m: f64,
+        /// The upper \[m\].
+        to_m: f64,
+    },
+    /// A margin below 0.
+    #[error("the margin of the fence must be 0 m or more, not {0:?}")]
+    Margin(f64),
+}
+
+impl Fence {
+    /// A fence through these corners \[m\], in either direction of turn; from one height to another \[m\], where heights are
+    /// given. Vehicles stay at least `margin_m` within.
+    ///
+    /// # Errors
+    /// [`FenceError`] where that is no simple polygon, or a number is out of range.
+    pub fn new(corners_m: &[[f64; 2]], height_m: Option<[f64; 2]>, margin_m: f64) -> Result<Self, FenceError> {
+        let mut corners_m: Vec<_> = corners_m.iter().map(|&[x, y]| Vector2::new(x, y)).collect();
+        // The first corner once more closes it.
+        if corners_m.len() > 3 && corners_m.first() == corners_m.last() {
+            corners_m.pop();
+        }
+        let count = corners_m.len();
+        if !(3..=MOST_CORNERS).contains(&count) {
+            return Err(FenceError::Corners(count));
+        }
+        let number = |what: String, value: f64| {
+            let is_one = value.abs() <= MAX_LENGTH_M;
+            if is_one { Ok(()) } else { Err(FenceError::Number { what, value }) }
+        };
+        for (k, corner) in corners_m.iter().enumerate() {
+            corner.iter().try_for_each(|&value| number(format!("corner {}", k + 1), value))?;
+        }
+        height_m.iter().flatten().try_for_each(|&value| number("a height".to_owned(), value))?;
+        number("the margin".to_owned(), margin_m)?;
+        if margin_m < 0.0 {
+            return Err(FenceError::Margin(margin_m));
+        }
+        if let Some([from_m, to_m]) = height_m.filter(|[from_m, to_m]| from_m >= to_m) {
+            return Err(FenceError::Heights { from_m, to_m });
+        }
+        let fence = Self { corners_m, height_m, margin_m };
+        fence.check_edges()?;
+        Ok(fence)
+    }
+
+    fn check_edges(&self) -> Result<(), FenceError> {
+        let count = self.corners_m.len();
+        let edges: Vec<_> = self.edges().collect();
+        for (first, one) in edges.iter().enumerate() {
+            if one[0] == one[1] {
+                return Err(FenceError::OnePlace(first + 1, (first + 1) % count + 1));
+            }
+            for (second, other) in edges.iter().enumerate().skip(first + 1) {
+                let are_neighbours = second == first + 1 || (first == 0 && second == count - 1);
+                let meet = if are_neighbours {
+                    // Neighbours share a corner; more of them only where one goes back over the other.
+                    let (shared, [a, b]) =
+                        if second == first + 1 { (one[1], [one[0], other[1]]) } else { (one[0], [one[1], other[0]]) };
+                    let (a, b) = (a - shared, b - shared);
+                    a.perp(&b) == 0.0 && a.dot(&b) > 0.0
+                } else {
+                    distance(*one, *other) == 0.0
+                };
+                if meet {
+                    return Err(FenceError::Crosses(first + 1, second + 1));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// How far within it vehicles must stay \[m\].
+    #[must_use]
+    pub fn margin_m(&self) -> f64 {
+        self.margin_m
+    }
+
+    /// Its lowest and highest height \[m\], where it has a floor and a ceiling.
+    #[must_use]
+    pub fn height_m(&self) -> Option<[f64; 2]> {
+        self.height_m
+    }
+
+    /// Its corners from above \[m\].
+    #[must_use]
+    pub fn corners_m(&self) -> &[Vector2<f64>] {
+        &self.corners_m
+    }
+
+    /// The least room \[m\] of a vehicle that flies straight from one place to another: its distance from the nearest wall, floor
+    /// or ceiling, below 0 by how far it gets outside.
+    #[must_use]
+    pub fn room_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+        self.room_until(from, to, &Interruption::default())
+    }
+
+    /// The same, or some number once the work is interrupted.
+    pub(super) fn room_until(&self, from: Vector3<f64>, to: Vector3<f64>, interruption: &Interruption) -> f64 {
+        if interruption.is_set() {
+            return f64::INFINITY;
+        }
+        let across = self.room_across(from.xy(), to.xy(), interruption);
+        self.height_m.map_or(across, |[low, high]| {
+            let (least, most) = (from.z.min(to.z), from.z.max(to.z));
+            across.min(least - low).min(high - most)
+        })
+    }
+
+    fn edges(&self) -> impl Iterator<Item = [Vector2<f64>; 2]> + '_ {
+        let next = self.corners_m.iter().cycle().skip(1);
+        self.corners_m.iter().zip(next).map(|(&from, &to)| [from, to])
+    }
+
+    fn room_across(&self, from: Vector2<f64>, to: Vector2<f64>, interruption: &Interruption) -> f64 {
+        let wall_m = self.edges().map(|edge| distance(edge, [from, to])).fold(f64::INFINITY, f64::min);
+        if wall_m > 0.0 && self.holds(from) {
+            return wall_m;
+        }
+        // It is outside, at least for a part.
+        let mut crossings: Vec<f64> = self.edges().filter_map(|edge| crossing([from, to], edge)).collect();
+        crossings.extend([0.0, 1.0]);
+        crossings.sort_unstable_by(f64::total_cmp);
+        let parts = crossings.windows(2).map(|pair| [pair[0], pair[1]]);
+        let parts = parts.take_while(|_| !interruption.is_set());
+        let is_outside = |&[start, end]: &[f64; 2]| !self.holds(from.lerp(&to, 0.5 * (start + end)));
+        let farthest =
+            parts.filter(is_outside).map(|[start, end]| self.farthest_m(from.lerp(&to, start), from.lerp(&to, end)));
+        0.0 - farthest.fold(0.0, f64::max)
+    }
+
+    /// How far a line that is outside gets from the fence \[m\]. The distance from one edge is a convex function of the place, so
+    /// that over a part of the line it is largest at an end: parts are halved until the least of these is reached.
+    fn farthest_m(&self, from: Vector2<f64>, to: Vector2<f64>) -> f64 {
+        let mut farthest_m = self.wall_m(from).max(self.wall_m(to));
+        let (mut open, mut looked_at) = (vec![[from, to]], 0);
+        while let Some([from, to]) = open.pop() {
+            let most_m =
+                self.edges().map(|edge| from_edge(from, edge).max(from_edge(to, edge))).fold(f64::INFINITY, f64::min);
+            looked_at += 1;
+            if most_m > farthest_m * (1.0 + RESOLUTION) && looked_at < MOST_PARTS {
+                let middle = from.lerp(&to, 0.5);
+                farthest_m = farthest_m.max(self.wall_m(middle));
+                open.extend([[from, middle], [middle, to]]);
+            }
+        }
+        farthest_m
+    }
+
+    fn wall_m(&self, place: Vector2<f64>) -> f64 {
+        self.edges().map(|edge| from_edge(place, edge)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether a place is within: a ray along x crosses an odd number of edges.
+    fn holds(&self, place: Vector2<f64>) -> bool {
+        let crosses = |[a, b]: [Vector2<f64>; 2]| {
+            (a.y > place.y) != (b.y > place.y) && {
+                // To the left of the edge where it goes up, to the right where it goes down.
+                let side = (b - a).perp(&(place - a));
+                if b.y > a.y { side > 0.0 } else { side < 0.0 }
+            }
+        };
+        self.edges().filter(|&edge| crosses(edge)).count() % 2 == 1
+    }
+}
+
+/// The fraction of a line at which it crosses an edge.
+fn crossing([from, to]: [Vector2<f64>; 2], [a, b]: [Vector2<f64>; 2]) -> Option<f64> {
+    let (line, edge) = (to - from, b - a);
+    let turn = line.perp(&edge);
+    let u = (a - from).perp(&edge) / turn;
+    let along = (a - from).perp(&line) / turn;
+    ((0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&along)).then_some(u)
+}
+
+/// How far a place is from an edge.
+fn from_edge(place: Vector2<f64>, [a, b]: [Vector2<f64>; 2]) -> f64 {
+    let edge = b - a;
+    let squared = edge.norm_squared();
+    let along = if squared > 0.0 { ((place - a).dot(&edge) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    (place - (a + edge * along)).norm()
+}
+
+/// How far two straight lines are from each other.
+fn distance(one: [Vector2<f64>; 2], other: [Vector2<f64>; 2]) -> f64 {
+    if crossing(one, other).is_some() {
+        return 0.0;
+    }
+    let ends = |of: [Vector2<f64>; 2], from: [Vector2<f64>; 2]| from_edge(of[0], from).min(from_edge(of[1], from));
+    ends(one, other).min(ends(other, one))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An L: the square from 0 to 10 without its upper right quarter.
+    fn l_shape() -> Fence {
+        let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 5.0], [5.0, 5.0], [5.0, 10.0], [0.0, 10.0], [0.0, 0.0]];
+        Fence::new(&corners, Some([0.0, 20.0]), 0.0).expect("a fence")
+    }
+
+    fn room(from: [f64; 3], to: [f64; 3]) -> f64 {
+        l_shape().room_m(Vector3::from(from), Vector3::from(to))
+    }
+
+    #[test]
+    fn the_room_is_that_of_the_nearest_wall_floor_or_ceiling() {
+        assert_eq!(room([2.0, 2.5, 10.0], [8.0, 2.5, 10.0]), 2.0);
+        assert_eq!(room([2.0, 2.5, 1.0], [8.0, 2.5, 10.0]), 1.0);
+        assert_eq!(room([2.0, 2.5, 3.0], [8.0, 2.5, 19.5]), 0.5);
+        assert_eq!(room([2.0, 2.0, 10.0], [2.0, 2.0, 10.0]), 2.0);
+    }
+
+    #[test]
+    fn a_line_from_inside_to_inside_that_cuts_a_corner_is_outside_in_between() {
+        let cut = room([9.0, 4.0, 10.0], [4.0, 9.0, 10.0]);
+        // Its middle is (6.5, 6.5), 1.5 m from either wall.
+        assert!((cut + 1.5).abs() < 1e-12, "{cut}");
+        assert!(room([4.0, 4.0, 10.0], [4.5, 4.5, 10.0]) > 0.0);
+    }
+
+    #[test]
+    fn outside_is_below_zero_by_how_far_and_the_wall_itself_is_zero() {
+        assert_eq!(room([12.0, 2.0, 10.0], [12.0, 2.0, 10.0]), -2.0);
+        assert_eq!(room([2.0, 2.0, 10.0], [2.0, 2.0, 21.0]), -1.0);
+        assert_eq!(room([0.0, 1.0, 10.0], [0.0, 9.0, 10.0]), 0.0);
+        assert_eq!(room([-3.0, 2.0, 10.0], [13.0, 2.0, 10.0]), -3.0);
+        // Along a wall, and past it: farthest where neither end nor middle is.
+        assert_eq!(room([12.0, 1.0, 10.0], [12.0, 4.0, 10.0]), -2.0);
+        let past = room([10.0, 5.5, 10.0], [5.5, 10.0, 10.0]);
+        assert!((past + 2.75).abs() < 1e-8, "{past}");
+        let (low, high) = (Vector3::new(9.0, 5.5, 10.0), Vector3::new(6.0, 9.5, 10.0));
+        let seen =
+            (0..=3000).map(|k| low.lerp(&high, f64::from(k) / 3000.0)).map(|place| l_shape().room_m(place, place));
+        let seen = seen.fold(0.0, f64::min);
+        let told = l_shape().room_m(low, high);
+        assert!(told <= seen + 1e-12 && seen - told < 1e-3, "{told} {seen}");
+    }
+
+    #[test]
+    fn the_same_polygon_the_other_way_round_is_the_same_fence() {
+        let turned: Vec<_> = l_shape().corners_m.iter().rev().map(|corner| [corner.x, corner.y]).collect();
+        let turned = Fence::new(&turned, None, 0.0).expect("a fence");
+        for (x, y) in [(1.0, 1.0), (7.0, 7.0), (-1.0, 2.0), (4.999, 9.0), (9.9, 4.9)] {
+            let place = Vector3::new(x, y, 5.0);
+            assert_eq!(turned.room_m(place, place).signum(), l_shape().room_m(place, place).signum());
+        }
+    }
+
+    #[test]
+    fn what_is_no_fence_is_refused_by_its_corner() {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let bow_tie = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+        let refused = |corners: &[[f64; 2]]| Fence::new(corners, None, 0.0).expect_err("no fence");
+        assert_eq!(refused(&bow_tie), FenceError::Crosses(1, 3));
+        assert_eq!(refused(&square[..2]), FenceError::Corners(2));
+        assert_eq!(refused(&[[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), FenceError::OnePlace(1, 2));
+        assert_eq!(refused(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0]]), FenceError::Crosses(1, 2));
+        assert!(matches!(refused(&[[f64::NAN, 0.0], [2.0, 0.0], [1.0, 1.0]]), FenceError::Number { .. }));
+        assert!(matches!(Fence::new(&square, Some([2.0, 2.0]), 0.0), Err(FenceError::Heights { .. })));
+        assert!(matches!(Fence::new(&square, None, -1.0), Err(FenceError::Margin(_))));
+    }
+}

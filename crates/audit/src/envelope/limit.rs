@@ -1,0 +1,166 @@
+//! What is limited, and to how much.
+
+use nalgebra::Vector3;
+
+use super::fence::Fence;
+
+/// Part of a limit, or of 1 where it is less, by which it counts as exceeded.
+const ALLOWANCE: f64 = 1e-9;
+
+/// What of a vehicle's motion is limited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Its speed \[m/s\].
+    Speed,
+    /// Its speed over ground, along x and y \[m/s\].
+    HorizontalSpeed,
+    /// How fast it rises along z \[m/s\].
+    Climb,
+    /// How fast it sinks along z \[m/s\].
+    Descent,
+    /// Its acceleration \[m/s^2\].
+    Acceleration,
+    /// Its height z, from above \[m\].
+    Height,
+    /// Its height z, from below \[m\].
+    Floor,
+    /// Its room to the fence, from below \[m\].
+    Fence,
+}
+
+impl Quantity {
+    /// Those that are limited by a number alone.
+    pub const NUMBERS: [Self; 7] =
+        [Self::Speed, Self::HorizontalSpeed, Self::Climb, Self::Descent, Self::Acceleration, Self::Height, Self::Floor];
+
+    /// What it is called on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::HorizontalSpeed => "horizontal",
+            Self::Climb => "climb",
+            Self::Descent => "descent",
+            Self::Acceleration => "accel",
+            Self::Height => "height",
+            Self::Floor => "floor",
+            Self::Fence => "fence",
+        }
+    }
+
+    /// What it is called in files, with its unit.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Speed => "speed_m_s",
+            Self::HorizontalSpeed => "horizontal_speed_m_s",
+            Self::Climb => "climb_m_s",
+            Self::Descent => "descent_m_s",
+            Self::Acceleration => "accel_m_s2",
+            Self::Height => "height_m",
+            Self::Floor => "floor_m",
+            Self::Fence => "fence_room_m",
+        }
+    }
+
+    /// Its unit.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Speed | Self::HorizontalSpeed | Self::Climb | Self::Descent => "m/s",
+            Self::Acceleration => "m/s^2",
+            Self::Height | Self::Floor | Self::Fence => "m",
+        }
+    }
+
+    /// Whether it depends on heights, and has no value in the plane of x and y.
+    #[must_use]
+    pub fn needs_height(self) -> bool {
+        matches!(self, Self::Climb | Self::Descent | Self::Height | Self::Floor)
+    }
+
+    /// Whether it depends on what positions are measured from.
+    #[must_use]
+    pub fn needs_origin(self) -> bool {
+        matches!(self, Self::Height | Self::Floor | Self::Fence)
+    }
+
+    /// Whether it must not fall below its limit, where the others must not exceed theirs.
+    #[must_use]
+    pub fn is_least(self) -> bool {
+        matches!(self, Self::Floor | Self::Fence)
+    }
+
+    /// Which derivative of the position it is a function of.
+    pub(crate) fn derivative(self) -> usize {
+        match self {
+            Self::Height | Self::Floor | Self::Fence => 0,
+            Self::Acceleration => 2,
+            _ => 1,
+        }
+    }
+
+    /// What must not exceed its bound, of that derivative: convex, and no steeper than 1.
+    pub(super) fn of(self, derivative: Vector3<f64>) -> f64 {
+        match self {
+            Self::Speed | Self::Acceleration => derivative.norm(),
+            Self::HorizontalSpeed => derivative.xy().norm(),
+            Self::Climb | Self::Height => derivative.z,
+            Self::Descent | Self::Floor => -derivative.z,
+            Self::Fence => f64::NAN,
+        }
+    }
+}
+
+/// A quantity and what it may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// What is limited.
+    pub quantity: Quantity,
+    /// What it must not exceed, or fall below ([`Quantity::is_least`]), in its unit.
+    pub allowed: f64,
+}
+
+impl Limit {
+    /// What must not be exceeded, with what rounding may cost: least quantities are turned around.
+    pub(super) fn bound(self) -> f64 {
+        self.turned(self.allowed) + self.allowance()
+    }
+
+    pub(super) fn allowance(self) -> f64 {
+        ALLOWANCE * self.allowed.abs().max(1.0)
+    }
+
+    /// Between what must not be exceeded and what is said of it.
+    pub(super) fn turned(self, value: f64) -> f64 {
+        if self.quantity.is_least() { -value } else { value }
+    }
+}
+
+/// Everything that is asked of each vehicle by itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Envelope {
+    /// Limits by a number alone.
+    pub limits: Vec<Limit>,
+    /// Where each must stay.
+    pub fence: Option<Fence>,
+}
+
+impl Envelope {
+    /// Whether nothing is asked.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.limits.is_empty() && self.fence.is_none()
+    }
+
+    /// All limits, that of the fence last.
+    pub(super) fn all(&self) -> Vec<Limit> {
+        let fence = self.fence.as_ref().map(|fence| Limit { quantity: Quantity::Fence, allowed: fence.margin_m() });
+        self.limits.iter().copied().chain(fence).collect()
+    }
+
+    /// Some quantity of a derivative of the position, which vehicles that jump do not have.
+    pub(crate) fn of_motion(&self) -> Option<Quantity> {
+        self.limits.iter().map(|limit| limit.quantity).find(|quantity| quantity.derivative() > 0)
+    }
+}

@@ -1,0 +1,367 @@
+//! Limits on single vehicles, followed through a recording.
+
+use nalgebra::Vector3;
+
+use super::extremum::{Enclosure, Goal, WIDTH, derivative, largest, largest_of};
+use super::fence::Fence;
+use super::followed::{Followed, Found};
+use super::limit::{Envelope, Limit, Quantity};
+use super::mean_acceleration::{MeanAcceleration, Velocity};
+use super::outcome::EnvelopeOutcome;
+use crate::interruption::Interruption;
+use crate::polynomial::{rescale, stray_across, value};
+use crate::sweep::Interval;
+use tautline_core::track::{Item, Piece, Sample};
+
+/// Pieces of a curve that meet within this \[m\], and whose velocities do within this \[m/s\], are one smooth curve: files
+/// write coefficients with about this resolution.
+const SMOOTH: f64 = 1e-3;
+/// Pieces whose times are within this \[s\] meet.
+const SAME_INSTANT_S: f64 = 1e-6;
+/// Part of the room that is left to a fence to which a curve's least room is told.
+const COARSE: f64 = 1e-3;
+/// What is taken of accelerations between samples where nothing bounds them.
+const BY_THREE_SAMPLES: &str = "accelerations are those of the parabolas through three samples in a row";
+
+/// What is taken of accelerations that are means over windows \[s\].
+fn by_windows(length_s: f64) -> String {
+    format!("accelerations are means over {length_s:?} s")
+}
+
+/// What is known of an item beside itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// Added to its times \[s\].
+    pub(crate) offset_s: f64,
+    /// Whether nothing is known of the time before it.
+    pub(crate) after_gap: bool,
+    /// Largest acceleration between samples \[m/s^2\]; none where they are joined by straight lines.
+    pub(crate) bounded_by_m_s2: Option<f64>,
+}
+
+/// Follows every limit, vehicle by vehicle.
+#[derive(Clone, Debug)]
+pub(crate) struct Watch {
+    fence: Option<WatchedFence>,
+    window: Interval,
+    of: Vec<Followed>,
+    vehicles: Vec<Last>,
+    /// Length of the averaging window of accelerations \[s\], and the recent velocities of each vehicle.
+    accel_window_s: Option<f64>,
+    means: Vec<MeanAcceleration>,
+}
+
+/// A fence, and what ends the search for the room to it.
+#[derive(Clone, Debug)]
+struct WatchedFence {
+    fence: Fence,
+    interruption: Interruption,
+}
+
+impl WatchedFence {
+    fn room_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+        self.fence.room_until(from, to, &self.interruption)
+    }
+}
+
+/// What was seen of a vehicle last.
+#[derive(Clone, Copy, Debug, Default)]
+struct Last {
+    sample: Option<Sample>,
+    /// Velocity at the end of its last piece \[m/s\].
+    curve_end: Option<Vector3<f64>>,
+    /// Mean velocity over its last interval \[m/s\], and how long that was \[s\].
+    interval: Option<(Vector3<f64>, f64)>,
+}
+
+impl Watch {
+    pub(crate) fn new(envelope: &Envelope, window: Interval, accel_window_s: Option<f64>) -> Self {
+        let of = envelope.all().into_iter().map(Followed::new).collect();
+        let fence = envelope.fence.clone().map(|fence| WatchedFence { fence, interruption: Interruption::default() });
+        Self { fence, window, of, vehicles: Vec::new(), accel_window_s, means: Vec::new() }
+    }
+
+    pub(crate) fn set_interruption(&mut self, interruption: Interruption) {
+        if let Some(fence) = &mut self.fence {
+            fence.interruption = interruption;
+        }
+    }
+
+    /// Takes what is said of a vehicle next.
+    pub(crate) fn take(&mut self, item: &Item, seen: Seen) {
+        let vehicle = item.vehicle();
+        if self.vehicles.len() <= vehicle {
+            self.vehicles.resize(vehicle + 1, Last::default());
+            self.means.resize(vehicle + 1, MeanAcceleration::default());
+        }
+        if seen.after_gap {
+            self.means[vehicle].restart();
+        }
+        let last = std::mem::take(&mut self.vehicles[vehicle]);
+        let last = if seen.after_gap { Last::default() } else { last };
+        self.vehicles[vehicle] = match item {
+            Item::Sample(sample) => {
+                self.sample(last, Sample { time_s: sample.time_s + seen.offset_s, ..*sample }, seen)
+            }
+            Item::Piece(piece) => self.piece(last, piece, seen.offset_s),
+        };
+    }
+
+    fn sample(&mut self, last: Last, seen: Sample, Seen { bounded_by_m_s2, .. }: Seen) -> Last {
+        let Some(before) = last.sample else {
+            self.instant(&seen);
+            return Last { sample: Some(seen), ..Last::default() };
+        };
+        let over = Interval { from_s: before.time_s, to_s: seen.time_s };
+        let h = over.to_s - over.from_s;
+        let mean = (seen.position_m - before.position_m) / h;
+        let bound_m_s2 = bounded_by_m_s2.unwrap_or(0.0);
+        self.each(seen.vehicle, |limit, fence, window, known| match limit.quantity.derivative() {
+            0 => place_between(limit, fence, window, (&before, &seen), (bound_m_s2, known)),
+            1 => speed_between(limit, window, (&before, &seen), mean, bound_m_s2),
+            _ => None,
+        });
+        if self.accel_window_s.is_some() {
+            let rounding_m_s = 2.0 * rounding_m(&before, &seen) / h;
+            self.windows(seen.vehicle, &Velocity { over, coefficients: vec![mean], rounding_m_s });
+        } else {
+            self.corner(&before, &seen, (last.interval, mean), bounded_by_m_s2);
+        }
+        Last { sample: Some(seen), interval: Some((mean, h)), curve_end: None }
+    }
+
+    /// Mean accelerations over windows that end in the time of a velocity.
+    fn windows(&mut self, vehicle: usize, velocity: &Velocity) {
+        let Some(length_s) = self.accel_window_s else { return };
+        let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
+        for of in accelerations {
+            let (known, bound, width) = (of.known(), of.limit.bound(), WIDTH * of.limit.allowance());
+            let goal = Goal { known, bound, width, coarse: 0.0 };
+            for found in self.means[vehicle].take(velocity.clone(), length_s, self.window, goal) {
+                of.note(vehicle, Some(found));
+            }
+            of.assumes = Some(by_windows(length_s));
+        }
+    }
+
+    /// Accelerations around a sample, from the mean velocities on both sides and its own velocity.
+    fn corner(
+        &mut self,
+        before: &Sample,
+        seen: &Sample,
+        (last, mean): (Option<(Vector3<f64>, f64)>, Vector3<f64>),
+        bounded_by_m_s2: Option<f64>,
+    ) {
+        let h = seen.time_s - before.time_s;
+        let shortest_s = last.map_or(h, |(_, h_before)| h.min(h_before));
+        let rounding = 4.0 * rounding_m(before, seen) / (h * shortest_s);
+        let needs = [
+            last.map(|(mean_before, h_before)| 2.0 * (mean - mean_before).norm() / (h_before + h)),
+            before.velocity_m_s.map(|start| 2.0 * (mean - start).norm() / h),
+            seen.velocity_m_s.map(|end| 2.0 * (end - mean).norm() / h),
+        ];
+        let needed = needs.into_iter().flatten().reduce(f64::max).map(|needed| (needed - rounding).max(0.0));
+        let from_s = before.time_s - last.map_or(0.0, |(_, h_before)| h_before);
+        self.each(seen.vehicle, |limit, _, window, _| {
+            let needed = needed.filter(|_| limit.quantity == Quantity::Acceleration)?;
+            // Of a bounded motion it is known that it needed as much somewhere between the samples, and not where.
+            let is_whole = window.from_s <= from_s && seen.time_s <= window.to_s;
+            let lower = if is_whole || bounded_by_m_s2.is_none() { needed } else { f64::NEG_INFINITY };
+            let upper = bounded_by_m_s2.map_or(lower, |most| most.max(lower));
+            let over = Interval { from_s: from_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
+            let at =
+                if over.to_s > over.from_s { (before.time_s - over.from_s) / (over.to_s - over.from_s) } else { 0.0 };
+            (over.from_s < over.to_s).then_some((over, Enclosure { lower, upper, at }))
+        });
+        if bounded_by_m_s2.is_none() {
+            let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
+            accelerations.for_each(|of| of.assumes = Some(BY_THREE_SAMPLES.to_owned()));
+        }
+    }
+
+    /// A vehicle of which nothing is known before.
+    fn instant(&mut self, seen: &Sample) {
+        let over = Interval { from_s: seen.time_s, to_s: seen.time_s };
+        self.each(seen.vehicle, |limit, fence, window, _| {
+            let is_asked = window.from_s <= seen.time_s && seen.time_s <= window.to_s;
+            let exact = match (limit.quantity, limit.quantity.derivative()) {
+                (Quantity::Fence, _) => -fence?.room_m(seen.position_m, seen.position_m),
+                (quantity, 0) => quantity.of(seen.position_m),
+                (quantity, 1) => quantity.of(seen.velocity_m_s?),
+                _ => return None,
+            };
+            is_asked.then_some((over, Enclosure { lower: exact, upper: exact, at: 0.0 }))
+        });
+    }
+
+    fn piece(&mut self, last: Last, piece: &Piece, offset_s: f64) -> Last {
+        let over = Interval { from_s: piece.from_s + offset_s, to_s: piece.to_s + offset_s };
+        let (vehicle, length_s) = (piece.vehicle, over.to_s - over.from_s);
+        let mut whole = piece.coefficients.clone();
+        rescale(&mut whole, 0.0, length_s);
+        let (start, start_m_s) = (whole[0], derivative(&whole, length_s)[0]);
+        let (end, end_m_s) = (value(&whole, 1.0), value(&derivative(&whole, length_s), 1.0));
+        self.join(&last, vehicle, (over.from_s, start), start_m_s);
+        let clip = Interval { from_s: over.from_s.max(self.window.from_s), to_s: over.to_s.min(self.window.to_s) };
+        if clip.from_s < clip.to_s {
+            let mut part = piece.coefficients.clone();
+            let clipped_s = clip.to_s - clip.from_s;
+            rescale(&mut part, clip.from_s - over.from_s, clipped_s);
+            let first = derivative(&part, clipped_s);
+            let second = derivative(&first, clipped_s);
+            let is_mean = self.accel_window_s.is_some();
+            for of in self.of.iter_mut().filter(|of| !(is_mean && of.limit.quantity == Quantity::Acceleration)) {
+                let goal = Goal {
+                    known: of.known(),
+                    bound: of.limit.bound(),
+                    width: WIDTH * of.limit.allowance(),
+                    coarse: 0.0,
+                };
+                let found = match (of.limit.quantity, of.limit.quantity.derivative()) {
+                    (Quantity::Fence, _) => {
+                        self.fence.as_ref().map(|fence| outside(fence, &part, Goal { coarse: COARSE, ..goal }))
+                    }
+                    (quantity, order) => Some(largest_of(quantity, [&part, &first, &second][order], goal)),
+                };
+                of.note(vehicle, found.map(|found| (clip, found)));
+            }
+        }
+        if self.accel_window_s.is_some() {
+            let coefficients = derivative(&whole, length_s);
+            self.windows(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
+        }
+        let sample = Sample { vehicle, time_s: over.to_s, position_m: end, velocity_m_s: None, radius_m: None };
+        Last { sample: Some(sample), curve_end: Some(end_m_s), interval: None }
+    }
+
+    /// Where a piece does not go on where the one before it ended, no speed is known; where it goes on at another velocity, the
+    /// curve has a corner.
+    fn join(&mut self, last: &Last, vehicle: usize, (from_s, start): (f64, Vector3<f64>), start_m_s: Vector3<f64>) {
+        let Some((before, end_m_s)) = last.sample.zip(last.curve_end) else { return };
+        let jumps = (start - before.position_m).norm() > SMOOTH;
+        let by_m_s = (start_m_s - end_m_s).norm();
+        // Pieces that are parted in time are joined by a straight line.
+        let apart_s = from_s - before.time_s;
+        let (is_parted, is_mean) = (apart_s > SAME_INSTANT_S, self.accel_window_s.is_some());
+        let over = Interval { from_s: before.time_s.min(from_s), to_s: from_s };
+        let is_in = |window: Interval| window.from_s <= from_s && from_s <= window.to_s;
+        self.each(vehicle, |limit, fence, window, _| {
+            let lower = match limit.quantity.derivative() {
+                0 if limit.quantity == Quantity::Fence => -fence?.room_m(before.position_m, start),
+                0 => limit.quantity.of(before.position_m).max(limit.quantity.of(start)),
+                _ if jumps => f64::NEG_INFINITY,
+                2 if is_parted && !is_mean && by_m_s > SMOOTH => by_m_s / apart_s,
+                _ => return None,
+            };
+            let upper = if limit.quantity.derivative() == 0 { lower } else { f64::INFINITY };
+            is_in(window).then_some((over, Enclosure { lower, upper, at: 1.0 }))
+        });
+        if jumps {
+            self.means[vehicle].restart();
+        } else if is_parted {
+            let coefficients = vec![(start - before.position_m) / apart_s];
+            self.windows(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
+        } else if by_m_s > SMOOTH && !is_mean && is_in(self.window) {
+            let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
+            accelerations.for_each(|of| of.note_corner(vehicle, from_s, by_m_s));
+        }
+    }
+
+    /// Asks for what was found of each limit, given the worst value that is known of it, and notes it.
+    fn each(
+        &mut self,
+        vehicle: usize,
+        mut find: impl FnMut(Limit, Option<&WatchedFence>, Interval, f64) -> Option<Found>,
+    ) {
+        let Self { fence, window, of, .. } = self;
+        for of in of {
+            let known = of.known();
+            of.note(vehicle, find(of.limit, fence.as_ref(), *window, known));
+        }
+    }
+
+    /// The verdicts, for vehicles that are judged; `is_whole` says that nothing of any was missed, and nothing contradicts what
+    /// was taken for granted.
+    pub(crate) fn finish(self, judged: &[bool], is_whole: bool) -> EnvelopeOutcome {
+        EnvelopeOutcome { limits: self.of.into_iter().map(|of| of.finish(judged, is_whole)).collect() }
+    }
+}
+
+/// Heights and the room to a fence between two samples: those of the straight line, and of whatever is within A h^2 / 8 of it.
+fn place_between(
+    limit: Limit,
+    fence: Option<&WatchedFence>,
+    window: Interval,
+    (before, seen): (&Sample, &Sample),
+    (bound_m_s2, known): (f64, f64),
+) -> Option<Found> {
+    let whole_s = seen.time_s - before.time_s;
+    let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
+    let place = |time_s: f64| before.position_m.lerp(&seen.position_m, (time_s - before.time_s) / whole_s);
+    let from = if over.from_s > before.time_s { place(over.from_s) } else { before.position_m };
+    let to = if over.to_s < seen.time_s { place(over.to_s) } else { seen.position_m };
+    let stray_m = bound_m_s2 * whole_s * whole_s / 8.0;
+    let (first, second, drawn) = match fence.filter(|_| limit.quantity == Quantity::Fence) {
+        None => {
+            let ends = [from, to].map(|here| limit.quantity.of(here));
+            (ends[0], ends[1], ends[0].max(ends[1]))
+        }
+        Some(fence) => {
+            let drawn = -fence.room_m(from, to);
+            // Where it is no worse than what is known, nobody asks at which end.
+            let [first, second] = if stray_m == 0.0 && drawn <= known.min(limit.bound()) {
+                [drawn; 2]
+            } else {
+                [from, to].map(|here| -fence.room_m(here, here))
+            };
+            (first, second, drawn)
+        }
+    };
+    let is_seen = |time_s: f64| time_s == before.time_s || time_s == seen.time_s;
+    let ends = [(over.from_s, first), (over.to_s, second)].into_iter().filter(|&(time_s, _)| is_seen(time_s));
+    let lower = if stray_m == 0.0 { drawn } else { ends.map(|(_, value)| value).fold(f64::NEG_INFINITY, f64::max) };
+    let at = if second > first { 1.0 } else { 0.0 };
+    (over.from_s <= over.to_s).then_some((over, Enclosure { lower, upper: drawn + stray_m, at }))
+}
+
+/// Speeds between two samples: that of the mean velocity, those that are recorded, and what a bounded acceleration adds.
+fn speed_between(
+    limit: Limit,
+    window: Interval,
+    (before, seen): (&Sample, &Sample),
+    mean: Vector3<f64>,
+    bound_m_s2: f64,
+) -> Option<Found> {
+    let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
+    let recorded = |of: &Sample| {
+        let in_window = window.from_s <= of.time_s && of.time_s <= window.to_s;
+        of.velocity_m_s.filter(|_| in_window).map(|velocity| limit.quantity.of(velocity))
+    };
+    let (start, end) = (recorded(before), recorded(seen));
+    let added = bound_m_s2 * (seen.time_s - before.time_s);
+    // What the digits of its places leave open is no speed.
+    let drawn = limit.quantity.of(mean) - 2.0 * rounding_m(before, seen) / (seen.time_s - before.time_s);
+    let drawn = if over.from_s < over.to_s { drawn } else { f64::NEG_INFINITY };
+    let is_whole = over.from_s == before.time_s && over.to_s == seen.time_s;
+    let of_mean = if is_whole || bound_m_s2 == 0.0 { drawn } else { f64::NEG_INFINITY };
+    let seen_most = start.into_iter().chain(end).fold(f64::NEG_INFINITY, f64::max);
+    let lower = of_mean.max(seen_most);
+    let by_ends = start.zip(end).map_or(f64::INFINITY, |(start, end)| 0.5 * (start + end + added));
+    let upper = if bound_m_s2 == 0.0 { lower } else { lower.max((drawn + 0.5 * added).min(by_ends)) };
+    let at = if end == Some(lower) { 1.0 } else { 0.0 };
+    let is_told = over.from_s < over.to_s || (over.from_s == over.to_s && seen_most.is_finite());
+    is_told.then_some((over, Enclosure { lower, upper, at }))
+}
+
+/// How far places of two samples may be off by their digits \[m\].
+fn rounding_m(before: &Sample, seen: &Sample) -> f64 {
+    f64::EPSILON * before.position_m.amax().max(seen.position_m.amax())
+}
+
+/// How far outside of a fence a curve gets.
+fn outside(fence: &WatchedFence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
+    largest(part, goal, |part, _| {
+        let (from, to) = (part[0], value(part, 1.0));
+        [-fence.room_m(from, from), -fence.room_m(to, to), stray_across(part) - fence.room_m(from, to)]
+    })
+}

@@ -1,0 +1,186 @@
+//! Two vehicles, or a vehicle and an obstacle, over time: what a figure shows of them.
+
+use nalgebra::Vector3;
+
+use super::error::RecordedError;
+use super::outcome::Outcome;
+use super::settings::Settings;
+use super::vehicle::Vehicle;
+use crate::enclosure::Target;
+use crate::obstacle::Shape;
+use crate::outcome::ObjectPair;
+use crate::pair_sweep::{Overlap, overlaps};
+use crate::segment::Segment;
+use crate::sweep::Interval;
+use tautline_core::track::Item;
+
+/// Parts of a segment at which a curve is looked at.
+const PLACES_ON_A_CURVE: u32 = 8;
+/// Samples that are kept, at most; beyond, neighbours become one.
+const MOST_SAMPLES: usize = 4096;
+
+/// Two at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairSample {
+    /// When \[s\].
+    pub time_s: f64,
+    /// Their distance as drawn \[m\], scaled with an ellipsoid.
+    pub distance_m: f64,
+    /// How much smaller or larger it can be \[m\].
+    pub deviation_m: f64,
+    /// Where both are \[m\].
+    pub positions_m: [Vector3<f64>; 2],
+    /// Nothing is known of the time since the sample before.
+    pub unseen_before: bool,
+}
+
+/// Follows two through a recording that is read again.
+///
+/// Its samples are those of the recording, and the closest between them; of a long recording the closest of several neighbours is kept,
+/// so that nothing that comes near is lost.
+#[derive(Clone, Debug)]
+pub struct PairSeries {
+    vehicles: Vec<(usize, Vehicle)>,
+    /// The path of the obstacle, if it is one, and its shape.
+    obstacle: Option<(Shape, Vec<Segment>)>,
+    scale: Vector3<f64>,
+    samples: Vec<PairSample>,
+    /// Up to when they were followed without a break \[s\].
+    known_s: f64,
+    /// Samples that one of the kept ones stands for.
+    stride: usize,
+    skipped: usize,
+}
+
+impl PairSeries {
+    /// Follows two of those that were audited by these settings, with this outcome.
+    ///
+    /// # Errors
+    /// [`RecordedError::Unnamed`] where there is no such vehicle or obstacle.
+    pub fn new(settings: &Settings, outcome: &Outcome, pair: ObjectPair) -> Result<Self, RecordedError> {
+        let vehicle = |index: usize| -> Result<_, RecordedError> {
+            let known = outcome.vehicles.get(index).zip(outcome.max_gaps_s.get(index));
+            let (name, max_gap_s) = known.ok_or(RecordedError::Unnamed { vehicle: index })?;
+            Ok((index, Vehicle::new(name, settings, *max_gap_s)))
+        };
+        let (vehicles, obstacle) = match pair {
+            ObjectPair::Vehicles(pair) => (vec![vehicle(pair.first())?, vehicle(pair.second())?], None),
+            ObjectPair::Obstacle { vehicle: index, obstacle } => {
+                let thing = settings.obstacles.get(obstacle).ok_or(RecordedError::Unnamed { vehicle: index })?;
+                (vec![vehicle(index)?], Some((thing.shape, thing.segments())))
+            }
+        };
+        Ok(Self {
+            vehicles,
+            obstacle,
+            scale: settings.ellipsoid_m.unwrap_or(Vector3::repeat(1.0)),
+            samples: Vec::new(),
+            known_s: f64::INFINITY,
+            stride: 1,
+            skipped: 0,
+        })
+    }
+
+    /// Follows them on.
+    ///
+    /// # Errors
+    /// [`RecordedError`] where an item is wrong.
+    pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
+        for item in items {
+            let of = self.vehicles.iter_mut().find(|(index, _)| *index == item.vehicle());
+            if let Some((_, vehicle)) = of {
+                vehicle.take(item)?;
+            }
+        }
+        let until_s = self.vehicles.iter().map(|(_, vehicle)| vehicle.known_s()).fold(f64::INFINITY, f64::min);
+        self.follow(until_s);
+        Ok(())
+    }
+
+    /// All samples, in order of time.
+    #[must_use]
+    pub fn finish(mut self) -> Vec<PairSample> {
+        self.follow(f64::INFINITY);
+        self.samples
+    }
+
+    fn follow(&mut self, until_s: f64) {
+        let (mut found, mut known_s) = (Vec::new(), self.known_s);
+        let target = self.obstacle.as_ref().map_or(Target::Origin, |(shape, _)| Target::Shape(shape));
+        let segments: Vec<&[Segment]> = self.vehicles.iter().map(|(_, vehicle)| &vehicle.segments[..]).collect();
+        let (first, second) = match (&self.obstacle, &segments[..]) {
+            (Some((_, path)), [vehicle]) => (&path[..], *vehicle),
+            (_, [first, second]) => (*first, *second),
+            _ => return,
+        };
+        overlaps(first, second, |overlap| {
+            let Interval { from_s, to_s } = overlap.over;
+            if to_s <= until_s {
+                let next = found.len();
+                samples(&overlap, target, &mut found);
+                found[next].unseen_before = from_s > known_s;
+                known_s = to_s;
+            }
+        });
+        self.known_s = known_s;
+        let scale = self.scale;
+        for sample in found {
+            self.keep(PairSample { positions_m: sample.positions_m.map(|at| at.component_mul(&scale)), ..sample });
+        }
+        for (_, vehicle) in &mut self.vehicles {
+            vehicle.forget(until_s);
+        }
+    }
+
+    fn keep(&mut self, sample: PairSample) {
+        if let Some(last) = self.samples.last_mut()
+            && self.skipped + 1 < self.stride
+        {
+            self.skipped += 1;
+            *last = last.nearer(sample);
+            return;
+        }
+        self.skipped = 0;
+        self.samples.push(sample);
+        if self.samples.len() >= MOST_SAMPLES {
+            self.stride *= 2;
+            let halves = self.samples.chunks(2);
+            self.samples = halves.filter_map(|two| two.iter().copied().reduce(PairSample::nearer)).collect();
+        }
+    }
+}
+
+impl PairSample {
+    /// The nearer of two neighbours, which stands for both.
+    fn nearer(self, later: Self) -> Self {
+        let is_later = later.distance_m - later.deviation_m < self.distance_m - self.deviation_m;
+        let unseen_before = self.unseen_before || later.unseen_before;
+        Self { unseen_before, ..if is_later { later } else { self } }
+    }
+}
+
+/// The samples of a time that two segments share: its ends and the closest, and places between on a curve. At least one.
+fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample>) {
+    let Overlap { first, second, over: Interval { from_s, to_s } } = *overlap;
+    let at = |time_s: f64| {
+        let positions_m = [first.position(time_s), second.position(time_s)];
+        let deviation_m = first.deviation_at(time_s) + second.deviation_at(time_s);
+        let distance_m = target.distance(positions_m[1] - positions_m[0]);
+        PairSample { time_s, distance_m, deviation_m, positions_m, unseen_before: false }
+    };
+    let mut times_s = vec![from_s, to_s];
+    if first.curve().is_none() && second.curve().is_none() {
+        let motion = overlap.straight();
+        let closest = match target {
+            Target::Origin => motion.closest().at,
+            Target::Shape(shape) => shape.closest(motion.from, motion.to).1,
+        };
+        times_s.push(from_s + (to_s - from_s) * closest);
+    } else {
+        let place = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(PLACES_ON_A_CURVE);
+        times_s.extend((1..PLACES_ON_A_CURVE).map(place));
+    }
+    times_s.sort_unstable_by(f64::total_cmp);
+    times_s.dedup();
+    found.extend(times_s.into_iter().map(at));
+}

@@ -1,0 +1,442 @@
+//! A window of time: which pairs can matter in it.
+//!
+//! Over the window every vehicle is near the chord, the straight way between where it is at both ends; how far it strays
+//! from that is the largest distance at its own corners, each against the place on the chord at the same time. So two
+//! vehicles are at least as far apart as their chords are, less what both stray: one closed form for a whole window, which
+//! is as sharp for a swarm that flies together as for one that rests. Sort and sweep along the longest axis finds the pairs
+//! to compare. A window in which too many pairs remain is halved.
+
+use std::mem;
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use super::vehicle::Vehicle;
+use crate::enclosure::Target;
+use crate::limits::Limits;
+use crate::obstacle::Obstacle;
+use crate::outcome::ObjectPair;
+use crate::pair_sweep::PairSweep;
+use crate::parry::KeepOut;
+use crate::polynomial::stray;
+use crate::results::{KEPT, Results};
+use crate::segment::Segment;
+use crate::sweep::{Interval, RelativeMotion, larger};
+use tautline_core::swarm::Pair;
+
+/// With more pairs left than this for each vehicle a window is halved.
+const PAIRS_PER_VEHICLE: usize = 4;
+/// With more pairs left than this in one that is not halved they are swept before others are looked for.
+const MOST_LISTED: usize = 1 << 20;
+/// A window is not halved below so many segments for each vehicle, unless there are curves in it.
+const FEWEST_SEGMENTS: usize = 4;
+/// A window is not halved more often than this.
+const MOST_HALVINGS: u32 = 12;
+/// Neighbours in the order of the sort that are compared first, so that the closest pairs are known roughly.
+const FIRST_NEIGHBOURS: u32 = 12;
+/// Rounding of a distance from a chord, and of chords from each other, relative to the coordinates that they join: at most
+/// sixteen operations.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// Where a vehicle is over a window.
+#[derive(Clone, Debug)]
+struct Extent {
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+    chord: Chord,
+    radius: f64,
+    grounded: bool,
+    vehicle: usize,
+    segments: Range<usize>,
+}
+
+/// The windows of a recording, one after the other; keeps its memory.
+#[derive(Clone, Debug)]
+pub(super) struct Windows {
+    limits: Limits,
+    /// Whether distances are held against the limits, and not only who came closest is asked.
+    judges: bool,
+    /// Obstacles, each with its path.
+    obstacles: Vec<(Obstacle, Vec<Segment>)>,
+    extents: Vec<Extent>,
+    near: Vec<Near>,
+}
+
+/// Two extents, and how close their chords come.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    first: u32,
+    second: u32,
+    /// Smallest distance of the chords, squared.
+    squared: f64,
+    /// What both stray.
+    stray: f64,
+}
+
+impl Near {
+    #[inline]
+    fn new(extents: &[Extent], first: u32, second: u32) -> Self {
+        let (a, b) = (&extents[first as usize].chord, &extents[second as usize].chord);
+        let squared = RelativeMotion::new(b.from - a.from, b.to - a.to).closest().squared;
+        Self { first, second, squared, stray: a.stray + b.stray }
+    }
+
+    /// Whether the two could come closer than a distance; what rounding of positions adds lies within what they stray.
+    #[inline]
+    fn may_come_within(&self, distance: f64) -> bool {
+        let reach = (distance + self.stray) * (1.0 + ROUNDING);
+        self.squared < reach * reach
+    }
+}
+
+impl Windows {
+    pub(super) fn new(limits: Limits, obstacles: &[Obstacle]) -> Self {
+        // The ground is where nothing but the vehicle matters, so an obstacle always counts as on it.
+        let grounded = |part| Segment { grounded: Some(true), ..part };
+        let with_path =
+            |obstacle: &Obstacle| (obstacle.clone(), obstacle.segments().into_iter().map(grounded).collect());
+        let obstacles = obstacles.iter().map(with_path).collect();
+        Self { limits, judges: true, obstacles, extents: Vec::new(), near: Vec::new() }
+    }
+
+    /// Which ask who came closest, and nothing else.
+    pub(super) fn of_closest(limits: Limits) -> Self {
+        Self { judges: false, ..Self::new(limits, &[]) }
+    }
+
+    /// Judges everything in a window.
+    pub(super) fn judge(&mut self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
+        self.halve(vehicles, window, 0, results);
+    }
+
+    fn halve(&mut self, vehicles: &[Vehicle], window: Interval, halvings: u32, results: &mut Results) {
+        results.ledger.begin(window);
+        self.extents.clear();
+        self.extents.extend(vehicles.iter().enumerate().filter_map(|(k, vehicle)| Extent::over(k, vehicle, window)));
+        let count = self.extents.len();
+        if count > 1 {
+            self.sort();
+            let few = count * (count - 1) / 2 <= KEPT;
+            if halvings == 0 && !few && results.closest.threshold == f64::INFINITY {
+                self.compare_neighbours(vehicles, window, results);
+            }
+            let segments: usize = self.extents.iter().map(|extent| extent.segments.len()).sum();
+            let curved = self.extents.iter().any(|extent| extent.chord.curved);
+            let fine = segments < FEWEST_SEGMENTS * count && !curved;
+            let middle_s = 0.5 * (window.from_s + window.to_s);
+            let whole = fine || halvings == MOST_HALVINGS || !(window.from_s < middle_s && middle_s < window.to_s);
+            let most = if whole { MOST_LISTED } else { PAIRS_PER_VEHICLE * count };
+            let mut done = self.collect(results, 0, most);
+            if !whole && done < count {
+                self.halve(vehicles, Interval { to_s: middle_s, ..window }, halvings + 1, results);
+                self.halve(vehicles, Interval { from_s: middle_s, ..window }, halvings + 1, results);
+                return;
+            }
+            loop {
+                for near in &self.near {
+                    self.sweep_vehicles(vehicles, near, window, results);
+                }
+                if done == count || results.interruption.is_set() {
+                    break;
+                }
+                done = self.collect(results, done, most);
+            }
+        }
+        self.sweep_obstacles(vehicles, window, results);
+    }
+
+    /// Sorts by the lower end along the axis on which the swarm is longest.
+    fn sort(&mut self) {
+        let Some(first) = self.extents.first() else { return };
+        let (mut low, mut high) = (first.low, first.low);
+        for extent in &self.extents {
+            (low, high) = (low.inf(&extent.low), high.sup(&extent.low));
+        }
+        let axis = (high - low).imax();
+        // The axis of the sort is the first one from here on.
+        if axis != 0 {
+            for extent in &mut self.extents {
+                extent.low.swap_rows(0, axis);
+                extent.high.swap_rows(0, axis);
+            }
+        }
+        self.extents.sort_unstable_by(|a, b| a.low[0].total_cmp(&b.low[0]).then(a.vehicle.cmp(&b.vehicle)));
+    }
+
+    /// Finds out how close the closest pairs come, and no more: every pair that matters is swept after this.
+    fn compare_neighbours(&self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
+        let interruption = results.interruption.clone();
+        let mut rough = Results { closest: mem::take(&mut results.closest), interruption, ..Results::default() };
+        let count = self.extents.len();
+        let pairs = |apart: u32| (0..).zip(apart..).take(count.saturating_sub(apart as usize));
+        for (a, b) in (1..=FIRST_NEIGHBOURS).flat_map(pairs) {
+            self.sweep_vehicles(vehicles, &Near::new(&self.extents, a, b), window, &mut rough);
+        }
+        results.closest = rough.closest;
+    }
+
+    /// Lists the pairs that could matter of the extents from one on with later ones, until they are more than `most`; returns
+    /// the extent that follows.
+    fn collect(&mut self, results: &Results, from: usize, most: usize) -> usize {
+        let Self { extents, near, limits, judges, .. } = self;
+        let limit = |first: f64, second: f64| if *judges { limits.of_vehicles(first, second) } else { 0.0 };
+        near.clear();
+        let radius = extents.iter().map(|extent| extent.radius).fold(0.0, f64::max);
+        let threshold = results.closest.threshold;
+        let reach = threshold.max(limit(radius, radius));
+        for (k, a) in (0_u32..).zip(extents.iter()).skip(from) {
+            if results.interruption.is_set() {
+                return extents.len();
+            }
+            let until = a.high[0] + reach;
+            for (l, b) in (k + 1..).zip(extents[k as usize + 1..].iter()).take_while(|(_, b)| b.low[0] <= until) {
+                let aside = (a.low[1] - b.high[1])
+                    .max(b.low[1] - a.high[1])
+                    .max(a.low[2] - b.high[2])
+                    .max(b.low[2] - a.high[2]);
+                if aside <= reach && !(a.grounded && b.grounded) {
+                    let of_both = Near::new(extents, k, l);
+                    if of_both.may_come_within(threshold.max(limit(a.radius, b.radius))) {
+                        near.push(of_both);
+                    }
+                }
+            }
+            if near.len() > most {
+                return k as usize + 1;
+            }
+        }
+        extents.len()
+    }
+
+    fn sweep_vehicles(&self, vehicles: &[Vehicle], near: &Near, window: Interval, results: &mut Results) {
+        if !results.goes_on() {
+            return;
+        }
+        let (a, b) = (&self.extents[near.first as usize], &self.extents[near.second as usize]);
+        let (a, b) = if a.vehicle < b.vehicle { (a, b) } else { (b, a) };
+        let pair = ObjectPair::Vehicles(Pair::new(a.vehicle, b.vehicle));
+        let limit = self.limits.of_vehicles(a.radius, b.radius);
+        let cutoff = results.closest.cutoff(pair, limit);
+        let may_violate = self.judges && near.may_come_within(limit);
+        if may_violate || near.may_come_within(cutoff) {
+            let (target, keep_out, above) = (Target::Origin, KeepOut::new(limit), self.limits.above);
+            PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
+                a.segments(vehicles),
+                b.segments(vehicles),
+                window,
+                results,
+            );
+        }
+    }
+
+    fn sweep_obstacles(&self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
+        for (index, (obstacle, path)) in self.obstacles.iter().enumerate() {
+            let path = &path[within(path, window)];
+            let place = Chord::over(path, window);
+            for extent in self.extents.iter().filter(|extent| !extent.grounded) {
+                if !results.goes_on() {
+                    return;
+                }
+                let pair = ObjectPair::Obstacle { vehicle: extent.vehicle, obstacle: index };
+                let limit = self.limits.of_obstacle(obstacle, extent.radius);
+                let (cutoff, chord) = (results.obstacles.cutoff(pair, limit), &extent.chord);
+                let between = obstacle.shape.closest(chord.from - place.from, chord.to - place.to).0;
+                let least = between - chord.stray - place.stray;
+                if least < limit.max(cutoff) {
+                    let (target, keep_out) = (Target::Shape(&obstacle.shape), KeepOut::new(limit));
+                    let (may_violate, above) = (least < limit, self.limits.above);
+                    PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
+                        path,
+                        extent.segments(vehicles),
+                        window,
+                        results,
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The straight way over a window, and how far from it segments stray.
+#[derive(Clone, Copy, Debug)]
+struct Chord {
+    from: Vector3<f64>,
+    to: Vector3<f64>,
+    stray: f64,
+    curved: bool,
+}
+
+impl Chord {
+    /// Of segments that meet the window, at least one. Where there is none the last place is kept; that only widens.
+    #[inline]
+    fn over(parts: &[Segment], window: Interval) -> Self {
+        let (Some(first), Some(last)) = (parts.first(), parts.last()) else {
+            return Self { from: Vector3::zeros(), to: Vector3::zeros(), stray: f64::INFINITY, curved: false };
+        };
+        let Interval { from_s, to_s } = window;
+        let (from, to) = (first.position(from_s.max(first.from_s)), last.position(to_s));
+        let by = to - from;
+        let per_s = if to_s > from_s { 1.0 / (to_s - from_s) } else { 0.0 };
+        let off = |time_s: f64, at: &Vector3<f64>| (at - (from + by * ((time_s - from_s) * per_s))).norm_squared();
+        let mut squared = 0.0;
+        // Where the segment before ends, or the motion begins: mostly where the next segment begins.
+        let (mut end_s, mut end) = (from_s, from);
+        for part in parts {
+            let follows = part.from_s == end_s && part.from.x == end.x && part.from.y == end.y && part.from.z == end.z;
+            if !follows && part.from_s >= from_s {
+                squared = larger(squared, off(part.from_s, &part.from));
+            }
+            if part.to_s <= to_s {
+                squared = larger(squared, off(part.to_s, &part.to));
+            }
+            (end_s, end) = (part.to_s, part.to);
+        }
+        let curved = parts.iter().any(|part| part.curve().is_some());
+        let beyond = if curved { stray_of_curves(parts, window) } else { 0.0 };
+        // The ends of the chord are interpolated on the first segment and the last one.
+        let rounding = ROUNDING * (from.amax() + to.amax()) + first.rounding() + last.rounding();
+        // Over a time too short to divide by nothing is known of the motion.
+        let stray =
+            if per_s.is_finite() { squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding } else { f64::INFINITY };
+        Self { from, to, stray, curved }
+    }
+}
+
+/// How far curves stray from the chords of their corners, at most.
+#[cold]
+fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
+    let curves = parts.iter().filter(|part| part.curve().is_some());
+    let strays = curves.map(|part| {
+        let (from_s, to_s) = (part.from_s.max(window.from_s), part.to_s.min(window.to_s));
+        stray(&part.local(Interval { from_s, to_s })) + part.deviation() + part.rounding()
+    });
+    strays.fold(0.0, larger)
+}
+
+/// The segments that meet a window; mostly all of them.
+pub(super) fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
+    let all_end_late = segments.first().is_none_or(|part| part.to_s >= from_s);
+    let first = if all_end_late { 0 } else { segments.partition_point(|part| part.to_s < from_s) };
+    let all_begin_early = segments.last().is_none_or(|part| part.from_s <= to_s);
+    let end = if all_begin_early { segments.len() } else { segments.partition_point(|part| part.from_s <= to_s) };
+    first..end.max(first)
+}
+
+impl Extent {
+    /// Of the segments of a vehicle that meet the window; `None` if there are none.
+    #[inline]
+    fn over(vehicle: usize, of: &Vehicle, window: Interval) -> Option<Self> {
+        let segments = within(&of.segments, window);
+        let parts = &of.segments[segments.clone()];
+        if parts.is_empty() {
+            return None;
+        }
+        let chord = Chord::over(parts, window);
+        let aside = Vector3::repeat(chord.stray);
+        Some(Self {
+            low: chord.from.inf(&chord.to) - aside,
+            high: chord.from.sup(&chord.to) + aside,
+            chord,
+            radius: of.radius_m.unwrap_or(0.0),
+            grounded: parts.iter().all(|part| part.grounded == Some(true)),
+            vehicle,
+            segments,
+        })
+    }
+
+    fn segments<'a>(&self, vehicles: &'a [Vehicle]) -> &'a [Segment] {
+        &vehicles[self.vehicle].segments[self.segments.clone()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recorded::Settings;
+    use crate::segment::{Curve, Deviation};
+
+    #[test]
+    fn a_vehicle_strays_from_its_straight_way_as_far_as_its_corners() {
+        let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
+        let parts = [
+            Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.5)),
+            Segment::straight(1.0, 2.0, at(1.0, 0.5), at(2.0, 0.0)),
+        ];
+        let way = Chord::over(&parts, Interval { from_s: 0.0, to_s: 2.0 });
+        assert_eq!((way.from, way.to), (at(0.0, 0.0), at(2.0, 0.0)));
+        assert!((way.stray - 0.5).abs() < 1e-12 && way.stray >= 0.5);
+        // Half of the way at the wrong time strays along it.
+        let hurried = [
+            Segment::straight(0.0, 0.5, at(0.0, 0.0), at(1.5, 0.0)),
+            Segment::straight(0.5, 2.0, at(1.5, 0.0), at(2.0, 0.0)),
+        ];
+        assert!((Chord::over(&hurried, Interval { from_s: 0.0, to_s: 2.0 }).stray - 1.0).abs() < 1e-12);
+        // A late vehicle is where it appears.
+        let late = [Segment::straight(1.0, 2.0, at(5.0, 0.0), at(5.0, 1.0))];
+        let way = Chord::over(&late, Interval { from_s: 0.0, to_s: 2.0 });
+        assert_eq!(way.from, at(5.0, 0.0));
+        assert!((way.stray - 0.5).abs() < 1e-12);
+        // One that was away strays where it appears again.
+        let away = [
+            Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.0)),
+            Segment::straight(3.0, 4.0, at(3.0, 2.0), at(4.0, 0.0)),
+        ];
+        assert!((Chord::over(&away, Interval { from_s: 0.0, to_s: 4.0 }).stray - 2.0).abs() < 1e-12);
+        // Over a time that cannot be divided by, a vehicle may be anywhere.
+        let instant = [Segment::straight(0.0, 3e-310, at(0.0, 0.0), at(1.0, 0.0))];
+        assert_eq!(Chord::over(&instant, Interval { from_s: 0.0, to_s: 3e-310 }).stray, f64::INFINITY);
+    }
+
+    #[test]
+    fn only_segments_that_meet_a_window_are_looked_at() {
+        let parts = [0.0, 1.0, 2.0].map(|t| Segment::straight(t, t + 1.0, Vector3::zeros(), Vector3::zeros()));
+        for ((from_s, to_s), expected) in
+            [((0.0, 3.0), 0..3), ((0.5, 1.5), 0..2), ((1.0, 2.0), 0..3), ((2.5, 9.0), 2..3), ((4.0, 9.0), 3..3)]
+        {
+            assert_eq!(within(&parts, Interval { from_s, to_s }), expected, "{from_s} {to_s}");
+        }
+        assert_eq!(within(&[], Interval { from_s: 0.0, to_s: 1.0 }), 0..0);
+    }
+
+    #[test]
+    fn who_came_closest_is_the_same_where_nothing_is_held_against_a_limit() {
+        // Forty that fly through each other, every third of them on a curve that may be off.
+        let at = |k: u32, by: f64| {
+            Vector3::new(f64::from(k * k % 41) + by, f64::from(k * 17 % 37) * (1.0 - by), f64::from(k % 3))
+        };
+        let part = |k: u32, from_s: u32| {
+            let (from_s, by) = (f64::from(from_s), f64::from(from_s) / 8.0);
+            let (from, to) = (at(k, by), at(k, by + 0.125));
+            let deviation = Deviation { peak: 0.01, hermite: false };
+            let curve = Curve { from_s, to_s: from_s + 1.0, coefficients: vec![from, to - from], deviation };
+            if k.is_multiple_of(3) { Segment::curved(curve) } else { Segment::straight(from_s, from_s + 1.0, from, to) }
+        };
+        let settings = Settings { delta_m: Some(2.0), radius_m: Some(5.0), ..Settings::default() };
+        let vehicle = |k: u32| {
+            let mut vehicle = Vehicle::new("", &settings, 1.0);
+            vehicle.segments = (0..8).map(|from_s| part(k, from_s)).collect();
+            vehicle
+        };
+        let vehicles: Vec<_> = (0..40).map(vehicle).collect();
+        let found =
+            [Windows::new(settings.limits(), &[]), Windows::of_closest(settings.limits())].map(|mut windows| {
+                let mut results = Results::default();
+                windows.judge(&vehicles, Interval { from_s: 0.0, to_s: 8.0 }, &mut results);
+                results
+            });
+        let [judged, closest] = found;
+        assert_eq!(judged.closest.kept, closest.closest.kept);
+        assert!(
+            closest.closest.kept[0].limit_m == 10.0 && closest.swept < judged.swept / 2,
+            "{} and {}",
+            closest.swept,
+            judged.swept
+        );
+        assert!(!judged.ledger.violations.is_empty() && judged.ledger.parry.min_toi_s.is_some());
+        assert!(
+            closest.ledger.violations.is_empty()
+                && closest.ledger.is_decided()
+                && closest.ledger.parry.min_toi_s.is_none()
+        );
+    }
+}

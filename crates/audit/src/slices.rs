@@ -1,0 +1,240 @@
+//! The closest approach of one slice of time after the other, as many as there is room for.
+
+use super::outcome::Approach;
+
+/// Neighbours become one across a gap only where that is this small a part of a slice.
+const GAP_SHARE: f64 = 1.0 / 16.0;
+
+/// The closest that any two came in a slice of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slice {
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// Who, how near and when.
+    pub closest: Approach,
+    /// Whether two are there all the time. Where it is not so nothing is known of some of it, and the distance is one of the
+    /// rest alone.
+    pub is_whole: bool,
+}
+
+/// Slices in order of time; nothing is known of the time between two that do not touch.
+///
+/// Beyond so many, neighbours become one, and all slices are about as wide; the closest of all is never lost. Two that do not
+/// touch become one that is not whole, and only where what is between them is a small part of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slices {
+    all: Vec<Slice>,
+    most: usize,
+    /// Widest slice that two neighbours become \[s\].
+    width_s: f64,
+}
+
+/// Most slices, where nobody says another number.
+const MOST: usize = 2000;
+
+impl Default for Slices {
+    fn default() -> Self {
+        Self::new(MOST)
+    }
+}
+
+impl Slice {
+    /// From when to when \[s\] it is known how near two were: all the time of a whole one, of another no longer than the instant
+    /// at which they were closest.
+    #[must_use]
+    pub fn known_s(&self) -> [f64; 2] {
+        let at_s = self.closest.time_s.max(self.from_s).min(self.to_s);
+        if self.is_whole { [self.from_s, self.to_s] } else { [at_s; 2] }
+    }
+
+    /// The width \[s\] from which on this one and the next become one.
+    fn joined_at_s(&self, next: &Self) -> f64 {
+        (next.to_s - self.from_s).max((next.from_s - self.to_s) / GAP_SHARE)
+    }
+
+    fn and(self, next: Self) -> Self {
+        Self {
+            to_s: next.to_s,
+            closest: nearer(self.closest, next.closest),
+            is_whole: self.is_whole && next.is_whole && next.from_s <= self.to_s,
+            ..self
+        }
+    }
+}
+
+impl Slices {
+    /// None yet, and at most so many, at least two.
+    #[must_use]
+    pub fn new(most: usize) -> Self {
+        Self { all: Vec::new(), most: most.max(2), width_s: 0.0 }
+    }
+
+    /// Takes the next one, which begins no earlier than the last one ended; what is no number is passed over.
+    pub fn take(&mut self, next: Slice) {
+        let numbers = [next.from_s, next.to_s, next.closest.time_s, next.closest.certain_m()];
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return;
+        }
+        match self.all.last_mut() {
+            Some(last) if last.joined_at_s(&next) <= self.width_s => *last = last.and(next),
+            _ => self.all.push(next),
+        }
+        if self.all.len() > self.most {
+            self.thin(self.most / 2);
+        }
+    }
+
+    /// Enters an approach at its time, in the slice that holds it or as one of no width.
+    pub fn enter(&mut self, closest: Approach) {
+        let at_s = closest.time_s;
+        let place = self.all.partition_point(|slice| slice.to_s < at_s);
+        match self.all.get_mut(place) {
+            Some(slice) if slice.from_s <= at_s => slice.closest = nearer(slice.closest, closest),
+            _ => self.all.insert(place, Slice { from_s: at_s, to_s: at_s, closest, is_whole: true }),
+        }
+    }
+
+    fn thin(&mut self, most: usize) {
+        let known_s: f64 = self.all.iter().map(|slice| slice.to_s - slice.from_s).sum();
+        self.width_s = self.width_s.max(known_s / most as f64);
+        loop {
+            let mut wider: Vec<Slice> = Vec::new();
+            for next in self.all.drain(..) {
+                match wider.last_mut() {
+                    Some(last) if last.joined_at_s(&next) <= self.width_s => *last = last.and(next),
+                    _ => wider.push(next),
+                }
+            }
+            self.all = wider;
+            if self.all.len() <= most {
+                return;
+            }
+            let needed_s = self.all.windows(2).map(|two| two[0].joined_at_s(&two[1])).fold(f64::INFINITY, f64::min);
+            self.width_s = needed_s.max(2.0 * self.width_s);
+        }
+    }
+
+    /// At most so many, at least one, in order of time.
+    #[must_use]
+    pub fn finish(mut self, most: usize) -> Vec<Slice> {
+        if self.all.len() > most.max(1) {
+            self.thin(most.max(1));
+        }
+        self.all
+    }
+
+    /// The closest of all.
+    #[must_use]
+    pub fn closest(&self) -> Option<Approach> {
+        self.all.iter().map(|slice| slice.closest).reduce(nearer)
+    }
+}
+
+/// The closer of two; of equals one that is known, and the first.
+fn nearer(a: Approach, b: Approach) -> Approach {
+    let order = b.certain_m().total_cmp(&a.certain_m()).then(a.is_known().cmp(&b.is_known()));
+    if order.is_lt() { b } else { a }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::ObjectPair;
+    use tautline_core::swarm::Pair;
+
+    fn approach(time_s: f64, distance_m: f64) -> Approach {
+        let pair = ObjectPair::Vehicles(Pair::new(0, 1));
+        Approach { pair, lower_m: distance_m, upper_m: distance_m, time_s, limit_m: 1.0 }
+    }
+
+    fn slice(k: u32) -> Slice {
+        let distance_m = if k == 12_345 { 0.5 } else { 2.0 + f64::from(k % 7) };
+        let from_s = f64::from(k);
+        Slice { from_s, to_s: from_s + 1.0, closest: approach(from_s + 0.5, distance_m), is_whole: true }
+    }
+
+    #[test]
+    fn slices_are_as_wide_at_the_beginning_as_at_the_end_and_the_closest_of_all_is_kept() {
+        let mut slices = Slices::new(4096);
+        (0..100_000).for_each(|k| slices.take(slice(k)));
+        assert_eq!(slices.closest(), Some(slice(12_345).closest));
+        for most in [4096, 1000, 3, 1] {
+            let kept = slices.clone().finish(most);
+            assert!(kept.len() <= most && kept.iter().any(|of| of.closest == slice(12_345).closest));
+            assert!(kept.windows(2).all(|two| two[0].to_s == two[1].from_s), "they touch");
+            let widest_s = kept.iter().map(|of| of.to_s - of.from_s).fold(0.0, f64::max);
+            assert!(most < 4 || widest_s <= 4.0 * 100_000.0 / most as f64, "{most}: {widest_s}");
+        }
+    }
+
+    #[test]
+    fn no_slice_reaches_across_a_gap() {
+        let mut slices = Slices::new(4096);
+        (0..50_000).filter(|k| !(30_000..30_400).contains(k)).for_each(|k| slices.take(slice(k)));
+        let kept = slices.finish(1000);
+        let gaps: Vec<_> = kept.windows(2).filter(|two| two[0].to_s < two[1].from_s).collect();
+        assert!(gaps.len() == 1 && gaps[0][0].to_s == 30_000.0 && gaps[0][1].from_s == 30_400.0, "{gaps:?}");
+        assert!(kept.iter().all(|of| of.is_whole));
+    }
+
+    #[test]
+    fn one_late_instant_makes_no_slice_wider() {
+        let mut slices = Slices::new(4096);
+        (0..6000).for_each(|k| slices.take(slice(k)));
+        slices.take(Slice { to_s: 2e8, ..slice(200_000_000) });
+        let kept = slices.finish(2000);
+        let widest_s = kept.iter().map(|of| of.to_s - of.from_s).fold(0.0, f64::max);
+        assert!(kept.len() > 1000 && widest_s <= 6.0, "{} of {widest_s} s", kept.len());
+    }
+
+    #[test]
+    fn what_is_joined_across_a_gap_is_known_at_its_closest_alone() {
+        let mut slices = Slices::new(4096);
+        (0..200).filter(|k| *k != 90).for_each(|k| slices.take(slice(k)));
+        let kept = slices.finish(4);
+        let of_gap: Vec<_> = kept.iter().filter(|of| of.from_s < 90.0 && 91.0 < of.to_s).collect();
+        assert!(of_gap.len() == 1 && !of_gap[0].is_whole, "{kept:?}");
+        assert_eq!(of_gap[0].known_s(), [of_gap[0].closest.time_s; 2]);
+        let others = kept.iter().filter(|of| !(of.from_s..of.to_s).contains(&90.0));
+        assert!(
+            others.clone().count() > 1 && others.clone().all(|of| of.known_s() == [of.from_s, of.to_s]),
+            "{kept:?}"
+        );
+    }
+
+    #[test]
+    fn many_gaps_are_bounded_too() {
+        let mut slices = Slices::new(100);
+        (0..10_000).map(|k| 2 * k).for_each(|k| slices.take(slice(k)));
+        assert!(slices.all.len() <= 100 && slices.finish(7).len() <= 7);
+        let mut instants = Slices::new(100);
+        (0..10_000).map(slice).for_each(|of| instants.take(Slice { to_s: of.from_s, ..of }));
+        assert!(instants.all.len() <= 100 && instants.finish(7).len() <= 7);
+    }
+
+    #[test]
+    fn what_is_entered_counts_in_its_slice_or_has_one_of_its_own() {
+        let mut slices = Slices::new(10);
+        for of in [slice(0), slice(5)] {
+            slices.take(of);
+        }
+        for of in [approach(0.25, 0.1), approach(3.0, 0.2), approach(9.0, 9.0)] {
+            slices.enter(of);
+        }
+        let found: Vec<_> = slices.finish(10).iter().map(|of| (of.from_s, of.to_s, of.closest.lower_m)).collect();
+        assert_eq!(found, [(0.0, 1.0, 0.1), (3.0, 3.0, 0.2), (5.0, 6.0, 7.0), (9.0, 9.0, 9.0)]);
+        let mut none = Slices::new(10);
+        none.take(Slice { closest: approach(0.5, f64::NAN), ..slice(0) });
+        assert_eq!((none.closest(), none.finish(10).len()), (None, 0));
+    }
+
+    #[test]
+    fn of_equals_the_known_one_stays() {
+        let bound = Approach { upper_m: 5.0, ..approach(0.5, 2.0) };
+        let known = approach(0.7, 2.0);
+        assert_eq!((nearer(bound, known), nearer(known, bound)), (known, known));
+        assert_eq!((nearer(known, approach(0.9, 2.0)), nearer(known, approach(0.9, 1.0))), (known, approach(0.9, 1.0)));
+    }
+}

@@ -1,0 +1,196 @@
+//! Reading `run.mcap` back.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+
+use super::message::{CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, VERDICT, fault};
+use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
+use super::{Header, RunVerdict};
+use crate::record::MessageHash;
+use crate::record::{Event, OwnedSample, ReadFault, RecordError};
+
+/// What a recording gives back, in the order in which it was written.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Entry {
+    /// A sample.
+    Sample(OwnedSample),
+    /// An event.
+    Event(Event),
+}
+
+/// A recording opened for reading: an iterator over its samples and events that holds one chunk in memory.
+///
+/// A file that was not closed gives everything up to where it breaks off. Damage gives an error, after which the
+/// iterator ends.
+pub struct McapRecording {
+    topics: TopicReader,
+    contents: Contents,
+    header: Header,
+    failed: bool,
+}
+
+impl McapRecording {
+    /// Opens a recording and reads as far as its scenario.
+    ///
+    /// # Errors
+    /// [`RecordError::Open`] when the system refuses; [`RecordError::Read`] when the file is empty, is not MCAP, has no
+    /// `/scenario` message or no `/swarm` channel, or is damaged.
+    pub fn open(path: &Path) -> Result<Self, RecordError> {
+        let mut topics = TopicReader::open(path)?;
+        let mut contents = Contents::default();
+        let header = loop {
+            if let Some(header) = contents.header.clone().filter(|_| contents.has_swarm) {
+                break header;
+            }
+            if !contents.advance(&mut topics)? {
+                let missing = if contents.has_swarm { Own::Scenario } else { Own::Swarm };
+                return Err(topics.fault(ReadFault::NoChannel { topic: missing.topic().name }));
+            }
+        };
+        Ok(Self { topics, contents, header, failed: false })
+    }
+
+    /// What the recording says about the run as a whole.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Whether the file was closed. One that was not, because its writer was killed or could write no more, holds
+    /// everything up to the last chunk that was written.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.topics.is_complete()
+    }
+
+    /// What the run said of itself when it closed the recording; known once everything was read, and none where it did not.
+    #[must_use]
+    pub fn verdict(&self) -> Option<&RunVerdict> {
+        self.contents.verdict.as_ref()
+    }
+
+    /// Hash of what was read of `/scenario`, `/summary` and `/events`, as [`RunVerdict::told_sha256`] has it.
+    #[must_use]
+    pub fn told_sha256(&self) -> String {
+        self.contents.told.digits()
+    }
+
+    /// All remaining samples and events, each in order.
+    ///
+    /// # Errors
+    /// The first error of the iterator.
+    pub fn read_all(self) -> Result<(Vec<OwnedSample>, Vec<Event>), RecordError> {
+        let (mut samples, mut events) = (Vec::new(), Vec::new());
+        for entry in self {
+            match entry? {
+                Entry::Sample(sample) => samples.push(sample),
+                Entry::Event(event) => events.push(event),
+            }
+        }
+        Ok((samples, events))
+    }
+
+    fn try_next(&mut self) -> Result<Option<Entry>, RecordError> {
+        loop {
+            if let Some(entry) = self.contents.ready.pop_front() {
+                return Ok(Some(entry));
+            }
+            if !self.contents.advance(&mut self.topics)? {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+impl Iterator for McapRecording {
+    type Item = Result<Entry, RecordError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.failed {
+            return None;
+        }
+        let next = self.try_next();
+        self.failed = next.is_err();
+        next.transpose()
+    }
+}
+
+/// What was read so far amounts to.
+#[derive(Default)]
+struct Contents {
+    /// Whether the topic of states is declared.
+    has_swarm: bool,
+    header: Option<Header>,
+    summary: Option<SummaryMessage>,
+    /// The last message of each channel since the last state.
+    channels: Vec<ChannelMessage<String, Vec<String>, Vec<f64>>>,
+    ready: VecDeque<Entry>,
+    verdict: Option<RunVerdict>,
+    /// Over the messages of all own topics but the states.
+    told: MessageHash,
+}
+
+impl Contents {
+    /// Takes in one part; `false` when there is none.
+    fn advance(&mut self, topics: &mut TopicReader) -> Result<bool, RecordError> {
+        let taken = match topics.next()? {
+            Some(Part::Topic(declared)) => self.declare(declared),
+            Some(Part::Message(message)) => self.take(&message),
+            Some(Part::Schema(_) | Part::Other) => Ok(()),
+            None => return Ok(false),
+        };
+        taken.map(|()| true).map_err(|fault| topics.fault(fault))
+    }
+
+    fn declare(&mut self, declared: &Declared) -> Result<(), ReadFault> {
+        let Some(own) = Own::of(&declared.topic) else { return Ok(()) };
+        let Topic { name: topic, schema_name: expected, message_encoding, .. } = own.topic();
+        if declared.schema != expected || declared.encoding != message_encoding {
+            let schema = if declared.schema.is_empty() { "no schema" } else { &declared.schema };
+            let found = format!("{schema} in {} encoding", declared.encoding);
+            return Err(ReadFault::ForeignChannel { topic, found, expected });
+        }
+        self.has_swarm |= own == Own::Swarm;
+        Ok(())
+    }
+
+    fn take(&mut self, message: &Message<'_>) -> Result<(), ReadFault> {
+        let Declared { topic, schema, encoding, .. } = message.of;
+        let own = Own::of(topic);
+        if own.is_some_and(Own::is_told) {
+            self.told.take(topic, message.bytes);
+        }
+        match own {
+            Some(Own::Scenario) => {
+                let header = content(message)?;
+                self.header.get_or_insert(header);
+            }
+            Some(Own::Summary) => self.summary = Some(content(message)?),
+            Some(Own::Swarm) => {
+                let state = content::<SwarmMessage<Vec<f64>>>(message)?;
+                let vehicles = self.header.as_ref().map_or(state.vehicles(), |header| header.vehicles);
+                let channels = std::mem::take(&mut self.channels);
+                self.ready.push_back(Entry::Sample(state.into_sample(vehicles, self.summary.as_ref(), channels)?));
+            }
+            Some(Own::Events) => {
+                self.ready.push_back(Entry::Event(content::<EventMessage<String>>(message)?.into_event()?));
+            }
+            None if topic == VERDICT.name && schema == VERDICT.schema_name && encoding == CDR => {
+                self.verdict = Some(content(message)?);
+            }
+            None if schema == CHANNEL_SCHEMA && encoding == CDR => {
+                let channel = content::<ChannelMessage<String, Vec<String>, Vec<f64>>>(message)?;
+                self.channels.retain(|before| before.name != channel.name);
+                self.channels.push(channel);
+            }
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+fn content<T: DeserializeOwned>(message: &Message<'_>) -> Result<T, ReadFault> {
+    decode(message.bytes).map_err(|reason| fault(&message.of.topic, reason))
+}

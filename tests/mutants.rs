@@ -1,0 +1,31 @@
+//! The broken variants that the tests are seen to catch are each a change of one line of the sources as they are.
+
+use std::fs;
+use std::path::Path;
+
+const PAGE: &str = include_str!("../docs/validation.md");
+
+#[test]
+fn every_broken_variant_is_still_a_change_of_one_line_and_listed_on_the_page() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut variants = 0;
+    for entry in fs::read_dir(root.join("tests/mutants")).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        let text = fs::read_to_string(&path).expect(&name);
+        let field = |key: &str| {
+            let line = text.lines().find_map(|line| line.strip_prefix(key)).unwrap_or_else(|| panic!("{name}: {key}"));
+            line.trim().to_owned()
+        };
+        let source = fs::read_to_string(root.join(field("file:"))).expect(&name);
+        assert_eq!(source.matches(&field("from:")).count(), 1, "{name}: the line to break");
+        assert_ne!(field("from:"), field("to:"), "{name}");
+        let (what, test) = (field("what:"), field("test:"));
+        let test = test.split(' ').next_back().expect("a test");
+        let row =
+            PAGE.lines().find(|line| line.contains(&format!("`{name}`"))).unwrap_or_else(|| panic!("{name}: no row"));
+        assert!(row.contains(&what) && row.contains(test), "{name}: {row}");
+        variants += 1;
+    }
+    assert_eq!(variants, 10);
+}
