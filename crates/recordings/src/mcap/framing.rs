@@ -11,7 +11,7 @@ use std::path::Path;
 use mcap::MAGIC;
 use mcap::records::op;
 
-use crate::record::{ReadFault, RecordError};
+use tautline_core::record::{ReadFault, RecordError};
 
 /// Longest record that is read \[bytes\]: a sample of three million vehicles.
 const RECORD_LIMIT_BYTES: u64 = 256 * 1024 * 1024;

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::error::{Fault, quoted};
 use super::options::ReadOptions;
-use crate::track::EarthOrigin;
+use tautline_core::track::EarthOrigin;
 
 /// Half the equator's diameter \[m\].
 const EQUATOR_M: f64 = 6_378_137.0;

@@ -37,8 +37,8 @@ use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
-use crate::record::{ReadFault, RecordError};
 use splits::Splits;
+use tautline_core::record::{ReadFault, RecordError};
 
 /// Opens the files of a ROS 2 bag, which follow each other and have at least so many messages.
 pub(super) fn open_bag(

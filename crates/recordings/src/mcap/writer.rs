@@ -14,8 +14,8 @@ use super::message::{
 };
 use super::topic::{Topic, TopicWriter, encode, log_time_ns};
 use super::{Header, RunVerdict};
-use crate::record::MessageHash;
-use crate::record::{Channel, Event, RecordError, Sample, Sink};
+use tautline_core::record::MessageHash;
+use tautline_core::record::{Channel, Event, RecordError, Sample, Sink};
 
 /// A chunk is closed and handed to the system with the first message this long after the chunk before \[simulated s\].
 pub const FLUSH_PERIOD_S: f64 = 1.0;

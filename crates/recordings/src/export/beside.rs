@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::read::is_read;
-use crate::record::Channel;
+use tautline_core::record::Channel;
 
 /// The channels that are written, in order of first appearance.
 #[derive(Clone, Debug, Default)]

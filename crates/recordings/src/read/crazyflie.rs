@@ -18,7 +18,7 @@ use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
-use crate::track::Item;
+use tautline_core::track::Item;
 
 /// Highest power that is read.
 const HIGHEST_POWER: usize = 15;

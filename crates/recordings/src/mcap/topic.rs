@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::framing::{self, Fields, Record, RecordReader, damaged};
-use crate::record::{ReadFault, RecordError};
+use tautline_core::record::{ReadFault, RecordError};
 
 /// Who wrote the file, for MCAP tools.
 const LIBRARY: &str = concat!("tautline ", env!("CARGO_PKG_VERSION"));

@@ -6,7 +6,7 @@ use super::super::error::ReadError;
 use super::exported::TRACKS;
 use crate::mcap::topic::{Message, Part, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, SWARM_SCHEMA};
-use crate::record::{Channel, ReadFault};
+use tautline_core::record::{Channel, ReadFault};
 
 /// A message as it is read.
 type Read = ChannelMessage<String, Vec<String>, Vec<f64>>;

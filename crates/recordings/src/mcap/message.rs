@@ -6,8 +6,8 @@ use serde::ser::SerializeSeq;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::topic::Topic;
-use crate::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
-use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
+use tautline_core::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
+use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 /// A topic that every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

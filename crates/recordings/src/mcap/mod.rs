@@ -11,7 +11,7 @@
 //! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
 //! | `/verdict` | `tautline_msgs/msg/Verdict` | once, last | the run's verdict, and hashes of everything before it |
 //!
-//! Each [`Channel`](crate::record::Channel) of the samples has a topic `/vehicles/<name>` of `tautline_msgs/msg/Channel`, declared
+//! Each [`Channel`](tautline_core::record::Channel) of the samples has a topic `/vehicles/<name>` of `tautline_msgs/msg/Channel`, declared
 //! with its first values. An [`ExtraTopic`] may add one of another kind, such as the 3-D scene on `/scene`; readers pass
 //! over it.
 //!
@@ -62,7 +62,7 @@ pub use writer::{ExtraTopic, FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
 
 use serde::{Deserialize, Serialize};
 
-use crate::record::sha256_hex;
+use tautline_core::record::sha256_hex;
 
 /// What a recording says about the run as a whole: the fields of `scenario.msg`, in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -15,7 +15,7 @@ use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
-use crate::track::{Item, Sample};
+use tautline_core::track::{Item, Sample};
 
 /// The only axes that are known, and what is said where none are.
 const GRAPHICS: &str = "ogl";

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::fmt::Write as _;
 
-use crate::track::Clock;
+use tautline_core::track::Clock;
 
 /// From this distance to zero on, a clock is counted from an epoch \[s\]: there doubles are coarser than 0.1 ns.
 const EPOCH_FROM_S: f64 = 1e6;

@@ -4,7 +4,7 @@ use super::axes::Axes;
 use super::error::{Fault, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
-use crate::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// A recording whose axes are turned as the user says.
 pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Recording, ReadError> {

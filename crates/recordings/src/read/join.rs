@@ -7,7 +7,7 @@ use super::error::{Fault, ReadError, quoted};
 use super::identity::spelling;
 use super::order::Recording;
 use super::source::Source;
-use crate::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// Clocks that begin further apart than this are not the same \[ns\]: 30 days.
 const APART_NS: i64 = 30 * 86_400 * 1_000_000_000;

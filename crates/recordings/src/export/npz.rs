@@ -14,7 +14,7 @@ use zip::{CompressionMethod, ZipWriter};
 use super::beside::Written;
 use super::error::ExportError;
 use super::source::{About, Source};
-use crate::track::Sample;
+use tautline_core::track::Sample;
 
 /// Arrays that mean something to who reads motion.
 const OWN: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "seen", "names", "epoch_ns"];

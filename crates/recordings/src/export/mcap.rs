@@ -11,7 +11,7 @@ use super::source::{About, Source};
 use crate::mcap::topic::{TopicWriter, encode, log_time_ns};
 use crate::mcap::{ChannelMessage, channel_topic, topic_of_channel};
 use crate::read::mcap::exported::{Instant, TRACKS, VEHICLES, Vehicles};
-use crate::track::Sample;
+use tautline_core::track::Sample;
 
 /// Size at which a chunk is closed \[bytes\].
 const CHUNK_BYTES: u64 = 1024 * 1024;

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::error::ExportError;
 use crate::read::ReadError;
-use crate::track::{Item, Piece, Sample, Tracks};
+use tautline_core::track::{Item, Piece, Sample, Tracks};
 
 /// Most samples that are made of the curves of a recording.
 const MOST_SAMPLES: f64 = 1e9;

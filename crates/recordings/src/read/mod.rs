@@ -1,11 +1,11 @@
-//! Recordings of any origin as a stream of [`Item`](crate::track::Item)s.
+//! Recordings of any origin as a stream of [`Item`](tautline_core::track::Item)s.
 //!
-//! [`open`] recognises the format by the content of the file and gives a [`Tracks`](crate::track::Tracks): items in order of time, a clock, and
+//! [`open`] recognises the format by the content of the file and gives a [`Tracks`](tautline_core::track::Tracks): items in order of time, a clock, and
 //! what a person should know. A format is a file of this room that turns its content into rows or into pieces of curves;
 //! order, clocks and limits are the same for all.
 //!
 //! Memory is bounded by what is read at a time, not by the file: a recording in order of time is streamed. One that is
-//! not is sorted, in memory, and says so in [`Tracks::notes`](crate::track::Tracks::notes).
+//! not is sorted, in memory, and says so in [`Tracks::notes`](tautline_core::track::Tracks::notes).
 //!
 //! # What is refused
 //! Numbers that are not finite, a vehicle that is in two places at a time or goes back in time, two columns of time that are
@@ -63,7 +63,7 @@ pub use axes::Axes;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
 pub use format::Format;
-pub(crate) use heading::is_read;
+pub use heading::is_read;
 pub use mcap::Channels;
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions};
 pub use order::Recording;

@@ -8,8 +8,8 @@ use serde::de::DeserializeOwned;
 use super::message::{CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, VERDICT, fault};
 use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
 use super::{Header, RunVerdict};
-use crate::record::MessageHash;
-use crate::record::{Event, OwnedSample, ReadFault, RecordError};
+use tautline_core::record::MessageHash;
+use tautline_core::record::{Event, OwnedSample, ReadFault, RecordError};
 
 /// What a recording gives back, in the order in which it was written.
 #[derive(Clone, Debug, PartialEq)]

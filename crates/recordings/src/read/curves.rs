@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::error::ReadError;
 use super::order::Recording;
 use super::rows::BATCH;
-use crate::track::{Clock, Item, Piece, Tracks};
+use tautline_core::track::{Clock, Item, Piece, Tracks};
 
 /// A curve that jumps further than this between two pieces is worth a word \[m\]: files round to micrometres.
 const JUMP_M: f64 = 1e-3;

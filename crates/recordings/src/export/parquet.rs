@@ -14,7 +14,7 @@ use parquet::schema::types::{Type, TypePtr};
 use super::error::ExportError;
 use super::source::{About, Source};
 use crate::read::parquet::EPOCH_KEY;
-use crate::track::Sample;
+use tautline_core::track::Sample;
 
 /// Rows of a group, which is built in memory.
 const GROUP_ROWS: usize = 200_000;

@@ -4,8 +4,8 @@ use super::beside::Beside;
 use super::error::ExportError;
 use super::sampled::Sampled;
 use crate::read::{Channels, ReadError, Recording};
-use crate::record::Channel;
-use crate::track::{Clock, Item, Sample};
+use tautline_core::record::Channel;
+use tautline_core::track::{Clock, Item, Sample};
 
 /// A recording that can be read again and again.
 pub(super) struct Source<'a> {

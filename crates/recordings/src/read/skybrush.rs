@@ -17,7 +17,7 @@ use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
 use super::stranger;
-use crate::track::{Item, Piece, Sample};
+use tautline_core::track::{Item, Piece, Sample};
 
 /// Highest degree of a Bezier segment that is read.
 const HIGHEST_DEGREE: usize = 15;

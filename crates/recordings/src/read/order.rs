@@ -9,7 +9,7 @@ use super::error::{Fault, ReadError, quoted};
 use super::options::{Duplicates, ReadOptions};
 use super::rows::{BATCH, Row, Rows, probe, refuse_steps_back};
 use super::source::Source;
-use crate::track::{Clock, EarthOrigin, Item, Sample, Tracks};
+use tautline_core::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 
 /// Longest step between two positions on the Earth that is accepted at any speed \[m\].
 const LONGEST_JUMP_M: f64 = 1000.0;
